@@ -1,0 +1,9 @@
+"""Errors of the experiments: each says the value, what was allowed and what to try."""
+
+
+class ExperimentError(Exception):
+    """Root of all errors that `experiments` raises on purpose."""
+
+
+class ResultsError(ExperimentError):
+    """A results folder that cannot be written or read."""

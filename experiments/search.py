@@ -1,0 +1,144 @@
+"""Which point-to-point sequence has the condition numbers that the paper reports?
+
+The paper gives Cond(W) of its trajectory, not the trajectory. This search finds one from a seed, by condition number
+alone: it looks at a torque only to keep the actuators' limits, and never at an error of identification.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import inf
+
+import numpy as np
+
+from experiments.errors import ExperimentError
+from identify import ExplicitModel, MotionLog, PowerModel, TorqueChannel, idbench_chain, scara
+from sim.ideal import ideal_log
+from sim.robot import Array, Robot
+from sim.scenario import Scenario
+
+PAPER_CONDITION = ((ExplicitModel(), 28.0), (PowerModel(), 93.0))
+"""Cond(W) of the paper's Table 1; that of the implicit model is the explicit one's."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """A random search for a motion with the paper's condition numbers in chain `idbench`, the same for the same seed.
+
+    It draws a sequence of waypoints, then redraws one of them at a time and keeps what comes closer.
+
+    Parameters
+    ----------
+    seed : int
+        Of everything random.
+    fs : float
+        Sampling frequency [Hz].
+    rest : float
+        Time at rest at both ends [s].
+    motion : float
+        Time from the first to the last move [s].
+    moves : int
+        Number of moves, each within 15 % of motion / moves long.
+    smallest_move : float
+        Least change of every joint in every move [rad]: slower moves would be masked for whole rows.
+    clearance : float
+        Least distance to the ends of the joints' ranges [rad].
+    velocity : float
+        Limit of the joints' speed [rad/s].
+    tolerance : float
+        It ends when both condition numbers are within this share of the paper's.
+    rounds, candidates : int
+        It gives up after so many rounds of so many candidates.
+    """
+
+    seed: int = 0
+    fs: float = 100.0
+    rest: float = 3.0
+    motion: float = 40.0
+    moves: int = 30
+    smallest_move: float = 0.4
+    clearance: float = 0.2
+    velocity: float = 7.0
+    tolerance: float = 0.01
+    rounds: int = 300
+    candidates: int = 16
+
+    def run(self, robot: Robot, progress: Callable[[int, float], None] | None = None) -> Scenario:
+        """Return the scenario found; `progress` hears the number of every round and the distance that is left.
+
+        Raises
+        ------
+        ExperimentError
+            If the rounds end before the tolerance is reached.
+        """
+        rng = np.random.default_rng(self.seed)
+        durations = rng.uniform(0.85, 1.15, self.moves)
+        durations *= self.motion / durations.sum()
+        best, distance = self._scenario(robot, self._drawn(rng, robot), durations), inf
+        for number in range(self.rounds):
+            points = [self._redrawn(rng, robot, np.array(best.waypoints)) for _ in range(self.candidates)]
+            best, distance = self._closest(robot, best, distance, [self._scenario(robot, p, durations) for p in points])
+            if progress:
+                progress(number + 1, distance)
+            if distance <= self.tolerance:
+                tried = (number + 1) * self.candidates
+                return replace(best, origin=f"idbench search --seed {self.seed}: {tried} candidates, chosen by Cond(W) alone")
+        raise ExperimentError(
+            f"no motion within {self.tolerance:.2%} of the paper's condition numbers in {self.rounds} rounds "
+            f"(closest: {distance:.2%}); try another seed"
+        )
+
+    def distances(self, scenarios: Sequence[Scenario]) -> Array:
+        """Return the largest departure from the paper's condition numbers, as a share; infinite if a row would be void."""
+        q = np.stack([scenario.trajectory.sample(self.fs).q for scenario in scenarios])
+        log = MotionLog(self.fs, q, np.zeros_like(q), TorqueChannel("instantaneous"))  # W holds no torque
+        chain, basis = replace(idbench_chain(), trim=self.rest), scara()
+        worst = np.zeros(len(scenarios))
+        for model, target in PAPER_CONDITION:
+            system = chain.build(log, basis, model)
+            share = np.abs(np.log(system.condition_number / target))
+            worst = np.maximum(worst, np.where(system.valid.all(axis=-1), share, inf))
+        return worst
+
+    def _closest(self, robot: Robot, best: Scenario, distance: float, others: Sequence[Scenario]) -> tuple[Scenario, float]:
+        """Return the closest of `best` and those of `others` that keep the robot's limits."""
+        distances = self.distances(others)
+        for i in np.argsort(distances, kind="stable"):
+            if distances[i] >= distance:
+                break
+            if self._keeps_limits(robot, others[i]):
+                return others[i], float(distances[i])
+        return best, distance
+
+    def _keeps_limits(self, robot: Robot, scenario: Scenario) -> bool:
+        torque = np.abs(ideal_log(robot, scenario.trajectory.sample(self.fs)).tau).max(axis=0)
+        return bool((scenario.trajectory.peak_velocity <= self.velocity).all() and (torque <= robot.torque_limits).all())
+
+    def _drawn(self, rng: np.random.Generator, robot: Robot) -> Array:
+        points = np.zeros((self.moves + 1, robot.n))
+        for k in range(self.moves + 1):
+            points[k] = self._waypoint(rng, robot, points[max(k - 1, 0) : k])
+        return points
+
+    def _redrawn(self, rng: np.random.Generator, robot: Robot, points: Array) -> Array:
+        k = int(rng.integers(len(points)))
+        points[k] = self._waypoint(rng, robot, np.delete(points, k, axis=0)[max(k - 1, 0) : k + 1])
+        return points
+
+    def _waypoint(self, rng: np.random.Generator, robot: Robot, neighbours: Array) -> Array:
+        """Return a random waypoint within the ranges, every joint of it at least `smallest_move` from its neighbours."""
+        low, high = robot.ranges.T + np.array([[self.clearance], [-self.clearance]])
+        while True:
+            point = rng.uniform(low, high)
+            if (np.abs(neighbours - point) >= self.smallest_move).all():
+                return point
+
+    def _scenario(self, robot: Robot, points: Array, durations: Array) -> Scenario:
+        return Scenario(
+            name=f"search-{self.seed}",
+            robot=robot.name,
+            fs=self.fs,
+            rest=self.rest,
+            waypoints=tuple(tuple(float(x) for x in point) for point in points),
+            durations=tuple(float(T) for T in durations),
+            seed=self.seed,
+        )

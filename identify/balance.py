@@ -1,0 +1,68 @@
+"""The sentence that every model says at every sample of a log."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from identify.arrays import Array, Columns
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """B tau = [c + s e] X at every sample, with s = d/dt.
+
+    Parameters
+    ----------
+    y : Array, shape (..., row, time)
+        B tau: torques [N m] or power [W].
+    c : Columns
+        Columns that are used as they are.
+    e : Columns
+        Columns that are still to be differentiated.
+    weight : Array, shape (..., row, time)
+        Weight of every row at every sample, between 0 and 1.
+    s : callable
+        d/dt along the last axis.
+    fs : float
+        [Hz].
+    parameters : tuple of str
+        Names of X.
+    """
+
+    y: Array
+    c: Columns
+    e: Columns
+    weight: Array
+    s: Callable[[Array], Array]
+    fs: float
+    parameters: tuple[str, ...]
+
+    @cached_property
+    def addresses(self) -> tuple[tuple[int, str], ...]:
+        """(row, parameter) of every column of c + s e that is not identically zero; k of them."""
+        return tuple(dict.fromkeys((*self.c, *self.e)))
+
+    def weighted(self) -> Array:
+        """Return y and then c + s e, times the weights of their rows, stacked to (..., row + k, time)."""
+        n = self.y.shape[-2]
+        stack = np.empty((*self.y.shape[:-2], n + len(self.addresses), self.y.shape[-1]))
+        np.multiply(self.y, self.weight, out=stack[..., :n, :])
+        for i, address in enumerate(self.addresses):
+            np.multiply(self._column(address), self.weight[..., address[0], :], out=stack[..., n + i, :])
+        return stack
+
+    def stack(self, columns: Columns) -> Array:
+        """Return `columns`, c or e, in the order of the addresses, shape (..., k, time), zero where there is none."""
+        stack = np.zeros((*self.y.shape[:-2], len(self.addresses), self.y.shape[-1]))
+        for i, address in enumerate(self.addresses):
+            if address in columns:
+                stack[..., i, :] = columns[address]
+        return stack
+
+    def _column(self, address: tuple[int, str]) -> Array:
+        if address not in self.e:
+            return self.c[address]
+        derivative = self.s(self.e[address])
+        return derivative + self.c[address] if address in self.c else derivative

@@ -1,0 +1,24 @@
+"""Robots, linear in their parameters: column blocks and their sum.
+
+``BLOCKS`` is the table of blocks that fit a robot of any number of joints, or refuse the wrong one.
+"""
+
+from identify.basis.base import AbstractBlock as AbstractBlock
+from identify.basis.base import AbstractConservativeBlock as AbstractConservativeBlock
+from identify.basis.base import AbstractFriction as AbstractFriction
+from identify.basis.basis import Basis as Basis
+from identify.basis.coulomb import CoulombFriction as CoulombFriction
+from identify.basis.scara import ScaraLinks as ScaraLinks
+from identify.basis.scara import scara as scara
+from identify.basis.viscous import ViscousFriction as ViscousFriction
+from identify.plugins import PluginTable
+
+BLOCKS: PluginTable[AbstractBlock] = PluginTable(
+    "blocks",
+    AbstractBlock,  # type: ignore[type-abstract]  # only asked whether an instance is one
+    {
+        "scara": ScaraLinks,
+        "viscous": ViscousFriction,
+        "coulomb": CoulombFriction,
+    },
+)

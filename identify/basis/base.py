@@ -1,0 +1,113 @@
+"""Column blocks: what a robot's basis is a sum of."""
+
+from abc import ABC, abstractmethod
+from typing import ClassVar, final
+
+from identify.arrays import Array, Columns
+
+
+class AbstractBlock(ABC):
+    """Named columns of a robot, linear in its parameters, as the three models need them.
+
+    Every function takes signals of shape (..., joint, time) and returns the columns that are not identically zero,
+    (row of an instant, parameter) -> (..., time). For all states, with s = d/dt,
+
+        explicit = s momentum + remainder          qd' explicit = s energy + dissipation
+
+    which is what makes the three models equivalent.
+    """
+
+    @abstractmethod
+    def names(self, n: int) -> tuple[str, ...]:
+        """Return the parameters of this block for a robot of `n` joints."""
+
+    @abstractmethod
+    def units(self, n: int) -> tuple[str, ...]:
+        """Return the unit of each parameter."""
+
+    @abstractmethod
+    def explicit(self, q: Array, qd: Array, qdd: Array) -> Columns:
+        """Return the columns D(q, qd, qdd) of the joint torques (Eq. 5, 6)."""
+
+    @abstractmethod
+    def momentum(self, q: Array, qd: Array) -> Columns:
+        """Return the columns M_i(q) qd of the momenta, still to be differentiated (Eq. 9)."""
+
+    @abstractmethod
+    def remainder(self, q: Array, qd: Array) -> Columns:
+        """Return the columns R_i(q, qd) of the torques that are not the derivative of a momentum (Eq. 8, 9)."""
+
+    @abstractmethod
+    def energy(self, q: Array, qd: Array) -> Columns:
+        """Return the columns h_i(q, qd) of kinetic plus potential energy in row 0, still to be differentiated (Eq. 10)."""
+
+    @abstractmethod
+    def dissipation(self, q: Array, qd: Array) -> Columns:
+        """Return the columns of the dissipated power qd' Gamma_f in row 0 (Eq. 10)."""
+
+
+class AbstractConservativeBlock(AbstractBlock):
+    """A block that stores energy and dissipates none: rigid bodies, rotors, springs."""
+
+    @final
+    def dissipation(self, q: Array, qd: Array) -> Columns:
+        """Return no columns."""
+        del q, qd
+        return {}
+
+
+class AbstractFriction(AbstractBlock):
+    """A friction law of every joint, with one parameter a joint; all that a law has to say is `force`.
+
+    A law with two coefficients is the sum of two blocks.
+    """
+
+    symbol: ClassVar[str]
+    """Letters of the parameter; the joint's number, from 1, follows them."""
+
+    unit: ClassVar[str]
+    """Unit of the parameter."""
+
+    @abstractmethod
+    def force(self, q: Array, qd: Array) -> Array:
+        """Return the friction torque of a unit parameter, (..., joint, time), positive when it resists qd > 0."""
+
+    @final
+    def names(self, n: int) -> tuple[str, ...]:
+        """Return the symbol with the number of each joint."""
+        return tuple(f"{self.symbol}{j + 1}" for j in range(n))
+
+    @final
+    def units(self, n: int) -> tuple[str, ...]:
+        """Return the unit, once a joint."""
+        return (self.unit,) * n
+
+    @final
+    def explicit(self, q: Array, qd: Array, qdd: Array) -> Columns:
+        """Return the force columns: joint j's parameter in row j."""
+        del qdd
+        return self.remainder(q, qd)
+
+    @final
+    def momentum(self, q: Array, qd: Array) -> Columns:
+        """Return no columns."""
+        del q, qd
+        return {}
+
+    @final
+    def remainder(self, q: Array, qd: Array) -> Columns:
+        """Return the force columns: joint j's parameter in row j."""
+        force = self.force(q, qd)
+        return {(j, name): force[..., j, :] for j, name in enumerate(self.names(q.shape[-2]))}
+
+    @final
+    def energy(self, q: Array, qd: Array) -> Columns:
+        """Return no columns."""
+        del q, qd
+        return {}
+
+    @final
+    def dissipation(self, q: Array, qd: Array) -> Columns:
+        """Return qd_j times the force of joint j, in row 0."""
+        power = qd * self.force(q, qd)
+        return {(0, name): power[..., j, :] for j, name in enumerate(self.names(q.shape[-2]))}

@@ -1,0 +1,114 @@
+"""From a log to a linear system: every choice of signal processing, in Hz, s and rad/s."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.basis import Basis
+from identify.differentiators import AbstractDifferentiator, CentralDifference
+from identify.errors import LogError, SettingError
+from identify.masks import AbstractMask, NoMask, ReversalMask
+from identify.models import AbstractModel
+from identify.motion_log import MotionLog
+from identify.operators import AbstractOperator, FirLowPass, IirLowPass
+from identify.plugins import PluginTable
+from identify.prefilters import AbstractPrefilter, ButterworthPrefilter, NoPrefilter
+from identify.signals import Signals
+from identify.system import System
+from identify.torques import AbstractAlignment, AbstractTorque, AsLogged, ByChannel
+
+
+@final
+@dataclass(frozen=True)
+class Chain:
+    """The stages between a log and Y = W X + rho; the same chain serves every sampling frequency.
+
+    Parameters
+    ----------
+    prefilter : AbstractPrefilter
+        Applied to positions and torques.
+    differentiator : AbstractDifferentiator
+        The operator s, for velocities, accelerations and the columns e.
+    alignment : AbstractAlignment
+        Puts the torque on the time of the columns.
+    mask : AbstractMask
+        Weights of the instants.
+    operator : AbstractOperator
+        Makes the rows.
+    trim : float, optional
+        Time [s] at either end of a log that makes no rows, only feeds the filters. By default as much as the stages look
+        to either side; less than that is refused.
+    """
+
+    prefilter: AbstractPrefilter
+    differentiator: AbstractDifferentiator
+    alignment: AbstractAlignment
+    mask: AbstractMask
+    operator: AbstractOperator
+    trim: float | None = None
+
+    def build(self, log: MotionLog | Sequence[MotionLog], basis: Basis, model: AbstractModel) -> System:
+        """Return the linear system of one log, or of several as one fit.
+
+        Raises
+        ------
+        LogError
+            If a log does not have the joints of the basis, or is too short.
+        SettingError
+            If a setting does not fit a log's sampling frequency.
+        """
+        if not isinstance(log, MotionLog):
+            return System.stack([self.build(one, basis, model) for one in log])
+        if log.n != basis.n:
+            raise LogError(f"the log has {log.n} joints, the basis {basis.n}")
+        signals = self.signals(log)
+        return self.operator.system(model.balance(basis, signals), self._margin(signals))
+
+    def signals(self, log: MotionLog) -> Signals:
+        """Return what the model sees of `log`: prefiltered, differentiated, aligned, weighted."""
+        q = self.prefilter.apply(_time_last(log.q), log.fs)
+        tau = self.prefilter.apply(_time_last(log.tau * np.asarray(log.torque.gain)), log.fs)
+        qd = self.differentiator.derivative(q, log.fs)
+        torque = self.alignment.align(tau, log.torque, log.fs)
+        return Signals(q, qd, torque, self.mask.weight(qd, log.fs), self.differentiator, log.fs)
+
+    def halo(self, fs: float, torque: AbstractTorque | None = None) -> float:
+        """Return how far [s] a row looks to either side of its instant, at `fs` [Hz]."""
+        derivatives = 2 * self.differentiator.halo(fs)  # of q, and of qd or e
+        aligned = torque.halo() if torque is not None else 0.0
+        return self.prefilter.halo(fs) + derivatives + aligned + self.operator.halo(fs)
+
+    def _margin(self, signals: Signals) -> float:
+        halo = self.halo(signals.fs, signals.torque)
+        if self.trim is None:
+            return halo
+        if self.trim < halo:
+            raise SettingError(f"trim = {self.trim:g} s is shorter than the {halo:.3g} s that this chain looks: raise it")
+        return self.trim
+
+
+def _time_last(x: Array) -> Array:
+    return np.ascontiguousarray(np.swapaxes(x, -1, -2))
+
+
+def paper_chain() -> Chain:
+    """The paper's own steps: Butterworth on q and tau, 2-point differences, Matlab's IIR decimate (sections 6.2, 7.2)."""
+    return Chain(ButterworthPrefilter(8.0), CentralDifference(2), AsLogged(), NoMask(), IirLowPass(4.0))
+
+
+def idbench_chain() -> Chain:
+    """No prefilter, 6th-order differences, torque aligned by its channel, reversals masked, FIR low-pass."""
+    return Chain(NoPrefilter(), CentralDifference(6), ByChannel(), ReversalMask(), FirLowPass())
+
+
+CHAINS: PluginTable[Chain] = PluginTable(
+    "chains",
+    Chain,
+    {
+        "paper": paper_chain,
+        "idbench": idbench_chain,
+    },
+)

@@ -1,0 +1,25 @@
+"""Errors of the identification package: each says the value, what was allowed and what to try."""
+
+
+class IdentificationError(ValueError):
+    """Root of all errors that `identify` raises on purpose."""
+
+
+class LogError(IdentificationError):
+    """A motion log that cannot be used as it is."""
+
+
+class SettingError(IdentificationError):
+    """A setting that is out of its range, or does not fit the log it meets."""
+
+
+class ExcitationError(IdentificationError):
+    """A motion that does not show every parameter."""
+
+
+class UnknownNameError(IdentificationError):
+    """A name that no table knows."""
+
+
+class PluginError(IdentificationError):
+    """A plug-in of another package that cannot be loaded, or is not what its entry point promises."""

@@ -1,0 +1,92 @@
+"""What comes out of an identification, and how good it is."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from identify.arrays import Array, frozen
+from identify.system import Status, System
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Parameters with their uncertainty, judged on the rows they came from. Leading axes are independent runs.
+
+    Parameters
+    ----------
+    system : System
+        Y and W.
+    X : Array, shape (..., p)
+        Estimated parameters; NaN where the system's status is not OK.
+    covariance : Array, shape (..., p, p)
+        Covariance of the error of X.
+    """
+
+    system: System
+    X: Array
+    covariance: Array
+
+    @classmethod
+    def judge(cls, system: System, X: npt.ArrayLike, covariance: npt.ArrayLike | None = None) -> Self:
+        """Return the estimate X of a system.
+
+        Without a `covariance` that of section 7.3 is used: sigma_rho^2 (W' W)^-1 with sigma_rho^2 = |Y - W X|^2 / (r - p).
+        """
+        estimate = cls(system, frozen(X), np.empty(0))
+        known = covariance if covariance is not None else estimate._paper_covariance()
+        return cls(system, estimate.X, frozen(known))
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of X."""
+        return self.system.parameters
+
+    @property
+    def sigma(self) -> Array:
+        """Standard deviation of every parameter, shape (..., p)."""
+        return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
+
+    @property
+    def relative_sigma_percent(self) -> Array:
+        """%sigma of section 7.3, 100 sigma / |X|, shape (..., p)."""
+        return 100 * self.sigma / np.abs(self.X)
+
+    @property
+    def rows(self) -> npt.NDArray[np.intp]:
+        """Number of rows that are not void, r, shape (...)."""
+        return self.system.rows
+
+    @cached_property
+    def predicted(self) -> Array:
+        """W X, shape (..., r)."""
+        return np.matmul(self.system.W, self.X[..., None])[..., 0]
+
+    @property
+    def residual(self) -> Array:
+        """rho = Y - W X, shape (..., r)."""
+        return self.system.Y - self.predicted
+
+    @property
+    def residual_rms(self) -> Array:
+        """Root mean square of the residual over the rows that are not void, shape (...)."""
+        return np.sqrt(np.sum(self.residual**2, axis=-1) / np.maximum(self.rows, 1))
+
+    @property
+    def condition_number(self) -> Array:
+        """Cond(W), shape (...)."""
+        return self.system.condition_number
+
+    def relative_error_percent(self, truth: npt.ArrayLike) -> Array:
+        """Return 100 |X - truth| / |truth|, shape (..., p), the paper's %e."""
+        true = np.asarray(truth, dtype=np.float64)
+        return 100 * np.abs(self.X - true) / np.abs(true)
+
+    def _paper_covariance(self) -> Array:
+        """Return sigma_rho^2 (W' W)^-1, NaN where the status is not OK."""
+        ok = (self.system.status == Status.OK)[..., None, None]
+        inverse = np.linalg.inv(np.where(ok, self.system.R_W, np.eye(len(self.parameters))))
+        freedom = np.maximum(self.rows - len(self.parameters), 1)
+        variance = np.sum(self.residual**2, axis=-1) / freedom
+        return np.where(ok, variance[..., None, None] * np.matmul(inverse, np.swapaxes(inverse, -1, -2)), np.nan)

@@ -1,0 +1,14 @@
+"""Estimators, and their table."""
+
+from identify.estimators.base import AbstractEstimator as AbstractEstimator
+from identify.estimators.base import Problem as Problem
+from identify.estimators.ordinary_least_squares import OrdinaryLeastSquares as OrdinaryLeastSquares
+from identify.plugins import PluginTable
+
+ESTIMATORS: PluginTable[AbstractEstimator] = PluginTable(
+    "estimators",
+    AbstractEstimator,  # type: ignore[type-abstract]  # only asked whether an instance is one
+    {
+        "OLS": OrdinaryLeastSquares,
+    },
+)

@@ -1,0 +1,13 @@
+"""What a mask is."""
+
+from abc import ABC, abstractmethod
+
+from identify.arrays import Array
+
+
+class AbstractMask(ABC):
+    """Weights of the instants: both sides of a model are multiplied by them before the operator."""
+
+    @abstractmethod
+    def weight(self, qd: Array, fs: float) -> Array:
+        """Return weights between 0 and 1 of every joint's instants, shape (..., joint, time) like `qd` [rad/s]."""

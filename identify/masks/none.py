@@ -1,0 +1,20 @@
+"""No mask."""
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.masks.base import AbstractMask
+
+
+@final
+@dataclass(frozen=True)
+class NoMask(AbstractMask):
+    """Keeps every instant."""
+
+    def weight(self, qd: Array, fs: float) -> Array:
+        """Return ones."""
+        del fs
+        return np.ones_like(qd)

@@ -1,0 +1,17 @@
+"""Identification models, and their table."""
+
+from identify.models.base import AbstractModel as AbstractModel
+from identify.models.explicit import ExplicitModel as ExplicitModel
+from identify.models.implicit import ImplicitModel as ImplicitModel
+from identify.models.power import PowerModel as PowerModel
+from identify.plugins import PluginTable
+
+MODELS: PluginTable[AbstractModel] = PluginTable(
+    "models",
+    AbstractModel,  # type: ignore[type-abstract]  # only asked whether an instance is one
+    {
+        "explicit": ExplicitModel,
+        "implicit": ImplicitModel,
+        "power": PowerModel,
+    },
+)

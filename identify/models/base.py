@@ -1,0 +1,43 @@
+"""What a model is."""
+
+from abc import ABC, abstractmethod
+from typing import final
+
+from identify.arrays import Array, Columns
+from identify.balance import Balance
+from identify.basis import Basis
+from identify.signals import Signals
+
+
+class AbstractModel(ABC):
+    """Picks B, c and e of B tau = [c + s e] X from a basis. It never filters."""
+
+    @abstractmethod
+    def y(self, signals: Signals) -> Array:
+        """Return B tau, shape (..., row, time)."""
+
+    @abstractmethod
+    def c(self, basis: Basis, signals: Signals) -> Columns:
+        """Return the columns that are used as they are."""
+
+    @abstractmethod
+    def e(self, basis: Basis, signals: Signals) -> Columns:
+        """Return the columns that are still to be differentiated."""
+
+    @abstractmethod
+    def weight(self, signals: Signals) -> Array:
+        """Return the weight of every row, shape (..., row, time)."""
+
+    @final
+    def balance(self, basis: Basis, signals: Signals) -> Balance:
+        """Return the model's sentence, its columns averaged over the same windows as the torque."""
+        average = signals.torque.average
+        return Balance(
+            y=self.y(signals),
+            c={address: average(column) for address, column in self.c(basis, signals).items()},
+            e={address: average(column) for address, column in self.e(basis, signals).items()},
+            weight=self.weight(signals),
+            s=signals.s,
+            fs=signals.fs,
+            parameters=basis.parameters,
+        )

@@ -1,0 +1,32 @@
+"""The explicit dynamic model."""
+
+from dataclasses import dataclass
+from typing import final
+
+from identify.arrays import Array, Columns
+from identify.basis import Basis
+from identify.models.base import AbstractModel
+from identify.signals import Signals
+
+
+@final
+@dataclass(frozen=True)
+class ExplicitModel(AbstractModel):
+    """Explicit dynamic model, tau = D(q, qd, qdd) X (Eq. 5, 6)."""
+
+    def y(self, signals: Signals) -> Array:
+        """Return tau."""
+        return signals.torque.mean()
+
+    def c(self, basis: Basis, signals: Signals) -> Columns:
+        """Return D(q, qd, qdd)."""
+        return basis.explicit(signals.q, signals.qd, signals.qdd)
+
+    def e(self, basis: Basis, signals: Signals) -> Columns:
+        """Return no columns."""
+        del basis, signals
+        return {}
+
+    def weight(self, signals: Signals) -> Array:
+        """Return the weight of each joint for its own row."""
+        return signals.weight

@@ -1,0 +1,31 @@
+"""The implicit dynamic model."""
+
+from dataclasses import dataclass
+from typing import final
+
+from identify.arrays import Array, Columns
+from identify.basis import Basis
+from identify.models.base import AbstractModel
+from identify.signals import Signals
+
+
+@final
+@dataclass(frozen=True)
+class ImplicitModel(AbstractModel):
+    """Implicit dynamic model, tau = [R(q, qd) + s M_i(q) qd] X (Eq. 7-9)."""
+
+    def y(self, signals: Signals) -> Array:
+        """Return tau."""
+        return signals.torque.mean()
+
+    def c(self, basis: Basis, signals: Signals) -> Columns:
+        """Return R(q, qd)."""
+        return basis.remainder(signals.q, signals.qd)
+
+    def e(self, basis: Basis, signals: Signals) -> Columns:
+        """Return M_i(q) qd."""
+        return basis.momentum(signals.q, signals.qd)
+
+    def weight(self, signals: Signals) -> Array:
+        """Return the weight of each joint for its own row."""
+        return signals.weight

@@ -1,0 +1,162 @@
+"""What a robot logged: the one thing that a simulator, or a real robot, hands to identification."""
+
+from dataclasses import dataclass
+from typing import Literal, Self, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from identify.arrays import Array, frozen, require_positive
+from identify.errors import LogError, SettingError
+
+Meaning = Literal["instantaneous", "held", "averaged"]
+
+UNIFORMITY = 0.01
+"""Largest departure of a time step from the mean step, as a share of it, that still counts as uniform sampling."""
+
+
+@dataclass(frozen=True)
+class TorqueChannel:
+    """What the torque samples of a log mean.
+
+    With T = 1/fs, sample k speaks for
+
+    - ``instantaneous``: the torque at the instant t_k + delay;
+    - ``held``: the torque that acts, constant, from t_k + delay to t_k + delay + T (a zero-order hold);
+    - ``averaged``: the mean of the torque from t_k + delay to t_k + delay + T.
+
+    Parameters
+    ----------
+    meaning : {"instantaneous", "held", "averaged"}
+        See above.
+    delay : float
+        [s]. A computing delay makes it positive, a torque that was filtered on its way to the log negative.
+    gain : float or tuple of float
+        Torque over logged value, of all joints or of each; 1 for a log in N m. G_T of the paper's Eq. 13 for a log of
+        current references.
+
+    Raises
+    ------
+    SettingError
+        If the meaning is unknown, the delay is not finite, or the gain is zero or not finite.
+    """
+
+    meaning: Meaning
+    delay: float = 0.0
+    gain: float | tuple[float, ...] = 1.0
+
+    def __post_init__(self) -> None:
+        if self.meaning not in get_args(Meaning):
+            raise SettingError(f"torque meaning {self.meaning!r} is unknown; known: {', '.join(get_args(Meaning))}")
+        if not np.isfinite(self.delay):
+            raise SettingError(f"torque delay = {self.delay} s must be finite")
+        if not np.all(np.isfinite(self.gain)) or np.any(np.asarray(self.gain) == 0):
+            raise SettingError(f"torque gain = {self.gain} must be finite and not 0")
+
+
+@dataclass(frozen=True, eq=False)
+class MotionLog:
+    """Uniformly sampled positions and torques of n joints; immutable, checked when it is made.
+
+    Leading axes are independent runs, each identified by itself.
+
+    Parameters
+    ----------
+    fs : float
+        Sampling frequency [Hz].
+    q : array_like, shape (..., time, joint)
+        Joint positions [rad].
+    tau : array_like, shape (..., time, joint)
+        Joint torques [N m], or what `torque.gain` turns into them.
+    torque : TorqueChannel
+        What a sample of `tau` means.
+
+    Raises
+    ------
+    LogError
+        If shapes differ, there are no samples or joints, or a value is NaN or infinite.
+    SettingError
+        If `fs` is not a finite number above zero.
+    """
+
+    fs: float
+    q: Array
+    tau: Array
+    torque: TorqueChannel
+
+    def __post_init__(self) -> None:
+        require_positive(fs=self.fs)
+        for name in ("q", "tau"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+        if self.q.shape != self.tau.shape:
+            raise LogError(f"q has shape {self.q.shape} and tau {self.tau.shape}: every sample needs both, of every joint")
+        if self.q.ndim < 2 or 0 in self.q.shape:
+            raise LogError(f"q has shape {self.q.shape}, not (..., time, joint) with at least one of each")
+        for name, values in (("q", self.q), ("tau", self.tau)):
+            _require_finite(name, values)
+        if np.size(self.torque.gain) not in (1, self.n):
+            raise LogError(f"{np.size(self.torque.gain)} torque gains for {self.n} joints: give one, or one a joint")
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.q.shape[-1]
+
+    @property
+    def samples(self) -> int:
+        """Number of samples, N."""
+        return self.q.shape[-2]
+
+    @property
+    def t(self) -> Array:
+        """Time of every sample [s], shape (time,), from 0."""
+        return np.arange(self.samples) / self.fs
+
+    @classmethod
+    def at_times(cls, t: npt.ArrayLike, q: npt.ArrayLike, tau: npt.ArrayLike, torque: TorqueChannel) -> Self:
+        """Make a log from samples at the times `t`, which must be uniform.
+
+        Parameters
+        ----------
+        t : array_like, shape (time,)
+            Sample times [s], increasing, their steps within 1 % of the mean step.
+        q, tau, torque
+            As for the class.
+
+        Raises
+        ------
+        LogError
+            If times are missing, decrease, or are not uniform; the worst step is named.
+        """
+        times, positions = np.asarray(t, dtype=np.float64), np.asarray(q, dtype=np.float64)
+        if positions.ndim < 2 or times.shape != positions.shape[-2:-1]:
+            raise LogError(f"t has shape {times.shape}, q {positions.shape}: one time is needed for each sample of q")
+        return cls(sampling_frequency(times), positions, np.asarray(tau, dtype=np.float64), torque)
+
+
+def sampling_frequency(t: Array) -> float:
+    """Return fs [Hz] of the uniform times `t` [s], shape (time,); raise LogError if they are not uniform."""
+    _require_finite("t", t[:, None])
+    if len(t) < 2:
+        raise LogError(f"{len(t)} samples do not tell a sampling frequency; at least 2 are needed")
+    step = np.diff(t)
+    if step.min() <= 0:
+        k = int(np.argmin(step))
+        raise LogError(f"time does not increase: t = {t[k]:.9g} s is followed by {t[k + 1]:.9g} s at sample {k + 1}")
+    mean = (t[-1] - t[0]) / (len(t) - 1)
+    k = int(np.argmax(np.abs(step - mean)))
+    if abs(step[k] - mean) > UNIFORMITY * mean:
+        raise LogError(
+            f"time is not uniform: a step of {step[k]:.6g} s after t = {t[k]:.6g} s, where the mean step is {mean:.6g} s; "
+            "resample the log at a fixed frequency first"
+        )
+    return float(1 / mean)
+
+
+def _require_finite(name: str, values: Array) -> None:
+    """Raise LogError that names the first value of `values` (..., time, joint) which is NaN or infinite."""
+    if np.isfinite(values).all():
+        return
+    *run, k, j = (int(i) for i in np.argwhere(~np.isfinite(values))[0])
+    where = f"sample {k}" + (f" of joint {j + 1}" if values.shape[-1] > 1 else "") + (f" of run {tuple(run)}" if run else "")
+    raise LogError(f"{name} is {values[(*run, k, j)]} at {where}; remove or repair such samples first")

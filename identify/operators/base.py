@@ -1,0 +1,73 @@
+"""What an operator is."""
+
+from abc import ABC, abstractmethod
+from typing import NamedTuple, final
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.balance import Balance
+from identify.operators.grid import Grid
+from identify.system import System
+
+
+class Rows(NamedTuple):
+    """Both sides of a model after an operator, at the rows of a grid."""
+
+    y: Array
+    """B tau, shape (..., row, count)."""
+
+    columns: Array
+    """c + s e in the order of the balance's addresses, shape (..., k, count)."""
+
+    valid: np.typing.NDArray[np.bool_]
+    """Whether the row says anything, shape (..., row, count)."""
+
+    lag: float
+    """Where the middle of a row lies after its sample, in samples."""
+
+
+class AbstractOperator(ABC):
+    """A linear operator that turns B tau = [c + s e] X into rows of Y = W X + rho.
+
+    It owns s, the weights and the decimation, and knows no robot.
+    """
+
+    @abstractmethod
+    def step(self, fs: float) -> int:
+        """Return how many samples lie between rows (n_d in the paper); raise SettingError if `fs` does not fit."""
+
+    @abstractmethod
+    def halo(self, fs: float) -> float:
+        """Return how far [s] a row looks to either side of its sample."""
+
+    @abstractmethod
+    def apply(self, balance: Balance, grid: Grid) -> Rows:
+        """Return both sides of `balance` at the rows of `grid`."""
+
+    @final
+    def system(self, balance: Balance, trim: float) -> System:
+        """Return Y = W X + rho, its rows `trim` [s] away from both ends, ordered by time, then row (Eq. 14).
+
+        Raises
+        ------
+        LogError
+            If the log leaves no row.
+        SettingError
+            If a setting does not fit the log's sampling frequency.
+        """
+        fs, (*runs, n, samples) = balance.fs, balance.y.shape
+        grid = Grid.inside(samples, fs, trim, self.step(fs))
+        y, columns, valid, lag = self.apply(balance, grid)
+        row = [address[0] for address in balance.addresses]
+        parameter = [balance.parameters.index(address[1]) for address in balance.addresses]
+        W = np.zeros((*runs, grid.count, n, len(balance.parameters)))
+        W[..., row, parameter] = np.swapaxes(columns * valid[..., row, :], -1, -2)
+        return System(
+            Y=np.swapaxes(y * valid, -1, -2).reshape(*runs, -1),
+            W=W.reshape(*runs, grid.count * n, -1),
+            valid=np.swapaxes(valid, -1, -2).reshape(*runs, -1),
+            time=np.repeat((grid.first + grid.step * np.arange(grid.count) + lag) / fs, n),
+            group=np.tile(np.arange(n), grid.count),
+            parameters=balance.parameters,
+        )

@@ -1,0 +1,53 @@
+"""FIR low-pass and decimate."""
+
+from dataclasses import dataclass
+from math import ceil
+from typing import final
+
+from scipy import signal
+
+from identify.arrays import Array, require_below_nyquist, require_positive
+from identify.operators.grid import Grid
+from identify.operators.low_pass import AbstractLowPass, decimation
+
+
+@final
+@dataclass(frozen=True)
+class FirLowPass(AbstractLowPass):
+    """Windowed-sinc low-pass and decimation by n_d = (fs/2) / cutoff, the paper's rule for a FIR filter (section 6.2).
+
+    Its memory ends, and only the kept samples are computed.
+
+    Parameters
+    ----------
+    cutoff : float
+        Frequency [Hz] at which it attenuates by 6 dB; the rows come at twice this rate.
+    transition : float
+        Width [Hz] of the transition from pass band to stop band (below -50 dB), around the cut-off.
+    """
+
+    cutoff: float = 5.0
+    transition: float = 5.0
+
+    def __post_init__(self) -> None:
+        require_positive(cutoff=self.cutoff, transition=self.transition)
+
+    def step(self, fs: float) -> int:
+        """Return n_d = (fs/2) / cutoff, rounded down."""
+        return decimation(1.0, self.cutoff, fs)
+
+    def halo(self, fs: float) -> float:
+        """Return half the length of the impulse response."""
+        return self._half(fs) / fs
+
+    def decimate(self, x: Array, fs: float, grid: Grid) -> Array:
+        """Return the filtered samples of the grid."""
+        half = self._half(fs)
+        taps = signal.firwin(2 * half + 1, self.cutoff, window="hamming", fs=fs)
+        return grid.weighted_sums(x, taps, half)
+
+    def _half(self, fs: float) -> int:
+        require_below_nyquist("operator cutoff", self.cutoff, fs)
+        # A Hamming window of M + 1 samples makes a transition of 3.3 fs / M (Oppenheim & Schafer, Discrete-Time Signal
+        # Processing, 3rd ed., table 7.2: main lobe 8 pi / M, transition measured 6.6 pi / M).
+        return ceil(3.3 * fs / self.transition / 2 - 1e-9)

@@ -1,0 +1,50 @@
+"""Where the rows of an operator lie, and weighted sums there."""
+
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+from scipy import signal
+
+from identify.arrays import Array
+from identify.errors import LogError
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Rows at the samples first, first + step, ...: `count` of them."""
+
+    first: int
+    step: int
+    count: int
+
+    @classmethod
+    def inside(cls, samples: int, fs: float, trim: float, step: int) -> "Grid":
+        """Return the grid of a log of `samples`, `trim` [s] away from both ends; raise LogError if nothing is left."""
+        first = ceil(trim * fs - 1e-9)  # the rounding of the product must not cost a sample
+        count = (samples - 2 * first) // step
+        if count < 1:
+            raise LogError(
+                f"the log has {samples} samples ({samples / fs:.4g} s); this chain drops {first} at either end and makes "
+                f"a row of {step}, so it needs at least {2 * first + step}: use a longer log, or a chain with a shorter "
+                "memory"
+            )
+        return cls(first, step, count)
+
+    @property
+    def samples(self) -> slice:
+        """The samples of the rows."""
+        return slice(self.first, self.first + self.step * self.count, self.step)
+
+    def weighted_sums(self, x: Array, weights: Array, before: int) -> Array:
+        """Return sum_j weights[j] x[k - before + j] at the samples k of the rows, shape (..., count).
+
+        Only these are computed. `before` samples must exist ahead of the first row, and len(weights) - before behind
+        the last one.
+        """
+        start, taps = self.first - before, len(weights)
+        delay = -(-(taps - 1) // self.step)
+        kernel = np.concatenate([np.zeros(delay * self.step - (taps - 1)), weights[::-1]])
+        stop = start + (self.count - 1) * self.step + taps
+        sums = signal.upfirdn(kernel, x[..., start:stop], up=1, down=self.step, axis=-1)
+        return sums[..., delay : delay + self.count]

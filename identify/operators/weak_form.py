@@ -1,0 +1,49 @@
+"""Integrals against a function of time: what windows and modulating functions have in common."""
+
+from abc import abstractmethod
+from typing import NamedTuple, final
+
+from scipy import ndimage
+
+from identify.arrays import Array
+from identify.balance import Balance
+from identify.operators.base import AbstractOperator, Rows
+from identify.operators.grid import Grid
+
+
+class Kernels(NamedTuple):
+    """Weights of the samples k - before, k - before + 1, ... in the row of sample k."""
+
+    integral: Array
+    """Weights of B tau and c."""
+
+    derivative: Array
+    """Weights of e, which give the integral of s e without differentiating."""
+
+
+class AbstractWeakForm(AbstractOperator):
+    """Rows that are integrals over a stretch of time, s e integrated by parts, so that no velocity is differentiated.
+
+    A stretch that touches a masked instant is left out whole: weights inside it would have to be differentiated too.
+    """
+
+    @abstractmethod
+    def kernels(self, fs: float) -> Kernels:
+        """Return the weights of both integrals, of equal length, for signals sampled at `fs` [Hz]."""
+
+    @final
+    def halo(self, fs: float) -> float:
+        """Return half the length of a stretch."""
+        return len(self.kernels(fs).integral) / 2 / fs
+
+    @final
+    def apply(self, balance: Balance, grid: Grid) -> Rows:
+        """Return the integrals; a row is void if its stretch touches a masked instant."""
+        integral, derivative = self.kernels(balance.fs)
+        length = len(integral)
+        before = (length - 1) // 2
+        columns = grid.weighted_sums(balance.stack(balance.c), integral, before)
+        columns += grid.weighted_sums(balance.stack(balance.e), derivative, before)
+        kept = ndimage.minimum_filter1d(balance.weight, length, axis=-1, mode="nearest", origin=before - length // 2)
+        y = grid.weighted_sums(balance.y, integral, before)
+        return Rows(y, columns, kept[..., grid.samples] == 1, (length - 1) / 2 - before)

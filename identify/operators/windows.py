@@ -1,0 +1,41 @@
+"""Integrals over consecutive windows."""
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from scipy import integrate
+
+from identify.arrays import require_positive
+from identify.errors import SettingError
+from identify.operators.weak_form import AbstractWeakForm, Kernels
+
+
+@final
+@dataclass(frozen=True)
+class Windows(AbstractWeakForm):
+    """Integrals over consecutive windows [ta, tb]: power becomes the energy model (Eq. 11, 20), implicit its integral form.
+
+    Parameters
+    ----------
+    length : float
+        tb - ta [s]; the paper's n_d / fs.
+    """
+
+    length: float = 0.1
+
+    def __post_init__(self) -> None:
+        require_positive(length=self.length)
+
+    def step(self, fs: float) -> int:
+        """Return the samples of a window, at least 2."""
+        samples = round(self.length * fs)
+        if samples < 2:
+            raise SettingError(f"windows of {self.length:g} s hold {samples} samples at fs = {fs:g} Hz, fewer than 2: use longer")
+        return samples
+
+    def kernels(self, fs: float) -> Kernels:
+        """Return Simpson's rule, and the difference of the window's ends."""
+        ends = np.zeros(self.step(fs) + 1)
+        ends[0], ends[-1] = -1.0, 1.0
+        return Kernels(integrate.simpson(np.eye(len(ends)), dx=1 / fs), ends)

@@ -1,0 +1,81 @@
+"""Plug-in tables: the names this package knows, and those that other packages add through entry points."""
+
+from collections.abc import Callable, Iterator, Mapping
+from difflib import get_close_matches
+from functools import cached_property
+from importlib.metadata import EntryPoint, entry_points
+from typing import Generic, TypeVar
+
+from identify.errors import PluginError, UnknownNameError
+
+T = TypeVar("T")
+
+
+class PluginTable(Mapping[str, Callable[[], T]], Generic[T]):
+    """Name -> factory of one plug-in point.
+
+    A factory is called without arguments: a class whose settings all have defaults, or a function. Another package adds
+    to the table through the entry-point group ``idbench.<point>``; what is built in cannot be replaced that way.
+
+    Parameters
+    ----------
+    point : str
+        Name of the plug-in point, for example ``"estimators"``.
+    kind : type
+        What every factory must return an instance of.
+    builtin : dict
+        The factories of this package.
+    """
+
+    def __init__(self, point: str, kind: type[T], builtin: dict[str, Callable[[], T]]) -> None:
+        self.point = point
+        self.kind: type[T] = kind
+        self._builtin = builtin
+
+    @cached_property
+    def _foreign(self) -> dict[str, EntryPoint]:
+        found = {e.name: e for e in entry_points(group=f"idbench.{self.point}")}
+        return {name: e for name, e in found.items() if name not in self._builtin}
+
+    def __iter__(self) -> Iterator[str]:
+        yield from self._builtin
+        yield from sorted(self._foreign)
+
+    def __len__(self) -> int:
+        return len(self._builtin) + len(self._foreign)
+
+    def __getitem__(self, name: str) -> Callable[[], T]:
+        if name in self._builtin:
+            return self._builtin[name]
+        if name in self._foreign:
+            return self._load(self._foreign[name])
+        near = get_close_matches(name, list(self), 1)
+        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        raise UnknownNameError(f"no {name!r} among the {self.point}{hint}; known: {', '.join(self)}")
+
+    def create(self, name: str) -> T:
+        """Return the plug-in `name` with its default settings.
+
+        Raises
+        ------
+        UnknownNameError
+            If no plug-in has that name; the message lists the known ones.
+        PluginError
+            If it cannot be loaded or made, or is not of the kind of this table.
+        """
+        made = self[name]()
+        if not isinstance(made, self.kind):
+            raise PluginError(f"{self.point} plug-in {name!r} makes {type(made).__name__}, not {self.kind.__name__}")
+        return made
+
+    def summary(self, name: str) -> str:
+        """Return the first line of the docstring of plug-in `name`."""
+        return (self[name].__doc__ or "(undocumented)").strip().splitlines()[0]
+
+    @staticmethod
+    def _load(entry: EntryPoint) -> Callable[[], T]:
+        try:
+            factory: Callable[[], T] = entry.load()
+        except Exception as error:
+            raise PluginError(f"plug-in {entry.name!r} ({entry.value}) cannot be loaded: {error}") from error
+        return factory

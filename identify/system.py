@@ -1,0 +1,148 @@
+"""The linear system Y = W X + rho."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from identify.arrays import Array
+from identify.errors import ExcitationError, IdentificationError, LogError
+
+UNSEEN = 1e-10
+"""A direction of the parameters, in columns scaled to unit length, counts as unseen when its singular value is below this
+share of the largest: rounding leaves about 1e-15, the quantization of a 24-bit encoder 1e-7."""
+
+
+class Status(IntEnum):
+    """Whether a system can be solved for X."""
+
+    OK = 0
+    TOO_FEW_ROWS = 1
+    RANK_DEFICIENT = 2
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """Y = W X + rho (Eq. 12): the rows that an operator has made of a model. Leading axes are independent runs.
+
+    Parameters
+    ----------
+    Y : Array, shape (..., r)
+        Measurement vector.
+    W : Array, shape (..., r, p)
+        Observation matrix.
+    valid : bool array, shape (..., r)
+        False where a row is void (masked out); such rows of Y and W are zero.
+    time : Array, shape (r,)
+        Instant of every row [s].
+    group : int array, shape (r,)
+        Row of the model that a row comes from: the joint, from 0, or 0 for all rows of the power model.
+    parameters : tuple of str
+        Names of X.
+    """
+
+    Y: Array
+    W: Array
+    valid: npt.NDArray[np.bool_]
+    time: Array
+    group: npt.NDArray[np.intp]
+    parameters: tuple[str, ...]
+
+    @property
+    def rows(self) -> npt.NDArray[np.intp]:
+        """Number of rows that are not void, r, of every run."""
+        return np.count_nonzero(self.valid, axis=-1)
+
+    @cached_property
+    def R(self) -> Array:
+        """Triangular factor of [W Y], shape (..., p + 1, p + 1): all that least squares needs to know of the rows."""
+        joined = np.concatenate([self.W, self.Y[..., None]], axis=-1)
+        short = joined.shape[-1] - joined.shape[-2]
+        if short > 0:
+            joined = np.concatenate([joined, np.zeros((*joined.shape[:-2], short, joined.shape[-1]))], axis=-2)
+        return np.linalg.qr(joined, mode="r")
+
+    @property
+    def R_W(self) -> Array:
+        """Triangular factor of W, shape (..., p, p)."""
+        p = len(self.parameters)
+        return self.R[..., :p, :p]
+
+    @cached_property
+    def condition_number(self) -> Array:
+        """Cond(W), the ratio of its extreme singular values, shape (...)."""
+        values = np.linalg.svd(self.R_W, compute_uv=False)
+        return np.divide(values[..., 0], values[..., -1], out=np.full(values.shape[:-1], np.inf), where=values[..., -1] > 0)
+
+    @property
+    def rank(self) -> npt.NDArray[np.intp]:
+        """Numerical rank of W with its columns scaled to unit length, shape (...)."""
+        values, _ = self._directions
+        return np.count_nonzero(values > UNSEEN * values[..., :1], axis=-1)
+
+    @property
+    def status(self) -> npt.NDArray[np.intp]:
+        """Status of every run, shape (...)."""
+        p = len(self.parameters)
+        deficient = np.where(self.rank < p, Status.RANK_DEFICIENT, Status.OK)
+        return np.where(self.rows <= p, Status.TOO_FEW_ROWS, deficient)
+
+    def unseen(self, run: tuple[int, ...] = ()) -> tuple[str, ...]:
+        """Return the parameters of `run` that the motion does not show, alone or in some combination."""
+        values, directions = self._directions
+        null = directions[run][values[run] <= UNSEEN * values[run].max()]
+        share = np.abs(null).max(axis=0, initial=0.0)
+        return tuple(name for name, s in zip(self.parameters, share, strict=True) if s > 1e-3)
+
+    def check(self) -> None:
+        """Raise unless every run can be solved.
+
+        Raises
+        ------
+        IdentificationError
+            If there are no more rows than parameters.
+        ExcitationError
+            If the motion does not show every parameter; the message names those it does not show.
+        """
+        failed = np.argwhere(self.status != Status.OK)
+        if not len(failed):
+            return
+        run = tuple(int(i) for i in failed[0])
+        where = f" (run {run}, and {len(failed) - 1} more)" if run else ""
+        p = len(self.parameters)
+        if self.status[run] == Status.TOO_FEW_ROWS:
+            raise IdentificationError(
+                f"{self.rows[run]} rows for {p} parameters{where}: use a longer motion, or a mask that leaves more of it"
+            )
+        raise ExcitationError(
+            f"the motion does not show {', '.join(self.unseen(run))}: W has rank {self.rank[run]} of {p}{where}; "
+            "move every joint, with others standing and moving, or leave these parameters out of the basis"
+        )
+
+    @cached_property
+    def _directions(self) -> tuple[Array, Array]:
+        """Singular values (..., p) and right singular vectors (..., p, p) of W with columns of unit length."""
+        length = np.linalg.norm(self.R_W, axis=-2, keepdims=True)
+        _, values, directions = np.linalg.svd(self.R_W / np.where(length > 0, length, 1.0))
+        return values, directions
+
+    @classmethod
+    def stack(cls, systems: Sequence[Self]) -> Self:
+        """Return the rows of several logs as one system: the paper's independent realizations."""
+        if not systems:
+            raise LogError("there is no log to identify")
+        first = systems[0]
+        if any(s.parameters != first.parameters or s.Y.shape[:-1] != first.Y.shape[:-1] for s in systems):
+            raise LogError("the logs of one fit must have the same parameters and the same number of runs")
+        return cls(
+            Y=np.concatenate([s.Y for s in systems], axis=-1),
+            W=np.concatenate([s.W for s in systems], axis=-2),
+            valid=np.concatenate([s.valid for s in systems], axis=-1),
+            time=np.concatenate([s.time for s in systems]),
+            group=np.concatenate([s.group for s in systems]),
+            parameters=first.parameters,
+        )

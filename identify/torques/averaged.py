@@ -1,0 +1,51 @@
+"""Torque averaged over a sampling period."""
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.stencils import CELL, REACH, shift, slide
+from identify.torques.base import AbstractTorque
+
+_DIFFERENCE = np.array([-0.5, 0.0, 0.5])
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class AveragedTorque(AbstractTorque):
+    """Sample k is the mean of the torque from t_k + delay to t_k + delay + T, with T = 1/fs.
+
+    Parameters
+    ----------
+    tau : Array, shape (..., joint, time)
+        [N m].
+    delay : float
+        [s].
+    fs : float
+        [Hz].
+    """
+
+    tau: Array
+    delay: float
+    fs: float
+
+    def halo(self) -> float:
+        """Return the shift and the reach of the interpolations."""
+        return abs(self.delay) + (REACH + 1) / self.fs
+
+    def mean(self) -> Array:
+        """Return the mean over the window around t_k, interpolated from windows around t_k + delay + T/2."""
+        return shift(self.tau, -(self.delay * self.fs + 0.5))
+
+    def power(self, q: Array, qd: Array) -> Array:
+        """Return mean torque times mean velocity plus (T^2/12) d tau/dt d qd/dt, their covariance to fourth order."""
+        tau = self.mean()
+        velocity = (shift(q, 0.5) - shift(q, -0.5)) * self.fs
+        covariance = slide(tau, _DIFFERENCE) * slide(qd, _DIFFERENCE) / 12
+        return np.sum(tau * velocity + covariance, axis=-2, keepdims=True)
+
+    def average(self, x: Array) -> Array:
+        """Return the mean of `x` over a sampling period around every sample, to fourth order."""
+        return slide(x, CELL)

@@ -1,0 +1,30 @@
+"""What a torque channel becomes once it stands on the time of the columns."""
+
+from abc import ABC, abstractmethod
+
+from identify.arrays import Array
+
+
+class AbstractTorque(ABC):
+    """The measured torque as a mean over one window around every sample instant.
+
+    The window is the instant itself for a torque that was measured at instants, and one sampling period for a torque
+    that was held or averaged; `average` puts the columns of a model over the same window, so that
+    B tau = [c + s e] X is compared with itself.
+    """
+
+    @abstractmethod
+    def halo(self) -> float:
+        """Return how far [s] the mean torque and its power look to either side."""
+
+    @abstractmethod
+    def mean(self) -> Array:
+        """Return the mean torque over the window of every sample, shape (..., joint, time) [N m]."""
+
+    @abstractmethod
+    def power(self, q: Array, qd: Array) -> Array:
+        """Return the mean of qd' tau over the window of every sample, shape (..., 1, time) [W]."""
+
+    @abstractmethod
+    def average(self, x: Array) -> Array:
+        """Return the mean of `x`, shape (..., time), over the window of every sample."""

@@ -1,0 +1,83 @@
+"""A robot: a compiled MuJoCo model of one serial arm and what the bench asks of it."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Self
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+import models
+from sim.errors import RobotError
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """An arm whose every joint is a hinge or a slide with one actuator.
+
+    Parameters
+    ----------
+    name : str
+        Name of the robot.
+    model : mujoco.MjModel
+        The compiled model.
+    """
+
+    name: str
+    model: mujoco.MjModel
+
+    def __post_init__(self) -> None:
+        simple = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+        other = [self.model.joint(j).name for j in range(self.model.njnt) if self.model.jnt_type[j] not in simple]
+        if other:
+            raise RobotError(f"robot {self.name!r}: only hinge and slide joints can be simulated, not {', '.join(other)}")
+        if not self.model.njnt:
+            raise RobotError(f"robot {self.name!r} has no joints")
+
+    @classmethod
+    def load(cls, name: str) -> Self:
+        """Return the robot that ships as `name`, or that of an MJCF file.
+
+        Raises
+        ------
+        RobotError
+            If there is no such robot or file, or MuJoCo cannot compile it.
+        """
+        try:
+            path = Path(name) if name.endswith(".xml") else models.path(name)
+            model = mujoco.MjModel.from_xml_path(str(path))
+        except KeyError as error:
+            raise RobotError(f"{error.args[0]}, or give the path of an MJCF file (.xml)") from None
+        except ValueError as error:
+            raise RobotError(f"MuJoCo cannot load {name!r}: {error}") from error
+        return cls(path.stem, model)
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return int(self.model.njnt)
+
+    @cached_property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints."""
+        return tuple(self.model.joint(j).name for j in range(self.n))
+
+    @property
+    def ranges(self) -> Array:
+        """Lowest and highest position of every joint [rad], shape (joint, 2), infinite where the model has no limits."""
+        unlimited = np.tile([-np.inf, np.inf], (self.n, 1))
+        return np.where(self.model.jnt_limited[:, None].astype(bool), self.model.jnt_range, unlimited)
+
+    @property
+    def torque_limits(self) -> Array:
+        """Largest torque of every joint's actuator [N m], shape (joint,), infinite where the model has no limits."""
+        limits = np.full(self.n, np.inf)
+        for a in range(self.model.nu):
+            if self.model.actuator_ctrllimited[a]:
+                gear, reach = self.model.actuator_gear[a, 0], self.model.actuator_ctrlrange[a].max()
+                limits[self.model.actuator_trnid[a, 0]] = abs(gear) * reach
+        return limits

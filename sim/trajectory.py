@@ -1,0 +1,131 @@
+"""Fifth-order point-to-point trajectories, in closed form."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.errors import ScenarioError
+from sim.robot import Array
+
+PEAK_VELOCITY = 15 / 8
+"""Largest |ds/du| of s(u) = 10 u^3 - 15 u^4 + 6 u^5, at u = 1/2."""
+
+PEAK_ACCELERATION = 10 / np.sqrt(3)
+"""Largest |d2s/du2| of s(u), at u = 1/2 - 1/sqrt(12)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A planned motion, sampled.
+
+    Parameters
+    ----------
+    fs : float
+        [Hz].
+    q, qd, qdd : Array, shape (time, joint)
+        [rad], [rad/s], [rad/s^2].
+    """
+
+    fs: float
+    q: Array
+    qd: Array
+    qdd: Array
+
+
+@dataclass(frozen=True, eq=False)
+class PointToPoint:
+    """Moves from waypoint to waypoint, each of fifth order and at rest at both ends, with pauses at the waypoints.
+
+    q(t) = q_i + (q_(i+1) - q_i) s(u), s(u) = 10 u^3 - 15 u^4 + 6 u^5, u = (t - t_i) / T_i: all joints start and stop together.
+
+    Parameters
+    ----------
+    waypoints : array_like, shape (w, joint)
+        Positions at rest [rad], at least two.
+    durations : array_like, shape (w - 1,)
+        Time of every move [s].
+    dwells : array_like, shape (w,)
+        Pause at every waypoint [s].
+
+    Raises
+    ------
+    ScenarioError
+        If shapes do not fit, a value is not finite, a duration is not above zero or a pause is negative.
+    """
+
+    waypoints: Array
+    durations: Array
+    dwells: Array
+
+    def __post_init__(self) -> None:
+        for name in ("waypoints", "durations", "dwells"):
+            values = np.array(getattr(self, name), dtype=np.float64)
+            if not np.isfinite(values).all():
+                raise ScenarioError(f"{name} hold a value that is not finite")
+            values.setflags(write=False)
+            object.__setattr__(self, name, values)
+        w = len(self.waypoints)
+        if self.waypoints.ndim != 2 or w < 2 or self.waypoints.shape[1] < 1:
+            raise ScenarioError(f"waypoints have shape {self.waypoints.shape}, not (at least 2, joints)")
+        if self.durations.shape != (w - 1,) or self.dwells.shape != (w,):
+            raise ScenarioError(
+                f"{w} waypoints need {w - 1} durations and {w} dwells, not {self.durations.shape} and {self.dwells.shape}"
+            )
+        if self.durations.min() <= 0 or self.dwells.min() < 0:
+            raise ScenarioError(f"durations must be above 0 s and dwells not below: {self.durations.min():g}, {self.dwells.min():g}")
+
+    @classmethod
+    def fastest(
+        cls, waypoints: npt.ArrayLike, velocity: npt.ArrayLike, acceleration: npt.ArrayLike, dwells: npt.ArrayLike
+    ) -> Self:
+        """Return the shortest moves that keep the joints' velocity [rad/s] and acceleration [rad/s^2] limits.
+
+        Parameters
+        ----------
+        waypoints, dwells
+            As for the class.
+        velocity, acceleration : array_like, shape (joint,)
+            Limits, above zero.
+
+        Raises
+        ------
+        ScenarioError
+            As for the class; also if two consecutive waypoints are equal, or a limit is not above zero.
+        """
+        limits = np.broadcast_to(velocity, np.shape(waypoints)[-1:]), np.broadcast_to(acceleration, np.shape(waypoints)[-1:])
+        if not all((limit > 0).all() for limit in limits):
+            raise ScenarioError(f"velocity and acceleration limits must be above 0: {limits[0]}, {limits[1]}")
+        change = np.abs(np.diff(np.asarray(waypoints, dtype=np.float64), axis=0))
+        by_velocity = PEAK_VELOCITY * change / limits[0]
+        by_acceleration = np.sqrt(PEAK_ACCELERATION * change / limits[1])
+        durations = np.maximum(by_velocity, by_acceleration).max(axis=1)
+        return cls(np.asarray(waypoints), durations, np.asarray(dwells))
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last instant, pauses included [s]."""
+        return float(self.durations.sum() + self.dwells.sum())
+
+    @property
+    def peak_velocity(self) -> Array:
+        """Largest speed of every joint [rad/s], shape (joint,)."""
+        return (PEAK_VELOCITY * np.abs(np.diff(self.waypoints, axis=0)) / self.durations[:, None]).max(axis=0)
+
+    def sample(self, fs: float) -> Reference:
+        """Return the motion at t = 0, 1/fs, 2/fs, ... below its duration, exactly."""
+        count = round(self.duration * fs)
+        return self.at(np.arange(count) / fs, fs)
+
+    def at(self, t: Array, fs: float) -> Reference:
+        """Return the motion at the times `t` [s], shape (time,); before the start and after the end it rests."""
+        start = self.dwells[:-1].cumsum() + np.concatenate([[0.0], self.durations[:-1].cumsum()])
+        move = np.clip(np.searchsorted(start, t, side="right") - 1, 0, len(start) - 1)
+        T = self.durations[move][:, None]
+        u = np.clip((t - start[move])[:, None] / T, 0.0, 1.0)
+        change = np.diff(self.waypoints, axis=0)[move]
+        q = self.waypoints[move] + change * u**3 * (10 - 15 * u + 6 * u**2)
+        qd = change / T * 30 * u**2 * (1 - u) ** 2
+        qdd = change / T**2 * 60 * u * (1 - u) * (1 - 2 * u)
+        return Reference(fs, q, qd, qdd)
