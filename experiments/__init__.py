@@ -1,0 +1,1 @@
+"""Experiments: what joins simulation and identification, prints the answer and records it."""

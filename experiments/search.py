@@ -11,7 +11,14 @@ from math import inf
 import numpy as np
 
 from experiments.errors import ExperimentError
-from identify import ExplicitModel, MotionLog, PowerModel, TorqueChannel, idbench_chain, scara
+from identify import (
+    ExplicitModel,
+    MotionLog,
+    PowerModel,
+    TorqueChannel,
+    idbench_chain,
+    scara,
+)
 from sim.ideal import ideal_log
 from sim.robot import Array, Robot
 from sim.scenario import Scenario

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from identify.arrays import Array, frozen
 from identify.system import Status, System
 
+
 @dataclass(frozen=True, eq=False)
 class Estimate:
     """Parameters with their uncertainty, judged on the rows they came from. Leading axes are independent runs.

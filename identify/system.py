@@ -52,7 +52,7 @@ class System:
     group: npt.NDArray[np.intp]
     parameters: tuple[str, ...]
 
-    @property
+    @cached_property
     def rows(self) -> npt.NDArray[np.intp]:
         """Number of rows that are not void, r, of every run."""
         return np.count_nonzero(self.valid, axis=-1)
@@ -64,7 +64,8 @@ class System:
         short = joined.shape[-1] - joined.shape[-2]
         if short > 0:
             joined = np.concatenate([joined, np.zeros((*joined.shape[:-2], short, joined.shape[-1]))], axis=-2)
-        return np.linalg.qr(joined, mode="r")
+        R: Array = np.linalg.qr(joined, mode="r")  # type: ignore[assignment]  # mode "r" gives R alone
+        return R
 
     @property
     def R_W(self) -> Array:
@@ -78,13 +79,13 @@ class System:
         values = np.linalg.svd(self.R_W, compute_uv=False)
         return np.divide(values[..., 0], values[..., -1], out=np.full(values.shape[:-1], np.inf), where=values[..., -1] > 0)
 
-    @property
+    @cached_property
     def rank(self) -> npt.NDArray[np.intp]:
         """Numerical rank of W with its columns scaled to unit length, shape (...)."""
         values, _ = self._directions
         return np.count_nonzero(values > UNSEEN * values[..., :1], axis=-1)
 
-    @property
+    @cached_property
     def status(self) -> npt.NDArray[np.intp]:
         """Status of every run, shape (...)."""
         p = len(self.parameters)

@@ -11,8 +11,6 @@ import numpy as np
 from sim.errors import ScenarioError
 from sim.trajectory import PointToPoint
 
-FOLDER = Path(__file__).parent / "scenarios"
-
 
 @dataclass(frozen=True)
 class Scenario:

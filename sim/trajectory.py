@@ -74,7 +74,9 @@ class PointToPoint:
                 f"{w} waypoints need {w - 1} durations and {w} dwells, not {self.durations.shape} and {self.dwells.shape}"
             )
         if self.durations.min() <= 0 or self.dwells.min() < 0:
-            raise ScenarioError(f"durations must be above 0 s and dwells not below: {self.durations.min():g}, {self.dwells.min():g}")
+            raise ScenarioError(
+                f"durations must be above 0 s and dwells not below: {self.durations.min():g}, {self.dwells.min():g}"
+            )
 
     @classmethod
     def fastest(

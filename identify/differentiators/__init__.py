@@ -1,6 +1,8 @@
 """Differentiators, and their table."""
 
-from identify.differentiators.base import AbstractDifferentiator as AbstractDifferentiator
+from identify.differentiators.base import (
+    AbstractDifferentiator as AbstractDifferentiator,
+)
 from identify.differentiators.central import CentralDifference as CentralDifference
 from identify.plugins import PluginTable
 

@@ -2,7 +2,9 @@
 
 from identify.estimators.base import AbstractEstimator as AbstractEstimator
 from identify.estimators.base import Problem as Problem
-from identify.estimators.ordinary_least_squares import OrdinaryLeastSquares as OrdinaryLeastSquares
+from identify.estimators.ordinary_least_squares import (
+    OrdinaryLeastSquares as OrdinaryLeastSquares,
+)
 from identify.plugins import PluginTable
 
 ESTIMATORS: PluginTable[AbstractEstimator] = PluginTable(

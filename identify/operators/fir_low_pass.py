@@ -1,12 +1,13 @@
 """FIR low-pass and decimate."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import ceil
 from typing import final
 
 from scipy import signal
 
-from identify.arrays import Array, require_below_nyquist, require_positive
+from identify.arrays import Array, frozen, require_below_nyquist, require_positive
 from identify.operators.grid import Grid
 from identify.operators.low_pass import AbstractLowPass, decimation
 
@@ -43,11 +44,15 @@ class FirLowPass(AbstractLowPass):
     def decimate(self, x: Array, fs: float, grid: Grid) -> Array:
         """Return the filtered samples of the grid."""
         half = self._half(fs)
-        taps = signal.firwin(2 * half + 1, self.cutoff, window="hamming", fs=fs)
-        return grid.weighted_sums(x, taps, half)
+        return grid.weighted_sums(x, _taps(half, self.cutoff, fs), half)
 
     def _half(self, fs: float) -> int:
         require_below_nyquist("operator cutoff", self.cutoff, fs)
         # A Hamming window of M + 1 samples makes a transition of 3.3 fs / M (Oppenheim & Schafer, Discrete-Time Signal
         # Processing, 3rd ed., table 7.2: main lobe 8 pi / M, transition measured 6.6 pi / M).
         return ceil(3.3 * fs / self.transition / 2 - 1e-9)
+
+
+@lru_cache(maxsize=16)
+def _taps(half: int, cutoff: float, fs: float) -> Array:
+    return frozen(signal.firwin(2 * half + 1, cutoff, window="hamming", fs=fs))

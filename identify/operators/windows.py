@@ -31,7 +31,9 @@ class Windows(AbstractWeakForm):
         """Return the samples of a window, at least 2."""
         samples = round(self.length * fs)
         if samples < 2:
-            raise SettingError(f"windows of {self.length:g} s hold {samples} samples at fs = {fs:g} Hz, fewer than 2: use longer")
+            raise SettingError(
+                f"windows of {self.length:g} s hold {samples} samples at fs = {fs:g} Hz, fewer than 2: use longer"
+            )
         return samples
 
     def kernels(self, fs: float) -> Kernels:

@@ -1,0 +1,37 @@
+"""What can be combined."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from identify import (
+    BLOCKS,
+    CHAINS,
+    DIFFERENTIATORS,
+    ESTIMATORS,
+    MASKS,
+    MODELS,
+    OPERATORS,
+    PREFILTERS,
+)
+from identify.plugins import PluginTable
+
+TABLES: tuple[PluginTable[Any], ...] = (BLOCKS, MODELS, PREFILTERS, DIFFERENTIATORS, MASKS, OPERATORS, CHAINS, ESTIMATORS)
+"""Every plug-in point."""
+
+
+def print_plugins(console: Console) -> None:
+    """Print every plug-in with the first line of its documentation."""
+    for table in TABLES:
+        grid = Table.grid(padding=(0, 2))
+        for name, line in summaries(table).items():
+            grid.add_row(f"  {name}", Text(line))
+        console.print(Text(f"{table.point} (entry points: idbench.{table.point})", style="bold"), grid, sep="\n")
+
+
+def summaries(table: PluginTable[Any]) -> Mapping[str, str]:
+    """Return the first line of documentation of every plug-in of a table."""
+    return {name: table.summary(name) for name in table}

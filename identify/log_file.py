@@ -1,0 +1,75 @@
+"""Motion logs on disk: Parquet with the columns t, q1, q2, ..., tau1, tau2, ... in SI units."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+from pyarrow import parquet
+
+from identify.arrays import Array
+from identify.errors import LogError
+from identify.motion_log import MotionLog, TorqueChannel
+
+_TORQUE = b"idbench.torque"
+
+
+def write_log(log: MotionLog, path: Path) -> None:
+    """Write one run to a Parquet file; the torque channel goes into its metadata.
+
+    Raises
+    ------
+    LogError
+        If the log holds several runs.
+    """
+    if log.q.ndim != 2:
+        raise LogError(f"a file holds one run, the log has shape {log.q.shape}: write each run by itself")
+    joints = range(log.n)
+    columns = {"t": log.t}
+    columns |= {f"q{j + 1}": log.q[:, j] for j in joints}
+    columns |= {f"tau{j + 1}": log.tau[:, j] for j in joints}
+    torque = {"meaning": log.torque.meaning, "delay": log.torque.delay, "gain": log.torque.gain}
+    table = pa.table({name: pa.array(values) for name, values in columns.items()})
+    parquet.write_table(table.replace_schema_metadata({_TORQUE: json.dumps(torque).encode()}), path)
+
+
+def read_log(path: Path, torque: TorqueChannel | None = None) -> MotionLog:
+    """Read a log from a Parquet file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    torque : TorqueChannel, optional
+        What its torque means; by default what the file says of it.
+
+    Raises
+    ------
+    LogError
+        If the file cannot be read, lacks a column, does not say what its torque means and `torque` does not either, or
+        holds values that make no log.
+    """
+    try:
+        table = parquet.read_table(path)
+    except (OSError, pa.ArrowException) as error:
+        raise LogError(f"cannot read the log {path}: {error}") from error
+    names = set(table.column_names)
+    n = next(j for j in range(len(names) + 1) if f"q{j + 1}" not in names)
+    needed = ["t", *(f"q{j + 1}" for j in range(max(n, 1))), *(f"tau{j + 1}" for j in range(max(n, 1)))]
+    if missing := [name for name in needed if name not in names]:
+        raise LogError(f"{path} has no column {', '.join(missing)}; it has {', '.join(table.column_names)}")
+    said = (table.schema.metadata or {}).get(_TORQUE)
+    if torque is None and said is None:
+        raise LogError(f"{path} does not say what its torque means: instantaneous, held or averaged, and with what delay")
+    channel = torque or _channel(json.loads(said or b"{}"))
+    q, tau = _columns(table, "q", n), _columns(table, "tau", n)
+    return MotionLog.at_times(table["t"].to_numpy(), q, tau, channel)
+
+
+def _columns(table: pa.Table, letter: str, n: int) -> Array:
+    return np.stack([np.asarray(table[f"{letter}{j + 1}"].to_numpy(), dtype=np.float64) for j in range(n)], axis=-1)
+
+
+def _channel(said: dict[str, object]) -> TorqueChannel:
+    gain = said["gain"]
+    return TorqueChannel(**{**said, "gain": tuple(gain) if isinstance(gain, list) else gain})  # type: ignore[arg-type]

@@ -1,0 +1,185 @@
+"""The column functions against the identities that tie them together, against MuJoCo, and against mutations."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import combinations
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from identify import (
+    AbstractBlock,
+    AbstractFriction,
+    Array,
+    Basis,
+    Columns,
+    CoulombFriction,
+    ScaraLinks,
+    ViscousFriction,
+    scara,
+)
+from identify.errors import SettingError
+from sim.inverse_dynamics import coulomb_torque, inverse_dynamics
+
+STATES = np.random.default_rng(5).uniform(-3, 3, (3, 2, 300))
+"""q, qd, qdd of 300 random instants, shape (joint, time) each."""
+
+PAPER_ORDER = "ZZR1 Fv1 Fs1 ZZ2 LMX2 LMY2 Fv2 Fs2".split()
+EPS = 1e-30
+
+
+def matrix(columns, rows, parameters):
+    """Return the columns as a dense array, shape (time, row, parameter)."""
+    dense = np.zeros((STATES.shape[-1], rows, len(parameters)))
+    for (row, name), signal in columns.items():
+        dense[:, row, parameters.index(name)] = signal
+    return dense
+
+
+def rate(columns, q, qd, qdd):
+    """Return d/dt of columns(q, qd), by a complex step: exact to rounding, with no difference taken."""
+    return {address: np.imag(signal) / EPS for address, signal in columns(q + 1j * EPS * qd, qd + 1j * EPS * qdd).items()}
+
+
+def defects(block):
+    """Return by how much the two identities between the five column functions fail at the random states."""
+    q, qd, qdd = STATES
+    names = list(block.names(2))
+    D = matrix(block.explicit(q, qd, qdd), 2, names)
+    implicit = matrix(rate(block.momentum, q, qd, qdd), 2, names) + matrix(block.remainder(q, qd), 2, names)
+    power = matrix(rate(block.energy, q, qd, qdd), 1, names) + matrix(block.dissipation(q, qd), 1, names)
+    return np.abs(D - implicit).max(), np.abs(np.einsum("jk,kjp->kp", qd, D) - power[:, 0]).max()
+
+
+def mujoco_defect(basis, robot, truth):
+    """Return by how much D X differs from MuJoCo's inverse dynamics plus the friction law."""
+    q, qd, qdd = (x.T for x in STATES)
+    tau = inverse_dynamics(robot, q, qd, qdd) + coulomb_torque(robot, qd)
+    D = matrix(basis.explicit(*STATES), 2, list(basis.parameters))
+    return np.abs(D @ truth - tau).max()
+
+
+@pytest.mark.parametrize("block", [ScaraLinks(), ViscousFriction(), CoulombFriction()], ids=lambda b: type(b).__name__)
+def test_explicit_is_rate_of_momentum_plus_remainder_and_power_is_rate_of_energy_plus_dissipation(block):
+    assert max(defects(block)) < 1e-10  # signals up to 1e2, rounding 1e-14
+
+
+def test_explicit_times_truth_is_mujocos_inverse_dynamics(robot, truth):
+    assert scara().parameters == tuple(PAPER_ORDER)
+    assert mujoco_defect(scara(), robot, truth) < 1e-10
+
+
+def test_momentum_columns_give_the_mass_matrix_times_velocity(truth):
+    """An independent route to the momenta: M(q) qd with the textbook's M."""
+    q, qd, _ = STATES
+    ZZR1, _, _, ZZ2, LMX2, LMY2, _, _ = truth
+    coupled = LMX2 * np.cos(q[1]) - LMY2 * np.sin(q[1])
+    p2 = (ZZ2 + coupled) * qd[0] + ZZ2 * qd[1]
+    p1 = (ZZR1 + ZZ2 + 2 * coupled) * qd[0] + (ZZ2 + coupled) * qd[1]
+    momenta = matrix(scara().momentum(q, qd), 2, PAPER_ORDER) @ truth
+    np.testing.assert_allclose(momenta, np.stack([p1, p2], axis=-1), atol=1e-12)
+
+
+FUNCTIONS = {"explicit": 3, "momentum": 2, "remainder": 2, "energy": 2, "dissipation": 2}
+"""Column functions, and how many of q, qd, qdd each takes."""
+
+
+@dataclass(frozen=True)
+class Mutant(AbstractBlock):
+    """The SCARA's links and friction with one column function changed."""
+
+    function: str
+    change: Callable[[Columns, Array], Columns]
+
+    def _columns(self, function, *state):
+        columns = getattr(scara(), function)(*state)
+        return self.change(columns, state[1]) if function == self.function else columns
+
+    def names(self, n):
+        return scara().parameters
+
+    def units(self, n):
+        return scara().units
+
+    def explicit(self, q, qd, qdd):
+        return self._columns("explicit", q, qd, qdd)
+
+    def momentum(self, q, qd):
+        return self._columns("momentum", q, qd)
+
+    def remainder(self, q, qd):
+        return self._columns("remainder", q, qd)
+
+    def energy(self, q, qd):
+        return self._columns("energy", q, qd)
+
+    def dissipation(self, q, qd):
+        return self._columns("dissipation", q, qd)
+
+
+def every_column():
+    """Return (function, address) of each column of the SCARA."""
+    return [(f, address) for f, takes in FUNCTIONS.items() for address in getattr(scara(), f)(*STATES[:takes])]
+
+
+def caught(block, robot, truth):
+    """Return whether one of the three identities fails visibly."""
+    return max(*defects(block), mujoco_defect(Basis(2, (block,)), robot, truth)) > 1e-6
+
+
+def test_the_unchanged_basis_is_no_mutant(robot, truth):
+    assert not caught(Mutant("energy", lambda columns, qd: columns), robot, truth)
+
+
+def test_the_papers_printed_h4_is_caught(robot, truth):
+    """1/2 (qd1^2 + qd2^2), as section 7.1 prints it, contradicts Eq. 10."""
+    printed = Mutant("energy", lambda columns, qd: {**columns, (0, "ZZ2"): 0.5 * (qd[0] ** 2 + qd[1] ** 2)})
+    assert caught(printed, robot, truth)
+
+
+@pytest.mark.parametrize(("function", "address"), every_column())
+def test_a_wrong_sign_is_caught(function, address, robot, truth):
+    assert caught(Mutant(function, lambda columns, qd: {**columns, address: -columns[address]}), robot, truth)
+
+
+@pytest.mark.parametrize(("function", "address"), every_column())
+def test_a_missing_column_is_caught(function, address, robot, truth):
+    missing = Mutant(function, lambda columns, qd: {a: x for a, x in columns.items() if a != address})
+    assert caught(missing, robot, truth)
+
+
+@pytest.mark.parametrize("function", FUNCTIONS)
+def test_swapped_columns_are_caught(function, robot, truth):
+    columns = getattr(scara(), function)(*STATES[: FUNCTIONS[function]])
+    for a, b in combinations(columns, 2):
+        if a[0] == b[0] and not np.array_equal(columns[a], columns[b]):
+            assert caught(Mutant(function, lambda c, qd, a=a, b=b: {**c, a: c[b], b: c[a]}), robot, truth), (a, b)
+
+
+def test_a_block_adds_its_parameters_behind_the_papers_order():
+    @dataclass(frozen=True)
+    class Drag(AbstractFriction):
+        symbol: ClassVar[str] = "Fq"
+        unit: ClassVar[str] = "N m s^2/rad^2"
+
+        def force(self, q, qd):
+            return qd * np.abs(qd)
+
+    basis = scara() + Drag()
+    assert basis.parameters == (*PAPER_ORDER, "Fq1", "Fq2")
+    assert basis.units[-1] == "N m s^2/rad^2"
+    assert max(defects(Drag())) < 1e-10
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: scara() + ViscousFriction(), "Fv1, Fv2 come from two blocks"),
+        (lambda: Basis(3, (ScaraLinks(),)), "describe 2 joints, not 3"),
+        (lambda: Basis(2, (ScaraLinks(),), ("ZZR2",)), "ZZR2, which no block has"),
+    ],
+)
+def test_contradictions_are_refused(make, message):
+    with pytest.raises(SettingError, match=message):
+        make()
