@@ -23,7 +23,7 @@ from sim.ideal import ideal_log
 from sim.robot import Array, Robot
 from sim.scenario import Scenario
 
-PAPER_CONDITION = ((ExplicitModel(), 28.0), (PowerModel(), 93.0))
+PAPER_CONDITION = {ExplicitModel(): 28.0, PowerModel(): 93.0}
 """Cond(W) of the paper's Table 1; that of the implicit model is the explicit one's."""
 
 
@@ -31,7 +31,8 @@ PAPER_CONDITION = ((ExplicitModel(), 28.0), (PowerModel(), 93.0))
 class Search:
     """A random search for a motion with the paper's condition numbers in chain `idbench`, the same for the same seed.
 
-    It draws a sequence of waypoints, then redraws one of them at a time and keeps what comes closer.
+    It draws a sequence of waypoints, then redraws one of them at a time and keeps what comes closer: first to the
+    limits of speed and torque, then, within them, to the condition numbers.
 
     Parameters
     ----------
@@ -81,9 +82,14 @@ class Search:
         durations = rng.uniform(0.85, 1.15, self.moves)
         durations *= self.motion / durations.sum()
         best, distance = self._scenario(robot, self._drawn(rng, robot), durations), inf
+        excess = self.excess(robot, best)
         for number in range(self.rounds):
             points = [self._redrawn(rng, robot, np.array(best.waypoints)) for _ in range(self.candidates)]
-            best, distance = self._closest(robot, best, distance, [self._scenario(robot, p, durations) for p in points])
+            others = [self._scenario(robot, p, durations) for p in points]
+            if excess > 0:
+                best, excess = min([(best, excess), *((o, self.excess(robot, o)) for o in others)], key=lambda pair: pair[1])
+            else:
+                best, distance = self._closest(robot, best, distance, others)
             if progress:
                 progress(number + 1, distance)
             if distance <= self.tolerance:
@@ -98,10 +104,9 @@ class Search:
         """Return the largest departure from the paper's condition numbers, as a share; infinite if a row would be void."""
         q = np.stack([scenario.trajectory.sample(self.fs).q for scenario in scenarios])
         log = MotionLog(self.fs, q, np.zeros_like(q), TorqueChannel("instantaneous"))  # W holds no torque
-        chain, basis = replace(idbench_chain(), trim=self.rest), scara()
+        systems = replace(idbench_chain(), trim=self.rest).build(log, scara(), list(PAPER_CONDITION))
         worst = np.zeros(len(scenarios))
-        for model, target in PAPER_CONDITION:
-            system = chain.build(log, basis, model)
+        for system, target in zip(systems, PAPER_CONDITION.values(), strict=True):
             share = np.abs(np.log(system.condition_number / target))
             worst = np.maximum(worst, np.where(system.valid.all(axis=-1), share, inf))
         return worst
@@ -112,13 +117,15 @@ class Search:
         for i in np.argsort(distances, kind="stable"):
             if distances[i] >= distance:
                 break
-            if self._keeps_limits(robot, others[i]):
+            if self.excess(robot, others[i]) <= 0:
                 return others[i], float(distances[i])
         return best, distance
 
-    def _keeps_limits(self, robot: Robot, scenario: Scenario) -> bool:
+    def excess(self, robot: Robot, scenario: Scenario) -> float:
+        """Return by how much a motion exceeds the limits of speed and torque, as a share; 0 or less if it keeps them."""
         torque = np.abs(ideal_log(robot, scenario.trajectory.sample(self.fs)).tau).max(axis=0)
-        return bool((scenario.trajectory.peak_velocity <= self.velocity).all() and (torque <= robot.torque_limits).all())
+        used = np.concatenate([scenario.trajectory.peak_velocity / self.velocity, torque / robot.torque_limits])
+        return float(used.max() - 1)
 
     def _drawn(self, rng: np.random.Generator, robot: Robot) -> Array:
         points = np.zeros((self.moves + 1, robot.n))

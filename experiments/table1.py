@@ -11,18 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.results import summarize
-from identify import (
-    CHAINS,
-    MODELS,
-    Chain,
-    Estimate,
-    MotionLog,
-    PowerModel,
-    Windows,
-    identify,
-    scara,
-)
-from identify.models import AbstractModel
+from identify import CHAINS, MODELS, Chain, Estimate, MotionLog, Windows, identify, identify_each, scara
 from sim.ideal import ideal_log
 from sim.robot import Robot
 from sim.scara import scara_truth
@@ -73,14 +62,6 @@ PAPER: Mapping[str, PaperColumn] = {
     ),
 }
 """Table 1 and section 7.2 of the paper."""
-
-
-def forms(chain: Chain) -> dict[str, tuple[AbstractModel, Chain]]:
-    """Return the three models with `chain`, and the energy form: the power model over windows (Eq. 11, 20)."""
-    return {
-        **{name: (MODELS.create(name), chain) for name in PAPER},
-        "energy": (PowerModel(), replace(chain, operator=Windows())),
-    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,4 +121,10 @@ class Table1:
         }
 
     def _identified(self, chain: Chain) -> dict[str, Estimate]:
-        return {form: identify(self.log, scara(), model, used) for form, (model, used) in forms(chain).items()}
+        """Return the estimates of the three models, and of the energy form: the power model over windows (Eq. 11, 20)."""
+        models = {name: MODELS.create(name) for name in PAPER}
+        windows = replace(chain, operator=Windows())
+        return {
+            **identify_each(self.log, scara(), models, chain),
+            "energy": identify(self.log, scara(), models["power"], windows),
+        }

@@ -53,10 +53,12 @@ from identify.operators import IirLowPass as IirLowPass
 from identify.operators import ModulatingFunctions as ModulatingFunctions
 from identify.operators import Windows as Windows
 from identify.pipeline import identify as identify
+from identify.pipeline import identify_each as identify_each
 from identify.prefilters import PREFILTERS as PREFILTERS
 from identify.prefilters import AbstractPrefilter as AbstractPrefilter
 from identify.prefilters import ButterworthPrefilter as ButterworthPrefilter
 from identify.prefilters import NoPrefilter as NoPrefilter
+from identify.state import State as State
 from identify.system import Status as Status
 from identify.system import System as System
 from identify.torques import AsLogged as AsLogged

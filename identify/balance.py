@@ -46,12 +46,13 @@ class Balance:
 
     def weighted(self) -> Array:
         """Return y and then c + s e, times the weights of their rows, stacked to (..., row + k, time)."""
-        n = self.y.shape[-2]
-        stack = np.empty((*self.y.shape[:-2], n + len(self.addresses), self.y.shape[-1]))
-        np.multiply(self.y, self.weight, out=stack[..., :n, :])
+        n, rates = self.y.shape[-2], self._rates()
+        both = np.empty((*self.y.shape[:-2], n + len(self.addresses), self.y.shape[-1]))
+        np.multiply(self.y, self.weight, out=both[..., :n, :])
         for i, address in enumerate(self.addresses):
-            np.multiply(self._column(address), self.weight[..., address[0], :], out=stack[..., n + i, :])
-        return stack
+            parts = [columns[address] for columns in (self.c, rates) if address in columns]
+            np.multiply(sum(parts[1:], start=parts[0]), self.weight[..., address[0], :], out=both[..., n + i, :])
+        return both
 
     def stack(self, columns: Columns) -> Array:
         """Return `columns`, c or e, in the order of the addresses, shape (..., k, time), zero where there is none."""
@@ -61,8 +62,9 @@ class Balance:
                 stack[..., i, :] = columns[address]
         return stack
 
-    def _column(self, address: tuple[int, str]) -> Array:
-        if address not in self.e:
-            return self.c[address]
-        derivative = self.s(self.e[address])
-        return derivative + self.c[address] if address in self.c else derivative
+    def _rates(self) -> Columns:
+        """Return s e, differentiated in one go."""
+        if not self.e:
+            return {}
+        rates = self.s(np.stack(list(self.e.values()), axis=-2))
+        return {address: rates[..., i, :] for i, address in enumerate(self.e)}

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import final
 
 import numpy as np
@@ -17,6 +18,7 @@ from identify.operators import AbstractOperator, FirLowPass, IirLowPass
 from identify.plugins import PluginTable
 from identify.prefilters import AbstractPrefilter, ButterworthPrefilter, NoPrefilter
 from identify.signals import Signals
+from identify.state import State
 from identify.system import System
 from identify.torques import AbstractAlignment, AbstractTorque, AsLogged, ByChannel
 
@@ -50,8 +52,10 @@ class Chain:
     operator: AbstractOperator
     trim: float | None = None
 
-    def build(self, log: MotionLog | Sequence[MotionLog], basis: Basis, model: AbstractModel) -> System:
-        """Return the linear system of one log, or of several as one fit.
+    def build(self, log: MotionLog | Sequence[MotionLog], basis: Basis, models: Sequence[AbstractModel]) -> list[System]:
+        """Return the linear system of each model, for one log, or for several as one fit.
+
+        What the models have in common, filtered positions and their derivatives, is computed once.
 
         Raises
         ------
@@ -61,19 +65,21 @@ class Chain:
             If a setting does not fit a log's sampling frequency.
         """
         if not isinstance(log, MotionLog):
-            return System.stack([self.build(one, basis, model) for one in log])
+            each = [self.build(one, basis, models) for one in log]
+            return [System.stack(systems) for systems in zip(*each, strict=True)] if each else [System.stack([])]
         if log.n != basis.n:
             raise LogError(f"the log has {log.n} joints, the basis {basis.n}")
         signals = self.signals(log)
-        return self.operator.system(model.balance(basis, signals), self._margin(signals))
+        margin = self._margin(signals)
+        return [self.operator.system(model.balance(basis, signals), margin) for model in models]
 
     def signals(self, log: MotionLog) -> Signals:
-        """Return what the model sees of `log`: prefiltered, differentiated, aligned, weighted."""
-        q = self.prefilter.apply(_time_last(log.q), log.fs)
-        tau = self.prefilter.apply(_time_last(log.tau * np.asarray(log.torque.gain)), log.fs)
-        qd = self.differentiator.derivative(q, log.fs)
-        torque = self.alignment.align(tau, log.torque, log.fs)
-        return Signals(q, qd, torque, self.mask.weight(qd, log.fs), self.differentiator, log.fs)
+        """Return what the models see of `log`: prefiltered, differentiated, aligned, weighted."""
+        fs, s = log.fs, partial(self.differentiator.derivative, fs=log.fs)
+        q = self.prefilter.apply(_time_last(log.q), fs)
+        tau = self.prefilter.apply(_time_last(log.tau * np.asarray(log.torque.gain)), fs)
+        state = State(q, s(q), s)
+        return Signals(state, self.alignment.align(tau, log.torque, fs), self.mask.weight(state.qd, fs), fs)
 
     def halo(self, fs: float, torque: AbstractTorque | None = None) -> float:
         """Return how far [s] a row looks to either side of its instant, at `fs` [Hz]."""

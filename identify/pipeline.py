@@ -1,6 +1,7 @@
-"""The verb of the package."""
+"""The verbs of the package."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 from identify.arrays import Array
 from identify.basis import Basis
@@ -9,6 +10,7 @@ from identify.estimate import Estimate
 from identify.estimators import AbstractEstimator, OrdinaryLeastSquares, Problem
 from identify.models import AbstractModel
 from identify.motion_log import MotionLog
+from identify.system import System
 
 
 def identify(
@@ -50,9 +52,31 @@ def identify(
     IdentificationError
         If the log, a setting, or the motion does not allow an estimate; the message says what to try.
     """
-    chain = chain or idbench_chain()
-    system = chain.build(log, basis, model)
-    problem = Problem(system, rebuild=lambda other: chain.build(other, basis, model), simulate=simulate)
-    if throw:
-        system.check()
-    return (estimator or OrdinaryLeastSquares()).fit(problem)
+    return identify_each(log, basis, {"": model}, chain, estimator, simulate=simulate, throw=throw)[""]
+
+
+def identify_each(
+    log: MotionLog | Sequence[MotionLog],
+    basis: Basis,
+    models: Mapping[str, AbstractModel],
+    chain: Chain | None = None,
+    estimator: AbstractEstimator | None = None,
+    *,
+    simulate: Callable[[Array], MotionLog] | None = None,
+    throw: bool = True,
+) -> dict[str, Estimate]:
+    """Identify with several models, by name, from the same filtered signals; otherwise as `identify`."""
+    chain, estimator = chain or idbench_chain(), estimator or OrdinaryLeastSquares()
+    systems = chain.build(log, basis, list(models.values()))
+    estimates = {}
+    for (name, model), system in zip(models.items(), systems, strict=True):
+        if throw:
+            system.check()
+        rebuild = partial(_rebuilt, chain, basis, model)
+        estimates[name] = estimator.fit(Problem(system, rebuild=rebuild, simulate=simulate))
+    return estimates
+
+
+def _rebuilt(chain: Chain, basis: Basis, model: AbstractModel, log: MotionLog) -> System:
+    (system,) = chain.build(log, basis, [model])
+    return system

@@ -82,7 +82,7 @@ class System:
     @cached_property
     def rank(self) -> npt.NDArray[np.intp]:
         """Numerical rank of W with its columns scaled to unit length, shape (...)."""
-        values, _ = self._directions
+        values = np.linalg.svd(self._scaled, compute_uv=False)
         return np.count_nonzero(values > UNSEEN * values[..., :1], axis=-1)
 
     @cached_property
@@ -94,8 +94,8 @@ class System:
 
     def unseen(self, run: tuple[int, ...] = ()) -> tuple[str, ...]:
         """Return the parameters of `run` that the motion does not show, alone or in some combination."""
-        values, directions = self._directions
-        null = directions[run][values[run] <= UNSEEN * values[run].max()]
+        _, values, directions = np.linalg.svd(self._scaled[run])
+        null = directions[values <= UNSEEN * values.max()]
         share = np.abs(null).max(axis=0, initial=0.0)
         return tuple(name for name, s in zip(self.parameters, share, strict=True) if s > 1e-3)
 
@@ -124,12 +124,11 @@ class System:
             "move every joint, with others standing and moving, or leave these parameters out of the basis"
         )
 
-    @cached_property
-    def _directions(self) -> tuple[Array, Array]:
-        """Singular values (..., p) and right singular vectors (..., p, p) of W with columns of unit length."""
+    @property
+    def _scaled(self) -> Array:
+        """Triangular factor of W with its columns scaled to unit length, shape (..., p, p)."""
         length = np.linalg.norm(self.R_W, axis=-2, keepdims=True)
-        _, values, directions = np.linalg.svd(self.R_W / np.where(length > 0, length, 1.0))
-        return values, directions
+        return self.R_W / np.where(length > 0, length, 1.0)
 
     @classmethod
     def stack(cls, systems: Sequence[Self]) -> Self:

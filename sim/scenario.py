@@ -49,6 +49,9 @@ class Scenario:
         for name in ("fs", "rest"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise ScenarioError(f"{name} = {getattr(self, name)} must be a finite number above 0")
+        if len({len(point) for point in self.waypoints}) != 1:
+            raise ScenarioError("waypoints must all have the same number of joints, at least 1")
+        _ = self.trajectory  # says what is wrong with the motion
 
     @property
     def trajectory(self) -> PointToPoint:

@@ -4,13 +4,14 @@ from abc import ABC, abstractmethod
 from typing import ClassVar, final
 
 from identify.arrays import Array, Columns
+from identify.state import State
 
 
 class AbstractBlock(ABC):
     """Named columns of a robot, linear in its parameters, as the three models need them.
 
-    Every function takes signals of shape (..., joint, time) and returns the columns that are not identically zero,
-    (row of an instant, parameter) -> (..., time). For all states, with s = d/dt,
+    Every function takes a state, signals of shape (..., joint, time), and returns the columns that are not identically
+    zero, (row of an instant, parameter) -> (..., time). For all states, with s = d/dt,
 
         explicit = s momentum + remainder          qd' explicit = s energy + dissipation
 
@@ -26,23 +27,23 @@ class AbstractBlock(ABC):
         """Return the unit of each parameter."""
 
     @abstractmethod
-    def explicit(self, q: Array, qd: Array, qdd: Array) -> Columns:
+    def explicit(self, state: State) -> Columns:
         """Return the columns D(q, qd, qdd) of the joint torques (Eq. 5, 6)."""
 
     @abstractmethod
-    def momentum(self, q: Array, qd: Array) -> Columns:
+    def momentum(self, state: State) -> Columns:
         """Return the columns M_i(q) qd of the momenta, still to be differentiated (Eq. 9)."""
 
     @abstractmethod
-    def remainder(self, q: Array, qd: Array) -> Columns:
+    def remainder(self, state: State) -> Columns:
         """Return the columns R_i(q, qd) of the torques that are not the derivative of a momentum (Eq. 8, 9)."""
 
     @abstractmethod
-    def energy(self, q: Array, qd: Array) -> Columns:
+    def energy(self, state: State) -> Columns:
         """Return the columns h_i(q, qd) of kinetic plus potential energy in row 0, still to be differentiated (Eq. 10)."""
 
     @abstractmethod
-    def dissipation(self, q: Array, qd: Array) -> Columns:
+    def dissipation(self, state: State) -> Columns:
         """Return the columns of the dissipated power qd' Gamma_f in row 0 (Eq. 10)."""
 
 
@@ -50,9 +51,9 @@ class AbstractConservativeBlock(AbstractBlock):
     """A block that stores energy and dissipates none: rigid bodies, rotors, springs."""
 
     @final
-    def dissipation(self, q: Array, qd: Array) -> Columns:
+    def dissipation(self, state: State) -> Columns:
         """Return no columns."""
-        del q, qd
+        del state
         return {}
 
 
@@ -83,31 +84,30 @@ class AbstractFriction(AbstractBlock):
         return (self.unit,) * n
 
     @final
-    def explicit(self, q: Array, qd: Array, qdd: Array) -> Columns:
+    def explicit(self, state: State) -> Columns:
         """Return the force columns: joint j's parameter in row j."""
-        del qdd
-        return self.remainder(q, qd)
+        return self.remainder(state)
 
     @final
-    def momentum(self, q: Array, qd: Array) -> Columns:
+    def momentum(self, state: State) -> Columns:
         """Return no columns."""
-        del q, qd
+        del state
         return {}
 
     @final
-    def remainder(self, q: Array, qd: Array) -> Columns:
+    def remainder(self, state: State) -> Columns:
         """Return the force columns: joint j's parameter in row j."""
-        force = self.force(q, qd)
-        return {(j, name): force[..., j, :] for j, name in enumerate(self.names(q.shape[-2]))}
+        force = self.force(state.q, state.qd)
+        return {(j, name): force[..., j, :] for j, name in enumerate(self.names(state.n))}
 
     @final
-    def energy(self, q: Array, qd: Array) -> Columns:
+    def energy(self, state: State) -> Columns:
         """Return no columns."""
-        del q, qd
+        del state
         return {}
 
     @final
-    def dissipation(self, q: Array, qd: Array) -> Columns:
+    def dissipation(self, state: State) -> Columns:
         """Return qd_j times the force of joint j, in row 0."""
-        power = qd * self.force(q, qd)
-        return {(0, name): power[..., j, :] for j, name in enumerate(self.names(q.shape[-2]))}
+        power = state.qd * self.force(state.q, state.qd)
+        return {(0, name): power[..., j, :] for j, name in enumerate(self.names(state.n))}

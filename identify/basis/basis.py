@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self, final
 
-from identify.arrays import Array, Columns
+from identify.arrays import Columns
 from identify.basis.base import AbstractBlock
 from identify.errors import SettingError
+from identify.state import State
 
 
 @final
@@ -59,25 +60,25 @@ class Basis:
         """Units of the p parameters."""
         return tuple(self._units.values())
 
-    def explicit(self, q: Array, qd: Array, qdd: Array) -> Columns:
+    def explicit(self, state: State) -> Columns:
         """Return the columns of the joint torques (Eq. 5, 6)."""
-        return self._sum(lambda block: block.explicit(q, qd, qdd))
+        return self._sum(lambda block: block.explicit(state))
 
-    def momentum(self, q: Array, qd: Array) -> Columns:
+    def momentum(self, state: State) -> Columns:
         """Return the columns of the momenta (Eq. 9)."""
-        return self._sum(lambda block: block.momentum(q, qd))
+        return self._sum(lambda block: block.momentum(state))
 
-    def remainder(self, q: Array, qd: Array) -> Columns:
+    def remainder(self, state: State) -> Columns:
         """Return the columns of the torques that are no derivative of a momentum (Eq. 8, 9)."""
-        return self._sum(lambda block: block.remainder(q, qd))
+        return self._sum(lambda block: block.remainder(state))
 
-    def energy(self, q: Array, qd: Array) -> Columns:
+    def energy(self, state: State) -> Columns:
         """Return the columns of the energy, in row 0 (Eq. 10)."""
-        return self._sum(lambda block: block.energy(q, qd))
+        return self._sum(lambda block: block.energy(state))
 
-    def dissipation(self, q: Array, qd: Array) -> Columns:
+    def dissipation(self, state: State) -> Columns:
         """Return the columns of the dissipated power, in row 0 (Eq. 10)."""
-        return self._sum(lambda block: block.dissipation(q, qd))
+        return self._sum(lambda block: block.dissipation(state))
 
     def _sum(self, columns: Callable[[AbstractBlock], Columns]) -> Columns:
         return {address: signal for block in self.blocks for address, signal in columns(block).items()}

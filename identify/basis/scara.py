@@ -3,14 +3,13 @@
 from dataclasses import dataclass
 from typing import final
 
-import numpy as np
-
-from identify.arrays import Array, Columns
+from identify.arrays import Columns
 from identify.basis.base import AbstractConservativeBlock
 from identify.basis.basis import Basis
 from identify.basis.coulomb import CoulombFriction
 from identify.basis.viscous import ViscousFriction
 from identify.errors import SettingError
+from identify.state import State
 
 
 @final
@@ -33,11 +32,11 @@ class ScaraLinks(AbstractConservativeBlock):
         """Return kg m^2, four times."""
         return ("kg m^2",) * len(self.names(n))
 
-    def explicit(self, q: Array, qd: Array, qdd: Array) -> Columns:
+    def explicit(self, state: State) -> Columns:
         """Return D (Eq. 5, 6)."""
-        c2, s2 = np.cos(q[..., 1, :]), np.sin(q[..., 1, :])
-        qd1, qd2 = qd[..., 0, :], qd[..., 1, :]
-        qdd1, qdd2 = qdd[..., 0, :], qdd[..., 1, :]
+        c2, s2 = state.cos_sin(1)
+        qd1, qd2 = state.qd[..., 0, :], state.qd[..., 1, :]
+        qdd1, qdd2 = state.qdd[..., 0, :], state.qdd[..., 1, :]
         qdd12, a = qdd1 + qdd2, 2 * qdd1 + qdd2
         b, qd1_squared = qd2 * (2 * qd1 + qd2), qd1 * qd1
         return {
@@ -50,10 +49,10 @@ class ScaraLinks(AbstractConservativeBlock):
             (1, "LMY2"): qd1_squared * c2 - qdd1 * s2,
         }
 
-    def momentum(self, q: Array, qd: Array) -> Columns:
+    def momentum(self, state: State) -> Columns:
         """Return M_i(q) qd (Eq. 9)."""
-        c2, s2 = np.cos(q[..., 1, :]), np.sin(q[..., 1, :])
-        qd1, qd2 = qd[..., 0, :], qd[..., 1, :]
+        c2, s2 = state.cos_sin(1)
+        qd1, qd2 = state.qd[..., 0, :], state.qd[..., 1, :]
         qd12, a = qd1 + qd2, 2 * qd1 + qd2
         return {
             (0, "ZZR1"): qd1,
@@ -65,21 +64,23 @@ class ScaraLinks(AbstractConservativeBlock):
             (1, "LMY2"): -qd1 * s2,
         }
 
-    def remainder(self, q: Array, qd: Array) -> Columns:
+    def remainder(self, state: State) -> Columns:
         """Return R_i(q, qd) = -dE_i/dq (Eq. 8, 9): only joint 2, on whose angle the inertia depends, has one."""
-        b = qd[..., 0, :] * (qd[..., 0, :] + qd[..., 1, :])
-        return {(1, "LMX2"): b * np.sin(q[..., 1, :]), (1, "LMY2"): b * np.cos(q[..., 1, :])}
+        c2, s2 = state.cos_sin(1)
+        b = state.qd[..., 0, :] * (state.qd[..., 0, :] + state.qd[..., 1, :])
+        return {(1, "LMX2"): b * s2, (1, "LMY2"): b * c2}
 
-    def energy(self, q: Array, qd: Array) -> Columns:
+    def energy(self, state: State) -> Columns:
         """Return h_i(q, qd) (Eq. 10), with the corrected h_4."""
-        qd1 = qd[..., 0, :]
-        qd12 = qd1 + qd[..., 1, :]
+        c2, s2 = state.cos_sin(1)
+        qd1 = state.qd[..., 0, :]
+        qd12 = qd1 + state.qd[..., 1, :]
         b = qd1 * qd12
         return {
             (0, "ZZR1"): 0.5 * qd1 * qd1,
             (0, "ZZ2"): 0.5 * qd12 * qd12,
-            (0, "LMX2"): b * np.cos(q[..., 1, :]),
-            (0, "LMY2"): -b * np.sin(q[..., 1, :]),
+            (0, "LMX2"): b * c2,
+            (0, "LMY2"): -b * s2,
         }
 
 

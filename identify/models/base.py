@@ -37,7 +37,7 @@ class AbstractModel(ABC):
             c={address: average(column) for address, column in self.c(basis, signals).items()},
             e={address: average(column) for address, column in self.e(basis, signals).items()},
             weight=self.weight(signals),
-            s=signals.s,
+            s=signals.state.s,
             fs=signals.fs,
             parameters=basis.parameters,
         )

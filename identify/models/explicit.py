@@ -20,7 +20,7 @@ class ExplicitModel(AbstractModel):
 
     def c(self, basis: Basis, signals: Signals) -> Columns:
         """Return D(q, qd, qdd)."""
-        return basis.explicit(signals.q, signals.qd, signals.qdd)
+        return basis.explicit(signals.state)
 
     def e(self, basis: Basis, signals: Signals) -> Columns:
         """Return no columns."""

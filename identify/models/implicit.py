@@ -20,11 +20,11 @@ class ImplicitModel(AbstractModel):
 
     def c(self, basis: Basis, signals: Signals) -> Columns:
         """Return R(q, qd)."""
-        return basis.remainder(signals.q, signals.qd)
+        return basis.remainder(signals.state)
 
     def e(self, basis: Basis, signals: Signals) -> Columns:
         """Return M_i(q) qd."""
-        return basis.momentum(signals.q, signals.qd)
+        return basis.momentum(signals.state)
 
     def weight(self, signals: Signals) -> Array:
         """Return the weight of each joint for its own row."""

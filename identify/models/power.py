@@ -18,15 +18,15 @@ class PowerModel(AbstractModel):
 
     def y(self, signals: Signals) -> Array:
         """Return qd' tau."""
-        return signals.torque.power(signals.q, signals.qd)
+        return signals.torque.power(signals.state.q, signals.state.qd)
 
     def c(self, basis: Basis, signals: Signals) -> Columns:
         """Return the dissipated power."""
-        return basis.dissipation(signals.q, signals.qd)
+        return basis.dissipation(signals.state)
 
     def e(self, basis: Basis, signals: Signals) -> Columns:
         """Return the energies h(q, qd)."""
-        return basis.energy(signals.q, signals.qd)
+        return basis.energy(signals.state)
 
     def weight(self, signals: Signals) -> Array:
         """Return the product of the joints' weights: one row holds the power of all of them."""

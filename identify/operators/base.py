@@ -61,11 +61,11 @@ class AbstractOperator(ABC):
         y, columns, valid, lag = self.apply(balance, grid)
         row = [address[0] for address in balance.addresses]
         parameter = [balance.parameters.index(address[1]) for address in balance.addresses]
-        W = np.zeros((*runs, grid.count, n, len(balance.parameters)))
-        W[..., row, parameter] = np.swapaxes(columns * valid[..., row, :], -1, -2)
+        W = np.zeros((*runs, n, len(balance.parameters), grid.count))
+        W[..., row, parameter, :] = columns * valid[..., row, :]
         return System(
             Y=np.swapaxes(y * valid, -1, -2).reshape(*runs, -1),
-            W=W.reshape(*runs, grid.count * n, -1),
+            W=np.moveaxis(W, -1, -3).reshape(*runs, grid.count * n, -1),
             valid=np.swapaxes(valid, -1, -2).reshape(*runs, -1),
             time=np.repeat((grid.first + grid.step * np.arange(grid.count) + lag) / fs, n),
             group=np.tile(np.arange(n), grid.count),

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
-from scipy import signal
 
 from identify.arrays import Array
 from identify.errors import LogError
@@ -39,12 +38,22 @@ class Grid:
     def weighted_sums(self, x: Array, weights: Array, before: int) -> Array:
         """Return sum_j weights[j] x[k - before + j] at the samples k of the rows, shape (..., count).
 
-        Only these are computed. `before` samples must exist ahead of the first row, and len(weights) - before behind
-        the last one.
+        Only these are computed: cut into frames of `step` samples, every sum is that of a few neighbouring frames, each
+        multiplied with its part of the weights. `before` samples must exist ahead of the first row, and
+        len(weights) - before behind the last one.
         """
-        start, taps = self.first - before, len(weights)
-        delay = -(-(taps - 1) // self.step)
-        kernel = np.concatenate([np.zeros(delay * self.step - (taps - 1)), weights[::-1]])
-        stop = start + (self.count - 1) * self.step + taps
-        sums = signal.upfirdn(kernel, x[..., start:stop], up=1, down=self.step, axis=-1)
-        return sums[..., delay : delay + self.count]
+        parts = -(-len(weights) // self.step)
+        frames = self.count + parts - 1
+        W = np.zeros(parts * self.step)
+        W[: len(weights)] = weights
+        start, length = self.first - before, frames * self.step
+        stretch = x[..., start : start + length]
+        if stretch.shape[-1] < length:  # beyond the last row's weights, where W is zero
+            pad = [(0, 0)] * (x.ndim - 1) + [(0, length - stretch.shape[-1])]
+            stretch = np.pad(stretch, pad)
+        cut = np.swapaxes(stretch.reshape(*x.shape[:-1], frames, self.step), -1, -2)
+        products = np.matmul(W.reshape(parts, self.step), cut)
+        sums = products[..., 0, : self.count].copy()
+        for i in range(1, parts):
+            sums += products[..., i, i : i + self.count]
+        return sums

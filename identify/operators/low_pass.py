@@ -4,7 +4,7 @@ from abc import abstractmethod
 from math import ceil, floor
 from typing import final
 
-from scipy import ndimage
+import numpy as np
 
 from identify.arrays import Array
 from identify.balance import Balance
@@ -26,11 +26,11 @@ class AbstractLowPass(AbstractOperator):
     @final
     def apply(self, balance: Balance, grid: Grid) -> Rows:
         """Return f_p of w B tau and of w (c + s e); a row is void if all it looks at is masked."""
-        filtered = self.decimate(balance.weighted(), balance.fs, grid)
-        reach = ceil(self.halo(balance.fs) * balance.fs - 1e-9)
-        seen = ndimage.maximum_filter1d(balance.weight, 2 * reach + 1, axis=-1, mode="nearest")
-        n = balance.y.shape[-2]
-        return Rows(filtered[..., :n, :], filtered[..., n:, :], seen[..., grid.samples] > 0, 0.0)
+        fs, n = balance.fs, balance.y.shape[-2]
+        filtered = self.decimate(balance.weighted(), fs, grid)
+        reach = ceil(self.halo(fs) * fs - 1e-9)
+        seen = grid.weighted_sums(balance.weight, np.ones(2 * reach + 1), reach)
+        return Rows(filtered[..., :n, :], filtered[..., n:, :], seen > 0, 0.0)
 
 
 def decimation(share: float, cutoff: float, fs: float) -> int:

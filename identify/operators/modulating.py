@@ -29,7 +29,7 @@ class ModulatingFunctions(AbstractWeakForm):
 
     support: float = 0.4
     spacing: float = 0.1
-    degree: int = 4
+    degree: int = 6
 
     def __post_init__(self) -> None:
         require_positive(support=self.support, spacing=self.spacing)

@@ -3,7 +3,7 @@
 from abc import abstractmethod
 from typing import NamedTuple, final
 
-from scipy import ndimage
+import numpy as np
 
 from identify.arrays import Array
 from identify.balance import Balance
@@ -44,6 +44,6 @@ class AbstractWeakForm(AbstractOperator):
         before = (length - 1) // 2
         columns = grid.weighted_sums(balance.stack(balance.c), integral, before)
         columns += grid.weighted_sums(balance.stack(balance.e), derivative, before)
-        kept = ndimage.minimum_filter1d(balance.weight, length, axis=-1, mode="nearest", origin=before - length // 2)
+        touched = grid.weighted_sums(1 - balance.weight, np.ones(length), before)
         y = grid.weighted_sums(balance.y, integral, before)
-        return Rows(y, columns, kept[..., grid.samples] == 1, (length - 1) / 2 - before)
+        return Rows(y, columns, touched == 0, (length - 1) / 2 - before)

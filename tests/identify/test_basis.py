@@ -16,6 +16,7 @@ from identify import (
     Columns,
     CoulombFriction,
     ScaraLinks,
+    State,
     ViscousFriction,
     scara,
 )
@@ -25,7 +26,7 @@ from sim.inverse_dynamics import coulomb_torque, inverse_dynamics
 STATES = np.random.default_rng(5).uniform(-3, 3, (3, 2, 300))
 """q, qd, qdd of 300 random instants, shape (joint, time) each."""
 
-PAPER_ORDER = "ZZR1 Fv1 Fs1 ZZ2 LMX2 LMY2 Fv2 Fs2".split()
+PAPER_ORDER = ["ZZR1", "Fv1", "Fs1", "ZZ2", "LMX2", "LMY2", "Fv2", "Fs2"]
 EPS = 1e-30
 
 
@@ -37,26 +38,34 @@ def matrix(columns, rows, parameters):
     return dense
 
 
-def rate(columns, q, qd, qdd):
-    """Return d/dt of columns(q, qd), by a complex step: exact to rounding, with no difference taken."""
-    return {address: np.imag(signal) / EPS for address, signal in columns(q + 1j * EPS * qd, qd + 1j * EPS * qdd).items()}
+def state(q, qd, qdd):
+    return State(q, qd, lambda _: qdd)
+
+
+AT = state(*STATES)
+
+
+def rate(columns):
+    """Return d/dt of columns along the random states, by a complex step: exact to rounding, with no difference taken."""
+    q, qd, qdd = STATES
+    ahead = state(q + 1j * EPS * qd, qd + 1j * EPS * qdd, None)
+    return {address: np.imag(signal) / EPS for address, signal in columns(ahead).items()}
 
 
 def defects(block):
     """Return by how much the two identities between the five column functions fail at the random states."""
-    q, qd, qdd = STATES
     names = list(block.names(2))
-    D = matrix(block.explicit(q, qd, qdd), 2, names)
-    implicit = matrix(rate(block.momentum, q, qd, qdd), 2, names) + matrix(block.remainder(q, qd), 2, names)
-    power = matrix(rate(block.energy, q, qd, qdd), 1, names) + matrix(block.dissipation(q, qd), 1, names)
-    return np.abs(D - implicit).max(), np.abs(np.einsum("jk,kjp->kp", qd, D) - power[:, 0]).max()
+    D = matrix(block.explicit(AT), 2, names)
+    implicit = matrix(rate(block.momentum), 2, names) + matrix(block.remainder(AT), 2, names)
+    power = matrix(rate(block.energy), 1, names) + matrix(block.dissipation(AT), 1, names)
+    return np.abs(D - implicit).max(), np.abs(np.einsum("jk,kjp->kp", AT.qd, D) - power[:, 0]).max()
 
 
 def mujoco_defect(basis, robot, truth):
     """Return by how much D X differs from MuJoCo's inverse dynamics plus the friction law."""
     q, qd, qdd = (x.T for x in STATES)
     tau = inverse_dynamics(robot, q, qd, qdd) + coulomb_torque(robot, qd)
-    D = matrix(basis.explicit(*STATES), 2, list(basis.parameters))
+    D = matrix(basis.explicit(AT), 2, list(basis.parameters))
     return np.abs(D @ truth - tau).max()
 
 
@@ -77,12 +86,11 @@ def test_momentum_columns_give_the_mass_matrix_times_velocity(truth):
     coupled = LMX2 * np.cos(q[1]) - LMY2 * np.sin(q[1])
     p2 = (ZZ2 + coupled) * qd[0] + ZZ2 * qd[1]
     p1 = (ZZR1 + ZZ2 + 2 * coupled) * qd[0] + (ZZ2 + coupled) * qd[1]
-    momenta = matrix(scara().momentum(q, qd), 2, PAPER_ORDER) @ truth
+    momenta = matrix(scara().momentum(AT), 2, PAPER_ORDER) @ truth
     np.testing.assert_allclose(momenta, np.stack([p1, p2], axis=-1), atol=1e-12)
 
 
-FUNCTIONS = {"explicit": 3, "momentum": 2, "remainder": 2, "energy": 2, "dissipation": 2}
-"""Column functions, and how many of q, qd, qdd each takes."""
+FUNCTIONS = ["explicit", "momentum", "remainder", "energy", "dissipation"]
 
 
 @dataclass(frozen=True)
@@ -92,9 +100,9 @@ class Mutant(AbstractBlock):
     function: str
     change: Callable[[Columns, Array], Columns]
 
-    def _columns(self, function, *state):
-        columns = getattr(scara(), function)(*state)
-        return self.change(columns, state[1]) if function == self.function else columns
+    def _columns(self, function, state):
+        columns = getattr(scara(), function)(state)
+        return self.change(columns, state.qd) if function == self.function else columns
 
     def names(self, n):
         return scara().parameters
@@ -102,25 +110,25 @@ class Mutant(AbstractBlock):
     def units(self, n):
         return scara().units
 
-    def explicit(self, q, qd, qdd):
-        return self._columns("explicit", q, qd, qdd)
+    def explicit(self, state):
+        return self._columns("explicit", state)
 
-    def momentum(self, q, qd):
-        return self._columns("momentum", q, qd)
+    def momentum(self, state):
+        return self._columns("momentum", state)
 
-    def remainder(self, q, qd):
-        return self._columns("remainder", q, qd)
+    def remainder(self, state):
+        return self._columns("remainder", state)
 
-    def energy(self, q, qd):
-        return self._columns("energy", q, qd)
+    def energy(self, state):
+        return self._columns("energy", state)
 
-    def dissipation(self, q, qd):
-        return self._columns("dissipation", q, qd)
+    def dissipation(self, state):
+        return self._columns("dissipation", state)
 
 
 def every_column():
     """Return (function, address) of each column of the SCARA."""
-    return [(f, address) for f, takes in FUNCTIONS.items() for address in getattr(scara(), f)(*STATES[:takes])]
+    return [(f, address) for f in FUNCTIONS for address in getattr(scara(), f)(AT)]
 
 
 def caught(block, robot, truth):
@@ -151,7 +159,7 @@ def test_a_missing_column_is_caught(function, address, robot, truth):
 
 @pytest.mark.parametrize("function", FUNCTIONS)
 def test_swapped_columns_are_caught(function, robot, truth):
-    columns = getattr(scara(), function)(*STATES[: FUNCTIONS[function]])
+    columns = getattr(scara(), function)(AT)
     for a, b in combinations(columns, 2):
         if a[0] == b[0] and not np.array_equal(columns[a], columns[b]):
             assert caught(Mutant(function, lambda c, qd, a=a, b=b: {**c, a: c[b], b: c[a]}), robot, truth), (a, b)

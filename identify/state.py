@@ -1,0 +1,49 @@
+"""How the joints move: what the column functions of a basis are functions of."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from identify.arrays import Array
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Positions, velocities and accelerations of n joints, with time as the last axis.
+
+    What several column functions need of it is computed once, when the first of them asks.
+
+    Parameters
+    ----------
+    q, qd : Array, shape (..., joint, time)
+        [rad], [rad/s].
+    s : callable
+        d/dt along the last axis; only asked for accelerations.
+    """
+
+    q: Array
+    qd: Array
+    s: Callable[[Array], Array]
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return int(self.q.shape[-2])
+
+    @cached_property
+    def qdd(self) -> Array:
+        """Joint accelerations [rad/s^2], shape (..., joint, time); only the explicit model asks for them."""
+        return self.s(self.qd)
+
+    def cos_sin(self, joint: int) -> tuple[Array, Array]:
+        """Return cosine and sine of the position of `joint`, from 0, shape (..., time) each."""
+        if joint not in self._turned:
+            angle = self.q[..., joint, :]
+            self._turned[joint] = np.cos(angle), np.sin(angle)
+        return self._turned[joint]
+
+    @cached_property
+    def _turned(self) -> dict[int, tuple[Array, Array]]:
+        return {}

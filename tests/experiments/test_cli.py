@@ -1,0 +1,176 @@
+"""The command line as a user meets it: answers, files, wrong input, interruption."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+import experiments.recording.table1
+from experiments.cli import main
+from experiments.table1 import SCENARIO
+from identify.log_file import read_log
+from sim.scenario import Scenario
+
+
+@pytest.fixture
+def out(tmp_path):
+    return tmp_path / "results"
+
+
+def complaint(capfd, *args):
+    """Run the command line on wrong input; return its one line of complaint."""
+    assert main(list(args)) == 2
+    lines = capfd.readouterr().err.strip().splitlines()
+    assert len(lines) == 1
+    assert lines[0].startswith("idbench: ")
+    return lines[0]
+
+
+def test_table1_prints_and_writes_everything(out, capsys):
+    assert main(["table1", "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    for text in (
+        "explicit model",
+        "implicit model",
+        "power model",
+        "energy form",
+        "0.649",
+        "3.502",
+        "Cond(W)",
+        "rows",
+        "all three",
+    ):
+        assert text in printed
+    assert sorted(path.name for path in out.iterdir()) == ["log.parquet", "recording.rrd", "summary.json"]
+    summary = json.loads((out / "summary.json").read_text())
+    assert (summary["experiment"], summary["seed"], summary["chain"]) == ("table1", 0, "idbench")
+    assert summary["models"]["explicit"]["rows"] == 800
+    assert Scenario.from_dict(summary["scenario"]) == Scenario.load(SCENARIO)
+    assert read_log(out / "log.parquet").samples == 4600
+    assert list(out.parent.iterdir()) == [out]
+
+
+def test_table1_repeats_itself(tmp_path, capsys):
+    for name in ("a", "b"):
+        main(["table1", "--out", str(tmp_path / name), "--seed", "5"])
+    a, b = (json.loads((tmp_path / name / "summary.json").read_text()) for name in ("a", "b"))
+    assert a == b
+    assert a["seed"] == 5
+    assert a["scenario"]["waypoints"] != list(map(list, Scenario.load(SCENARIO).waypoints))
+
+
+def test_one_chain_may_be_asked_for(out, capsys):
+    assert main(["table1", "--out", str(out), "--chain", "paper"]) == 0
+    assert "idbench X" not in capsys.readouterr().out
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["chain"] == "paper"
+    assert summary["models"]["explicit"]["relative_error_percent"][0] > 0.01
+    assert "idbench_chain" not in summary
+
+
+def test_an_unknown_chain_lists_the_known_and_leaves_nothing(out, capfd):
+    line = complaint(capfd, "table1", "--out", str(out), "--chain", "papre")
+    assert "no 'papre' among the chains (did you mean 'paper'?); known: paper, idbench" in line
+    assert not out.exists()
+    assert not list(out.parent.iterdir())
+
+
+def test_an_output_folder_that_cannot_be_written_is_told(tmp_path, capfd):
+    (tmp_path / "file").write_text("precious")
+    assert "is a file, not a folder" in complaint(capfd, "table1", "--out", str(tmp_path / "file"))
+    assert "cannot write to" in complaint(capfd, "table1", "--out", str(tmp_path / "file" / "below"))
+    assert (tmp_path / "file").read_text() == "precious"
+
+
+def test_a_failure_half_way_leaves_earlier_results_whole(out, monkeypatch, capfd):
+    main(["table1", "--out", str(out), "--chain", "paper"])
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+
+    def full(*args):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(experiments.recording.table1, "record_table1", full)
+    capfd.readouterr()
+    assert "No space left on device" in complaint(capfd, "table1", "--out", str(out))
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+    assert list(out.parent.iterdir()) == [out]
+
+
+def test_interruption_is_quiet_and_leaves_nothing(out, capfd, monkeypatch):
+    def interrupted(*args):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(experiments.recording.table1, "record_table1", interrupted)
+    assert main(["table1", "--out", str(out)]) == 130
+    assert "interrupted" in capfd.readouterr().err
+    assert not list(out.parent.iterdir())
+
+
+def test_a_real_interrupt_ends_the_process_without_a_traceback(tmp_path):
+    """Ctrl-C at some instant of a long search."""
+    code = "import sys; from experiments.search import Search; from experiments import cli\n"
+    code += "cli._search = lambda seed: Search(seed=seed, tolerance=0.0, rounds=10**6).run(cli.Robot.load('scara'), print)\n"
+    code += "sys.exit(cli.main(['table1', '--seed', '1', '--out', 'results']))"
+    process = subprocess.Popen(
+        [sys.executable, "-uc", code], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout.readline()  # the search is under way
+    time.sleep(0.2)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert err.strip() == "idbench: interrupted; nothing was written"
+    assert not list(tmp_path.iterdir())
+
+
+def test_search_writes_a_scenario(tmp_path, capsys):
+    path = tmp_path / "found.toml"
+    assert main(["search", "--seed", "5", "--out", str(path)]) == 0
+    found = Scenario.load(path)
+    assert found.seed == 5
+    assert main(["search", "--seed", "5"]) == 0
+    assert path.read_text() in capsys.readouterr().out
+
+
+def test_search_says_where_it_cannot_write(tmp_path, capfd):
+    assert "cannot write" in complaint(capfd, "search", "--seed", "5", "--out", str(tmp_path / "nowhere" / "found.toml"))
+
+
+def test_list_shows_every_plugin_with_a_line(capsys):
+    assert main(["list"]) == 0
+    printed = capsys.readouterr().out
+    for name in (
+        "scara",
+        "coulomb",
+        "explicit",
+        "butterworth",
+        "central",
+        "reversal",
+        "windows",
+        "modulating",
+        "idbench",
+        "OLS",
+    ):
+        assert name in printed
+
+
+def test_view_needs_a_recording(tmp_path, capfd):
+    assert "there is no recording" in complaint(capfd, "view", str(tmp_path))
+
+
+def test_wrong_words_exit_with_2(capfd):
+    with pytest.raises(SystemExit) as ended:
+        main(["tabel1"])
+    assert ended.value.code == 2
+
+
+def test_a_reader_that_goes_away_is_no_error(tmp_path):
+    code = "import sys; from experiments.cli import main; sys.exit(main(['list']))"
+    with subprocess.Popen(
+        [sys.executable, "-c", code], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        process.stdout.close()
+        assert process.stderr.read() == ""

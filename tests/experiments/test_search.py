@@ -1,0 +1,72 @@
+"""The search finds the paper's condition numbers from any seed, the same for the same seed, and keeps the robot's limits."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.errors import ExperimentError
+from experiments.search import Search
+from experiments.table1 import SCENARIO, Table1
+from sim.scenario import Scenario
+
+
+def test_the_scenario_that_ships_is_what_its_command_finds(robot):
+    """Numbers to 1e-9 rad: another machine may round Cond(W) differently, but must take the same way."""
+    shipped = Scenario.load(SCENARIO)
+    assert f"--seed {shipped.seed}" in shipped.origin
+    found = Search(seed=shipped.seed).run(robot)
+    assert found.origin == shipped.origin
+    np.testing.assert_allclose(found.waypoints, shipped.waypoints, atol=1e-9)
+    np.testing.assert_allclose(found.durations, shipped.durations, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", [11, 12, 13, 14, 15])
+def test_other_trajectories_of_the_search_are_identified_as_well(seed, robot, truth):
+    """Five seeds that nothing was chosen by: cond within 10 % of the paper's, all 24 errors within 0.01 %."""
+    scenario = Search(seed=seed).run(robot)
+    estimates = Table1(scenario, ("idbench",)).estimates["idbench"]
+    for form, cond, rows in (("explicit", 28, 800), ("implicit", 28, 800), ("power", 93, 400)):
+        assert estimates[form].condition_number == pytest.approx(cond, rel=0.1)
+        assert estimates[form].rows == rows
+        assert estimates[form].relative_error_percent(truth).max() < 0.01
+    assert estimates["energy"].relative_error_percent(truth).max() < 0.01
+
+
+def test_limits_are_kept(robot):
+    search = Search(seed=3, velocity=5.0)
+    scenario = search.run(robot)
+    points = np.array(scenario.waypoints)
+    assert (np.abs(points) <= robot.ranges[:, 1] - search.clearance).all()
+    assert (np.abs(np.diff(points, axis=0)) >= search.smallest_move).all()
+    assert (scenario.trajectory.peak_velocity <= 5.0).all()
+    assert (np.abs(Table1(scenario, ()).log.tau) <= robot.torque_limits).all()
+    assert sum(scenario.durations) == pytest.approx(40.0)
+
+
+def test_a_torque_limit_turns_motions_away(robot):
+    class Weak:
+        name, n, ranges, model = robot.name, robot.n, robot.ranges, robot.model
+        torque_limits = np.array([30.0, 1.5])
+
+    tau = np.abs(Table1(Search(seed=3, tolerance=0.05).run(Weak()), ()).log.tau).max(axis=0)
+    assert (tau <= Weak.torque_limits).all()
+    assert (np.abs(Table1(Search(seed=3, tolerance=0.05).run(robot), ()).log.tau).max(axis=0) > Weak.torque_limits).any()
+
+
+def test_it_never_sees_an_error_of_identification(robot):
+    """Another truth, the same motion: with twice the friction and inertia the search takes the same way."""
+    import mujoco
+
+    import models
+    from sim.robot import Robot
+
+    spec = mujoco.MjSpec.from_file(str(models.path("scara")))
+    spec.joint("joint1").damping, spec.joint("joint1").armature = [0.1, 0, 0], 0.5
+    other = Robot("scara", spec.compile())
+    assert Search(seed=4).run(other).waypoints == Search(seed=4).run(robot).waypoints
+
+
+def test_it_gives_up_with_advice(robot):
+    with pytest.raises(ExperimentError, match=r"in 2 rounds \(closest: .*; try another seed"):
+        replace(Search(), tolerance=1e-9, rounds=2).run(robot)

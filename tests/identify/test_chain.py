@@ -1,0 +1,149 @@
+"""The whole way from a log to X: recovery, several logs, batches, sampling frequencies, wrong input."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identify import (
+    CHAINS,
+    MODELS,
+    OPERATORS,
+    PREFILTERS,
+    Basis,
+    Chain,
+    CoulombFriction,
+    ExcitationError,
+    ExplicitModel,
+    IdentificationError,
+    LogError,
+    MotionLog,
+    PowerModel,
+    SettingError,
+    System,
+    TorqueChannel,
+    ViscousFriction,
+    idbench_chain,
+    identify,
+    paper_chain,
+    scara,
+)
+from sim.ideal import ideal_log
+
+
+def error(log, model, chain, truth, **options):
+    return identify(log, scara(), model, chain, **options).relative_error_percent(truth)
+
+
+@pytest.mark.parametrize("operator", OPERATORS)
+@pytest.mark.parametrize("model", MODELS)
+def test_every_model_with_every_operator_recovers_the_truth(model, operator, log, truth):
+    """Noise-free: 0.01 %, but for the recursive filter, whose ripple-free stop band the others do not need."""
+    chain = replace(idbench_chain(), operator=OPERATORS.create(operator))
+    assert error(log, MODELS.create(model), chain, truth).max() < 0.01
+
+
+@pytest.mark.parametrize("prefilter", PREFILTERS)
+def test_a_wide_prefilter_is_harmless(prefilter, log, truth):
+    """A prefilter of 0.8 of the Nyquist frequency leaves 0.01 % (measured: 0.001 %)."""
+    chosen = PREFILTERS.create(prefilter)
+    wide = replace(chosen, cutoff=40.0) if prefilter == "butterworth" else chosen
+    assert error(log, ExplicitModel(), replace(idbench_chain(), prefilter=wide), truth).max() < 0.01
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_same_chain_serves_a_log_at_ten_times_the_frequency(model, table1, truth):
+    fast = ideal_log(table1.robot, table1.scenario.trajectory.sample(1000.0))
+    chain = replace(idbench_chain(), trim=table1.scenario.rest)
+    slow, quick = (identify(log, scara(), MODELS.create(model), chain) for log in (table1.log, fast))
+    assert slow.rows == quick.rows
+    np.testing.assert_allclose(slow.condition_number, quick.condition_number, rtol=0.01)
+    np.testing.assert_allclose(slow.X, quick.X, rtol=1e-5)
+    assert quick.relative_error_percent(truth).max() < 0.001
+
+
+def test_several_logs_are_one_fit(log, truth):
+    half = log.samples // 2
+    halves = [MotionLog(log.fs, log.q[part], log.tau[part], log.torque) for part in (slice(half), slice(half, None))]
+    both = identify(halves, scara(), PowerModel())
+    parts = [identify(part, scara(), PowerModel(), throw=False) for part in halves]
+    assert both.rows == sum(part.rows for part in parts)
+    assert both.relative_error_percent(truth).max() < 0.01
+
+
+def test_several_logs_may_have_several_frequencies_and_channels(table1, log, truth):
+    fast = ideal_log(table1.robot, table1.scenario.trajectory.sample(500.0))
+    scaled = MotionLog(500.0, fast.q, fast.tau / [2.0, 3.0], TorqueChannel("instantaneous", gain=(2.0, 3.0)))
+    assert error([log, scaled], ExplicitModel(), idbench_chain(), truth).max() < 0.01
+
+
+@pytest.mark.parametrize("name", CHAINS)
+def test_a_batch_is_identified_run_by_run_with_the_same_bits(name, log):
+    """Other runs in the batch, failed ones among them, change no bit of a run."""
+    q = np.stack([log.q, np.zeros_like(log.q), log.q[::-1]])
+    tau = np.stack([log.tau, log.tau, -log.tau[::-1]])
+    together = identify(MotionLog(log.fs, q, tau, log.torque), scara(), PowerModel(), CHAINS.create(name), throw=False)
+    for run in (0, 2):
+        alone = identify(MotionLog(log.fs, q[run], tau[run], log.torque), scara(), PowerModel(), CHAINS.create(name))
+        np.testing.assert_array_equal(together.X[run], alone.X)
+        np.testing.assert_array_equal(together.covariance[run], alone.covariance)
+    assert np.isnan(together.X[1]).all()
+
+
+def test_a_joint_that_never_moves_is_told_with_the_parameters_it_hides(table1):
+    points = np.array(table1.scenario.waypoints)
+    points[:, 1] = 0.3
+    still = replace(table1.scenario, waypoints=tuple(map(tuple, points)))
+    log = ideal_log(table1.robot, still.trajectory.sample(100.0))
+    with pytest.raises(ExcitationError, match=r"does not show ZZR1, ZZ2, LMX2, LMY2, Fv2, Fs2: W has rank 3 of 8"):
+        identify(log, scara(), ExplicitModel())
+
+
+def test_a_robot_at_rest_is_refused(log):
+    rest = MotionLog(100.0, np.zeros((1000, 2)), np.zeros((1000, 2)), TorqueChannel("instantaneous"))
+    with pytest.raises(IdentificationError, match="0 rows for 8 parameters"):
+        identify(rest, scara(), ExplicitModel())
+
+
+def test_trim_must_cover_what_the_stages_look_at(log):
+    with pytest.raises(SettingError, match=r"trim = 0\.1 s is shorter than the 0\.39 s that this chain looks"):
+        identify(log, scara(), ExplicitModel(), replace(idbench_chain(), trim=0.1))
+
+
+@pytest.mark.parametrize(
+    ("samples", "chain", "message"),
+    [
+        (60, idbench_chain(), r"the log has 60 samples .* needs at least 88"),
+        (12, paper_chain(), "the log has 12 samples, the filter needs more than"),
+        (500, paper_chain(), r"the log has 500 samples .* needs at least 572"),
+    ],
+)
+def test_short_logs_are_refused(samples, chain, message, log):
+    short = MotionLog(log.fs, log.q[:samples], log.tau[:samples], log.torque)
+    with pytest.raises(LogError, match=message):
+        identify(short, scara(), ExplicitModel(), chain)
+
+
+def test_a_log_of_other_joints_is_refused(log):
+    with pytest.raises(LogError, match="the log has 1 joints, the basis 2"):
+        identify(MotionLog(100.0, log.q[:, :1], log.tau[:, :1], log.torque), scara(), ExplicitModel())
+
+
+def test_a_chain_too_slow_for_the_log_is_refused(log):
+    crawling = MotionLog(8.0, log.q, log.tau, log.torque)
+    with pytest.raises(SettingError, match=r"operator cutoff = 5 Hz is not below the Nyquist frequency, 4 Hz"):
+        identify(crawling, scara(), ExplicitModel())
+
+
+def test_a_basis_may_be_part_of_a_robot(log):
+    """Parameters left out cost no error: the friction of a robot whose links are known."""
+    basis = Basis(2, (ViscousFriction(), CoulombFriction()))
+    assert identify(log, basis, ExplicitModel()).parameters == ("Fv1", "Fv2", "Fs1", "Fs2")
+
+
+def test_chain_is_what_it_says(log):
+    chain: Chain = idbench_chain()
+    (built,) = chain.build(log, scara(), [PowerModel()])
+    assert isinstance(built, System)
+    assert built.time[0] >= chain.halo(100.0)
+    assert built.time[-1] <= log.t[-1] - chain.halo(100.0)

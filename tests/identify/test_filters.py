@@ -1,0 +1,87 @@
+"""Filters against the closed forms of their gain, and their limits."""
+
+import numpy as np
+import pytest
+from scipy.special import eval_chebyt
+
+from identify import ButterworthPrefilter, FirLowPass, IirLowPass, LogError, SettingError
+from identify.operators.grid import Grid
+
+FS = 100.0
+T = np.arange(4000) / FS
+MIDDLE = slice(1500, 2500)
+
+
+def gain_and_phase(y, f):
+    """Return the complex gain of a sine of frequency f [Hz] in the middle of y."""
+    t = T[MIDDLE]
+    c, s = np.linalg.lstsq(np.stack([np.cos(2 * np.pi * f * t), np.sin(2 * np.pi * f * t)], axis=-1), y[MIDDLE], rcond=None)[0]
+    return complex(s, c)
+
+
+def warped(f):
+    """The analogue frequency that the bilinear transform maps f to."""
+    return np.tan(np.pi * f / FS)
+
+
+@pytest.mark.parametrize("f", [1.0, 4.0, 8.0, 12.0])
+def test_butterworth_forward_backward_has_its_gain_squared_and_no_phase(f):
+    expected = 1 / (1 + (warped(f) / warped(8.0)) ** 8)  # |H|^2 of order 4
+    out = ButterworthPrefilter(8.0, order=4).apply(np.sin(2 * np.pi * f * T), FS)
+    assert gain_and_phase(out, f) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("f", [0.5, 2.0, 4.0, 4.5, 5.0])
+def test_iir_low_pass_is_matlabs_chebyshev_forward_backward(f):
+    epsilon_squared = 10 ** (0.05 / 10) - 1
+    expected = 1 / (1 + epsilon_squared * eval_chebyt(8, warped(f) / warped(4.0)) ** 2)
+    out = IirLowPass(4.0).decimate(np.sin(2 * np.pi * f * T), FS, Grid(0, 1, 4000))
+    assert gain_and_phase(out, f) == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("fs", [100.0, 250.0, 1000.0])
+@pytest.mark.parametrize(
+    ("f", "low", "high"), [(0.0, 0.9999, 1.0001), (2.4, 0.996, 1.004), (5.0, 0.49, 0.51), (7.7, -0.004, 0.004)]
+)
+def test_fir_low_pass_has_its_cutoff_and_transition_in_hertz(fs, f, low, high):
+    """Flat to -50 dB below cutoff - transition/2, half at the cut-off, below -50 dB above, whatever fs."""
+    t = np.arange(int(10 * fs)) / fs
+    out = FirLowPass(5.0, 5.0).decimate(np.cos(2 * np.pi * f * (t - 5.0)), fs, Grid(int(5 * fs), 1, 1))
+    assert low < out[0] < high
+
+
+@pytest.mark.parametrize(
+    ("operator", "fs", "step"),
+    [(FirLowPass(5.0), 100, 10), (FirLowPass(5.0), 1000, 100), (IirLowPass(4.0), 100, 10), (IirLowPass(4.0), 1000, 100)],
+)
+def test_decimation_follows_the_papers_rules(operator, fs, step):
+    """n_d = (fs/2)/f_fp for FIR, 0.8 (fs/2)/f_fp for IIR (section 6.2)."""
+    assert operator.step(fs) == step
+
+
+@pytest.mark.parametrize(
+    "make",
+    [lambda: ButterworthPrefilter(50.0).apply(T, FS), lambda: IirLowPass(50.0).halo(FS), lambda: FirLowPass(60.0).halo(FS)],
+)
+def test_cutoffs_at_or_above_nyquist_are_refused(make):
+    with pytest.raises(SettingError, match=r"is not below the Nyquist frequency, 50 Hz"):
+        make()
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: ButterworthPrefilter(-1.0),
+        lambda: FirLowPass(0.0),
+        lambda: IirLowPass(np.nan),
+        lambda: FirLowPass(transition=-1.0),
+    ],
+)
+def test_settings_that_are_not_positive_are_refused(make):
+    with pytest.raises(SettingError, match="must be a finite number above 0"):
+        make()
+
+
+def test_a_log_shorter_than_the_filter_needs_is_refused():
+    with pytest.raises(LogError, match="the log has 15 samples, the filter needs more than 15"):
+        ButterworthPrefilter(8.0).apply(np.zeros(15), FS)

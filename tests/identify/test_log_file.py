@@ -1,0 +1,50 @@
+import numpy as np
+import pyarrow as pa
+import pytest
+from pyarrow import parquet
+
+from identify import LogError, MotionLog, TorqueChannel
+from identify.log_file import read_log, write_log
+
+
+@pytest.fixture
+def written(tmp_path, rng):
+    log = MotionLog(100, rng.normal(size=(50, 3)), rng.normal(size=(50, 3)), TorqueChannel("held", 0.0031, (1.0, 2.0, 3.0)))
+    write_log(log, tmp_path / "log.parquet")
+    return log, tmp_path / "log.parquet"
+
+
+def test_what_is_written_is_read(written):
+    log, path = written
+    back = read_log(path)
+    assert parquet.read_table(path).column_names == ["t", "q1", "q2", "q3", "tau1", "tau2", "tau3"]
+    np.testing.assert_array_equal(back.q, log.q)
+    np.testing.assert_array_equal(back.tau, log.tau)
+    assert back.torque == log.torque
+    assert back.fs == pytest.approx(log.fs, rel=1e-12)
+
+
+def test_the_caller_may_say_what_the_torque_means(written):
+    assert read_log(written[1], TorqueChannel("averaged")).torque.meaning == "averaged"
+
+
+def test_a_file_that_does_not_say_what_its_torque_means_is_asked(tmp_path):
+    path = tmp_path / "foreign.parquet"
+    parquet.write_table(pa.table({name: np.arange(9) / 10 for name in ("t", "q1", "tau1")}), path)
+    with pytest.raises(LogError, match="does not say what its torque means"):
+        read_log(path)
+    assert read_log(path, TorqueChannel("held")).n == 1
+
+
+def test_unusable_files_are_refused(tmp_path, rng):
+    with pytest.raises(LogError, match="cannot read the log"):
+        read_log(tmp_path / "missing.parquet")
+    (tmp_path / "text.parquet").write_text("t,q1\n")
+    with pytest.raises(LogError, match="cannot read the log"):
+        read_log(tmp_path / "text.parquet")
+    parquet.write_table(pa.table({"t": [0.0, 0.1], "q1": [0.0, 1.0], "q2": [0.0, 1.0]}), tmp_path / "half.parquet")
+    with pytest.raises(LogError, match="no column tau1, tau2; it has t, q1, q2"):
+        read_log(tmp_path / "half.parquet")
+    runs = MotionLog(100, rng.normal(size=(2, 9, 1)), rng.normal(size=(2, 9, 1)), TorqueChannel("held"))
+    with pytest.raises(LogError, match="a file holds one run"):
+        write_log(runs, tmp_path / "runs.parquet")

@@ -1,0 +1,164 @@
+"""Every operator keeps the sentence B tau = [c + s e] X true, looks no further than its halo, and honours the weights."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from identify import CentralDifference, FirLowPass, IirLowPass, LogError, ModulatingFunctions, SettingError, Windows
+from identify.balance import Balance
+from identify.operators import OPERATORS
+
+FS = 100.0
+T = np.arange(1500) / FS
+X = np.array([2.0, -0.7])
+TRIM = 3.0
+
+
+def balance(y=None, weight=None, t=T):
+    """A sentence of two rows that is true for X: y = c X_a + (d/dt e) X_b, with smooth signals known in closed form."""
+    c = {(0, "a"): np.cos(3 * t), (1, "a"): np.sin(2 * t)}
+    e = {(0, "b"): np.sin(4 * t), (1, "b"): np.cos(t), (1, "a"): np.sin(t)}
+    rate = {(0, "b"): 4 * np.cos(4 * t), (1, "b"): -np.sin(t), (1, "a"): np.cos(t)}
+    exact = np.stack([X[0] * c[0, "a"] + X[1] * rate[0, "b"], X[0] * (c[1, "a"] + rate[1, "a"]) + X[1] * rate[1, "b"]])
+    fs = 1 / (t[1] - t[0])
+    return Balance(
+        y=exact if y is None else y,
+        c=c,
+        e=e,
+        weight=np.ones((2, len(t))) if weight is None else weight,
+        s=lambda x: CentralDifference(6).derivative(x, fs),
+        fs=fs,
+        parameters=("a", "b"),
+    )
+
+
+def precision(operator):
+    """Share of the signal by which a row of a true sentence may be off.
+
+    Simpson's rule over 0.1 s: (4/100)^4 / 180; sums of a modulating function of degree 6: 4e-8; the 6th-order difference:
+    (4/100)^6 / 140. A recursive filter still remembers, to its 1 % twice, that the log begins and ends.
+    """
+    return 2e-4 if isinstance(operator, IirLowPass) else 1e-7
+
+
+@pytest.fixture(params=list(OPERATORS))
+def operator(request):
+    return OPERATORS.create(request.param)
+
+
+def test_a_true_sentence_stays_true(operator):
+    system = operator.system(balance(), TRIM)
+    residual = system.Y - system.W @ X
+    assert np.abs(residual).max() < precision(operator) * np.abs(system.Y).max()
+    assert system.valid.all()
+    assert system.W.shape == (len(system.Y), 2)
+
+
+def test_the_mask_leaves_true_sentences_and_voids_what_sees_nothing(operator):
+    """Nonsense at masked instants changes nothing, and rows with nothing else to see are void and zero."""
+    weight = np.ones((2, len(T)))
+    weight[0, 600:900] = 0
+    nonsense = balance().y.copy()
+    nonsense[0, 600:900] = 1e3
+    system = operator.system(balance(nonsense, weight), TRIM)
+    residual = system.Y - system.W @ X
+    assert np.abs(residual).max() < precision(operator) * np.abs(system.Y).max()
+    middle = (system.group == 0) & (np.abs(system.time - 7.5) < 1.5 - operator.halo(FS))
+    assert not system.valid[middle].any()
+    assert system.valid[system.group == 1].all()
+    assert not system.Y[~system.valid].any()
+    assert not system.W[~system.valid].any()
+
+
+def test_rows_look_no_further_than_the_halo(operator):
+    """Samples outside the halo of a row, and of the differences of e, do not reach it."""
+    change = np.zeros((2, len(T)))
+    change[:, 1000] = 1.0
+    before, after = (operator.system(balance(balance().y + d), TRIM) for d in (0 * change, change))
+    reach = np.abs(before.time - T[1000]) > operator.halo(FS) + 1e-9
+    changed = np.abs(after.Y - before.Y)
+    assert changed[~reach].max() > 0
+    remembered = 0.01 if isinstance(operator, IirLowPass) else 0.0  # a recursive filter settles, to 1 %
+    assert changed[reach].max() <= remembered * changed.max()
+
+
+def test_rows_are_ordered_by_time_then_row(operator):
+    system = operator.system(balance(), TRIM)
+    assert list(system.group[:4]) == [0, 1, 0, 1]
+    assert (np.diff(system.time.reshape(-1, 2), axis=0) > 0).all()
+    assert system.time[0] >= TRIM - 1e-9
+
+
+def test_leading_axes_are_independent_runs_with_the_same_bits(operator, rng):
+    y = rng.normal(size=(3, 2, len(T)))
+    one, weight = balance(), (rng.uniform(size=(3, 2, len(T))) > 0.02).astype(float)
+
+    def spread(columns):
+        return {address: np.broadcast_to(signal, (3, len(T))) for address, signal in columns.items()}
+
+    together = operator.system(Balance(y, spread(one.c), spread(one.e), weight, one.s, FS, one.parameters), TRIM)
+    for run in range(3):
+        alone = operator.system(balance(y[run], weight[run]), TRIM)
+        np.testing.assert_array_equal(together.Y[run], alone.Y)
+        np.testing.assert_array_equal(together.W[run], alone.W)
+        np.testing.assert_array_equal(together.valid[run], alone.valid)
+
+
+def test_the_same_settings_give_the_same_rows_at_another_frequency(operator):
+    slow = operator.system(balance(), TRIM)
+    fast = operator.system(balance(t=np.arange(15000) / 1000), TRIM)
+    assert slow.Y.shape == fast.Y.shape
+    # IIR: the bilinear transform bends the pass band by (f/fs)^2; others: sampled kernels differ from their integrals.
+    np.testing.assert_allclose(slow.Y, fast.Y, atol=5e-3 * np.abs(slow.Y).max())
+
+
+@pytest.mark.parametrize("length", [0.1, 0.07])
+def test_windows_are_integrals(length):
+    """Even and odd numbers of intervals; each window begins where the last one ends."""
+    system = Windows(length).system(balance(), TRIM)
+    rows = system.group == 0
+    centre = system.time[rows]
+    np.testing.assert_allclose(np.diff(centre), length, atol=1e-12)
+    for i in (0, 17):
+        exact = quad(lambda t: X[0] * np.cos(3 * t) + X[1] * 4 * np.cos(4 * t), centre[i] - length / 2, centre[i] + length / 2)[
+            0
+        ]
+        assert system.Y[rows][i] == pytest.approx(exact, abs=1e-7)
+
+
+def test_a_window_that_touches_a_masked_instant_is_void_and_its_neighbours_are_not():
+    for length in (0.1, 0.07):
+        weight = np.ones((2, len(T)))
+        weight[:, 700] = 0
+        system = Windows(length).system(balance(weight=weight), TRIM)
+        touches = np.abs(system.time - T[700]) <= length / 2 + 1e-9
+        np.testing.assert_array_equal(system.valid, ~touches)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Windows(0.01).step(FS), r"windows of 0\.01 s hold 1 samples"),
+        (lambda: ModulatingFunctions(support=0.05).kernels(FS), "too few for degree 6"),
+        (lambda: ModulatingFunctions(degree=1), "degree 1 have a kink"),
+        (lambda: Windows(0.0), "length = 0 must be"),
+    ],
+)
+def test_settings_that_do_not_fit_are_refused(make, message):
+    with pytest.raises(SettingError, match=message):
+        make()
+
+
+def test_a_log_that_leaves_no_row_is_refused(operator):
+    with pytest.raises(LogError, match=r"the log has 600 samples .* it needs at least 6"):
+        operator.system(balance(t=T[:600]), TRIM)
+
+
+def test_fir_computes_what_a_full_convolution_gives(rng):
+    """An independent, slow route: filter everything, then keep one sample in n_d."""
+    from scipy.signal import firwin
+
+    y = rng.normal(size=(2, len(T)))
+    system = FirLowPass(5.0, 5.0).system(balance(y), TRIM)
+    full = np.stack([np.convolve(row, firwin(67, 5.0, fs=FS), mode="same") for row in y])
+    np.testing.assert_allclose(system.Y.reshape(-1, 2).T, full[:, 300:1200:10], atol=1e-14)

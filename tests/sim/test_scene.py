@@ -1,0 +1,27 @@
+"""Shapes and poses against MuJoCo's own, one state at a time."""
+
+import mujoco
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from sim.scene import motion, shapes
+
+
+def test_shapes_moved_by_their_bodies_are_where_mujoco_puts_the_geoms(robot, rng):
+    q = rng.uniform(-2, 2, (5, 2))
+    moving, data = motion(robot, q), mujoco.MjData(robot.model)
+    assert {shape.kind for shape in shapes(robot)} == {"box", "cylinder"}
+    for k in range(5):
+        data.qpos[:] = q[k]
+        mujoco.mj_forward(robot.model, data)
+        for shape in shapes(robot):
+            body = Rotation.from_quat(moving.quaternions[shape.body][k])
+            geom = data.geom(shape.name)
+            np.testing.assert_allclose(moving.positions[shape.body][k] + body.apply(shape.position), geom.xpos, atol=1e-12)
+            turned = (body * Rotation.from_quat(shape.quaternion)).as_matrix()
+            np.testing.assert_allclose(turned, geom.xmat.reshape(3, 3), atol=1e-12)
+        np.testing.assert_allclose(moving.sites["tool"][k], data.site("tool").xpos, atol=1e-12)
+
+
+def test_every_visible_geom_is_drawn(robot):
+    assert len(shapes(robot)) == robot.model.ngeom

@@ -1,0 +1,91 @@
+"""Quintic moves against SciPy's Hermite polynomials, and the fastest against ruckig."""
+
+import numpy as np
+import pytest
+import ruckig
+from scipy.interpolate import BPoly
+
+from sim.errors import ScenarioError
+from sim.trajectory import PointToPoint
+
+POINTS = [[0.0, 1.0, -0.5], [0.7, -0.4, 0.1], [0.2, 0.9, 1.3]]
+
+
+@pytest.fixture
+def moves():
+    return PointToPoint(np.array(POINTS), np.array([1.2, 0.7]), np.array([0.5, 0.3, 0.4]))
+
+
+def test_the_motion_is_the_quintic_hermite_interpolant(moves):
+    """Position given, velocity and acceleration zero at both ends of each move: one polynomial of degree 5 does that."""
+    times = [0.5, 1.7, 2.0, 2.7]
+    values = [[[np.array(POINTS[i])[j], 0, 0] for i in (0, 1, 1, 2)] for j in range(3)]
+    reference = moves.sample(250.0)
+    t = np.arange(len(reference.q)) / 250.0
+    assert len(t) == round(3.1 * 250)
+    for j in range(3):
+        exact = BPoly.from_derivatives(times, values[j])
+        inside = (t >= times[0]) & (t < times[-1])
+        for order, found in enumerate((reference.q, reference.qd, reference.qdd)):
+            np.testing.assert_allclose(found[inside, j], exact(t[inside], order), atol=1e-11)
+    rest = t >= times[-1]
+    np.testing.assert_array_equal(reference.qd[rest], 0)
+    np.testing.assert_allclose(reference.q[rest], np.broadcast_to(POINTS[-1], (rest.sum(), 3)), atol=1e-15)
+
+
+def test_it_rests_before_the_start_and_after_the_end(moves):
+    outside = moves.at(np.array([-1.0, 9.0]), 100.0)
+    np.testing.assert_allclose(outside.q, [POINTS[0], POINTS[-1]], atol=1e-15)
+    np.testing.assert_array_equal(outside.qd, 0)
+    np.testing.assert_array_equal(outside.qdd, 0)
+
+
+def test_sampling_is_exact_whatever_the_frequency(moves):
+    np.testing.assert_allclose(moves.sample(1000.0).q[::10], moves.sample(100.0).q, atol=1e-14)
+
+
+@pytest.mark.parametrize("limit", ["velocity", "acceleration"])
+def test_the_fastest_moves_reach_a_limit_and_pass_none(limit):
+    velocity, acceleration = ([0.6, 0.7, 0.8], [99.0] * 3) if limit == "velocity" else ([99.0] * 3, [2.0, 3.0, 4.0])
+    moves = PointToPoint.fastest(POINTS, velocity, acceleration, [0.0, 0.0, 0.0])
+    t = np.linspace(0, moves.duration, 200001)
+    found = moves.at(t, 1.0)
+    used = np.abs(found.qd) / velocity if limit == "velocity" else np.abs(found.qdd) / acceleration
+    first = t <= moves.durations[0]
+    assert used[first].max() == pytest.approx(1, abs=1e-6)
+    assert used[~first].max() == pytest.approx(1, abs=1e-6)
+
+
+def test_the_fastest_quintic_is_slower_than_the_time_optimal_move(rng):
+    """An independent lower bound: ruckig's time-optimal move under the same limits, with jerk unlimited."""
+    for start, end in rng.uniform(-2, 2, (20, 2, 2)):
+        velocity, acceleration = rng.uniform(1, 4, 2), rng.uniform(5, 20, 2)
+        problem = ruckig.InputParameter(2)
+        problem.current_position, problem.target_position = list(start), list(end)
+        problem.max_velocity, problem.max_acceleration, problem.max_jerk = list(velocity), list(acceleration), [np.inf] * 2
+        optimal = ruckig.Trajectory(2)
+        assert ruckig.Ruckig(2).calculate(problem, optimal) == ruckig.Result.Working
+        quintic = PointToPoint.fastest([start, end], velocity, acceleration, [0.0, 0.0])
+        assert optimal.duration < quintic.duration < 2 * optimal.duration
+
+
+@pytest.mark.parametrize(
+    ("points", "durations", "dwells", "message"),
+    [
+        ([[0.0, 1.0]], [], [0.0], r"shape \(1, 2\), not \(at least 2, joints\)"),
+        ([[0.0], [1.0]], [1.0, 2.0], [0.0, 0.0], "2 waypoints need 1 durations and 2 dwells"),
+        ([[0.0], [1.0]], [0.0], [0.0, 0.0], "durations must be above 0 s"),
+        ([[0.0], [1.0]], [1.0], [0.0, -1.0], "dwells not below"),
+        ([[0.0], [np.nan]], [1.0], [0.0, 0.0], "waypoints hold a value that is not finite"),
+    ],
+)
+def test_impossible_motions_are_refused(points, durations, dwells, message):
+    with pytest.raises(ScenarioError, match=message):
+        PointToPoint(np.array(points), np.array(durations), np.array(dwells))
+
+
+def test_impossible_limits_and_moves_to_nowhere_are_refused():
+    with pytest.raises(ScenarioError, match="limits must be above 0"):
+        PointToPoint.fastest(POINTS, [1.0, 0.0, 1.0], [1.0] * 3, [0.0] * 3)
+    with pytest.raises(ScenarioError, match="durations must be above 0"):
+        PointToPoint.fastest([[0.0], [0.0]], [1.0], [1.0], [0.0, 0.0])

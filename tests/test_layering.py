@@ -1,0 +1,49 @@
+"""The arrows between the packages: who may import whom, and which libraries each may use."""
+
+import ast
+import sys
+
+import pytest
+
+OURS = {"models", "sim", "identify", "experiments", "tests"}
+
+CONTRACT = {"identify.motion_log"}
+"""What `sim` may know of `identify`: the contract types alone."""
+
+ALLOWED = {
+    "models": set(),
+    "identify": {"identify", "numpy", "scipy"},
+    "sim": {"sim", "models", "numpy", "mujoco", "ruckig"},
+    "experiments": {"experiments", "sim", "identify", "models", "numpy", "rerun", "rerun_cli", "rich", "tyro", "tomli_w"},
+}
+
+ALLOWED_IN = {"identify/log_file.py": {"pyarrow"}}
+"""Libraries that one file alone may use."""
+
+
+def imports(path):
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            yield node.module
+
+
+@pytest.mark.parametrize("package", ALLOWED)
+def test_arrows(package, root):
+    files = sorted((root / package).rglob("*.py"))
+    assert files
+    for path in files:
+        name = path.relative_to(root).as_posix()
+        for module in imports(path):
+            top = module.split(".")[0]
+            if package == "sim" and top == "identify":
+                assert module in CONTRACT, f"{name} imports {module}"
+            elif top in OURS or top not in sys.stdlib_module_names:
+                assert top in ALLOWED[package] | ALLOWED_IN.get(name, set()), f"{name} imports {module}"
+
+
+def test_models_hold_no_dynamics(root):
+    """Models are MJCF and the few lines that find it."""
+    assert [path.name for path in (root / "models").rglob("*.py")] == ["__init__.py"]

@@ -1,0 +1,103 @@
+"""Plug-ins of another package: found by their entry points, named in errors, refused when they are not what they promise."""
+
+import re
+import subprocess
+import sys
+import textwrap
+
+import numpy as np
+import pytest
+
+from identify import ESTIMATORS, AbstractEstimator, PluginError, UnknownNameError
+from identify.plugins import PluginTable
+
+
+def blocks(root, language, heading):
+    """Return the fenced code blocks of a README section."""
+    section = (root / "README.md").read_text().split(f"## {heading}\n")[1].split("\n## ")[0]
+    return re.findall(rf"```{language}\n(.*?)```", section, re.DOTALL)
+
+
+def install(folder, module, source, entries):
+    """Lay out an installed distribution: a module and its metadata."""
+    (folder / f"{module}.py").write_text(source)
+    info = folder / f"{module}-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {module}\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(entries)
+
+
+def python(code, folder, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(folder))
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, cwd=folder, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture
+def readme_package(tmp_path, root):
+    """The package that the README shows, installed where Python finds it."""
+    friction, estimator = blocks(root, "python", "Add your own")
+    (toml,) = blocks(root, "toml", "Add your own")
+    entries = re.sub(r'\[project\.entry-points\."(.*?)"\]', r"[\1]", toml).replace('"', "")
+    for source in (friction, estimator):
+        assert sum(1 for line in source.splitlines() if line.strip() and "import" not in line) <= 12  # "about ten lines"
+    install(tmp_path, "mybench", friction + estimator, entries)
+    return tmp_path
+
+
+def test_the_readmes_package_is_listed(readme_package, monkeypatch):
+    listed = python("from experiments.cli import main; main(['list'])", readme_package, monkeypatch)
+    assert re.search(r"drag\s+Drag that grows with the square of the velocity", listed)
+    assert re.search(r"ridge\s+Least squares with a penalty", listed)
+
+
+def test_the_readmes_friction_is_identified_by_all_models_with_its_estimator(readme_package, monkeypatch):
+    """A robot with quadratic drag, known to no file of this project, gives its drag back in all three models."""
+    out = python(
+        """
+        import numpy as np
+        from experiments.table1 import SCENARIO, Table1
+        from identify import BLOCKS, ESTIMATORS, MODELS, MotionLog, identify, scara
+        from sim.scenario import Scenario
+        table = Table1(Scenario.load(SCENARIO), ("idbench",))
+        log, qd = table.log, table.reference.qd
+        dragged = MotionLog(log.fs, log.q, log.tau + [0.03, 0.004] * qd * abs(qd), log.torque)
+        basis = scara() + BLOCKS.create("drag")
+        for model in MODELS:
+            print(*identify(dragged, basis, MODELS.create(model), estimator=ESTIMATORS.create("ridge")).X[-2:])
+        """,
+        readme_package,
+        monkeypatch,
+    )
+    np.testing.assert_allclose(np.array(out.split(), float).reshape(3, 2), [[0.03, 0.004]] * 3, rtol=1e-3)
+
+
+def test_an_unknown_name_lists_the_known():
+    with pytest.raises(UnknownNameError, match=r"no 'OSL' among the estimators \(did you mean 'OLS'\?\); known: OLS"):
+        ESTIMATORS.create("OSL")
+
+
+def test_a_plugin_that_cannot_be_loaded_is_named(tmp_path, monkeypatch):
+    install(tmp_path, "broken", "raise RuntimeError('no licence')\n", "[idbench.estimators]\nbroken = broken:Nothing\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    table = PluginTable("estimators", AbstractEstimator, {})
+    assert list(table) == ["broken"]
+    with pytest.raises(PluginError, match=r"'broken' \(broken:Nothing\) cannot be loaded: no licence"):
+        table.create("broken")
+
+
+def test_a_plugin_of_another_kind_is_refused(tmp_path, monkeypatch):
+    install(tmp_path, "other", "class Thing: pass\n", "[idbench.estimators]\nthing = other:Thing\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(PluginError, match="'thing' makes Thing, not AbstractEstimator"):
+        PluginTable("estimators", AbstractEstimator, {}).create("thing")
+
+
+def test_what_is_built_in_cannot_be_replaced(tmp_path, monkeypatch):
+    install(tmp_path, "thief", "class Thief: pass\n", "[idbench.estimators]\nOLS = thief:Thief\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    builtin = dict.fromkeys(["OLS"], ESTIMATORS["OLS"])
+    assert PluginTable("estimators", AbstractEstimator, builtin).create("OLS") == ESTIMATORS.create("OLS")
