@@ -15,21 +15,7 @@ _DIFFERENCE = np.array([-0.5, 0.0, 0.5])
 @final
 @dataclass(frozen=True, eq=False)
 class AveragedTorque(AbstractTorque):
-    """Sample k is the mean of the torque from t_k + delay to t_k + delay + T, with T = 1/fs.
-
-    Parameters
-    ----------
-    tau : Array, shape (..., joint, time)
-        [N m].
-    delay : float
-        [s].
-    fs : float
-        [Hz].
-    """
-
-    tau: Array
-    delay: float
-    fs: float
+    """Sample k is the mean of the torque from t_k + delay to t_k + delay + T, with T = 1/fs."""
 
     def halo(self) -> float:
         """Return the shift and the reach of the interpolations."""

@@ -1,17 +1,32 @@
 """What a torque channel becomes once it stands on the time of the columns."""
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 
 from identify.arrays import Array
 
 
+@dataclass(frozen=True, eq=False)
 class AbstractTorque(ABC):
     """The measured torque as a mean over one window around every sample instant.
 
     The window is the instant itself for a torque that was measured at instants, and one sampling period for a torque
     that was held or averaged; `average` puts the columns of a model over the same window, so that
     B tau = [c + s e] X is compared with itself.
+
+    Parameters
+    ----------
+    tau : Array, shape (..., joint, time)
+        Logged torque [N m].
+    delay : float
+        [s]; what sample k speaks for begins at t_k + delay.
+    fs : float
+        [Hz]; T = 1/fs.
     """
+
+    tau: Array
+    delay: float
+    fs: float
 
     @abstractmethod
     def halo(self) -> float:

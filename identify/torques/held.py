@@ -17,20 +17,7 @@ class HeldTorque(AbstractTorque):
 
     Over the window [t_k - T/2, t_k + T/2] two samples act, the older one until t_k + x T, where x in [-1/2, 1/2] is what
     is left of delay / T after whole periods.
-
-    Parameters
-    ----------
-    tau : Array, shape (..., joint, time)
-        [N m].
-    delay : float
-        [s].
-    fs : float
-        [Hz].
     """
-
-    tau: Array
-    delay: float
-    fs: float
 
     def halo(self) -> float:
         """Return the delay and the reach of the interpolation of q between samples."""

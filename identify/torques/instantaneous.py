@@ -13,21 +13,7 @@ from identify.torques.base import AbstractTorque
 @final
 @dataclass(frozen=True, eq=False)
 class InstantaneousTorque(AbstractTorque):
-    """Sample k is the torque at t_k + delay.
-
-    Parameters
-    ----------
-    tau : Array, shape (..., joint, time)
-        [N m].
-    delay : float
-        [s].
-    fs : float
-        [Hz].
-    """
-
-    tau: Array
-    delay: float
-    fs: float
+    """Sample k is the torque at t_k + delay."""
 
     def halo(self) -> float:
         """Return the reach of the interpolation, none without a delay."""
