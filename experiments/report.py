@@ -37,7 +37,7 @@ def print_table1(console: Console, table: Table1) -> None:
 def _model_table(table: Table1, form: str) -> Table:
     """Return a model's table: truth, what the paper prints, and what every chain gives."""
     paper, estimates = PAPER.get(form), [found[form] for found in table.estimates.values()]
-    title = f"{form} model" if paper else f"{form} form: power over windows, not in the paper's table"
+    title = f"{form} model" if paper else f"{form} form (power over windows)"
     grid = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
     grid.add_column("")
     sources = (*(("paper's\nTable 1",) if paper else ()), *(f"chain\n{chain}" for chain in table.chains))

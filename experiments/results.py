@@ -1,6 +1,7 @@
 """The folder that every experiment writes: whole, or not at all."""
 
 import json
+import os
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -15,31 +16,45 @@ from identify import Estimate
 
 @contextmanager
 def results_folder(out: Path) -> Iterator[Path]:
-    """Give a folder beside `out` to write into; on success its files replace those of the same names in `out`.
+    """Give a hidden folder to write into; on success its files replace those of the same names in `out`.
 
-    Nothing in `out` changes if the block raises, is interrupted, or the disk is full.
+    Nothing in `out` changes if the block raises, is interrupted or terminated, or the disk is full. The hidden folder lies
+    on the same file system, so that the files are only renamed, summary.json last.
 
     Raises
     ------
     ResultsError
         If `out` cannot be written, or is a file.
     """
-    if out.exists() and not out.is_dir():
-        raise ResultsError(f"{out} is a file, not a folder: choose another --out")
     try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        beside = Path(tempfile.mkdtemp(prefix=f".{out.name}.", dir=out.parent))
+        if out.exists() and not out.is_dir():
+            raise ResultsError(f"{out} is a file, not a folder: choose another --out")
+        hidden = Path(tempfile.mkdtemp(prefix=".idbench-", dir=_nearest_folder(out)))
     except OSError as error:
         raise ResultsError(f"cannot write to {out}: {error.strerror}; choose another --out") from error
     try:
-        yield beside
-        out.mkdir(exist_ok=True)
-        for path in sorted(beside.iterdir()):
-            path.replace(out / path.name)
+        yield hidden
+        _move(hidden, out)
     except OSError as error:
-        raise ResultsError(f"cannot write to {out}: {error.strerror or error}; nothing there was changed") from error
+        raise ResultsError(
+            f"cannot write to {out}: {error.strerror or error}; free some space or choose another --out"
+        ) from error
     finally:
-        shutil.rmtree(beside, ignore_errors=True)
+        shutil.rmtree(hidden, ignore_errors=True)
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write `text` to `path`, whole or not at all; raise ResultsError if that fails."""
+    try:
+        number, beside = tempfile.mkstemp(prefix=".idbench-", dir=path.parent)
+        try:
+            with os.fdopen(number, "w") as file:
+                file.write(text)
+            Path(beside).replace(path)
+        finally:
+            Path(beside).unlink(missing_ok=True)
+    except OSError as error:
+        raise ResultsError(f"cannot write {path}: {error.strerror}; choose another place") from error
 
 
 def write_summary(path: Path, summary: dict[str, Any]) -> None:
@@ -58,3 +73,17 @@ def summarize(estimate: Estimate, truth: list[float]) -> dict[str, Any]:
         "rows": int(estimate.rows),
         "residual_rms": float(estimate.residual_rms),
     }
+
+
+def _nearest_folder(out: Path) -> Path:
+    """Return `out`, or the nearest folder above it that exists."""
+    return next(folder for folder in (out, *out.absolute().parents) if folder.is_dir())
+
+
+def _move(hidden: Path, out: Path) -> None:
+    paths = sorted(hidden.iterdir(), key=lambda path: (path.name == "summary.json", path.name))
+    if taken := [path.name for path in paths if (out / path.name).is_dir()]:
+        raise ResultsError(f"{out / taken[0]} is a folder where a file must go: remove it or choose another --out")
+    out.mkdir(parents=True, exist_ok=True)
+    for path in paths:
+        path.replace(out / path.name)

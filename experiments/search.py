@@ -70,6 +70,10 @@ class Search:
     rounds: int = 300
     candidates: int = 16
 
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise ExperimentError(f"seed = {self.seed} must be 0 or a positive whole number")
+
     def run(self, robot: Robot, progress: Callable[[int, float], None] | None = None) -> Scenario:
         """Return the scenario found; `progress` hears the number of every round and the distance that is left.
 

@@ -79,6 +79,10 @@ class Table1:
     scenario: Scenario
     chains: tuple[str, ...]
 
+    def __post_init__(self) -> None:
+        for name in self.chains:
+            CHAINS.create(name)
+
     @cached_property
     def robot(self) -> Robot:
         """The SCARA."""

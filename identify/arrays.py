@@ -1,12 +1,13 @@
 """The array type and the checks that every stage shares."""
 
 from collections.abc import Mapping
+from numbers import Real
 from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from identify.errors import SettingError
+from identify.errors import LogError, SettingError
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -14,9 +15,15 @@ Columns: TypeAlias = Mapping[tuple[int, str], Array]
 """Columns of an observation matrix that are not identically zero: (row of an instant, parameter) -> signal (..., time)."""
 
 
-def frozen(values: npt.ArrayLike) -> Array:
-    """Return a read-only float64 copy, contiguous in memory."""
-    array = np.array(values, dtype=np.float64, order="C")
+def frozen(name: str, values: npt.ArrayLike) -> Array:
+    """Return a read-only float64 copy, contiguous in memory; raise LogError if `values` are not real numbers."""
+    try:
+        given = np.asarray(values)
+    except ValueError as error:
+        raise LogError(f"{name} is no array: its rows differ in length") from error
+    if given.dtype.kind not in "iuf":
+        raise LogError(f"{name} must be real numbers in SI units, not {given.dtype}")
+    array = np.array(given, dtype=np.float64, order="C")
     array.setflags(write=False)
     return array
 
@@ -24,8 +31,26 @@ def frozen(values: npt.ArrayLike) -> Array:
 def require_positive(**settings: float) -> None:
     """Raise SettingError unless every setting is a finite number above zero."""
     for name, value in settings.items():
-        if not (np.isfinite(value) and value > 0):
-            raise SettingError(f"{name} = {value:g} must be a finite number above 0")
+        if not (_is_number(value) and value > 0):
+            raise SettingError(f"{name} = {value!r} must be a finite number above 0")
+
+
+def require_not_negative(**settings: float) -> None:
+    """Raise SettingError unless every setting is a finite number, 0 or above."""
+    for name, value in settings.items():
+        if not (_is_number(value) and value >= 0):
+            raise SettingError(f"{name} = {value!r} must be a finite number, 0 or above")
+
+
+def require_whole(least: int, **settings: int) -> None:
+    """Raise SettingError unless every setting is a whole number, at least `least`."""
+    for name, value in settings.items():
+        if not _is_number(value) or value != int(value) or value < least:
+            raise SettingError(f"{name} = {value!r} must be a whole number, at least {least}")
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool) and bool(np.isfinite(float(value)))
 
 
 def require_below_nyquist(name: str, frequency: float, fs: float) -> None:

@@ -7,7 +7,7 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Array
+from identify.arrays import Array, require_not_negative
 from identify.basis import Basis
 from identify.differentiators import AbstractDifferentiator, CentralDifference
 from identify.errors import LogError, SettingError
@@ -52,6 +52,10 @@ class Chain:
     operator: AbstractOperator
     trim: float | None = None
 
+    def __post_init__(self) -> None:
+        if self.trim is not None:
+            require_not_negative(trim=self.trim)
+
     def build(self, log: MotionLog | Sequence[MotionLog], basis: Basis, models: Sequence[AbstractModel]) -> list[System]:
         """Return the linear system of each model, for one log, or for several as one fit.
 
@@ -68,10 +72,11 @@ class Chain:
             each = [self.build(one, basis, models) for one in log]
             return [System.stack(systems) for systems in zip(*each, strict=True)] if each else [System.stack([])]
         if log.n != basis.n:
-            raise LogError(f"the log has {log.n} joints, the basis {basis.n}")
+            hint = "; its axes are (time, joint), is it transposed?" if log.samples == basis.n else ""
+            raise LogError(f"the log has {log.n} joints, the basis {basis.n}{hint}")
         signals = self.signals(log)
-        margin = self._margin(signals)
-        return [self.operator.system(model.balance(basis, signals), margin) for model in models]
+        grid = self.operator.grid(log.samples, log.fs, self._margin(signals))
+        return [self.operator.system(model.balance(basis, signals), grid) for model in models]
 
     def signals(self, log: MotionLog) -> Signals:
         """Return what the models see of `log`: prefiltered, differentiated, aligned, weighted."""
@@ -92,7 +97,9 @@ class Chain:
         if self.trim is None:
             return halo
         if self.trim < halo:
-            raise SettingError(f"trim = {self.trim:g} s is shorter than the {halo:.3g} s that this chain looks: raise it")
+            raise SettingError(
+                f"trim = {self.trim:g} s is shorter than the {halo:.3g} s that this chain looks: raise it, or leave it out"
+            )
         return self.trim
 
 

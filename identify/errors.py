@@ -17,8 +17,10 @@ class ExcitationError(IdentificationError):
     """A motion that does not show every parameter."""
 
 
-class UnknownNameError(IdentificationError):
+class UnknownNameError(IdentificationError, KeyError):
     """A name that no table knows."""
+
+    __str__ = Exception.__str__  # a KeyError would show its message in quotes
 
 
 class PluginError(IdentificationError):

@@ -11,7 +11,7 @@ from identify.arrays import Array, frozen
 from identify.system import Status, System
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Estimate:
     """Parameters with their uncertainty, judged on the rows they came from. Leading axes are independent runs.
 
@@ -35,9 +35,9 @@ class Estimate:
 
         Without a `covariance` that of section 7.3 is used: sigma_rho^2 (W' W)^-1 with sigma_rho^2 = |Y - W X|^2 / (r - p).
         """
-        estimate = cls(system, frozen(X), np.empty(0))
+        estimate = cls(system, frozen("X", X), np.empty(0))
         known = covariance if covariance is not None else estimate._paper_covariance()
-        return cls(system, estimate.X, frozen(known))
+        return cls(system, estimate.X, frozen("covariance", known))
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -78,6 +78,16 @@ class Estimate:
     def condition_number(self) -> Array:
         """Cond(W), shape (...)."""
         return self.system.condition_number
+
+    def __str__(self) -> str:
+        if self.X.ndim > 1:
+            return f"estimates of {', '.join(self.parameters)} in {self.X.shape[:-1]} runs"
+        lines = [f"{'':8}{'X':>12}{'sigma':>12}{'%sigma':>9}"]
+        values = zip(self.parameters, self.X, self.sigma, self.relative_sigma_percent, strict=True)
+        lines += [f"{name:8}{x:12.5g}{s:12.2g}{percent:9.2g}" for name, x, s, percent in values]
+        return "\n".join(
+            [*lines, f"Cond(W) = {self.condition_number:.1f}, {self.rows} rows, residual rms {self.residual_rms:.3g}"]
+        )
 
     def relative_error_percent(self, truth: npt.ArrayLike) -> Array:
         """Return 100 |X - truth| / |truth|, shape (..., p), the paper's %e."""

@@ -21,6 +21,8 @@ def write_log(log: MotionLog, path: Path) -> None:
     ------
     LogError
         If the log holds several runs.
+    OSError
+        If the file cannot be written.
     """
     if log.q.ndim != 2:
         raise LogError(f"a file holds one run, the log has shape {log.q.shape}: write each run by itself")
@@ -50,9 +52,12 @@ def read_log(path: Path, torque: TorqueChannel | None = None) -> MotionLog:
         holds values that make no log.
     """
     try:
-        table = parquet.read_table(path)
-    except (OSError, pa.ArrowException) as error:
-        raise LogError(f"cannot read the log {path}: {error}") from error
+        with Path(path).open("rb") as file:
+            table = parquet.read_table(file)
+    except OSError as error:
+        raise LogError(f"cannot read the log {path}: {error.strerror or error}") from error
+    except pa.ArrowException as error:
+        raise LogError(f"cannot read the log {path}: it is not a Parquet file") from error
     names = set(table.column_names)
     n = next(j for j in range(len(names) + 1) if f"q{j + 1}" not in names)
     needed = ["t", *(f"q{j + 1}" for j in range(max(n, 1))), *(f"tau{j + 1}" for j in range(max(n, 1)))]
@@ -60,16 +65,22 @@ def read_log(path: Path, torque: TorqueChannel | None = None) -> MotionLog:
         raise LogError(f"{path} has no column {', '.join(missing)}; it has {', '.join(table.column_names)}")
     said = (table.schema.metadata or {}).get(_TORQUE)
     if torque is None and said is None:
-        raise LogError(f"{path} does not say what its torque means: instantaneous, held or averaged, and with what delay")
-    channel = torque or _channel(json.loads(said or b"{}"))
+        raise LogError(
+            f"{path} does not say what its torque means: instantaneous, held or averaged, and with what "
+            "delay; say it with torque=TorqueChannel(...)"
+        )
+    channel = torque or _channel(path, said or b"")
     q, tau = _columns(table, "q", n), _columns(table, "tau", n)
     return MotionLog.at_times(table["t"].to_numpy(), q, tau, channel)
 
 
 def _columns(table: pa.Table, letter: str, n: int) -> Array:
-    return np.stack([np.asarray(table[f"{letter}{j + 1}"].to_numpy(), dtype=np.float64) for j in range(n)], axis=-1)
+    return np.stack([table[f"{letter}{j + 1}"].to_numpy() for j in range(n)], axis=-1)
 
 
-def _channel(said: dict[str, object]) -> TorqueChannel:
-    gain = said["gain"]
-    return TorqueChannel(**{**said, "gain": tuple(gain) if isinstance(gain, list) else gain})  # type: ignore[arg-type]
+def _channel(path: Path, said: bytes) -> TorqueChannel:
+    try:
+        known = json.loads(said)
+        return TorqueChannel(known["meaning"], known["delay"], known["gain"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise LogError(f"{path} says of its torque {said.decode(errors='replace')!r}, which makes no torque channel") from error

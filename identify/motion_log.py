@@ -6,7 +6,7 @@ from typing import Literal, Self, get_args
 import numpy as np
 import numpy.typing as npt
 
-from identify.arrays import Array, frozen, require_positive
+from identify.arrays import Array, frozen, require_not_negative, require_positive
 from identify.errors import LogError, SettingError
 
 Meaning = Literal["instantaneous", "held", "averaged"]
@@ -48,10 +48,11 @@ class TorqueChannel:
     def __post_init__(self) -> None:
         if self.meaning not in get_args(Meaning):
             raise SettingError(f"torque meaning {self.meaning!r} is unknown; known: {', '.join(get_args(Meaning))}")
-        if not np.isfinite(self.delay):
-            raise SettingError(f"torque delay = {self.delay} s must be finite")
-        if not np.all(np.isfinite(self.gain)) or np.any(np.asarray(self.gain) == 0):
+        require_not_negative(delay=abs(self.delay))
+        gains = np.atleast_1d(np.asarray(self.gain, dtype=np.float64))
+        if not np.isfinite(gains).all() or (gains == 0).any():
             raise SettingError(f"torque gain = {self.gain} must be finite and not 0")
+        object.__setattr__(self, "gain", float(gains[0]) if gains.size == 1 else tuple(float(g) for g in gains))
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +87,10 @@ class MotionLog:
 
     def __post_init__(self) -> None:
         require_positive(fs=self.fs)
+        if not isinstance(self.torque, TorqueChannel):
+            raise LogError(f"torque = {self.torque!r} must be a TorqueChannel, such as TorqueChannel('held', delay=0.002)")
         for name in ("q", "tau"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
+            object.__setattr__(self, name, frozen(name, getattr(self, name)))
         if self.q.shape != self.tau.shape:
             raise LogError(f"q has shape {self.q.shape} and tau {self.tau.shape}: every sample needs both, of every joint")
         if self.q.ndim < 2 or 0 in self.q.shape:
@@ -128,10 +131,12 @@ class MotionLog:
         LogError
             If times are missing, decrease, or are not uniform; the worst step is named.
         """
-        times, positions = np.asarray(t, dtype=np.float64), np.asarray(q, dtype=np.float64)
-        if positions.ndim < 2 or times.shape != positions.shape[-2:-1]:
+        times, positions = frozen("t", t), frozen("q", q)
+        if positions.ndim < 2:
+            raise LogError(f"q has shape {positions.shape}, not (..., time, joint)")
+        if times.shape != positions.shape[-2:-1]:
             raise LogError(f"t has shape {times.shape}, q {positions.shape}: one time is needed for each sample of q")
-        return cls(sampling_frequency(times), positions, np.asarray(tau, dtype=np.float64), torque)
+        return cls(sampling_frequency(times), positions, frozen("tau", tau), torque)
 
 
 def sampling_frequency(t: Array) -> float:

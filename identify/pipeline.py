@@ -6,6 +6,7 @@ from functools import partial
 from identify.arrays import Array
 from identify.basis import Basis
 from identify.chain import Chain, idbench_chain
+from identify.errors import IdentificationError
 from identify.estimate import Estimate
 from identify.estimators import AbstractEstimator, OrdinaryLeastSquares, Problem
 from identify.models import AbstractModel
@@ -67,6 +68,12 @@ def identify_each(
 ) -> dict[str, Estimate]:
     """Identify with several models, by name, from the same filtered signals; otherwise as `identify`."""
     chain, estimator = chain or idbench_chain(), estimator or OrdinaryLeastSquares()
+    _require(log, Sequence, "a MotionLog or a sequence of them, such as read_log(path)", MotionLog)
+    _require(basis, Basis, "a Basis, such as scara()")
+    _require(chain, Chain, 'a Chain, such as CHAINS.create("paper")')
+    _require(estimator, AbstractEstimator, 'an estimator, such as ESTIMATORS.create("OLS")')
+    for model in models.values():
+        _require(model, AbstractModel, 'a model, such as MODELS.create("power")')
     systems = chain.build(log, basis, list(models.values()))
     estimates = {}
     for (name, model), system in zip(models.items(), systems, strict=True):
@@ -80,3 +87,9 @@ def identify_each(
 def _rebuilt(chain: Chain, basis: Basis, model: AbstractModel, log: MotionLog) -> System:
     (system,) = chain.build(log, basis, [model])
     return system
+
+
+def _require(given: object, kind: type, wanted: str, *others: type) -> None:
+    """Raise IdentificationError unless `given` is an object of the kind: names, paths and classes are likely slips."""
+    if not isinstance(given, (kind, *others)) or isinstance(given, (str, bytes)):
+        raise IdentificationError(f"{given!r:.60} is given where {wanted} is needed")

@@ -37,6 +37,11 @@ class PluginTable(Mapping[str, Callable[[], T]], Generic[T]):
         found = {e.name: e for e in entry_points(group=f"idbench.{self.point}")}
         return {name: e for name, e in found.items() if name not in self._builtin}
 
+    @property
+    def builtin(self) -> tuple[str, ...]:
+        """Names of the plug-ins of this package."""
+        return tuple(self._builtin)
+
     def __iter__(self) -> Iterator[str]:
         yield from self._builtin
         yield from sorted(self._foreign)
@@ -49,7 +54,7 @@ class PluginTable(Mapping[str, Callable[[], T]], Generic[T]):
             return self._builtin[name]
         if name in self._foreign:
             return self._load(self._foreign[name])
-        near = get_close_matches(name, list(self), 1)
+        near = get_close_matches(str(name), list(self), 1)
         hint = f" (did you mean {near[0]!r}?)" if near else ""
         raise UnknownNameError(f"no {name!r} among the {self.point}{hint}; known: {', '.join(self)}")
 
@@ -63,14 +68,22 @@ class PluginTable(Mapping[str, Callable[[], T]], Generic[T]):
         PluginError
             If it cannot be loaded or made, or is not of the kind of this table.
         """
-        made = self[name]()
+        factory = self[name]
+        try:
+            made = factory()
+        except Exception as error:
+            raise PluginError(f"{self.point} plug-in {name!r} cannot be made without arguments: {error}") from error
         if not isinstance(made, self.kind):
             raise PluginError(f"{self.point} plug-in {name!r} makes {type(made).__name__}, not {self.kind.__name__}")
         return made
 
     def summary(self, name: str) -> str:
-        """Return the first line of the docstring of plug-in `name`."""
-        return (self[name].__doc__ or "(undocumented)").strip().splitlines()[0]
+        """Return the first line of the docstring of plug-in `name`, or why it cannot be used."""
+        try:
+            self.create(name)
+        except PluginError as error:
+            return f"({error})"
+        return ((self[name].__doc__ or "").strip() or "(undocumented)").splitlines()[0]
 
     @staticmethod
     def _load(entry: EntryPoint) -> Callable[[], T]:

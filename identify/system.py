@@ -117,7 +117,8 @@ class System:
         p = len(self.parameters)
         if self.status[run] == Status.TOO_FEW_ROWS:
             raise IdentificationError(
-                f"{self.rows[run]} rows for {p} parameters{where}: use a longer motion, or a mask that leaves more of it"
+                f"{self.rows[run]} rows of {self.valid.shape[-1]} are left by the mask for {p} parameters{where}: use a longer "
+                "motion, in which every joint moves; in the power model all must move at once"
             )
         raise ExcitationError(
             f"the motion does not show {', '.join(self.unseen(run))}: W has rank {self.rank[run]} of {p}{where}; "

@@ -4,9 +4,11 @@ import re
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from experiments.cli import main
+from identify import MODELS, MotionLog, TorqueChannel, identify_each
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +44,7 @@ def test_every_plugin_is_in_its_table(readme):
 
     for table in TABLES:
         (row,) = re.findall(rf"^\| `{table.point}` \| (.*?) \|", readme, re.MULTILINE)
-        assert set(re.findall(r"`(\w+)`", row)) == set(table), table.point
+        assert set(re.findall(r"`(\w+)`", row)) == set(table.builtin), table.point
 
 
 def test_the_causes_in_the_docs_are_those_computed(root, table1):
@@ -55,3 +57,33 @@ def test_the_causes_in_the_docs_are_those_computed(root, table1):
             assert max(map(float, cells)) < 0.00002
         else:
             assert f"| {name} | {' | '.join(cells)} |" in text
+
+
+def pages(root):
+    return re.findall(r"```python\n(.*?)```", (root / "docs" / "your-own-log.md").read_text(), re.DOTALL)
+
+
+def test_the_recipe_for_a_log_in_csv_works(root, tmp_path, table1):
+    log = table1.log
+    columns = np.column_stack([log.t, log.q, log.tau])
+    np.savetxt(tmp_path / "log.csv", columns, delimiter=",", header="t,q1,q2,tau1,tau2", comments="")
+    recipe = pages(root)[0].replace('"held", delay=0.002', '"instantaneous"')
+    done = subprocess.run([sys.executable, "-c", recipe], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    printed = {line.split()[0]: float(line.split()[1]) for line in done.stdout.splitlines()[1:9]}
+    np.testing.assert_allclose(list(printed.values()), list(table1.truth.values()), rtol=1e-4)
+
+
+def test_the_pendulum_of_the_docs_is_identified_by_all_models(root):
+    """Its torque is written down here once more, by hand."""
+    page = {}
+    exec(compile(pages(root)[1], "your-own-log.md", "exec"), page)
+    t = np.arange(6000) / 100
+    q = 0.9 * np.sin(2 * t) + 0.6 * np.sin(3.1 * t)
+    qd = 1.8 * np.cos(2 * t) + 1.86 * np.cos(3.1 * t)
+    qdd = -3.6 * np.sin(2 * t) - 5.766 * np.sin(3.1 * t)
+    tau = 0.8 * qdd + 9.81 * (1.2 * np.cos(q) + 0.1 * np.sin(q)) + 0.3 * qd + 0.5 * np.sign(qd)
+    log = MotionLog(100.0, q[:, None], tau[:, None], TorqueChannel("instantaneous"))
+    models = {name: MODELS.create(name) for name in MODELS.builtin}
+    for estimate in identify_each(log, page["pendulum"], models).values():
+        np.testing.assert_allclose(estimate.X, [0.8, 1.2, -0.1, 0.3, 0.5], rtol=1e-4)

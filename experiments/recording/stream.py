@@ -20,13 +20,12 @@ def recording_file(path: Path, name: str, blueprint: rrb.Blueprint) -> Iterator[
     recording = rr.RecordingStream("idbench", recording_id=name)
     try:
         recording.save(path, default_blueprint=blueprint)
-    except RuntimeError as error:
-        raise ResultsError(f"cannot write the recording {path}: {error}") from error
-    recording.set_log_time_enabled(False)
-    try:
+        recording.set_log_time_enabled(False)
         yield recording
-    finally:
         recording.flush()
+    except RuntimeError as error:  # rerun's writer gives no other reason
+        raise ResultsError(f"cannot write the recording {path.name}: is there space left? ({error})") from error
+    finally:
         recording.disconnect()
 
 

@@ -7,8 +7,7 @@ from typing import final
 import numpy as np
 from scipy import ndimage
 
-from identify.arrays import Array, require_positive
-from identify.errors import SettingError
+from identify.arrays import Array, require_not_negative, require_positive
 from identify.masks.base import AbstractMask
 
 
@@ -30,8 +29,7 @@ class ReversalMask(AbstractMask):
 
     def __post_init__(self) -> None:
         require_positive(threshold=self.threshold)
-        if not (np.isfinite(self.width) and self.width >= 0):
-            raise SettingError(f"mask width = {self.width} s must be finite and not negative")
+        require_not_negative(width=self.width)
 
     def weight(self, qd: Array, fs: float) -> Array:
         """Return 1 where the joint slides, 0 elsewhere."""

@@ -46,8 +46,8 @@ class AbstractOperator(ABC):
         """Return both sides of `balance` at the rows of `grid`."""
 
     @final
-    def system(self, balance: Balance, trim: float) -> System:
-        """Return Y = W X + rho, its rows `trim` [s] away from both ends, ordered by time, then row (Eq. 14).
+    def grid(self, samples: int, fs: float, trim: float) -> Grid:
+        """Return where the rows of a log of `samples` lie, `trim` [s] away from both ends.
 
         Raises
         ------
@@ -56,8 +56,12 @@ class AbstractOperator(ABC):
         SettingError
             If a setting does not fit the log's sampling frequency.
         """
-        fs, (*runs, n, samples) = balance.fs, balance.y.shape
-        grid = Grid.inside(samples, fs, trim, self.step(fs))
+        return Grid.inside(samples, fs, trim, self.step(fs))
+
+    @final
+    def system(self, balance: Balance, grid: Grid) -> System:
+        """Return Y = W X + rho at the rows of `grid`, ordered by time, then row (Eq. 14)."""
+        fs, (*runs, n, _) = balance.fs, balance.y.shape
         y, columns, valid, lag = self.apply(balance, grid)
         row = [address[0] for address in balance.addresses]
         parameter = [balance.parameters.index(address[1]) for address in balance.addresses]

@@ -5,7 +5,7 @@ from typing import final
 
 from scipy import signal
 
-from identify.arrays import Array, require_below_nyquist, require_positive
+from identify.arrays import Array, require_below_nyquist, require_positive, require_whole
 from identify.operators.grid import Grid
 from identify.operators.low_pass import AbstractLowPass, decimation
 from identify.recursive import forward_backward, settling_time
@@ -33,7 +33,8 @@ class IirLowPass(AbstractLowPass):
     ripple: float = 0.05
 
     def __post_init__(self) -> None:
-        require_positive(cutoff=self.cutoff, order=self.order, ripple=self.ripple)
+        require_positive(cutoff=self.cutoff, ripple=self.ripple)
+        require_whole(2, order=self.order)  # above 1, or s f_p(s) does not reject high frequencies (section 6.3)
 
     def step(self, fs: float) -> int:
         """Return n_d = 0.8 (fs/2) / cutoff, rounded down."""

@@ -5,7 +5,7 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import require_positive
+from identify.arrays import require_positive, require_whole
 from identify.errors import SettingError
 from identify.operators.weak_form import AbstractWeakForm, Kernels
 
@@ -33,8 +33,7 @@ class ModulatingFunctions(AbstractWeakForm):
 
     def __post_init__(self) -> None:
         require_positive(support=self.support, spacing=self.spacing)
-        if self.degree < 2:
-            raise SettingError(f"modulating functions of degree {self.degree} have a kink at their ends: use 2 or more")
+        require_whole(2, degree=self.degree)  # of degree 1 they have a kink at their ends
 
     def step(self, fs: float) -> int:
         """Return the samples between functions, at least 1."""

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from typing import final
 
 import numpy as np
-from scipy import integrate
 
-from identify.arrays import require_positive
+from identify.arrays import Array, require_positive
 from identify.errors import SettingError
 from identify.operators.weak_form import AbstractWeakForm, Kernels
 
@@ -38,6 +37,18 @@ class Windows(AbstractWeakForm):
 
     def kernels(self, fs: float) -> Kernels:
         """Return Simpson's rule, and the difference of the window's ends."""
-        ends = np.zeros(self.step(fs) + 1)
+        intervals = self.step(fs)
+        ends = np.zeros(intervals + 1)
         ends[0], ends[-1] = -1.0, 1.0
-        return Kernels(integrate.simpson(np.eye(len(ends)), dx=1 / fs), ends)
+        return Kernels(_simpson(intervals) / fs, ends)
+
+
+def _simpson(intervals: int) -> Array:
+    """Return the weights of Simpson's rule over unit intervals; an odd number of them ends with the 3/8 rule."""
+    weights = np.zeros(intervals + 1)
+    by_thirds = intervals - 3 * (intervals % 2)
+    for i, weight in enumerate((1, 4, 1)):
+        weights[i : by_thirds - 1 + i : 2] += weight / 3
+    if intervals % 2:
+        weights[-4:] += np.array([3, 9, 9, 3]) / 8
+    return weights

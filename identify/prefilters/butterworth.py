@@ -5,7 +5,7 @@ from typing import final
 
 from scipy import signal
 
-from identify.arrays import Array, require_below_nyquist, require_positive
+from identify.arrays import Array, require_below_nyquist, require_positive, require_whole
 from identify.prefilters.base import AbstractPrefilter
 from identify.recursive import forward_backward, settling_time
 
@@ -28,7 +28,8 @@ class ButterworthPrefilter(AbstractPrefilter):
     order: int = 4
 
     def __post_init__(self) -> None:
-        require_positive(cutoff=self.cutoff, order=self.order)
+        require_positive(cutoff=self.cutoff)
+        require_whole(3, order=self.order)
 
     def halo(self, fs: float) -> float:
         """Return the settling time of one pass."""

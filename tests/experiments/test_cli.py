@@ -111,9 +111,9 @@ def test_interruption_is_quiet_and_leaves_nothing(out, capfd, monkeypatch):
 
 def test_a_real_interrupt_ends_the_process_without_a_traceback(tmp_path):
     """Ctrl-C at some instant of a long search."""
-    code = "import sys; from experiments.search import Search; from experiments import cli\n"
-    code += "cli._search = lambda seed: Search(seed=seed, tolerance=0.0, rounds=10**6).run(cli.Robot.load('scara'), print)\n"
-    code += "sys.exit(cli.main(['table1', '--seed', '1', '--out', 'results']))"
+    code = "import sys; from experiments.search import Search; from experiments import commands\n"
+    code += "commands.Search = lambda seed: print('searching') or Search(seed=seed, tolerance=0.0, rounds=10**6)\n"
+    code += "sys.exit(commands.run(['table1', '--seed', '1', '--out', 'results']))"
     process = subprocess.Popen(
         [sys.executable, "-uc", code], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
@@ -122,8 +122,90 @@ def test_a_real_interrupt_ends_the_process_without_a_traceback(tmp_path):
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=30)
     assert process.returncode == 130
-    assert err.strip() == "idbench: interrupted; nothing was written"
+    assert err.strip() == "idbench: interrupted"
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("delay", [0.3, 1.0, 1.8])
+def test_an_interrupt_while_modules_are_loaded_is_as_quiet(tmp_path, delay):
+    code = "import sys, time; from experiments.cli import main; print('begun', flush=True)\n"
+    code += "sys.exit(main(['table1', '--out', 'x']))"
+    with subprocess.Popen(
+        [sys.executable, "-c", code], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        process.stdout.readline()
+        time.sleep(delay)
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=30)
+    assert (process.returncode, err) == (130, "idbench: interrupted\n")
+    assert not list(tmp_path.iterdir())
+
+
+def test_termination_leaves_nothing_half_written(tmp_path):
+    """SIGTERM while the recording is written: the hidden folder goes, too."""
+    code = "import sys; from experiments import commands; import experiments.recording.table1 as r\n"
+    code += "def slow(*args): print('recording', flush=True); import time; time.sleep(60)\n"
+    code += "r.record_table1 = slow\nsys.exit(commands.run(['table1', '--out', 'results']))"
+    with subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline()
+        assert len(list(tmp_path.iterdir())) == 1
+        process.terminate()
+        assert process.wait(timeout=30) == 143
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("size", [20_000, 300_000])
+def test_a_full_disk_is_one_line(tmp_path, size):
+    """Too small for the log, and for the recording alone: no file may grow beyond `size` bytes."""
+    code = f"import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size}))\n"
+    code += "from experiments.cli import main; sys.exit(main(['table1', '--out', 'results']))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert [line for line in done.stderr.splitlines() if line.startswith("idbench: cannot write")]
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (["table1", "--seed", "-1"], "seed = -1 must be 0 or a positive whole number"),
+        (["search", "--seed", "-1"], "seed = -1 must be 0 or a positive whole number"),
+        (["table1", "--out", "a" * 300], "File name too long"),
+        (["view", "README.md"], "there is no recording README.md"),
+    ],
+)
+def test_more_wrong_input_is_one_line(args, message, capfd, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert message in complaint(capfd, *args)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_in_the_place_of_a_file_stops_all(out, capfd):
+    (out / "recording.rrd").mkdir(parents=True)
+    assert "recording.rrd is a folder where a file must go" in complaint(capfd, "table1", "--out", str(out))
+    assert [path.name for path in out.iterdir()] == ["recording.rrd"]
+
+
+def test_results_go_through_a_link(tmp_path, capsys):
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "elsewhere")
+    assert main(["table1", "--chain", "idbench", "--out", str(tmp_path / "link")]) == 0
+    assert len(list((tmp_path / "elsewhere").iterdir())) == 3
+
+
+def test_view_tells_where_there_is_no_display(out, capfd, monkeypatch):
+    out.mkdir()
+    (out / "recording.rrd").write_bytes(b"RRF2")
+    monkeypatch.setattr(sys, "platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    assert "there is no display here" in complaint(capfd, "view", str(out))
+
+
+def test_version(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("idbench 0.")
 
 
 def test_search_writes_a_scenario(tmp_path, capsys):
@@ -174,3 +256,4 @@ def test_a_reader_that_goes_away_is_no_error(tmp_path):
     ) as process:
         process.stdout.close()
         assert process.stderr.read() == ""
+    assert process.returncode == 0

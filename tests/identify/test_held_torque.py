@@ -35,12 +35,12 @@ def log(request, table1):
     return simulate(table1.robot, table1.reference, request.param)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", MODELS.builtin)
 def test_a_held_torque_that_says_so_is_identified(model, log, truth):
     assert identify(log, scara(), MODELS.create(model)).relative_error_percent(truth).max() < 1
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", MODELS.builtin)
 def test_unaligned_it_shows_the_negative_friction_of_the_papers_table_2(model, log):
     unaligned = identify(log, scara(), MODELS.create(model), replace(idbench_chain(), alignment=AsLogged()))
     X = dict(zip(unaligned.parameters, unaligned.X, strict=True))

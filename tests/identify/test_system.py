@@ -75,9 +75,9 @@ def test_scales_of_parameters_do_not_make_a_system_deficient(rng):
 
 
 def test_too_few_rows_are_refused(rng):
-    with pytest.raises(IdentificationError, match="3 rows for 3 parameters"):
+    with pytest.raises(IdentificationError, match="3 rows of 3 are left by the mask for 3 parameters"):
         system(rng.normal(size=(3, 3)), np.zeros(3)).check()
-    with pytest.raises(IdentificationError, match="2 rows for 3 parameters"):
+    with pytest.raises(IdentificationError, match="2 rows of 2 are left"):
         system(rng.normal(size=(2, 3)), np.zeros(2)).check()
 
 
@@ -111,3 +111,13 @@ def test_an_estimator_may_bring_its_own_covariance(rng):
     np.testing.assert_array_equal(estimate.sigma, [1, 2, 4])
     np.testing.assert_array_equal(estimate.relative_sigma_percent, [100, 100, 100])
     np.testing.assert_array_equal(estimate.relative_error_percent([2.0, 2.0, -2.0]), [50, 0, 100])
+
+
+def test_an_estimate_prints_its_numbers(rng):
+    estimate = fit(rng.normal(size=(50, 3)), rng.normal(size=50))
+    printed = str(estimate).splitlines()
+    assert printed[0].split() == ["X", "sigma", "%sigma"]
+    assert [line.split()[0] for line in printed[1:4]] == list(NAMES)
+    assert float(printed[1].split()[1]) == pytest.approx(estimate.X[0], rel=1e-4)
+    assert "50 rows" in printed[-1]
+    assert str(fit(rng.normal(size=(4, 50, 3)), rng.normal(size=(4, 50)))) == "estimates of a, b, c in (4,) runs"

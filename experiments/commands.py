@@ -1,0 +1,132 @@
+"""The commands."""
+
+import os
+import sys
+from collections.abc import Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated
+
+import tomli_w
+import tyro
+from rich.console import Console
+
+from experiments.errors import ExperimentError
+from experiments.interruption import INTERRUPTED, importing, terminating
+from experiments.results import results_folder, write_summary, write_whole
+from experiments.search import Search
+from identify import IdentificationError
+from identify.log_file import write_log
+from sim.errors import BenchError
+from sim.robot import Robot
+from sim.scenario import Scenario
+
+DESCRIPTION = "A MuJoCo testbench for the dynamic identification of robots."
+
+app = tyro.extras.SubcommandApp()
+console = Console(highlight=False)
+
+Seed = Annotated[int | None, tyro.conf.arg(metavar="INT")]
+File = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
+
+
+@app.command(name="table1")
+def table1(out: Path = Path("runs/table1"), chain: str = "both", seed: Seed = None) -> None:
+    """Reproduce the paper's simulation comparison (Table 1) and record it.
+
+    Args:
+        out: Folder for summary.json, recording.rrd and log.parquet.
+        chain: Signal processing: both, or the name of one chain (paper, idbench, ...).
+        seed: Search another trajectory from this seed instead of taking the one that ships.
+    """
+    with importing():
+        from experiments.recording.table1 import record_table1
+        from experiments.report import print_table1
+        from experiments.table1 import SCENARIO, Table1
+
+    chains = ("paper", "idbench") if chain == "both" else (chain,)
+    with results_folder(out) as folder, console.capture() as printed:
+        table = Table1(Scenario.load(SCENARIO) if seed is None else _search(seed), chains)
+        print_table1(console, table)
+        console.print(f"written to {out}; see it: uv run idbench view {out}", soft_wrap=True)
+        write_log(table.log, folder / "log.parquet")
+        record_table1(folder / "recording.rrd", table)
+        write_summary(folder / "summary.json", table.summary())
+    _show(printed.get())
+
+
+@app.command(name="search")
+def search(seed: int = 0, out: File = None) -> None:
+    """Search a trajectory with the paper's condition numbers.
+
+    Args:
+        seed: The same seed gives the same trajectory.
+        out: Scenario file (TOML) to write; printed if none is given.
+    """
+    scenario = _search(seed)
+    text = tomli_w.dumps(scenario.to_dict())
+    if out is not None:
+        write_whole(out, text)
+        text = f"{out}: {scenario.origin}\n"
+    _show(text)
+
+
+@app.command(name="list")
+def list_plugins() -> None:
+    """List the plug-ins: what can be combined, one line each."""
+    from experiments.plugins import print_plugins
+
+    with console.capture() as printed:
+        print_plugins(console)
+    _show(printed.get())
+
+
+@app.command(name="view")
+def view(folder: tyro.conf.Positional[Path]) -> None:
+    """Open the recording of a results folder in the rerun viewer.
+
+    Args:
+        folder: Results folder, or a recording (.rrd).
+    """
+    from experiments.viewer import view as open_viewer
+
+    open_viewer(folder)
+
+
+def _search(seed: int) -> Scenario:
+    with Console(stderr=True).status("searching a trajectory ...") as status:
+        return Search(seed=seed).run(
+            Robot.load("scara"),
+            lambda number, distance: status.update(f"searching: round {number}, {distance:.1%} from the paper's Cond(W)"),
+        )
+
+
+def run(args: Sequence[str] | None = None) -> int:
+    """Run a command; return its exit code: 0, 2 for wrong input, 130 when interrupted."""
+    words = sys.argv[1:] if args is None else list(args)
+    try:
+        with terminating():
+            if words == ["--version"]:
+                _show(f"idbench {version('idbench')}\n")
+            else:
+                app.cli(prog="idbench", description=DESCRIPTION, args=words)
+    except (IdentificationError, BenchError, ExperimentError) as error:
+        return _complain(str(error), 2)
+    except KeyboardInterrupt:
+        return _complain("interrupted", INTERRUPTED)
+    except BrokenPipeError:  # the reader of our output has gone, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:
+        return _complain(f"cannot print: {error.strerror}", 2)
+    return 0
+
+
+def _show(text: str) -> None:
+    if sys.stdout is not None:  # as it is where standard output was closed before we began
+        sys.stdout.write(text)
+        sys.stdout.flush()
+
+
+def _complain(what: str, code: int) -> int:
+    print(f"idbench: {what}", file=sys.stderr)
+    return code

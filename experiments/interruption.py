@@ -1,0 +1,43 @@
+"""Ending cleanly: Ctrl-C and termination at any instant."""
+
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C: 128 + SIGINT."""
+
+
+@contextmanager
+def importing() -> Iterator[None]:
+    """Make Ctrl-C leave at once and quietly while modules are loaded: some turn an interruption into an ImportError."""
+    before = signal.signal(signal.SIGINT, _leave)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def terminating() -> Iterator[None]:
+    """Make termination (SIGTERM, SIGHUP) unwind like an error, so that nothing half-written stays behind."""
+    numbers = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    before = {number: signal.signal(number, _unwind) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    del number, frame
+    os.write(2, b"idbench: interrupted\n")
+    os._exit(INTERRUPTED)
+
+
+def _unwind(number: int, frame: FrameType | None) -> None:
+    del frame
+    raise SystemExit(128 + number)
