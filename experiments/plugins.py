@@ -8,6 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 from identify import (
+    ALIGNMENTS,
     BLOCKS,
     CHAINS,
     DIFFERENTIATORS,
@@ -19,7 +20,17 @@ from identify import (
 )
 from identify.plugins import PluginTable
 
-TABLES: tuple[PluginTable[Any], ...] = (BLOCKS, MODELS, PREFILTERS, DIFFERENTIATORS, MASKS, OPERATORS, CHAINS, ESTIMATORS)
+TABLES: tuple[PluginTable[Any], ...] = (
+    BLOCKS,
+    MODELS,
+    PREFILTERS,
+    DIFFERENTIATORS,
+    ALIGNMENTS,
+    MASKS,
+    OPERATORS,
+    CHAINS,
+    ESTIMATORS,
+)
 """Every plug-in point."""
 
 

@@ -26,6 +26,9 @@ from sim.scenario import Scenario
 PAPER_CONDITION = {ExplicitModel(): 28.0, PowerModel(): 93.0}
 """Cond(W) of the paper's Table 1; that of the implicit model is the explicit one's."""
 
+WAYPOINT_DRAWS = 10_000
+"""Draws after which there is no such waypoint."""
+
 
 @dataclass(frozen=True)
 class Search:
@@ -73,6 +76,9 @@ class Search:
     def __post_init__(self) -> None:
         if self.seed < 0:
             raise ExperimentError(f"seed = {self.seed} must be 0 or a positive whole number")
+        for name in ("fs", "rest", "motion", "moves", "smallest_move", "velocity", "rounds", "candidates"):
+            if not getattr(self, name) > 0:
+                raise ExperimentError(f"{name} = {getattr(self, name)} must be above 0")
 
     def run(self, robot: Robot, progress: Callable[[int, float], None] | None = None) -> Scenario:
         """Return the scenario found; `progress` hears the number of every round and the distance that is left.
@@ -145,10 +151,14 @@ class Search:
     def _waypoint(self, rng: np.random.Generator, robot: Robot, neighbours: Array) -> Array:
         """Return a random waypoint within the ranges, every joint of it at least `smallest_move` from its neighbours."""
         low, high = robot.ranges.T + np.array([[self.clearance], [-self.clearance]])
-        while True:
+        for _ in range(WAYPOINT_DRAWS if (low < high).all() else 0):
             point = rng.uniform(low, high)
             if (np.abs(neighbours - point) >= self.smallest_move).all():
                 return point
+        raise ExperimentError(
+            f"no waypoint is {self.smallest_move:g} rad from its neighbours and {self.clearance:g} rad inside the joints' "
+            f"ranges, {robot.ranges.tolist()}: lower smallest_move or clearance"
+        )
 
     def _scenario(self, robot: Robot, points: Array, durations: Array) -> Scenario:
         return Scenario(

@@ -61,5 +61,8 @@ from identify.prefilters import NoPrefilter as NoPrefilter
 from identify.state import State as State
 from identify.system import Status as Status
 from identify.system import System as System
+from identify.torques import ALIGNMENTS as ALIGNMENTS
+from identify.torques import AbstractAlignment as AbstractAlignment
+from identify.torques import AbstractTorque as AbstractTorque
 from identify.torques import AsLogged as AsLogged
 from identify.torques import ByChannel as ByChannel

@@ -7,7 +7,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from identify.errors import LogError, SettingError
+from identify.errors import SettingError
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -15,15 +15,9 @@ Columns: TypeAlias = Mapping[tuple[int, str], Array]
 """Columns of an observation matrix that are not identically zero: (row of an instant, parameter) -> signal (..., time)."""
 
 
-def frozen(name: str, values: npt.ArrayLike) -> Array:
-    """Return a read-only float64 copy, contiguous in memory; raise LogError if `values` are not real numbers."""
-    try:
-        given = np.asarray(values)
-    except ValueError as error:
-        raise LogError(f"{name} is no array: its rows differ in length") from error
-    if given.dtype.kind not in "iuf":
-        raise LogError(f"{name} must be real numbers in SI units, not {given.dtype}")
-    array = np.array(given, dtype=np.float64, order="C")
+def frozen(values: npt.ArrayLike) -> Array:
+    """Return a read-only float64 copy, contiguous in memory."""
+    array = np.array(values, dtype=np.float64, order="C")
     array.setflags(write=False)
     return array
 
@@ -33,6 +27,13 @@ def require_positive(**settings: float) -> None:
     for name, value in settings.items():
         if not (_is_number(value) and value > 0):
             raise SettingError(f"{name} = {value!r} must be a finite number above 0")
+
+
+def require_finite(**settings: float) -> None:
+    """Raise SettingError unless every setting is a finite number."""
+    for name, value in settings.items():
+        if not _is_number(value):
+            raise SettingError(f"{name} = {value!r} must be a finite number")
 
 
 def require_not_negative(**settings: float) -> None:

@@ -54,14 +54,6 @@ class Balance:
             np.multiply(sum(parts[1:], start=parts[0]), self.weight[..., address[0], :], out=both[..., n + i, :])
         return both
 
-    def stack(self, columns: Columns) -> Array:
-        """Return `columns`, c or e, in the order of the addresses, shape (..., k, time), zero where there is none."""
-        stack = np.zeros((*self.y.shape[:-2], len(self.addresses), self.y.shape[-1]))
-        for i, address in enumerate(self.addresses):
-            if address in columns:
-                stack[..., i, :] = columns[address]
-        return stack
-
     def _rates(self) -> Columns:
         """Return s e, differentiated in one go."""
         if not self.e:

@@ -13,14 +13,14 @@ from identify.differentiators import AbstractDifferentiator, CentralDifference
 from identify.errors import LogError, SettingError
 from identify.masks import AbstractMask, NoMask, ReversalMask
 from identify.models import AbstractModel
-from identify.motion_log import MotionLog
+from identify.motion_log import MotionLog, TorqueChannel
 from identify.operators import AbstractOperator, FirLowPass, IirLowPass
 from identify.plugins import PluginTable
 from identify.prefilters import AbstractPrefilter, ButterworthPrefilter, NoPrefilter
 from identify.signals import Signals
 from identify.state import State
 from identify.system import System
-from identify.torques import AbstractAlignment, AbstractTorque, AsLogged, ByChannel
+from identify.torques import AbstractAlignment, AsLogged, ByChannel
 
 
 @final
@@ -74,8 +74,8 @@ class Chain:
         if log.n != basis.n:
             hint = "; its axes are (time, joint), is it transposed?" if log.samples == basis.n else ""
             raise LogError(f"the log has {log.n} joints, the basis {basis.n}{hint}")
+        grid = self.operator.grid(log.samples, log.fs, self._margin(log))
         signals = self.signals(log)
-        grid = self.operator.grid(log.samples, log.fs, self._margin(signals))
         return [self.operator.system(model.balance(basis, signals), grid) for model in models]
 
     def signals(self, log: MotionLog) -> Signals:
@@ -86,14 +86,15 @@ class Chain:
         state = State(q, s(q), s)
         return Signals(state, self.alignment.align(tau, log.torque, fs), self.mask.weight(state.qd, fs), fs)
 
-    def halo(self, fs: float, torque: AbstractTorque | None = None) -> float:
-        """Return how far [s] a row looks to either side of its instant, at `fs` [Hz]."""
+    def halo(self, fs: float, channel: TorqueChannel) -> float:
+        """Return how far [s] a row looks to either side of its instant, in a log at `fs` [Hz] with this torque channel."""
+        torque = self.alignment.align(np.empty((0, 0)), channel, fs)  # how far it looks does not depend on the values
         derivatives = 2 * self.differentiator.halo(fs)  # of q, and of qd or e
-        aligned = torque.halo() if torque is not None else 0.0
-        return self.prefilter.halo(fs) + derivatives + aligned + self.operator.halo(fs)
+        stages = self.prefilter.halo(fs), derivatives, self.mask.halo(fs), torque.halo(), self.operator.halo(fs)
+        return sum(stages)
 
-    def _margin(self, signals: Signals) -> float:
-        halo = self.halo(signals.fs, signals.torque)
+    def _margin(self, log: MotionLog) -> float:
+        halo = self.halo(log.fs, log.torque)
         if self.trim is None:
             return halo
         if self.trim < halo:

@@ -35,9 +35,8 @@ class Estimate:
 
         Without a `covariance` that of section 7.3 is used: sigma_rho^2 (W' W)^-1 with sigma_rho^2 = |Y - W X|^2 / (r - p).
         """
-        estimate = cls(system, frozen("X", X), np.empty(0))
-        known = covariance if covariance is not None else estimate._paper_covariance()
-        return cls(system, estimate.X, frozen("covariance", known))
+        x = frozen(X)
+        return cls(system, x, frozen(_paper_covariance(system, x) if covariance is None else covariance))
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -62,7 +61,7 @@ class Estimate:
     @cached_property
     def predicted(self) -> Array:
         """W X, shape (..., r)."""
-        return np.matmul(self.system.W, self.X[..., None])[..., 0]
+        return _predicted(self.system, self.X)
 
     @property
     def residual(self) -> Array:
@@ -94,10 +93,15 @@ class Estimate:
         true = np.asarray(truth, dtype=np.float64)
         return 100 * np.abs(self.X - true) / np.abs(true)
 
-    def _paper_covariance(self) -> Array:
-        """Return sigma_rho^2 (W' W)^-1, NaN where the status is not OK."""
-        ok = (self.system.status == Status.OK)[..., None, None]
-        inverse = np.linalg.inv(np.where(ok, self.system.R_W, np.eye(len(self.parameters))))
-        freedom = np.maximum(self.rows - len(self.parameters), 1)
-        variance = np.sum(self.residual**2, axis=-1) / freedom
-        return np.where(ok, variance[..., None, None] * np.matmul(inverse, np.swapaxes(inverse, -1, -2)), np.nan)
+
+def _paper_covariance(system: System, X: Array) -> Array:
+    """Return sigma_rho^2 (W' W)^-1 (section 7.3), NaN where the system cannot be solved."""
+    ok = (system.status == Status.OK)[..., None, None]
+    inverse = np.linalg.inv(np.where(ok, system.R_W, np.eye(len(system.parameters))))
+    freedom = np.maximum(system.rows - len(system.parameters), 1)
+    variance = np.sum((system.Y - _predicted(system, X)) ** 2, axis=-1) / freedom
+    return np.where(ok, variance[..., None, None] * np.matmul(inverse, np.swapaxes(inverse, -1, -2)), np.nan)
+
+
+def _predicted(system: System, X: Array) -> Array:
+    return np.matmul(system.W, X[..., None])[..., 0]

@@ -1,6 +1,7 @@
 """Motion logs on disk: Parquet with the columns t, q1, q2, ..., tau1, tau2, ... in SI units."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -58,11 +59,11 @@ def read_log(path: Path, torque: TorqueChannel | None = None) -> MotionLog:
         raise LogError(f"cannot read the log {path}: {error.strerror or error}") from error
     except pa.ArrowException as error:
         raise LogError(f"cannot read the log {path}: it is not a Parquet file") from error
-    names = set(table.column_names)
-    n = next(j for j in range(len(names) + 1) if f"q{j + 1}" not in names)
-    needed = ["t", *(f"q{j + 1}" for j in range(max(n, 1))), *(f"tau{j + 1}" for j in range(max(n, 1)))]
-    if missing := [name for name in needed if name not in names]:
-        raise LogError(f"{path} has no column {', '.join(missing)}; it has {', '.join(table.column_names)}")
+    names = table.column_names
+    n = max(sum(name.startswith("q") and name[1:].isdigit() for name in names), 1)
+    needed = ["t", *(f"q{j + 1}" for j in range(n)), *(f"tau{j + 1}" for j in range(n))]
+    if wrong := set(needed) ^ {name for name in names if re.fullmatch(r"t|(q|tau)\d+", name)}:
+        raise LogError(f"{path} must have the columns {', '.join(needed)}; missing or left over: {', '.join(sorted(wrong))}")
     said = (table.schema.metadata or {}).get(_TORQUE)
     if torque is None and said is None:
         raise LogError(

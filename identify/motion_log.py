@@ -6,7 +6,7 @@ from typing import Literal, Self, get_args
 import numpy as np
 import numpy.typing as npt
 
-from identify.arrays import Array, frozen, require_not_negative, require_positive
+from identify.arrays import Array, frozen, require_finite, require_positive
 from identify.errors import LogError, SettingError
 
 Meaning = Literal["instantaneous", "held", "averaged"]
@@ -48,7 +48,7 @@ class TorqueChannel:
     def __post_init__(self) -> None:
         if self.meaning not in get_args(Meaning):
             raise SettingError(f"torque meaning {self.meaning!r} is unknown; known: {', '.join(get_args(Meaning))}")
-        require_not_negative(delay=abs(self.delay))
+        require_finite(delay=self.delay)
         gains = np.atleast_1d(np.asarray(self.gain, dtype=np.float64))
         if not np.isfinite(gains).all() or (gains == 0).any():
             raise SettingError(f"torque gain = {self.gain} must be finite and not 0")
@@ -90,7 +90,7 @@ class MotionLog:
         if not isinstance(self.torque, TorqueChannel):
             raise LogError(f"torque = {self.torque!r} must be a TorqueChannel, such as TorqueChannel('held', delay=0.002)")
         for name in ("q", "tau"):
-            object.__setattr__(self, name, frozen(name, getattr(self, name)))
+            object.__setattr__(self, name, frozen(_real(name, getattr(self, name))))
         if self.q.shape != self.tau.shape:
             raise LogError(f"q has shape {self.q.shape} and tau {self.tau.shape}: every sample needs both, of every joint")
         if self.q.ndim < 2 or 0 in self.q.shape:
@@ -131,12 +131,12 @@ class MotionLog:
         LogError
             If times are missing, decrease, or are not uniform; the worst step is named.
         """
-        times, positions = frozen("t", t), frozen("q", q)
+        times, positions = _real("t", t), _real("q", q)
         if positions.ndim < 2:
             raise LogError(f"q has shape {positions.shape}, not (..., time, joint)")
         if times.shape != positions.shape[-2:-1]:
             raise LogError(f"t has shape {times.shape}, q {positions.shape}: one time is needed for each sample of q")
-        return cls(sampling_frequency(times), positions, frozen("tau", tau), torque)
+        return cls(sampling_frequency(times), positions, _real("tau", tau), torque)
 
 
 def sampling_frequency(t: Array) -> float:
@@ -155,7 +155,25 @@ def sampling_frequency(t: Array) -> float:
             f"time is not uniform: a step of {step[k]:.6g} s after t = {t[k]:.6g} s, where the mean step is {mean:.6g} s; "
             "resample the log at a fixed frequency first"
         )
+    late = t - t[0] - mean * np.arange(len(t))
+    if np.abs(late).max() > mean / 2:
+        k = int(np.argmax(np.abs(late)))
+        raise LogError(
+            f"time drifts: t = {t[k]:.6g} s is {abs(late[k]):.3g} s from where uniform sampling at {1 / mean:.6g} Hz puts "
+            "it; resample the log at a fixed frequency first"
+        )
     return float(1 / mean)
+
+
+def _real(name: str, values: npt.ArrayLike) -> Array:
+    """Return `values` as an array of floats; raise LogError if they are not real numbers."""
+    try:
+        given = np.asarray(values)
+    except ValueError as error:
+        raise LogError(f"{name} is no array: its rows differ in length") from error
+    if given.dtype.kind not in "iuf":
+        raise LogError(f"{name} must be real numbers in SI units, not {given.dtype}")
+    return given.astype(np.float64, copy=False)
 
 
 def _require_finite(name: str, values: Array) -> None:

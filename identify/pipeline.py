@@ -77,7 +77,7 @@ def identify_each(
     systems = chain.build(log, basis, list(models.values()))
     estimates = {}
     for (name, model), system in zip(models.items(), systems, strict=True):
-        if throw:
+        if throw and estimator.full_rank:
             system.check()
         rebuild = partial(_rebuilt, chain, basis, model)
         estimates[name] = estimator.fit(Problem(system, rebuild=rebuild, simulate=simulate))

@@ -4,37 +4,44 @@ All act along the last axis and repeat the first and last value beyond the ends;
 """
 
 from functools import lru_cache
+from math import floor
 
 import numpy as np
 from scipy import ndimage
 
 from identify.arrays import Array
 
-REACH = 3
-"""Samples to either side from which a value between two samples is interpolated: a polynomial of degree 6."""
+REACH = 4
+"""Samples to either side from which a value between two samples is interpolated: a polynomial of degree 7."""
 
 CELL = np.array([1.0, 22.0, 1.0]) / 24
 """Weights that turn samples of a smooth signal into its mean over one sampling period around them, to fourth order."""
 
 
-def slide(x: Array, weights: Array) -> Array:
-    """Return sum_i weights[i] x[k + i - m] for every k, with `weights` of odd length 2 m + 1."""
-    return ndimage.correlate1d(x, weights, axis=-1, mode="nearest")
+def slide(x: Array, weights: Array, spacing: int = 1) -> Array:
+    """Return sum_i weights[i] x[k + (i - m) spacing] for every k, with `weights` of odd length 2 m + 1."""
+    if spacing == 1:
+        return ndimage.correlate1d(x, weights, axis=-1, mode="nearest")
+    result = np.empty_like(x)
+    for start in range(spacing):
+        comb = slice(start, None, spacing)
+        result[..., comb] = ndimage.correlate1d(x[..., comb], weights, axis=-1, mode="nearest")
+    return result
 
 
 def shift(x: Array, samples: float) -> Array:
-    """Return x at k + `samples`, for every k; exact for polynomials of degree 2 REACH."""
-    whole = round(samples)
-    return slide(x, _shift_weights(whole, samples - whole)) if samples else x
+    """Return x at k + `samples`, for every k; exact for polynomials of degree 2 REACH - 1."""
+    whole = floor(samples)
+    moved = x[..., np.clip(np.arange(x.shape[-1]) + whole, 0, x.shape[-1] - 1)]
+    return moved if samples == whole else slide(moved, _between(samples - whole))
 
 
 @lru_cache(maxsize=64)
-def _shift_weights(whole: int, part: float) -> Array:
-    """Return the weights of the Lagrange polynomial at `part`, moved by `whole` samples."""
-    nodes = np.arange(-REACH, REACH + 1)
-    weights = np.zeros(2 * (REACH + abs(whole)) + 1)
-    middle = REACH + abs(whole) + whole
+def _between(part: float) -> Array:
+    """Return the weights of the samples -REACH ... REACH that interpolate at `part`, between the samples 0 and 1."""
+    nodes = np.arange(1 - REACH, REACH + 1)
+    weights = np.zeros(2 * REACH + 1)
     for i in nodes:
         others = nodes[nodes != i]
-        weights[middle + i] = np.prod((part - others) / (i - others))
+        weights[REACH + i] = np.prod((part - others) / (i - others))
     return weights

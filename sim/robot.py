@@ -74,10 +74,16 @@ class Robot:
 
     @property
     def torque_limits(self) -> Array:
-        """Largest torque of every joint's actuator [N m], shape (joint,), infinite where the model has no limits."""
-        limits = np.full(self.n, np.inf)
-        for a in range(self.model.nu):
-            if self.model.actuator_ctrllimited[a]:
-                gear, reach = self.model.actuator_gear[a, 0], self.model.actuator_ctrlrange[a].max()
-                limits[self.model.actuator_trnid[a, 0]] = abs(gear) * reach
+        """Largest torque of every joint's actuator [N m], shape (joint,), infinite where the model has no limits.
+
+        From the range of forces, and from that of controls where the control is a force, as in `motor`.
+        """
+        limits, model = np.full(self.n, np.inf), self.model
+        for a in range(model.nu):
+            joint, gear = model.actuator_trnid[a, 0], abs(model.actuator_gear[a, 0])
+            if model.actuator_forcelimited[a]:
+                limits[joint] = min(limits[joint], gear * model.actuator_forcerange[a].max())
+            is_force = model.actuator_biastype[a] == int(mujoco.mjtBias.mjBIAS_NONE)
+            if model.actuator_ctrllimited[a] and is_force:
+                limits[joint] = min(limits[joint], gear * model.actuator_gainprm[a, 0] * model.actuator_ctrlrange[a].max())
         return limits

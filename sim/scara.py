@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 
 from sim.errors import RobotError
+from sim.inverse_dynamics import inverse_dynamics
 from sim.robot import Array, Robot
 
 
@@ -20,6 +21,7 @@ def scara_truth(robot: Robot) -> dict[str, float]:
     """
     model = robot.model
     data = mujoco.MjData(model)
+    data.qpos[:] = 0.0
     mujoco.mj_forward(model, data)
     if robot.n != 2 or not np.allclose(data.xaxis, [0, 0, 1]):
         raise RobotError(f"robot {robot.name!r} is not a planar arm with two vertical joints")
@@ -31,7 +33,7 @@ def scara_truth(robot: Robot) -> dict[str, float]:
     L = float(np.linalg.norm(along))
     zz2, mass2, first2 = _about_joint(model, data, 1, along / L)
     (Fv1, Fv2), (Fs1, Fs2) = model.dof_damping, model.dof_frictionloss
-    return {
+    truth = {
         "ZZR1": float(zz1 + model.dof_armature[0] + L**2 * mass2),
         "Fv1": float(Fv1),
         "Fs1": float(Fs1),
@@ -41,6 +43,8 @@ def scara_truth(robot: Robot) -> dict[str, float]:
         "Fv2": float(Fv2),
         "Fs2": float(Fs2),
     }
+    _require_complete(robot, truth)
+    return truth
 
 
 def _about_joint(model: mujoco.MjModel, data: mujoco.MjData, joint: int, x_axis: Array) -> tuple[float, float, Array]:
@@ -56,3 +60,20 @@ def _about_joint(model: mujoco.MjModel, data: mujoco.MjData, joint: int, x_axis:
         mass += float(m)
         first += m * np.array([arm @ x_axis, arm @ across])
     return zz, mass, first
+
+
+def _require_complete(robot: Robot, X: dict[str, float]) -> None:
+    """Raise RobotError unless the parameters give the robot's inverse dynamics, at some random states."""
+    q, qd, qdd = np.random.default_rng(0).uniform(-3, 3, (3, 50, 2))
+    c, s = np.cos(q[:, 1]), np.sin(q[:, 1])
+    coupling, slope = X["LMX2"] * c - X["LMY2"] * s, -X["LMX2"] * s - X["LMY2"] * c
+    tau2 = (X["ZZ2"] + coupling) * qdd[:, 0] + X["ZZ2"] * qdd[:, 1] - slope * qd[:, 0] ** 2
+    tau1 = (X["ZZR1"] + coupling) * qdd[:, 0] + coupling * qdd.sum(axis=1) + X["ZZ2"] * qdd.sum(axis=1)
+    tau1 += slope * qd[:, 1] * (2 * qd[:, 0] + qd[:, 1])
+    expected = np.stack([tau1, tau2], axis=-1) + qd * [X["Fv1"], X["Fv2"]]
+    missed = np.abs(inverse_dynamics(robot, q, qd, qdd) - expected).max()
+    if missed > 1e-9 * np.abs(expected).max():
+        raise RobotError(
+            f"robot {robot.name!r} has forces that the eight parameters of a SCARA do not describe, up to {missed:.2g} N m: "
+            "springs, gears, tendons, fluid, or joint angles not counted from the stretched arm"
+        )

@@ -7,6 +7,7 @@ import pytest
 
 from experiments.plugins import TABLES
 from identify import (
+    ALIGNMENTS,
     BLOCKS,
     CHAINS,
     DIFFERENTIATORS,
@@ -17,9 +18,11 @@ from identify import (
     PREFILTERS,
     Basis,
     ExplicitModel,
+    MotionLog,
     PowerModel,
     Problem,
     State,
+    TorqueChannel,
     idbench_chain,
     identify,
     scara,
@@ -160,3 +163,29 @@ def test_estimators_recover_noiseless_systems(name, log, truth):
 def test_a_robot_is_the_sum_of_its_blocks():
     basis = Basis(2, tuple(BLOCKS.create(name) for name in BLOCKS.builtin))
     assert len(basis.parameters) == sum(len(BLOCKS.create(name).names(2)) for name in BLOCKS.builtin)
+
+
+@pytest.mark.parametrize("name", ESTIMATORS.builtin)
+def test_estimators_take_every_run_by_itself(name, log):
+    """A batch, one run of which stands still, gives the others what they get alone, to the bit."""
+    q = np.stack([log.q, np.zeros_like(log.q), log.q])
+    tau = np.stack([log.tau, log.tau, log.tau + 0.1])
+    batch = MotionLog(log.fs, q, tau, log.torque)
+    estimator = ESTIMATORS.create(name)
+    together = identify(batch, scara(), ExplicitModel(), estimator=estimator, throw=False)
+    alone = identify(MotionLog(log.fs, q[2], tau[2], log.torque), scara(), ExplicitModel(), estimator=estimator)
+    np.testing.assert_array_equal(together.X[2], alone.X)
+    np.testing.assert_array_equal(together.covariance[2], alone.covariance)
+
+
+@pytest.mark.parametrize("name", ALIGNMENTS.builtin)
+@pytest.mark.parametrize("meaning", ["instantaneous", "held", "averaged"])
+def test_alignments_keep_shapes_and_constants(name, meaning):
+    """A constant torque is itself, whatever its samples mean, and its power is it times the velocity."""
+    torque = ALIGNMENTS.create(name).align(np.full(SIGNALS.shape, 2.0), TorqueChannel(meaning, 0.004), FS)
+    np.testing.assert_allclose(torque.mean(), 2.0, rtol=1e-12)
+    power = torque.power(np.broadcast_to(3 * T, SIGNALS.shape), np.full(SIGNALS.shape, 3.0))
+    np.testing.assert_allclose(power[..., 20:-20], 2 * 2.0 * 3.0, rtol=1e-9)
+    assert power.shape == (3, 1, len(T))
+    np.testing.assert_allclose(torque.average(np.full(50, 7.0)), 7.0, rtol=1e-12)
+    assert torque.halo() >= 0

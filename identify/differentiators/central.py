@@ -5,7 +5,7 @@ from typing import Literal, final
 
 import numpy as np
 
-from identify.arrays import Array
+from identify.arrays import Array, require_positive
 from identify.differentiators.base import AbstractDifferentiator
 from identify.errors import SettingError
 from identify.stencils import slide
@@ -25,20 +25,29 @@ class CentralDifference(AbstractDifferentiator):
     Parameters
     ----------
     order : {2, 6}
-        Order of accuracy. At the angular frequency w the derivative is too small by (w/fs)^2 / 6 (order 2) or
-        (w/fs)^6 / 140 (order 6).
+        Order of accuracy. At the angular frequency w the derivative is too small by (w h)^2 / 6 (order 2) or
+        (w h)^6 / 140 (order 6), with h the time between the samples it takes.
+    spacing : float
+        Least time h [s] between the samples it takes, to the nearest whole number of sampling periods: a log at a higher
+        frequency does not make it noisier.
     """
 
     order: Literal[2, 6] = 6
+    spacing: float = 0.01
 
     def __post_init__(self) -> None:
+        require_positive(spacing=self.spacing)
         if self.order not in _WEIGHTS:
             raise SettingError(f"central difference of order {self.order} is unknown; known orders: 2, 6")
 
     def halo(self, fs: float) -> float:
-        """Return half the number of intervals the difference spans."""
-        return self.order / 2 / fs
+        """Return half the time the difference spans."""
+        return self.order / 2 * self._samples(fs) / fs
 
     def derivative(self, x: Array, fs: float) -> Array:
-        """Return the central difference of `x` times `fs`."""
-        return slide(x, _WEIGHTS[self.order] * fs)
+        """Return the central difference of `x` over h."""
+        samples = self._samples(fs)
+        return slide(x, _WEIGHTS[self.order] * (fs / samples), samples)
+
+    def _samples(self, fs: float) -> int:
+        return max(1, round(self.spacing * fs))

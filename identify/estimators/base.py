@@ -39,6 +39,9 @@ class AbstractEstimator(ABC):
     needs: ClassVar[frozenset[Need]] = frozenset()
     """What it needs beside the system."""
 
+    full_rank: ClassVar[bool] = True
+    """Whether it needs a motion that shows every parameter; one with a prior or a penalty does not."""
+
     @abstractmethod
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate of `problem`, every run by itself."""

@@ -9,5 +9,9 @@ class AbstractMask(ABC):
     """Weights of the instants: both sides of a model are multiplied by them before the operator."""
 
     @abstractmethod
+    def halo(self, fs: float) -> float:
+        """Return how far [s] a weight looks to either side."""
+
+    @abstractmethod
     def weight(self, qd: Array, fs: float) -> Array:
         """Return weights between 0 and 1 of every joint's instants, shape (..., joint, time) like `qd` [rad/s]."""

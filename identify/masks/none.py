@@ -14,6 +14,11 @@ from identify.masks.base import AbstractMask
 class NoMask(AbstractMask):
     """Keeps every instant."""
 
+    def halo(self, fs: float) -> float:
+        """Return 0."""
+        del fs
+        return 0.0
+
     def weight(self, qd: Array, fs: float) -> Array:
         """Return ones."""
         del fs

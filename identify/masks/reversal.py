@@ -19,7 +19,7 @@ class ReversalMask(AbstractMask):
     Parameters
     ----------
     threshold : float
-        A joint stands or turns while |qd| is at most this [rad/s].
+        A joint stands or turns while |qd| is at most this [rad/s], and where the sign of qd changes.
     width : float
         The instants this close [s] to such a one are left out as well: as far as differences look across the kink.
     """
@@ -31,8 +31,17 @@ class ReversalMask(AbstractMask):
         require_positive(threshold=self.threshold)
         require_not_negative(width=self.width)
 
+    def halo(self, fs: float) -> float:
+        """Return the width, and the sample next to it."""
+        return (self._reach(fs) + 1) / fs
+
     def weight(self, qd: Array, fs: float) -> Array:
         """Return 1 where the joint slides, 0 elsewhere."""
-        slides = (np.abs(qd) > self.threshold).astype(np.float64)
-        reach = ceil(self.width * fs - 1e-9)  # 0.03 s at 100 Hz are 3 samples, whatever the rounding of the product
-        return ndimage.minimum_filter1d(slides, 2 * reach + 1, axis=-1, mode="nearest")
+        slides = np.abs(qd) > self.threshold
+        turns = np.signbit(qd[..., 1:]) != np.signbit(qd[..., :-1])  # a fast joint turns between two samples
+        slides[..., 1:] &= ~turns
+        slides[..., :-1] &= ~turns
+        return ndimage.minimum_filter1d(slides.astype(np.float64), 2 * self._reach(fs) + 1, axis=-1, mode="nearest")
+
+    def _reach(self, fs: float) -> int:
+        return ceil(self.width * fs - 1e-9)  # 0.03 s at 100 Hz are 3 samples, whatever the rounding of the product

@@ -55,4 +55,4 @@ class FirLowPass(AbstractLowPass):
 
 @lru_cache(maxsize=16)
 def _taps(half: int, cutoff: float, fs: float) -> Array:
-    return frozen("taps", signal.firwin(2 * half + 1, cutoff, window="hamming", fs=fs))
+    return frozen(signal.firwin(2 * half + 1, cutoff, window="hamming", fs=fs))

@@ -39,11 +39,14 @@ class AbstractWeakForm(AbstractOperator):
     @final
     def apply(self, balance: Balance, grid: Grid) -> Rows:
         """Return the integrals; a row is void if its stretch touches a masked instant."""
-        integral, derivative = self.kernels(balance.fs)
-        length = len(integral)
+        kernels = self.kernels(balance.fs)
+        length = len(kernels.integral)
         before = (length - 1) // 2
-        columns = grid.weighted_sums(balance.stack(balance.c), integral, before)
-        columns += grid.weighted_sums(balance.stack(balance.e), derivative, before)
+        columns = np.zeros((*balance.y.shape[:-2], len(balance.addresses), grid.count))
+        for part, kernel in ((balance.c, kernels.integral), (balance.e, kernels.derivative)):
+            if part:
+                place = [balance.addresses.index(address) for address in part]
+                columns[..., place, :] += grid.weighted_sums(np.stack(list(part.values()), axis=-2), kernel, before)
         touched = grid.weighted_sums(1 - balance.weight, np.ones(length), before)
-        y = grid.weighted_sums(balance.y, integral, before)
+        y = grid.weighted_sums(balance.y, kernels.integral, before)
         return Rows(y, columns, touched == 0, (length - 1) / 2 - before)

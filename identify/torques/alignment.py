@@ -7,6 +7,7 @@ from typing import final
 
 from identify.arrays import Array
 from identify.motion_log import Meaning, TorqueChannel
+from identify.plugins import PluginTable
 from identify.torques.averaged import AveragedTorque
 from identify.torques.base import AbstractTorque
 from identify.torques.held import HeldTorque
@@ -46,3 +47,13 @@ class AsLogged(AbstractAlignment):
         """Return the torque as if it were instantaneous and not delayed."""
         del channel
         return InstantaneousTorque(tau, 0.0, fs)
+
+
+ALIGNMENTS: PluginTable[AbstractAlignment] = PluginTable(
+    "alignments",
+    AbstractAlignment,  # type: ignore[type-abstract]  # only asked whether an instance is one
+    {
+        "channel": ByChannel,
+        "logged": AsLogged,
+    },
+)

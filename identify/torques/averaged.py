@@ -15,11 +15,14 @@ _DIFFERENCE = np.array([-0.5, 0.0, 0.5])
 @final
 @dataclass(frozen=True, eq=False)
 class AveragedTorque(AbstractTorque):
-    """Sample k is the mean of the torque from t_k + delay to t_k + delay + T, with T = 1/fs."""
+    """Sample k is the mean, from t_k + delay to t_k + delay + T with T = 1/fs, of a torque that is smooth within it.
+
+    A torque that is itself held is `HeldTorque`, whatever measured it.
+    """
 
     def halo(self) -> float:
         """Return the shift and the reach of the interpolations."""
-        return abs(self.delay) + (REACH + 1) / self.fs
+        return abs(self.delay) + (REACH + 2) / self.fs
 
     def mean(self) -> Array:
         """Return the mean over the window around t_k, interpolated from windows around t_k + delay + T/2."""

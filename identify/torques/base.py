@@ -10,9 +10,8 @@ from identify.arrays import Array
 class AbstractTorque(ABC):
     """The measured torque as a mean over one window around every sample instant.
 
-    The window is the instant itself for a torque that was measured at instants, and one sampling period for a torque
-    that was held or averaged; `average` puts the columns of a model over the same window, so that
-    B tau = [c + s e] X is compared with itself.
+    The window is one sampling period for a torque that was averaged, and the instant itself otherwise; `average` puts the
+    columns of a model over the same window, so that B tau = [c + s e] X is compared with itself.
 
     Parameters
     ----------

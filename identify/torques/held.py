@@ -15,32 +15,25 @@ from identify.torques.base import AbstractTorque
 class HeldTorque(AbstractTorque):
     """Sample k acts, constant, from t_k + delay to t_k + delay + T, with T = 1/fs.
 
-    Over the window [t_k - T/2, t_k + T/2] two samples act, the older one until t_k + x T, where x in [-1/2, 1/2] is what
-    is left of delay / T after whole periods.
+    What a sampled motion shows of such a staircase is its content below fs/2: the samples, T/2 + delay later, and smoothed
+    by the hold, whose gain sin(w T/2) / (w T/2) is that of a mean over one period. So this torque stands at the instants
+    themselves, and the columns stay as they are. (Averaging the staircase and the columns over one period instead takes
+    the accelerations for smooth within it, which they are not: an error of (w T)^2 times 1/24 - (1/2 - delay/T)^2 / 2.)
     """
 
     def halo(self) -> float:
-        """Return the delay and the reach of the interpolation of q between samples."""
-        return abs(self.delay) + (REACH + 1) / self.fs
+        """Return the delay and the reach of the interpolation."""
+        return abs(self.delay) + (REACH + 2) / self.fs
 
     def mean(self) -> Array:
-        """Return (1/2 - x) tau_(k-m) + (1/2 + x) tau_(k-m-1), exactly the mean over the window."""
-        older, newer, x = self._acting()
-        return (0.5 - x) * newer + (0.5 + x) * older
+        """Return tau, delay + T/2 later, averaged over a period."""
+        return slide(shift(self.tau, -(self.delay * self.fs + 0.5)), CELL)
 
     def power(self, q: Array, qd: Array) -> Array:
-        """Return the work of the two samples over the window, divided by T: a held torque times the angle turned."""
-        del qd
-        older, newer, x = self._acting()
-        start, change, end = shift(q, -0.5), shift(q, x), shift(q, 0.5)
-        work = older * (change - start) + newer * (end - change)
-        return np.sum(work, axis=-2, keepdims=True) * self.fs
+        """Return qd' times this torque."""
+        del q
+        return np.sum(qd * self.mean(), axis=-2, keepdims=True)
 
     def average(self, x: Array) -> Array:
-        """Return the mean of `x` over a sampling period around every sample, to fourth order."""
-        return slide(x, CELL)
-
-    def _acting(self) -> tuple[Array, Array, float]:
-        whole = round(self.delay * self.fs)
-        older, newer = shift(self.tau, -whole - 1), shift(self.tau, -whole)
-        return older, newer, self.delay * self.fs - whole
+        """Return `x`."""
+        return x

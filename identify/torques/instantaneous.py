@@ -17,7 +17,7 @@ class InstantaneousTorque(AbstractTorque):
 
     def halo(self) -> float:
         """Return the reach of the interpolation, none without a delay."""
-        return abs(self.delay) + REACH / self.fs if self.delay else 0.0
+        return abs(self.delay) + (REACH + 1) / self.fs if self.delay else 0.0
 
     def mean(self) -> Array:
         """Return the torque at t_k, interpolated."""

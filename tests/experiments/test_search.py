@@ -70,3 +70,14 @@ def test_it_never_sees_an_error_of_identification(robot):
 def test_it_gives_up_with_advice(robot):
     with pytest.raises(ExperimentError, match=r"in 2 rounds \(closest: .*; try another seed"):
         replace(Search(), tolerance=1e-9, rounds=2).run(robot)
+
+
+@pytest.mark.parametrize("settings", [{"smallest_move": 4.0}, {"clearance": 3.0}])
+def test_impossible_waypoints_are_told(settings, robot):
+    with pytest.raises(ExperimentError, match=r"no waypoint is .* lower smallest_move or clearance"):
+        Search(**settings).run(robot)
+
+
+def test_impossible_settings_are_told():
+    with pytest.raises(ExperimentError, match="motion = 0 must be above 0"):
+        Search(motion=0)

@@ -18,6 +18,7 @@ from identify import (
     IdentificationError,
     LogError,
     MotionLog,
+    NoMask,
     PowerModel,
     SettingError,
     System,
@@ -29,6 +30,11 @@ from identify import (
     scara,
 )
 from sim.ideal import ideal_log
+
+CHANNELS = [
+    TorqueChannel("instantaneous"),
+    *(TorqueChannel(meaning, delay) for meaning in ("held", "averaged", "instantaneous") for delay in (0.007, -0.013, 0.052)),
+]
 
 
 def error(log, model, chain, truth, **options):
@@ -101,20 +107,20 @@ def test_a_joint_that_never_moves_is_told_with_the_parameters_it_hides(table1):
 
 def test_a_robot_at_rest_is_refused(log):
     rest = MotionLog(100.0, np.zeros((1000, 2)), np.zeros((1000, 2)), TorqueChannel("instantaneous"))
-    with pytest.raises(IdentificationError, match="0 rows of 184 are left by the mask for 8 parameters"):
+    with pytest.raises(IdentificationError, match="0 rows of 182 are left by the mask for 8 parameters"):
         identify(rest, scara(), ExplicitModel())
 
 
 def test_trim_must_cover_what_the_stages_look_at(log):
-    with pytest.raises(SettingError, match=r"trim = 0\.1 s is shorter than the 0\.39 s that this chain looks"):
+    with pytest.raises(SettingError, match=r"trim = 0\.1 s is shorter than the 0\.43 s that this chain looks"):
         identify(log, scara(), ExplicitModel(), replace(idbench_chain(), trim=0.1))
 
 
 @pytest.mark.parametrize(
     ("samples", "chain", "message"),
     [
-        (60, idbench_chain(), r"the log has 60 samples .* needs at least 88"),
-        (12, paper_chain(), "the log has 12 samples, the filter needs more than"),
+        (60, idbench_chain(), r"the log has 60 samples .* needs at least 96"),
+        (12, paper_chain(), r"the log has 12 samples .* needs at least 572"),
         (500, paper_chain(), r"the log has 500 samples .* needs at least 572"),
     ],
 )
@@ -145,5 +151,35 @@ def test_chain_is_what_it_says(log):
     chain: Chain = idbench_chain()
     (built,) = chain.build(log, scara(), [PowerModel()])
     assert isinstance(built, System)
-    assert built.time[0] >= chain.halo(100.0)
-    assert built.time[-1] <= log.t[-1] - chain.halo(100.0)
+    halo = chain.halo(100.0, log.torque)
+    assert built.time[0] >= halo - 1e-9
+    assert built.time[-1] <= log.t[-1] - halo + 1e-9
+
+
+@pytest.mark.parametrize("channel", CHANNELS)
+@pytest.mark.parametrize("model", MODELS.builtin)
+@pytest.mark.parametrize("operator", ["fir", "windows", "modulating"])
+def test_no_row_looks_further_than_the_declared_halo(operator, model, channel, log, rng):
+    """One sample of position or torque is disturbed: rows that move are within the halo, and some do."""
+    chain = replace(idbench_chain(), operator=OPERATORS.create(operator))
+    k, q, tau = 900, log.q[:1800].copy(), log.tau[:1800].copy()
+    before = chain.build(MotionLog(100.0, q, tau, channel), scara(), [MODELS.create(model)])[0]
+    for signal in (q, tau):
+        signal[k] += 0.5
+        (after,) = chain.build(MotionLog(100.0, q, tau, channel), scara(), [MODELS.create(model)])
+        signal[k] -= 0.5
+        moved = (after.Y != before.Y) | (after.W != before.W).any(axis=-1)
+        assert moved.any()
+        assert (
+            np.abs(before.time - k / 100)[moved].max() <= chain.halo(100.0, channel) + 0.005 + 1e-9
+        )  # half a sample: odd windows
+
+
+def test_the_halo_counts_every_stage():
+    """Each stage alone moves it by what it looks at."""
+    chain = replace(idbench_chain(), mask=NoMask())
+    plain, held = TorqueChannel("instantaneous"), TorqueChannel("held", 0.02)
+    assert chain.halo(100.0, held) - chain.halo(100.0, plain) == pytest.approx(0.02 + 0.06)
+    assert idbench_chain().halo(100.0, plain) - chain.halo(100.0, plain) == pytest.approx(0.04)
+    filtered = replace(chain, prefilter=PREFILTERS.create("butterworth"))
+    assert filtered.halo(100.0, plain) > chain.halo(100.0, plain) + 0.1

@@ -3,7 +3,7 @@ import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
-from identify import LogError, MotionLog, TorqueChannel
+from identify import IdentificationError, LogError, MotionLog, TorqueChannel
 from identify.log_file import read_log, write_log
 
 
@@ -43,8 +43,25 @@ def test_unusable_files_are_refused(tmp_path, rng):
     with pytest.raises(LogError, match="cannot read the log"):
         read_log(tmp_path / "text.parquet")
     parquet.write_table(pa.table({"t": [0.0, 0.1], "q1": [0.0, 1.0], "q2": [0.0, 1.0]}), tmp_path / "half.parquet")
-    with pytest.raises(LogError, match="no column tau1, tau2; it has t, q1, q2"):
+    with pytest.raises(LogError, match="missing or left over: tau1, tau2"):
         read_log(tmp_path / "half.parquet")
     runs = MotionLog(100, rng.normal(size=(2, 9, 1)), rng.normal(size=(2, 9, 1)), TorqueChannel("held"))
     with pytest.raises(LogError, match="a file holds one run"):
         write_log(runs, tmp_path / "runs.parquet")
+
+
+@pytest.mark.parametrize("names", [("t", "q1", "q3", "tau1", "tau3"), ("t", "q1", "tau1", "tau2"), ("q1", "tau1")])
+def test_columns_that_do_not_pair_up_are_refused(tmp_path, names):
+    parquet.write_table(pa.table({name: np.arange(9) / 10 for name in names}), tmp_path / "log.parquet")
+    with pytest.raises(LogError, match="missing or left over"):
+        read_log(tmp_path / "log.parquet", TorqueChannel("held"))
+
+
+@pytest.mark.parametrize("said", [b"{}", b"text", b"[1]", b'{"meaning": "held", "delay": "x", "gain": 1}'])
+def test_a_torque_channel_that_makes_no_sense_is_refused(tmp_path, said):
+    table = pa.table({name: np.arange(9) / 10 for name in ("t", "q1", "tau1")}).replace_schema_metadata(
+        {b"idbench.torque": said}
+    )
+    parquet.write_table(table, tmp_path / "log.parquet")
+    with pytest.raises(IdentificationError, match=r"torque|delay"):
+        read_log(tmp_path / "log.parquet")

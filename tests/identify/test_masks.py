@@ -21,3 +21,11 @@ def test_each_joint_has_its_own_weights():
 def test_impossible_settings_are_refused(settings):
     with pytest.raises(SettingError):
         ReversalMask(**settings)
+
+
+def test_a_turn_between_two_samples_is_seen():
+    """So fast that no sample is below the threshold."""
+    qd = np.array([[3.0] * 10 + [-3.0] * 10])
+    np.testing.assert_array_equal(
+        ReversalMask(0.1, 0.03).weight(qd, 100.0)[0] == 0, (np.arange(20) >= 6) & (np.arange(20) <= 13)
+    )

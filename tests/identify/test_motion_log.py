@@ -90,3 +90,10 @@ def test_times_that_are_not_uniform_are_refused(t, message):
 def test_one_sample_tells_no_frequency():
     with pytest.raises(LogError, match="1 samples do not tell"):
         MotionLog.at_times(np.zeros(1), Q[:1], Q[:1], CHANNEL)
+
+
+def test_times_that_drift_are_refused():
+    """Every step within 1 % of the mean, and yet the middle of the log is 0.9 samples off."""
+    t = np.cumsum(np.where(np.arange(200) < 100, 0.00991, 0.01009))
+    with pytest.raises(LogError, match=r"time drifts: t = .* is 0\.00\d+ s from where uniform sampling"):
+        MotionLog.at_times(t, np.zeros((200, 2)), np.zeros((200, 2)), CHANNEL)

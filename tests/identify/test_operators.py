@@ -167,3 +167,11 @@ def test_fir_computes_what_a_full_convolution_gives(rng):
     system = at(FirLowPass(5.0, 5.0), balance(y))
     full = np.stack([np.convolve(row, firwin(67, 5.0, fs=FS), mode="same") for row in y])
     np.testing.assert_allclose(system.Y.reshape(-1, 2).T, full[:, 300:1200:10], atol=1e-14)
+
+
+@pytest.mark.parametrize("intervals", range(2, 13))
+def test_windows_of_any_length_integrate_cubics_exactly(intervals):
+    weights = Windows(intervals / FS).kernels(FS).integral
+    t = np.arange(intervals + 1) / FS
+    for power in range(4):
+        assert weights @ t**power == pytest.approx(t[-1] ** (power + 1) / (power + 1), rel=1e-12)

@@ -90,3 +90,28 @@ def test_missing_file_and_wrong_joint_are_refused(tmp_path):
     path.write_text('<mujoco><worldbody><body><joint name="hip" type="ball"/><geom size="1"/></body></worldbody></mujoco>')
     with pytest.raises(RobotError, match="only hinge and slide joints can be simulated, not hip"):
         Robot.load(str(path))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda spec: setattr(spec.joint("joint1"), "stiffness", [4.0, 0, 0]),
+        lambda spec: setattr(spec.joint("joint2"), "damping", [0.01, 0.2, 0]),
+        lambda spec: setattr(spec.option, "density", 1000.0),
+    ],
+    ids=["spring", "quadratic damping", "fluid"],
+)
+def test_what_eight_parameters_do_not_describe_is_refused(change):
+    spec = mujoco.MjSpec.from_file(str(models.path("scara")))
+    change(spec)
+    with pytest.raises(RobotError, match="forces that the eight parameters of a SCARA do not describe"):
+        scara_truth(Robot("odd", spec.compile()))
+
+
+def test_angles_may_be_counted_from_another_pose():
+    """The truth is that of q2 as the model counts it; the parameters are checked against its inverse dynamics."""
+    spec = mujoco.MjSpec.from_file(str(models.path("scara")))
+    spec.joint("joint2").ref = 0.5
+    turned = scara_truth(Robot("turned", spec.compile()))
+    expected = np.array([[np.cos(0.5), np.sin(0.5)], [-np.sin(0.5), np.cos(0.5)]]) @ [0.12, 0.005]
+    np.testing.assert_allclose([turned["LMX2"], turned["LMY2"]], expected, atol=1e-12)
