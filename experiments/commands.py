@@ -31,22 +31,25 @@ File = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
 
 
 @app.command(name="table1")
-def table1(out: Path = Path("runs/table1"), chain: str = "both", seed: Seed = None) -> None:
+def table1(out: Path = Path("runs/table1"), chain: str = "both", seed: Seed = None, scenario: File = None) -> None:
     """Reproduce the paper's simulation comparison (Table 1) and record it.
 
     Args:
         out: Folder for summary.json, recording.rrd and log.parquet.
         chain: Signal processing: both, or the name of one chain (paper, idbench, ...).
         seed: Search another trajectory from this seed instead of taking the one that ships.
+        scenario: Scenario file (TOML), as `idbench search` writes it, instead of the one that ships.
     """
     with importing():
         from experiments.recording.table1 import record_table1
         from experiments.report import print_table1
         from experiments.table1 import SCENARIO, Table1
 
+    if seed is not None and scenario is not None:
+        raise ExperimentError(f"--seed {seed} and --scenario {scenario} name two trajectories: give one")
     chains = ("paper", "idbench") if chain == "both" else (chain,)
     with results_folder(out) as folder, console.capture() as printed:
-        table = Table1(Scenario.load(SCENARIO) if seed is None else _search(seed), chains)
+        table = Table1(Scenario.load(scenario or SCENARIO) if seed is None else _search(seed), chains)
         print_table1(console, table)
         console.print(f"written to {out}; see it: uv run idbench view {out}", soft_wrap=True)
         write_log(table.log, folder / "log.parquet")

@@ -32,7 +32,7 @@ def slide(x: Array, weights: Array, spacing: int = 1) -> Array:
 def shift(x: Array, samples: float) -> Array:
     """Return x at k + `samples`, for every k; exact for polynomials of degree 2 REACH - 1."""
     whole = floor(samples)
-    moved = x[..., np.clip(np.arange(x.shape[-1]) + whole, 0, x.shape[-1] - 1)]
+    moved = x[..., np.clip(np.arange(x.shape[-1]) + whole, 0, x.shape[-1] - 1)] if whole else x
     return moved if samples == whole else slide(moved, _between(samples - whole))
 
 

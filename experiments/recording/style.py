@@ -18,3 +18,8 @@ FORMS = {
 def joint_colors(n: int) -> list[list[int]]:
     """Return a colour for each of `n` joints."""
     return [JOINTS[j % len(JOINTS)] for j in range(n)]
+
+
+def lighter(color: list[int], times: int) -> list[int]:
+    """Return `color` moved halfway to white, that many times: one model's rows are shades of its colour."""
+    return [round(255 - (255 - c) / 2**times) for c in color]

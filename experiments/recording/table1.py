@@ -8,7 +8,7 @@ import rerun.blueprint as rrb
 
 from experiments.recording.arm import send_arm
 from experiments.recording.stream import recording_file, send_curves, time_columns
-from experiments.recording.style import FORMS, MEASURED, joint_colors
+from experiments.recording.style import FORMS, MEASURED, joint_colors, lighter
 from experiments.report import markdown
 from experiments.table1 import Table1
 from identify import Array, Estimate
@@ -49,9 +49,10 @@ def _send_model(recording: rr.RecordingStream, chain: str, form: str, estimate: 
         both = np.stack([system.Y[rows], estimate.predicted[rows]], axis=-1)
         path = f"identify/{chain}/{form}"
         labels = [f"measured{number}", f"predicted{number}"]
-        send_curves(recording, f"{path}/signal/row{group + 1}", times, both, labels, [MEASURED, color], [4.0, 1.5])
+        shade = lighter(color, int(group))
+        send_curves(recording, f"{path}/signal/row{group + 1}", times, both, labels, [MEASURED, shade], [4.0, 1.5])
         residual = estimate.residual[rows, None]
-        send_curves(recording, f"{path}/residual/row{group + 1}", times, residual, [f"{chain}{number}"], [color], [1.5])
+        send_curves(recording, f"{path}/residual/row{group + 1}", times, residual, [f"{chain}{number}"], [shade], [1.5])
 
 
 def _send_errors(recording: rr.RecordingStream, path: str, error_percent: Array, form: str) -> None:
@@ -78,7 +79,7 @@ def _blueprint(table: Table1) -> rrb.Blueprint:
                 _plot("/joint/q", "q [rad]"),
                 _plot("/joint/qd", "qd [rad/s]"),
                 _plot("/joint/tau", "tau [N m]"),
-                *(_bars(chain, chain == table.chains[0]) for chain in table.chains),
+                *(_bars(table, chain) for chain in table.chains),
             ),
             rrb.Vertical(*(_plot(f"/identify/{main}/{form}/signal", f"{form} [{UNITS[form]}]") for form in UNITS)),
             rrb.Vertical(*(_residuals(table, form) for form in UNITS)),
@@ -89,11 +90,10 @@ def _blueprint(table: Table1) -> rrb.Blueprint:
     )
 
 
-def _bars(chain: str, legend: bool) -> rrb.BarChartView:
+def _bars(table: Table1, chain: str) -> rrb.BarChartView:
+    legend = rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=chain == table.chains[0])
     return rrb.BarChartView(
-        origin=f"/error/{chain}",
-        name=f"error [ppm] of parameters 1 to 8, {chain}",
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
+        origin=f"/error/{chain}", name=f"error [ppm] of parameters 1 to {len(table.truth)}, {chain}", plot_legend=legend
     )
 
 

@@ -172,6 +172,8 @@ def test_a_full_disk_is_one_line(tmp_path, size):
         (["table1", "--seed", "-1"], "seed = -1 must be 0 or a positive whole number"),
         (["search", "--seed", "-1"], "seed = -1 must be 0 or a positive whole number"),
         (["table1", "--out", "a" * 300], "File name too long"),
+        (["table1", "--seed", "1", "--scenario", "x.toml"], "name two trajectories: give one"),
+        (["table1", "--scenario", "nowhere.toml"], "cannot read scenario nowhere.toml"),
         (["view", "README.md"], "there is no recording README.md"),
     ],
 )
@@ -213,6 +215,8 @@ def test_search_writes_a_scenario(tmp_path, capsys):
     assert main(["search", "--seed", "5", "--out", str(path)]) == 0
     found = Scenario.load(path)
     assert found.seed == 5
+    assert main(["table1", "--scenario", str(path), "--chain", "idbench", "--out", str(tmp_path / "out")]) == 0
+    assert Scenario.from_dict(json.loads((tmp_path / "out" / "summary.json").read_text())["scenario"]) == found
     assert main(["search", "--seed", "5"]) == 0
     assert path.read_text() in capsys.readouterr().out
 
