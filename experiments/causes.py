@@ -22,7 +22,7 @@ from identify import (
 )
 from identify.models import AbstractModel
 
-MODELS: dict[str, AbstractModel] = {"explicit": ExplicitModel(), "power": PowerModel()}
+COMPARED: dict[str, AbstractModel] = {"explicit": ExplicitModel(), "power": PowerModel()}
 """The implicit model's errors are the explicit one's to a few percent of themselves."""
 
 
@@ -65,7 +65,7 @@ def causes(table: Table1) -> Iterator[tuple[str, dict[str, Worst]]]:
         chain = replace(paper_chain(), trim=table.scenario.rest)
         for change in changes:
             chain = change(chain)
-        estimates = identify_each(table.log, scara(), MODELS, chain)
+        estimates = identify_each(table.log, scara(), COMPARED, chain)
         yield name, {form: _worst(table, estimate) for form, estimate in estimates.items()}
 
 

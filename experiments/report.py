@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from experiments.causes import MODELS, causes
+from experiments.causes import COMPARED, causes
 from experiments.table1 import PAPER, Table1
 from identify import Array, Estimate
 
@@ -68,7 +68,7 @@ def _times_the_papers(table: Table1) -> dict[str, float]:
 def _causes_table(table: Table1) -> Table:
     grid = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     grid.add_column("chain paper with")
-    for form in MODELS:
+    for form in COMPARED:
         for what in ("inertia", "friction"):
             grid.add_column(f"{form}\n{what}", justify="right")
     for name, worst in causes(table):

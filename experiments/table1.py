@@ -1,7 +1,7 @@
 """Does the paper's Table 1 come out: which systematic error do filters and differences make in each of the three models?
 
-Expected: with the paper's own steps errors of its size, ZZR1's from the 2-point difference, friction's from the sign of the
-velocity at reversals; with chain `idbench` none above 0.001 %, so that nothing but the method limited the paper.
+Expected: with the paper's own steps ZZR1 slightly too large in all models, by its differences, and friction off in the dynamic
+models, by reversals; with chain `idbench` no error above 0.001 %, so that nothing but the method limited the paper.
 """
 
 from collections.abc import Mapping

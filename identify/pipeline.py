@@ -84,7 +84,7 @@ def identify_each(
     return estimates
 
 
-def _rebuilt(chain: Chain, basis: Basis, model: AbstractModel, log: MotionLog) -> System:
+def _rebuilt(chain: Chain, basis: Basis, model: AbstractModel, log: MotionLog | Sequence[MotionLog]) -> System:
     (system,) = chain.build(log, basis, [model])
     return system
 

@@ -1,7 +1,7 @@
 """What an estimator is, and what it is given."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal, final
 
@@ -23,13 +23,13 @@ class Problem:
     system : System
         Y = W X + rho.
     rebuild : callable, optional
-        Makes the system of another log with the same chain, basis and model (instrumental variables).
+        Makes the system of another log, or of several, with the same chain, basis and model (instrumental variables).
     simulate : callable, optional
         Makes the log of a robot with the parameters X that repeats the motion (output error, DIDIM).
     """
 
     system: System
-    rebuild: Callable[[MotionLog], System] | None = None
+    rebuild: Callable[[MotionLog | Sequence[MotionLog]], System] | None = None
     simulate: Callable[[Array], MotionLog] | None = None
 
 
