@@ -1,6 +1,9 @@
 """The entry point of the command line: everything slow to load is loaded here, guarded."""
 
+import signal
+import sys
 from collections.abc import Sequence
+from typing import NoReturn
 
 from experiments.interruption import importing
 
@@ -10,3 +13,10 @@ def main(args: Sequence[str] | None = None) -> int:
     with importing():
         from experiments.commands import run
     return run(args)
+
+
+def entry() -> NoReturn:
+    """Run the command line and end the process; an interruption after the work is done changes nothing."""
+    code = main()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    sys.exit(code)

@@ -4,6 +4,7 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
+from io import StringIO
 from pathlib import Path
 from typing import Annotated
 
@@ -24,7 +25,6 @@ from sim.scenario import Scenario
 DESCRIPTION = "A MuJoCo testbench for the dynamic identification of robots."
 
 app = tyro.extras.SubcommandApp()
-console = Console(highlight=False)
 
 Seed = Annotated[int | None, tyro.conf.arg(metavar="INT")]
 File = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
@@ -40,6 +40,7 @@ def table1(out: Path = Path("runs/table1"), chain: str = "both", seed: Seed = No
         seed: Search another trajectory from this seed instead of taking the one that ships.
         scenario: Scenario file (TOML), as `idbench search` writes it, instead of the one that ships.
     """
+    os.environ.setdefault("RUST_LOG", "off")  # what goes wrong in rerun we say ourselves, in one line
     with importing():
         from experiments.recording.table1 import record_table1
         from experiments.report import print_table1
@@ -48,14 +49,15 @@ def table1(out: Path = Path("runs/table1"), chain: str = "both", seed: Seed = No
     if seed is not None and scenario is not None:
         raise ExperimentError(f"--seed {seed} and --scenario {scenario} name two trajectories: give one")
     chains = ("paper", "idbench") if chain == "both" else (chain,)
-    with results_folder(out) as folder, console.capture() as printed:
+    page = _page()
+    with results_folder(out) as folder:
         table = Table1(Scenario.load(scenario or SCENARIO) if seed is None else _search(seed), chains)
-        print_table1(console, table)
-        console.print(f"written to {out}; see it: uv run idbench view {out}", soft_wrap=True)
+        print_table1(page, table)
+        page.print(f"written to {out}; see it: uv run idbench view {out}", soft_wrap=True)
         write_log(table.log, folder / "log.parquet")
         record_table1(folder / "recording.rrd", table)
         write_summary(folder / "summary.json", table.summary())
-    _show(printed.get())
+    _show(page)
 
 
 @app.command(name="search")
@@ -66,12 +68,12 @@ def search(seed: int = 0, out: File = None) -> None:
         seed: The same seed gives the same trajectory.
         out: Scenario file (TOML) to write; printed if none is given.
     """
-    scenario = _search(seed)
+    scenario, page = _search(seed), _page()
     text = tomli_w.dumps(scenario.to_dict())
     if out is not None:
         write_whole(out, text)
-        text = f"{out}: {scenario.origin}\n"
-    _show(text)
+    page.out(f"{out}: {scenario.origin}" if out is not None else text.rstrip("\n"))
+    _show(page)
 
 
 @app.command(name="list")
@@ -79,9 +81,9 @@ def list_plugins() -> None:
     """List the plug-ins: what can be combined, one line each."""
     from experiments.plugins import print_plugins
 
-    with console.capture() as printed:
-        print_plugins(console)
-    _show(printed.get())
+    page = _page()
+    print_plugins(page)
+    _show(page)
 
 
 @app.command(name="view")
@@ -110,7 +112,9 @@ def run(args: Sequence[str] | None = None) -> int:
     try:
         with terminating():
             if words == ["--version"]:
-                _show(f"idbench {version('idbench')}\n")
+                page = _page()
+                page.print(f"idbench {version('idbench')}")
+                _show(page)
             else:
                 app.cli(prog="idbench", description=DESCRIPTION, args=words)
     except (IdentificationError, BenchError, ExperimentError) as error:
@@ -124,9 +128,15 @@ def run(args: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _show(text: str) -> None:
-    if sys.stdout is not None:  # as it is where standard output was closed before we began
-        sys.stdout.write(text)
+def _page() -> Console:
+    """Return a console that keeps what is printed: it is shown when everything has gone well, whatever the terminal does."""
+    terminal = Console()
+    return Console(file=StringIO(), width=terminal.width, force_terminal=terminal.is_terminal, highlight=False)
+
+
+def _show(page: Console) -> None:
+    if sys.stdout is not None and isinstance(page.file, StringIO):  # None where it was closed before we began
+        sys.stdout.write(page.file.getvalue())
         sys.stdout.flush()
 
 

@@ -37,7 +37,7 @@ def results_folder(out: Path) -> Iterator[Path]:
         _move(hidden, out)
     except OSError as error:
         raise ResultsError(
-            f"cannot write to {out}: {error.strerror or error}; free some space or choose another --out"
+            f"cannot write to {out}: {error.strerror or error}; choose another --out, or free some space"
         ) from error
     finally:
         shutil.rmtree(hidden, ignore_errors=True)

@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from experiments.errors import ExperimentError
 from experiments.results import summarize
 from identify import CHAINS, MODELS, Chain, Estimate, MotionLog, Windows, identify, identify_each, scara
 from sim.ideal import ideal_log
@@ -106,7 +107,7 @@ class Table1:
     @cached_property
     def estimates(self) -> dict[str, dict[str, Estimate]]:
         """The estimate of every form, by chain."""
-        return {name: self._identified(replace(CHAINS.create(name), trim=self.scenario.rest)) for name in self.chains}
+        return {name: self._identified(self._settled(name)) for name in self.chains}
 
     def summary(self) -> dict[str, Any]:
         """Return summary.json: `models` holds the last of the chains, `<name>_chain` the others."""
@@ -123,6 +124,13 @@ class Table1:
             "models": by_chain[main],
             **{f"{name}_chain": by_chain[name] for name in others},
         }
+
+    def _settled(self, name: str) -> Chain:
+        """Return the chain `name`, its filters settling while the robot rests."""
+        chain, rest = CHAINS.create(name), self.scenario.rest
+        if (halo := chain.halo(self.log.fs, self.log.torque)) > rest:
+            raise ExperimentError(f"rest = {rest:g} s is shorter than the {halo:.3g} s that chain {name} looks: raise it")
+        return replace(chain, trim=rest)
 
     def _identified(self, chain: Chain) -> dict[str, Estimate]:
         """Return the estimates of the three models, and of the energy form: the power model over windows (Eq. 11, 20)."""

@@ -53,7 +53,7 @@ class Robot:
         except KeyError as error:
             raise RobotError(f"{error.args[0]}, or give the path of an MJCF file (.xml)") from None
         except ValueError as error:
-            raise RobotError(f"MuJoCo cannot load {name!r}: {error}") from error
+            raise RobotError(f"MuJoCo cannot load {name!r}: {' '.join(str(error).split())}") from error
         return cls(path.stem, model)
 
     @property

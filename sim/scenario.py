@@ -11,6 +11,9 @@ import numpy as np
 from sim.errors import ScenarioError
 from sim.trajectory import PointToPoint
 
+MOST_SAMPLES = 1e8
+"""Samples of a joint above which a scenario is taken for a slip: 0.8 GB."""
+
 
 @dataclass(frozen=True)
 class Scenario:
@@ -51,7 +54,11 @@ class Scenario:
                 raise ScenarioError(f"{name} = {getattr(self, name)} must be a finite number above 0")
         if len({len(point) for point in self.waypoints}) != 1:
             raise ScenarioError("waypoints must all have the same number of joints, at least 1")
-        _ = self.trajectory  # says what is wrong with the motion
+        if len(self.durations) != len(self.waypoints) - 1:
+            w, d = len(self.waypoints), len(self.durations)
+            raise ScenarioError(f"{w} waypoints need {w - 1} durations, not {d}")
+        if self.trajectory.duration * self.fs > MOST_SAMPLES:  # making it says what else is wrong with the motion
+            raise ScenarioError(f"fs = {self.fs:g} Hz makes more than {MOST_SAMPLES:.0e} samples of this motion: lower it")
 
     @property
     def trajectory(self) -> PointToPoint:
@@ -71,7 +78,9 @@ class Scenario:
         """
         try:
             content = tomllib.loads(path.read_text())
-        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        except OSError as error:
+            raise ScenarioError(f"cannot read scenario {path}: {error.strerror}") from error
+        except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
             raise ScenarioError(f"cannot read scenario {path}: {error}") from error
         return cls.from_dict(content, str(path))
 

@@ -71,7 +71,7 @@ class PointToPoint:
             raise ScenarioError(f"waypoints have shape {self.waypoints.shape}, not (at least 2, joints)")
         if self.durations.shape != (w - 1,) or self.dwells.shape != (w,):
             raise ScenarioError(
-                f"{w} waypoints need {w - 1} durations and {w} dwells, not {self.durations.shape} and {self.dwells.shape}"
+                f"{w} waypoints need {w - 1} durations and {w} dwells, not {self.durations.size} and {self.dwells.size}"
             )
         if self.durations.min() <= 0 or self.dwells.min() < 0:
             raise ScenarioError(

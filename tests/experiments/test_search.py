@@ -46,7 +46,7 @@ def test_limits_are_kept(robot):
 
 def test_a_torque_limit_turns_motions_away(robot):
     class Weak:
-        name, n, ranges, model = robot.name, robot.n, robot.ranges, robot.model
+        name, n, ranges, model, joints = robot.name, robot.n, robot.ranges, robot.model, robot.joints
         torque_limits = np.array([30.0, 1.5])
 
     tau = np.abs(Table1(Search(seed=3, tolerance=0.05).run(Weak()), ()).log.tau).max(axis=0)

@@ -29,7 +29,7 @@ def test_a_scenario_survives_its_file(tmp_path):
         ({"fs": 0}, r"fs = 0\.0 must be a finite number above 0"),
         ({"rest": -1.0}, r"rest = -1\.0 must be"),
         ({"waypoints": [0.0, 1.0]}, "not iterable"),
-        ({"durations": [1.0, 2.0]}, "2 waypoints need 1 durations"),
+        ({"durations": [1.0, 2.0]}, "2 waypoints need 1 durations, not 2"),
         ({"waypoints": [[0.0, 0.0], [1.0]]}, "waypoints"),
     ],
 )
