@@ -76,13 +76,13 @@ class System:
     @cached_property
     def condition_number(self) -> Array:
         """Cond(W), the ratio of its extreme singular values, shape (...)."""
-        values = np.linalg.svd(self.R_W, compute_uv=False)
+        values = self._singular_values[..., 0, :]
         return np.divide(values[..., 0], values[..., -1], out=np.full(values.shape[:-1], np.inf), where=values[..., -1] > 0)
 
     @cached_property
     def rank(self) -> npt.NDArray[np.intp]:
         """Numerical rank of W with its columns scaled to unit length, shape (...)."""
-        values = np.linalg.svd(self._scaled, compute_uv=False)
+        values = self._singular_values[..., 1, :]
         return np.count_nonzero(values > UNSEEN * values[..., :1], axis=-1)
 
     @cached_property
@@ -124,6 +124,11 @@ class System:
             f"the motion does not show {', '.join(self.unseen(run))}: W has rank {self.rank[run]} of {p}{where}; "
             "move every joint, with others standing and moving, or leave these parameters out of the basis"
         )
+
+    @cached_property
+    def _singular_values(self) -> Array:
+        """Singular values of W as it is, and with its columns scaled to unit length, shape (..., 2, p)."""
+        return np.linalg.svd(np.stack([self.R_W, self._scaled], axis=-3), compute_uv=False)
 
     @property
     def _scaled(self) -> Array:
