@@ -114,7 +114,7 @@ class Search:
         """Return the largest departure from the paper's condition numbers, as a share; infinite if a row would be void."""
         q = np.stack([scenario.trajectory.sample(self.fs).q for scenario in scenarios])
         log = MotionLog(self.fs, q, np.zeros_like(q), TorqueChannel("instantaneous"))  # W holds no torque
-        systems = replace(idbench_chain(), trim=self.rest).build(log, scara(), list(PAPER_CONDITION))
+        systems = replace(idbench_chain(), trim=self.rest).build_each(log, scara(), list(PAPER_CONDITION))
         worst = np.zeros(len(scenarios))
         for system, target in zip(systems, PAPER_CONDITION.values(), strict=True):
             share = np.abs(np.log(system.condition_number / target))

@@ -56,10 +56,8 @@ class Chain:
         if self.trim is not None:
             require_not_negative(trim=self.trim)
 
-    def build(self, log: MotionLog | Sequence[MotionLog], basis: Basis, models: Sequence[AbstractModel]) -> list[System]:
-        """Return the linear system of each model, for one log, or for several as one fit.
-
-        What the models have in common, filtered positions and their derivatives, is computed once.
+    def build(self, log: MotionLog | Sequence[MotionLog], basis: Basis, model: AbstractModel) -> System:
+        """Return the linear system of a model, for one log, or for several as one fit.
 
         Raises
         ------
@@ -68,8 +66,16 @@ class Chain:
         SettingError
             If a setting does not fit a log's sampling frequency.
         """
+        (system,) = self.build_each(log, basis, [model])
+        return system
+
+    def build_each(self, log: MotionLog | Sequence[MotionLog], basis: Basis, models: Sequence[AbstractModel]) -> list[System]:
+        """Return the linear system of each model, otherwise as `build`.
+
+        What the models have in common, filtered positions and their derivatives, is computed once.
+        """
         if not isinstance(log, MotionLog):
-            each = [self.build(one, basis, models) for one in log]
+            each = [self.build_each(one, basis, models) for one in log]
             return [System.stack(systems) for systems in zip(*each, strict=True)] if each else [System.stack([])]
         if log.n != basis.n:
             hint = "; its axes are (time, joint), is it transposed?" if log.samples == basis.n else ""

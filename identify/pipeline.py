@@ -11,7 +11,6 @@ from identify.estimate import Estimate
 from identify.estimators import AbstractEstimator, OrdinaryLeastSquares, Problem
 from identify.models import AbstractModel
 from identify.motion_log import MotionLog
-from identify.system import System
 
 
 def identify(
@@ -74,19 +73,14 @@ def identify_each(
     _require(estimator, AbstractEstimator, 'an estimator, such as ESTIMATORS.create("OLS")')
     for model in models.values():
         _require(model, AbstractModel, 'a model, such as MODELS.create("power")')
-    systems = chain.build(log, basis, list(models.values()))
+    systems = chain.build_each(log, basis, list(models.values()))
     estimates = {}
     for (name, model), system in zip(models.items(), systems, strict=True):
         if throw and estimator.full_rank:
             system.check()
-        rebuild = partial(_rebuilt, chain, basis, model)
+        rebuild = partial(chain.build, basis=basis, model=model)
         estimates[name] = estimator.fit(Problem(system, rebuild=rebuild, simulate=simulate))
     return estimates
-
-
-def _rebuilt(chain: Chain, basis: Basis, model: AbstractModel, log: MotionLog | Sequence[MotionLog]) -> System:
-    (system,) = chain.build(log, basis, [model])
-    return system
 
 
 def _require(given: object, kind: type, wanted: str, *others: type) -> None:

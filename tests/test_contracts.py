@@ -153,8 +153,8 @@ def test_chains_recover_ideal_data(name, model, log, truth):
 @pytest.mark.parametrize("name", ESTIMATORS.builtin)
 def test_estimators_recover_noiseless_systems(name, log, truth):
     chain, basis = idbench_chain(), scara()
-    (system,) = chain.build(log, basis, [ExplicitModel()])
-    problem = Problem(system, rebuild=lambda other: chain.build(other, basis, [ExplicitModel()])[0], simulate=lambda X: log)
+    system = chain.build(log, basis, ExplicitModel())
+    problem = Problem(system, rebuild=lambda other: chain.build(other, basis, ExplicitModel()), simulate=lambda X: log)
     X = ESTIMATORS.create(name).fit(problem).X
     np.testing.assert_array_equal(X, ESTIMATORS.create(name).fit(problem).X)
     np.testing.assert_allclose(X, truth, rtol=1e-5)

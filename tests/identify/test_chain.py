@@ -149,7 +149,7 @@ def test_a_basis_may_be_part_of_a_robot(log):
 
 def test_chain_is_what_it_says(log):
     chain: Chain = idbench_chain()
-    (built,) = chain.build(log, scara(), [PowerModel()])
+    built = chain.build(log, scara(), PowerModel())
     assert isinstance(built, System)
     halo = chain.halo(100.0, log.torque)
     assert built.time[0] >= halo - 1e-9
@@ -163,10 +163,10 @@ def test_no_row_looks_further_than_the_declared_halo(operator, model, channel, l
     """One sample of position or torque is disturbed: rows that move are within the halo, and some do."""
     chain = replace(idbench_chain(), operator=OPERATORS.create(operator))
     k, q, tau = 900, log.q[:1800].copy(), log.tau[:1800].copy()
-    before = chain.build(MotionLog(100.0, q, tau, channel), scara(), [MODELS.create(model)])[0]
+    before = chain.build(MotionLog(100.0, q, tau, channel), scara(), MODELS.create(model))
     for signal in (q, tau):
         signal[k] += 0.5
-        (after,) = chain.build(MotionLog(100.0, q, tau, channel), scara(), [MODELS.create(model)])
+        after = chain.build(MotionLog(100.0, q, tau, channel), scara(), MODELS.create(model))
         signal[k] -= 0.5
         moved = (after.Y != before.Y) | (after.W != before.W).any(axis=-1)
         assert moved.any()
