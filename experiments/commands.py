@@ -123,8 +123,6 @@ def run(args: Sequence[str] | None = None) -> int:
         return _complain("interrupted", INTERRUPTED)
     except BrokenPipeError:  # the reader of our output has gone, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    except OSError as error:
-        return _complain(f"cannot print: {error.strerror}", 2)
     return 0
 
 
@@ -136,8 +134,13 @@ def _page() -> Console:
 
 def _show(page: Console) -> None:
     if sys.stdout is not None and isinstance(page.file, StringIO):  # None where it was closed before we began
-        sys.stdout.write(page.file.getvalue())
-        sys.stdout.flush()
+        try:
+            sys.stdout.write(page.file.getvalue())
+            sys.stdout.flush()
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            raise ExperimentError(f"cannot print: {error.strerror}") from error
 
 
 def _complain(what: str, code: int) -> int:

@@ -1,6 +1,5 @@
 """What can be combined."""
 
-from collections.abc import Mapping
 from typing import Any
 
 from rich.console import Console
@@ -38,11 +37,6 @@ def print_plugins(console: Console) -> None:
     """Print every plug-in with the first line of its documentation."""
     for table in TABLES:
         grid = Table.grid(padding=(0, 2))
-        for name, line in summaries(table).items():
-            grid.add_row(f"  {name}", Text(line))
+        for name in table:
+            grid.add_row(f"  {name}", Text(table.summary(name)))
         console.print(Text(f"{table.point} (entry points: idbench.{table.point})", style="bold"), grid, sep="\n")
-
-
-def summaries(table: PluginTable[Any]) -> Mapping[str, str]:
-    """Return the first line of documentation of every plug-in of a table."""
-    return {name: table.summary(name) for name in table}

@@ -11,19 +11,13 @@ from math import inf
 import numpy as np
 
 from experiments.errors import ExperimentError
-from identify import (
-    ExplicitModel,
-    MotionLog,
-    PowerModel,
-    TorqueChannel,
-    idbench_chain,
-    scara,
-)
+from experiments.table1 import PAPER
+from identify import MODELS, MotionLog, TorqueChannel, idbench_chain, scara
 from sim.ideal import ideal_log
 from sim.robot import Array, Robot
 from sim.scenario import Scenario
 
-PAPER_CONDITION = {ExplicitModel(): 28.0, PowerModel(): 93.0}
+PAPER_CONDITION = {MODELS.create(name): PAPER[name].condition_number for name in ("explicit", "power")}
 """Cond(W) of the paper's Table 1; that of the implicit model is the explicit one's."""
 
 WAYPOINT_DRAWS = 10_000

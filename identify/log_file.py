@@ -58,7 +58,7 @@ def read_log(path: Path, torque: TorqueChannel | None = None) -> MotionLog:
     except OSError as error:
         raise LogError(f"cannot read the log {path}: {error.strerror or error}") from error
     except pa.ArrowException as error:
-        raise LogError(f"cannot read the log {path}: it is not a Parquet file") from error
+        raise LogError(f"cannot read the log {path} as Parquet: {str(error).splitlines()[0]}") from error
     names = table.column_names
     n = max(sum(name.startswith("q") and name[1:].isdigit() for name in names), 1)
     needed = ["t", *(f"q{j + 1}" for j in range(n)), *(f"tau{j + 1}" for j in range(n))]

@@ -49,8 +49,11 @@ class TorqueChannel:
         if self.meaning not in get_args(Meaning):
             raise SettingError(f"torque meaning {self.meaning!r} is unknown; known: {', '.join(get_args(Meaning))}")
         require_finite(delay=self.delay)
-        gains = np.atleast_1d(np.asarray(self.gain, dtype=np.float64))
-        if not np.isfinite(gains).all() or (gains == 0).any():
+        try:
+            gains = np.atleast_1d(np.asarray(self.gain, dtype=np.float64))
+        except (TypeError, ValueError) as error:
+            raise SettingError(f"torque gain = {self.gain!r} must be a number, or one a joint") from error
+        if gains.ndim != 1 or not np.isfinite(gains).all() or (gains == 0).any():
             raise SettingError(f"torque gain = {self.gain} must be finite and not 0")
         object.__setattr__(self, "gain", float(gains[0]) if gains.size == 1 else tuple(float(g) for g in gains))
 

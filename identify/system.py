@@ -12,9 +12,9 @@ import numpy.typing as npt
 from identify.arrays import Array
 from identify.errors import ExcitationError, IdentificationError, LogError
 
-UNSEEN = 1e-10
+UNSEEN = 1e-6
 """A direction of the parameters, in columns scaled to unit length, counts as unseen when its singular value is below this
-share of the largest: rounding leaves about 1e-15, the quantization of a 24-bit encoder 1e-7."""
+share of the largest: it would take columns known to seven digits to tell it to 10 %, and no log gives those."""
 
 
 class Status(IntEnum):

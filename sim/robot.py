@@ -17,7 +17,7 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """An arm whose every joint is a hinge or a slide with one actuator.
+    """An arm whose every joint is a hinge or a slide.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ def scara_truth(robot: Robot) -> dict[str, float]:
     Raises
     ------
     RobotError
-        If the robot is not such an arm, or has armature on joint 2, which these eight parameters cannot express.
+        If the robot is not such an arm, or its inverse dynamics has more in it than these eight parameters express.
     """
     model = robot.model
     data = mujoco.MjData(model)
@@ -31,6 +31,8 @@ def scara_truth(robot: Robot) -> dict[str, float]:
     along = data.xanchor[1] - data.xanchor[0]
     along[2] = 0.0
     L = float(np.linalg.norm(along))
+    if L == 0:
+        raise RobotError(f"robot {robot.name!r} has both joints on one axis: no length of link 1 to speak of")
     zz2, mass2, first2 = _about_joint(model, data, 1, along / L)
     (Fv1, Fv2), (Fs1, Fs2) = model.dof_damping, model.dof_frictionloss
     truth = {
@@ -72,8 +74,8 @@ def _require_complete(robot: Robot, X: dict[str, float]) -> None:
     tau1 += slope * qd[:, 1] * (2 * qd[:, 0] + qd[:, 1])
     expected = np.stack([tau1, tau2], axis=-1) + qd * [X["Fv1"], X["Fv2"]]
     missed = np.abs(inverse_dynamics(robot, q, qd, qdd) - expected).max()
-    if missed > 1e-9 * np.abs(expected).max():
+    if not missed <= 1e-9 * np.abs(expected).max():  # nor if it is not a number
         raise RobotError(
             f"robot {robot.name!r} has forces that the eight parameters of a SCARA do not describe, up to {missed:.2g} N m: "
-            "springs, gears, tendons, fluid, or joint angles not counted from the stretched arm"
+            "springs, tendons, fluid, friction of another kind, or gravity"
         )

@@ -48,8 +48,7 @@ class FirLowPass(AbstractLowPass):
 
     def _half(self, fs: float) -> int:
         require_below_nyquist("operator cutoff", self.cutoff, fs)
-        # A Hamming window of M + 1 samples makes a transition of 3.3 fs / M (Oppenheim & Schafer, Discrete-Time Signal
-        # Processing, 3rd ed., table 7.2: main lobe 8 pi / M, transition measured 6.6 pi / M).
+        # A Hamming window of M + 1 samples makes a transition of about 3.3 fs / M.
         return ceil(3.3 * fs / self.transition / 2 - 1e-9)
 
 

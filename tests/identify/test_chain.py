@@ -105,6 +105,14 @@ def test_a_joint_that_never_moves_is_told_with_the_parameters_it_hides(table1):
         identify(log, scara(), ExplicitModel())
 
 
+def test_a_joint_that_trembles_with_its_encoder_is_told_in_the_power_model(log, rng):
+    """One count of 16 bits up and down: every column of joint 2 is there, and says nothing."""
+    q = log.q.copy()
+    q[:, 1] = rng.integers(0, 2, log.samples) * 2 * np.pi / 2**16
+    with pytest.raises(ExcitationError, match="does not show ZZR1"):
+        identify(MotionLog(log.fs, q, log.tau, log.torque), scara(), PowerModel(), paper_chain())
+
+
 def test_a_robot_at_rest_is_refused(log):
     rest = MotionLog(100.0, np.zeros((1000, 2)), np.zeros((1000, 2)), TorqueChannel("instantaneous"))
     with pytest.raises(IdentificationError, match="0 rows of 182 are left by the mask for 8 parameters"):

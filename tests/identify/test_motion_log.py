@@ -55,6 +55,8 @@ def test_impossible_sampling_frequencies_are_refused(fs):
         ({"meaning": "held", "delay": np.nan}, "delay = nan"),
         ({"meaning": "held", "gain": 0.0}, "gain = 0.0"),
         ({"meaning": "held", "gain": (1.0, np.inf)}, "gain ="),
+        ({"meaning": "held", "gain": "2 N m/A"}, "gain = '2 N m/A' must be a number"),
+        ({"meaning": "held", "delay": "2 ms"}, "delay = '2 ms' must be a finite number"),
     ],
 )
 def test_impossible_channels_are_refused(settings, message):

@@ -123,8 +123,8 @@ def test_an_estimate_prints_its_numbers(rng):
     assert str(fit(rng.normal(size=(4, 50, 3)), rng.normal(size=(4, 50)))) == "estimates of a, b, c in (4,) runs"
 
 
-@pytest.mark.parametrize(("apart", "status"), [(1e-12, Status.RANK_DEFICIENT), (1e-7, Status.OK)])
-def test_directions_count_as_unseen_at_the_level_of_rounding(apart, status, rng):
+@pytest.mark.parametrize(("apart", "status"), [(1e-8, Status.RANK_DEFICIENT), (1e-4, Status.OK)])
+def test_directions_count_as_unseen_at_the_level_of_the_columns_own_errors(apart, status, rng):
     W = rng.normal(size=(50, 3))
     W[:, 2] = W[:, 0] + apart * W[:, 2]
     assert system(W, np.zeros(50)).status == status

@@ -115,3 +115,10 @@ def test_angles_may_be_counted_from_another_pose():
     turned = scara_truth(Robot("turned", spec.compile()))
     expected = np.array([[np.cos(0.5), np.sin(0.5)], [-np.sin(0.5), np.cos(0.5)]]) @ [0.12, 0.005]
     np.testing.assert_allclose([turned["LMX2"], turned["LMY2"]], expected, atol=1e-12)
+
+
+def test_joints_on_one_axis_are_refused():
+    spec = mujoco.MjSpec.from_file(str(models.path("scara")))
+    spec.body("link2").pos = [0.0, 0.0, 0.1]
+    with pytest.raises(RobotError, match="both joints on one axis"):
+        scara_truth(Robot("column", spec.compile()))

@@ -1,0 +1,91 @@
+"""Wrong input to the command line: one line each, exit code 2, nothing written."""
+
+import sys
+
+import pytest
+import tomli_w
+
+from experiments.cli import main
+from experiments.table1 import SCENARIO
+from sim.scenario import Scenario
+
+
+def test_an_unknown_chain_lists_the_known_and_leaves_nothing(out, complaint):
+    line = complaint("table1", "--out", str(out), "--chain", "papre")
+    assert "no 'papre' among the chains (did you mean 'paper'?); known: paper, idbench" in line
+    assert not out.exists()
+    assert not list(out.parent.iterdir())
+
+
+def test_an_output_folder_that_cannot_be_written_is_told(tmp_path, complaint):
+    (tmp_path / "file").write_text("precious")
+    assert "is a file, not a folder" in complaint("table1", "--out", str(tmp_path / "file"))
+    assert "cannot write to" in complaint("table1", "--out", str(tmp_path / "file" / "below"))
+    assert (tmp_path / "file").read_text() == "precious"
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (["table1", "--seed", "-1"], "seed = -1 must be 0 or a positive whole number"),
+        (["search", "--seed", "-1"], "seed = -1 must be 0 or a positive whole number"),
+        (["table1", "--out", "a" * 300], "File name too long"),
+        (["table1", "--seed", "1", "--scenario", "x.toml"], "name two trajectories: give one"),
+        (["table1", "--scenario", "nowhere.toml"], "cannot read scenario nowhere.toml"),
+        (["view", "README.md"], "there is no recording README.md"),
+    ],
+)
+def test_more_wrong_input_is_one_line(args, message, tmp_path, monkeypatch, complaint):
+    monkeypatch.chdir(tmp_path)
+    assert message in complaint(*args)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"waypoints": [[0.0], [1.0], [0.0]], "durations": [1.0, 1.0]}, "the trajectory moves 1 joints, robot 'scara' has 2"),
+        (
+            {"waypoints": [[0.0, 0.0], [4.0, 1.0]], "durations": [1.0]},
+            "joint1 would move from 0 to 4 rad, its range is -2.4 to 2.4",
+        ),
+        ({"durations": [1.0]}, "31 waypoints need 30 durations, not 1"),
+        ({"fs": 1e9}, "fs = 1e+09 Hz makes more than 1e+08 samples"),
+        ({"rest": 1.0}, "rest = 1 s is shorter than the 2.81 s that chain paper looks: raise it"),
+        ({"robot": "scora"}, "no robot 'scora'; known: scara"),
+    ],
+)
+def test_scenarios_that_make_no_sense_are_one_line(changes, message, tmp_path, complaint):
+    path = tmp_path / "scenario.toml"
+    path.write_text(tomli_w.dumps({**Scenario.load(SCENARIO).to_dict(), **changes}))
+    assert message in complaint("table1", "--scenario", str(path), "--out", str(tmp_path / "out"))
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_folder_in_the_place_of_a_file_stops_all(out, complaint):
+    (out / "recording.rrd").mkdir(parents=True)
+    assert "recording.rrd is a folder where a file must go" in complaint("table1", "--out", str(out))
+    assert [path.name for path in out.iterdir()] == ["recording.rrd"]
+
+
+def test_view_tells_where_there_is_no_display(out, monkeypatch, complaint):
+    out.mkdir()
+    (out / "recording.rrd").write_bytes(b"RRF2")
+    monkeypatch.setattr(sys, "platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    assert "there is no display here" in complaint("view", str(out))
+
+
+def test_search_says_where_it_cannot_write(tmp_path, complaint):
+    assert "cannot write" in complaint("search", "--seed", "5", "--out", str(tmp_path / "nowhere" / "found.toml"))
+
+
+def test_view_needs_a_recording(tmp_path, complaint):
+    assert "there is no recording" in complaint("view", str(tmp_path))
+
+
+def test_wrong_words_exit_with_2(capfd):
+    with pytest.raises(SystemExit) as ended:
+        main(["tabel1"])
+    assert ended.value.code == 2
