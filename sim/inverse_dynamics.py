@@ -4,14 +4,15 @@ import numpy as np
 from mujoco import mjtStage
 from mujoco.batch import Batch
 
-from sim.robot import Array, Robot
+from sim.motors import Array
+from sim.robot import Robot
 
 BLOCK = 8192
 """States evaluated together: bounds the memory of long trajectories."""
 
 
-def inverse_dynamics(robot: Robot, q: Array, qd: Array, qdd: Array) -> Array:
-    """Return M(q) qdd + bias - passive forces [N m], shape (time, joint), all from MuJoCo, without `frictionloss`.
+class InverseDynamics:
+    """M(q) qdd + bias - passive forces [N m] of many states at once, all from MuJoCo, without `frictionloss`.
 
     This is `mj_inverse` without its constraint forces. With `frictionloss`, `mj_inverse` takes the sign of the friction
     from qd plus a share of qdd, so that joints that brake get the wrong one; damping, a passive force, is right.
@@ -20,24 +21,36 @@ def inverse_dynamics(robot: Robot, q: Array, qd: Array, qdd: Array) -> Array:
     ----------
     robot : Robot
         The arm.
-    q, qd, qdd : Array, shape (time, joint)
-        [rad], [rad/s], [rad/s^2].
+    count : int
+        Number of states of every call.
     """
-    blocks = range(0, len(q), BLOCK)
-    return np.concatenate([_block(robot, *(x[i : i + BLOCK] for x in (q, qd, qdd))) for i in blocks])
+
+    def __init__(self, robot: Robot, count: int) -> None:
+        self._states = Batch(robot.model, count)
+        names = ("qpos", "qvel", "M", "qfrc_bias", "qfrc_passive")
+        self._q, self._qd, self._packed, self._bias, self._passive = (self._states.bind(name) for name in names)
+        self._M = np.zeros((count, robot.n, robot.n))
+        self._place = np.repeat(np.arange(robot.n), robot.model.M_rownnz), robot.model.M_colind
+
+    def __call__(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """Return the torques at the states `q` [rad], `qd` [rad/s], `qdd` [rad/s^2], shape (state, joint)."""
+        self._q[:], self._qd[:] = q, qd
+        self._states.forward(stage=mjtStage.mjSTAGE_VEL.value)
+        row, column = self._place
+        self._M[:, row, column] = self._packed
+        self._M[:, column, row] = self._packed
+        # Sums along an axis of each state: the bits do not depend on how many states there are.
+        return (self._M * qdd[:, None, :]).sum(axis=-1) + self._bias - self._passive
+
+    def inertia(self) -> Array:
+        """Return the diagonal of M at the states of the last call [kg m^2], shape (state, joint)."""
+        return np.diagonal(self._M, axis1=1, axis2=2)
 
 
-def _block(robot: Robot, q: Array, qd: Array, qdd: Array) -> Array:
-    states = Batch(robot.model, len(q))
-    M, bias, passive = states.bind("M"), states.bind("qfrc_bias"), states.bind("qfrc_passive")
-    states.bind("qpos")[:] = q
-    states.bind("qvel")[:] = qd
-    states.forward(stage=mjtStage.mjSTAGE_VEL.value)
-    dense = np.zeros((len(q), robot.n, robot.n))
-    row, column = np.repeat(np.arange(robot.n), robot.model.M_rownnz), robot.model.M_colind
-    dense[:, row, column] = M
-    dense[:, column, row] = M
-    return np.matmul(dense, qdd[..., None])[..., 0] + bias - passive
+def inverse_dynamics(robot: Robot, q: Array, qd: Array, qdd: Array) -> Array:
+    """Return the torques [N m] along a motion, as `InverseDynamics`; all arrays have the shape (time, joint)."""
+    blocks = [slice(i, i + BLOCK) for i in range(0, len(q), BLOCK)]
+    return np.concatenate([InverseDynamics(robot, len(q[b]))(q[b], qd[b], qdd[b]) for b in blocks])
 
 
 def coulomb_torque(robot: Robot, qd: Array) -> Array:

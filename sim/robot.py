@@ -1,5 +1,6 @@
 """A robot: a compiled MuJoCo model of one serial arm and what the bench asks of it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -7,12 +8,10 @@ from typing import Self
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 import models
-from sim.errors import RobotError
-
-Array = npt.NDArray[np.float64]
+from sim.errors import BenchError, RobotError
+from sim.motors import Array, Motors
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +38,8 @@ class Robot:
             raise RobotError(f"robot {self.name!r} has no joints")
 
     @classmethod
-    def load(cls, name: str) -> Self:
-        """Return the robot that ships as `name`, or that of an MJCF file.
+    def load(cls, name: str, *edits: Callable[[mujoco.MjSpec], None]) -> Self:
+        """Return the robot that ships as `name`, or that of an MJCF file, changed by `edits` before it is compiled.
 
         Raises
         ------
@@ -49,9 +48,14 @@ class Robot:
         """
         try:
             path = Path(name) if name.endswith(".xml") else models.path(name)
-            model = mujoco.MjModel.from_xml_path(str(path))
+            spec = mujoco.MjSpec.from_file(str(path))
+            for edit in edits:
+                edit(spec)
+            model = spec.compile()
         except KeyError as error:
             raise RobotError(f"{error.args[0]}, or give the path of an MJCF file (.xml)") from None
+        except BenchError:
+            raise
         except ValueError as error:
             raise RobotError(f"MuJoCo cannot load {name!r}: {' '.join(str(error).split())}") from error
         return cls(path.stem, model)
@@ -65,6 +69,11 @@ class Robot:
     def joints(self) -> tuple[str, ...]:
         """Names of the joints."""
         return tuple(self.model.joint(j).name for j in range(self.n))
+
+    @cached_property
+    def motors(self) -> Motors:
+        """The DC motors of the joints; RobotError if a joint has none."""
+        return Motors.of(self.model)
 
     @property
     def ranges(self) -> Array:

@@ -5,7 +5,8 @@ import numpy as np
 
 from sim.errors import RobotError
 from sim.inverse_dynamics import inverse_dynamics
-from sim.robot import Array, Robot
+from sim.motors import Array
+from sim.robot import Robot
 
 
 def scara_truth(robot: Robot) -> dict[str, float]:

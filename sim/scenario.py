@@ -1,112 +1,107 @@
 """Everything that defines a run, from TOML or Python."""
 
-import tomllib
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
-from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Literal, final
 
-import numpy as np
+from pydantic import Field
 
+from sim.controllers import AbstractController, PDFeedforward
+from sim.drives import AbstractDrive, IdealDrive
+from sim.encoders import AbstractEncoder, ExactEncoder
 from sim.errors import ScenarioError
-from sim.trajectory import PointToPoint
+from sim.frictions import AbstractFrictionLaw, CoulombViscous
+from sim.measurement import TorqueMeasurement
+from sim.payload import Payload
+from sim.ripple import Ripple
+from sim.robot import Robot
+from sim.settings import NotNegative, Number, Positive, Seed, settings
+from sim.trajectories import AbstractTrajectory, Quintic
 
 MOST_SAMPLES = 1e8
 """Samples of a joint above which a scenario is taken for a slip: 0.8 GB."""
 
 
-@dataclass(frozen=True)
-class Scenario:
-    """A run of ideal data: a robot on a point-to-point trajectory.
+@final
+@settings
+class Timing:
+    """When things happen."""
 
-    Parameters
-    ----------
-    name : str
-        Name of the run.
-    robot : str
-        Name of a robot that ships, or path of an MJCF file.
-    fs : float
-        Sampling frequency [Hz].
-    rest : float
-        Time at rest before the first and after the last move [s]: filters settle there.
-    waypoints : tuple of tuple of float
-        Positions at rest [rad], joint by joint.
-    durations : tuple of float
-        Time of every move [s].
-    seed : int
-        Seed of whatever is random in it.
-    origin : str
-        Where the trajectory comes from.
-    """
-
-    name: str
-    robot: str
-    fs: float
-    rest: float
-    waypoints: tuple[tuple[float, ...], ...]
-    durations: tuple[float, ...]
-    seed: int = 0
-    origin: str = ""
+    delay: NotNegative = 0.0
+    """Computing delay: from a sample to the instant its command acts [s]; below 1 s."""
+    jitter: NotNegative = 0.0
+    """Sample instants scatter evenly over this width around the instant that the log claims [s]."""
 
     def __post_init__(self) -> None:
-        for name in ("fs", "rest"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise ScenarioError(f"{name} = {getattr(self, name)} must be a finite number above 0")
-        if len({len(point) for point in self.waypoints}) != 1:
-            raise ScenarioError("waypoints must all have the same number of joints, at least 1")
-        if len(self.durations) != len(self.waypoints) - 1:
-            w, d = len(self.waypoints), len(self.durations)
-            raise ScenarioError(f"{w} waypoints need {w - 1} durations, not {d}")
-        if self.trajectory.duration * self.fs > MOST_SAMPLES:  # making it says what else is wrong with the motion
-            raise ScenarioError(f"fs = {self.fs:g} Hz makes more than {MOST_SAMPLES:.0e} samples of this motion: lower it")
+        if self.delay >= 1:
+            raise ScenarioError(f"delay = {self.delay:g} s must be below 1 s")
+
+
+@final
+@settings
+class Physics:
+    """How the plant is integrated."""
+
+    step: Annotated[Number, Field(gt=0, le=0.01)] = 0.001
+    """Longest physics step [s]; the drive may need a shorter one."""
+    integrator: Literal["RK4", "implicitfast", "implicit", "Euler"] = "RK4"
+    """MuJoCo's integrator. All but RK4 act half a step early, which the log's torque delay states."""
 
     @property
-    def trajectory(self) -> PointToPoint:
-        """The motion, with its rest at both ends."""
-        dwells = np.zeros(len(self.waypoints))
-        dwells[[0, -1]] = self.rest
-        return PointToPoint(np.array(self.waypoints), np.array(self.durations), dwells)
+    def early(self) -> float:
+        """Share of a step by which torques act early."""
+        return 0.0 if self.integrator == "RK4" else 0.5
 
-    @classmethod
-    def load(cls, path: Path) -> Self:
-        """Read a scenario from a TOML file.
 
-        Raises
-        ------
-        ScenarioError
-            If the file cannot be read, is not TOML, lacks a key, or has one that is unknown or of the wrong type.
-        """
-        try:
-            content = tomllib.loads(path.read_text())
-        except OSError as error:
-            raise ScenarioError(f"cannot read scenario {path}: {error.strerror}") from error
-        except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            raise ScenarioError(f"cannot read scenario {path}: {error}") from error
-        return cls.from_dict(content, str(path))
+@final
+@settings
+class Scenario:
+    """A robot, a motion, and all that is imperfect about them."""
 
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any], where: str = "scenario") -> Self:
-        """Make a scenario from the keys of a TOML document; `where` names it in errors."""
-        known = {field.name for field in fields(cls)}
-        needed = known - {"seed", "origin"}
-        if unknown := sorted(set(content) - known):
-            raise ScenarioError(f"{where}: unknown key {unknown[0]!r}; known: {', '.join(sorted(known))}")
-        if missing := sorted(needed - set(content)):
-            raise ScenarioError(f"{where}: key {missing[0]!r} is missing")
-        try:
-            return cls(
-                name=str(content["name"]),
-                robot=str(content["robot"]),
-                fs=float(content["fs"]),
-                rest=float(content["rest"]),
-                waypoints=tuple(tuple(float(x) for x in point) for point in content["waypoints"]),
-                durations=tuple(float(x) for x in content["durations"]),
-                seed=int(content.get("seed", 0)),
-                origin=str(content.get("origin", "")),
-            )
-        except (TypeError, ValueError) as error:
-            raise ScenarioError(f"{where}: {error}") from error
+    name: str
+    """Name of the run."""
+    trajectory: AbstractTrajectory
+    """Where the joints shall go: a table with a kind, or the name of a scenario whose trajectory it takes."""
+    robot: str = "scara"
+    """Name of a robot that ships, or path of an MJCF file."""
+    fs: Positive = 100.0
+    """Sampling frequency of controller and log [Hz]."""
+    seed: Seed = 0
+    """Seed of whatever is random in it."""
+    origin: str = ""
+    """Where it comes from."""
+    start: tuple[Number, ...] = ()
+    """Positions [rad] from which the arm is brought to the trajectory, before the log begins; empty: it is there."""
+    controller: AbstractController = PDFeedforward()
+    """What commands the torques."""
+    timing: Timing = Timing()
+    """When things happen."""
+    drive: AbstractDrive = IdealDrive()
+    """What makes torque of a command."""
+    ripple: Ripple = Ripple()
+    """Torque that depends on the rotor's position."""
+    friction: AbstractFrictionLaw = CoulombViscous()
+    """How the joints resist."""
+    payload: Payload = Payload()
+    """A mass that the controller does not know."""
+    encoder: AbstractEncoder = ExactEncoder()
+    """What measures the positions."""
+    torque: TorqueMeasurement = TorqueMeasurement()
+    """What the log's torque is made of."""
+    physics: Physics = Physics()
+    """How the plant is integrated."""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the scenario as the keys of a TOML or JSON document."""
-        return asdict(self)
+    @property
+    def real_robot(self) -> Robot:
+        """The robot that is simulated: with its payload, and the friction of the scenario."""
+        return Robot.load(self.robot, self.payload.edit, self.friction.edit)
+
+    @property
+    def nominal_robot(self) -> Robot:
+        """The robot as its maker describes it."""
+        return Robot.load(self.robot)
+
+    def quintic(self) -> Quintic:
+        """Return the trajectory if it is given by waypoints and times; raise ScenarioError if not."""
+        if not isinstance(self.trajectory, Quintic):
+            raise ScenarioError(f"scenario {self.name!r}: only a trajectory of kind quintic will do here")
+        return self.trajectory
+

@@ -8,7 +8,8 @@ import numpy as np
 from mujoco import mjtStage
 from mujoco.batch import Batch
 
-from sim.robot import Array, Robot
+from sim.motors import Array
+from sim.robot import Robot
 
 Kind = Literal["sphere", "capsule", "ellipsoid", "cylinder", "box"]
 

@@ -7,7 +7,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.errors import ScenarioError
-from sim.robot import Array
+from sim.motors import Array
+from sim.trajectories.reference import AbstractMotion, Reference
 
 PEAK_VELOCITY = 15 / 8
 """Largest |ds/du| of s(u) = 10 u^3 - 15 u^4 + 6 u^5, at u = 1/2."""
@@ -17,25 +18,7 @@ PEAK_ACCELERATION = 10 / np.sqrt(3)
 
 
 @dataclass(frozen=True, eq=False)
-class Reference:
-    """A planned motion, sampled.
-
-    Parameters
-    ----------
-    fs : float
-        [Hz].
-    q, qd, qdd : Array, shape (time, joint)
-        [rad], [rad/s], [rad/s^2].
-    """
-
-    fs: float
-    q: Array
-    qd: Array
-    qdd: Array
-
-
-@dataclass(frozen=True, eq=False)
-class PointToPoint:
+class PointToPoint(AbstractMotion):
     """Moves from waypoint to waypoint, each of fifth order and at rest at both ends, with pauses at the waypoints.
 
     q(t) = q_i + (q_(i+1) - q_i) s(u), s(u) = 10 u^3 - 15 u^4 + 6 u^5, u = (t - t_i) / T_i: all joints start and stop together.
@@ -114,11 +97,6 @@ class PointToPoint:
     def peak_velocity(self) -> Array:
         """Largest speed of every joint [rad/s], shape (joint,)."""
         return (PEAK_VELOCITY * np.abs(np.diff(self.waypoints, axis=0)) / self.durations[:, None]).max(axis=0)
-
-    def sample(self, fs: float) -> Reference:
-        """Return the motion at t = 0, 1/fs, 2/fs, ... below its duration, exactly."""
-        count = round(self.duration * fs)
-        return self.at(np.arange(count) / fs, fs)
 
     def at(self, t: Array, fs: float) -> Reference:
         """Return the motion at the times `t` [s], shape (time,); before the start and after the end it rests."""

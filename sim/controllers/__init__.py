@@ -1,0 +1,19 @@
+"""Controllers, and their table."""
+
+from identify.plugins import PluginTable
+from sim.controllers.base import AbstractController as AbstractController
+from sim.controllers.base import AbstractLaw as AbstractLaw
+from sim.controllers.base import Task as Task
+from sim.controllers.computed_torque import ComputedTorque as ComputedTorque
+from sim.controllers.pd import PDFeedforward as PDFeedforward
+from sim.controllers.pid import PID as PID
+
+CONTROLLERS: PluginTable[AbstractController] = PluginTable(
+    "controllers",
+    AbstractController,  # type: ignore[type-abstract]  # only asked whether an instance is one
+    {
+        "pd": PDFeedforward,
+        "pid": PID,
+        "computed_torque": ComputedTorque,
+    },
+)

@@ -1,0 +1,87 @@
+"""A current-controlled DC motor, its chopper averaged away."""
+
+from typing import final
+
+import numpy as np
+
+from sim.drives.base import AbstractAmplifier, AbstractDrive
+from sim.errors import ScenarioError
+from sim.motors import Array, Motors
+from sim.robot import Robot
+from sim.settings import EachPositiveOrNone, Positive, per_joint, settings
+
+Limit = EachPositiveOrNone
+
+
+def limits(robot: Robot, voltage: Limit, current: Limit) -> tuple[Array, Array]:
+    """Return the bus voltage [V] and largest current [A] of every joint: a setting, or what the motors have, if less."""
+    motors, n, unlimited = robot.motors, robot.n, (np.inf,)
+    V = np.minimum(motors.V, per_joint(voltage or unlimited, n, "drive.bus_voltage"))
+    return V, np.minimum(motors.I, per_joint(current or unlimited, n, "drive.current_limit"))
+
+
+@final
+@settings
+class AveragedDrive(AbstractDrive):
+    """Current-controlled DC motor: winding, bus voltage and current limit; the current loop is of first order.
+
+    L di/dt = v - R i - K qd with v = R i + L w (i_ref - i) + K qd as long as that is within the bus voltage: a PI controller
+    whose zero cancels the winding's pole, and that knows the back-EMF. The equation is solved exactly in every physics step,
+    for the speed in its middle.
+    """
+
+    bandwidth: Positive = 1000.0
+    """Bandwidth of the current loop, w / (2 pi) [Hz]."""
+    bus_voltage: EachPositiveOrNone = None
+    """Bus voltage [V], of all joints or of each; without it, or where the robot's motors have less, theirs holds."""
+    current_limit: EachPositiveOrNone = None
+    """Largest current [A], of all joints or of each; without it, or where the robot's motors have less, theirs holds."""
+
+    def start(self, robot: Robot, nsim: int, h: float) -> AbstractAmplifier:
+        """Return the drive without current."""
+        V, I = limits(robot, self.bus_voltage, self.current_limit)  # noqa: E741
+        return _Amplifier(robot.motors, 2 * np.pi * self.bandwidth, V, I, nsim, h)
+
+    def lag(self, robot: Robot) -> Array:
+        """Return 1 / w."""
+        return np.full(robot.n, 1 / (2 * np.pi * self.bandwidth))
+
+
+class _Amplifier(AbstractAmplifier):
+    """i follows the loop with rate w; where that needs more than the bus voltage, the winding's own rate R/L comes first."""
+
+    def __init__(self, motors: Motors, w: float, V: Array, I: Array, nsim: int, h: float) -> None:  # noqa: E741, PLR0913, PLR0917
+        if (w * motors.L <= motors.R).any():
+            raise ScenarioError(
+                f"drive.bandwidth = {w / 2 / np.pi:g} Hz must be above that of the bare winding, "
+                f"{(motors.R / motors.L / 2 / np.pi).max():.3g} Hz"
+            )
+        self._R, self._L, self._K, self._V, self._I, self._w, self._h = motors.R, motors.L, motors.K, V, I, w, h
+        self._i = np.zeros((nsim, len(motors.R)))
+        self._kept, self._moved = np.exp(-w * h), -np.expm1(-w * h) / w / h
+
+    def step(self, demand: Array, speed: Array) -> Array:
+        e, i0 = self._K * speed, self._i
+        limited = np.minimum(np.maximum(demand / self._K, -self._I), self._I)
+        target = np.minimum(np.maximum(limited, (-self._V - e) / self._R), (self._V - e) / self._R)
+        asked = self._R * i0 + self._L * self._w * (target - i0) + e
+        saturated = np.abs(asked) > self._V
+        if saturated.any():
+            return self._K * self._with_limit(saturated, np.copysign(self._V, asked), target, e)
+        away = i0 - target
+        self._i = target + away * self._kept
+        return self._K * (target + away * self._moved)
+
+    def _with_limit(self, saturated: Array, v: Array, target: Array, e: Array) -> Array:
+        """Advance where the voltage `v` is all there is at first; return the mean currents."""
+        R, L, w, h, i0 = self._R, self._L, self._w, self._h, self._i
+        end = (v - e) / R
+        released = (v - e - L * w * target) / (R - L * w)  # the current at which the loop asks for less than v
+        share = np.where(saturated, (released - end) / np.where(i0 == end, 1.0, i0 - end), 1.0)
+        t = np.minimum(-np.log(np.clip(share, 1e-300, 1.0)) * L / R, h)
+        i1 = np.where(saturated, end + (i0 - end) * np.exp(-t * R / L), i0)
+        charge = (end * t - (i1 - i0) * L / R) * saturated
+        away, rest = i1 - target, h - t
+        self._i = np.where(saturated, target + away * np.exp(-w * rest), target + away * self._kept)
+        mean = (charge + target * rest - away * np.expm1(-w * rest) / w) / h
+        return np.where(saturated, mean, target + away * self._moved)

@@ -1,0 +1,31 @@
+"""A drive that does as it is told."""
+
+from typing import final
+
+import numpy as np
+
+from sim.drives.base import AbstractAmplifier, AbstractDrive
+from sim.motors import Array
+from sim.robot import Robot
+from sim.settings import settings
+
+
+@final
+@settings
+class IdealDrive(AbstractDrive):
+    """Torque as asked: no winding, no limit, no lag."""
+
+    def start(self, robot: Robot, nsim: int, h: float) -> AbstractAmplifier:
+        """Return the drive."""
+        del robot, nsim, h
+        return _Amplifier()
+
+    def lag(self, robot: Robot) -> Array:
+        """Return zeros."""
+        return np.zeros(robot.n)
+
+
+class _Amplifier(AbstractAmplifier):
+    def step(self, demand: Array, speed: Array) -> Array:
+        del speed
+        return demand

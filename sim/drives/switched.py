@@ -1,0 +1,103 @@
+"""A DC motor behind an H-bridge chopper, the winding resolved between the edges of the pulses."""
+
+from typing import Annotated, final
+
+import numpy as np
+from pydantic import Field
+
+from sim.drives.averaged import limits
+from sim.drives.base import AbstractAmplifier, AbstractDrive
+from sim.drives.pwm import Modulation, Pieces, bridge
+from sim.drives.winding import pass_period
+from sim.errors import ScenarioError
+from sim.motors import Array, Motors
+from sim.robot import Robot
+from sim.settings import EachPositiveOrNone, NotNegative, Number, Positive, settings
+
+
+@final
+@settings
+class SwitchedDrive(AbstractDrive):
+    """H-bridge chopper with a digital PI current loop; torque ripple emerges from its pulses.
+
+    The loop samples the current at the start of every PWM period. Its zero cancels the winding's pole, so that the sampled
+    current follows its reference with the pole a = exp(-2 pi bandwidth / pwm). A physics step is a PWM period; the plant gets
+    the mean torque of the period.
+    """
+
+    pwm: Positive = 5000.0
+    """Switching frequency [Hz], a whole multiple of fs."""
+    modulation: Modulation = "unipolar"
+    """unipolar (phase-shifted legs), bipolar, or sign_magnitude."""
+    bandwidth: Positive = 500.0
+    """Bandwidth of the current loop [Hz], below a fifth of the switching frequency."""
+    dead_time: NotNegative = 520e-9
+    """Time for which both transistors of a leg are off before one turns on [s]; below a tenth of the PWM period."""
+    duty_resolution: Annotated[Number, Field(ge=0, le=0.1)] = 0.001
+    """Step of the duty, as a share of the period; 0 is exact."""
+    bus_voltage: EachPositiveOrNone = None
+    """Bus voltage [V], of all joints or of each; without it, or where the robot's motors have less, theirs holds."""
+    current_limit: EachPositiveOrNone = None
+    """Largest current [A], of all joints or of each; without it, or where the robot's motors have less, theirs holds."""
+
+    def __post_init__(self) -> None:
+        if self.dead_time * self.pwm >= 0.1:
+            raise ScenarioError(f"dead_time = {self.dead_time:g} s must be below a tenth of the period, {0.1 / self.pwm:g} s")
+        if self.bandwidth > self.pwm / 5:
+            raise ScenarioError(f"bandwidth = {self.bandwidth:g} Hz must be at most a fifth of pwm = {self.pwm:g} Hz")
+
+    def start(self, robot: Robot, nsim: int, h: float) -> AbstractAmplifier:
+        """Return the drive without current."""
+        V, I = limits(robot, self.bus_voltage, self.current_limit)  # noqa: E741
+        if not np.isfinite(V).all():
+            raise ScenarioError("drive.bus_voltage is needed: the robot's motors give none")
+        return SwitchedAmplifier(self, robot.motors, V, I, nsim, h)
+
+    def lag(self, robot: Robot) -> Array:
+        """Return T / (1 - a) - T / 2, from the sampled loop and the hold of its reference."""
+        T = 1 / self.pwm
+        return np.full(robot.n, T / -np.expm1(-2 * np.pi * self.bandwidth * T) - T / 2)
+
+    def step_length(self, fs: float, longest: float) -> float:
+        """Return the PWM period [s].
+
+        Raises
+        ------
+        ScenarioError
+            If it is above `longest`, or does not fit whole times into a sample.
+        """
+        times = self.pwm / fs
+        if times < 1 or abs(times - round(times)) > 1e-9 * times:
+            raise ScenarioError(f"drive.pwm = {self.pwm:g} Hz must be a whole multiple of fs = {fs:g} Hz")
+        if 1 / self.pwm > longest * (1 + 1e-9):
+            raise ScenarioError(f"drive.pwm = {self.pwm:g} Hz makes steps longer than physics.step = {longest:g} s: raise it")
+        return 1 / self.pwm
+
+
+class SwitchedAmplifier(AbstractAmplifier):
+    """The chopper at work; `electrical` and `copper` [J] count what came in and what became heat, shape (nsim, joint)."""
+
+    def __init__(self, settings: SwitchedDrive, motors: Motors, V: Array, I: Array, nsim: int, h: float) -> None:  # noqa: E741, PLR0913, PLR0917
+        self._settings, self._motors, self._V, self._I, self._h = settings, motors, V, I, h
+        lost = -np.expm1(-h * motors.R / motors.L)
+        self._kp = motors.R / lost * -np.expm1(-2 * np.pi * settings.bandwidth * h)
+        self._ki = self._kp * lost
+        self._most = (1 - 4 * settings.dead_time / h) * V
+        self.i, self._sum, self.electrical, self.copper = np.zeros((4, nsim, len(V)))
+
+    def step(self, demand: Array, speed: Array) -> Array:
+        passage = pass_period(self.i, self.pieces(demand), self._V, self._motors.K * speed, self._motors.R, self._motors.L)
+        self.i = passage.i
+        self.electrical += passage.electrical
+        self.copper += passage.copper
+        return passage.charge * (self._motors.K / self._h)
+
+    def pieces(self, demand: Array) -> Pieces:
+        """Return the pulses that the current loop asks for; its integrator rests while the voltage is at its limit."""
+        error = np.minimum(np.maximum(demand / self._motors.K, -self._I), self._I) - self.i
+        asked = self._kp * error + self._sum
+        v = np.minimum(np.maximum(asked, -self._most), self._most)
+        self._sum = self._sum + self._ki * error * (v == asked)
+        step = 2 * self._settings.duty_resolution
+        m = np.rint(v / (step * self._V)) * step if step else v / self._V
+        return bridge(m, self._h, self._settings.dead_time, self._settings.modulation)

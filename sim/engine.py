@@ -1,0 +1,188 @@
+"""Running a scenario: controller, drive and encoder in NumPy around MuJoCo, many simulations at once."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from identify.motion_log import MotionLog
+from sim.controllers import Task
+from sim.errors import ScenarioError
+from sim.history import History
+from sim.inverse_dynamics import inverse_dynamics
+from sim.measurement import CurrentSensor
+from sim.motors import Array
+from sim.plant import Plant
+from sim.robot import Robot
+from sim.run import Run
+from sim.scenario import MOST_SAMPLES, Scenario
+from sim.trajectories import Reference
+from sim.trajectories.approach import approach
+
+Progress = Callable[[float], None]
+"""Hears the share of a run that is done."""
+
+
+def simulate(
+    scenario: Scenario,
+    seeds: Sequence[int] = (),
+    *,
+    vary: Mapping[str, npt.ArrayLike] | None = None,
+    threads: int = 0,
+    progress: Progress | None = None,
+) -> Run:
+    """Run a scenario in closed loop.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What to run.
+    seeds : sequence of int, optional
+        A simulation for each; that of the scenario by default. What a simulation gives depends on its own seed alone.
+    vary : mapping of str to array_like, optional
+        Fields of MuJoCo's model, such as dof_damping, with a value for every simulation, shape (nsim, ...).
+    threads : int
+        Native threads; 0 for all processors. No bit depends on it.
+    progress : callable, optional
+        Hears the share of the run that is done, about a hundred times.
+
+    Raises
+    ------
+    ScenarioError
+        If settings do not fit each other or the robot, or a joint leaves its range.
+    RobotError
+        If the robot does not have what the scenario asks of it.
+    """
+    seeds = tuple(seeds) or (scenario.seed,)
+    robot = scenario.real_robot
+    planned, skipped = _planned(scenario, robot)
+    bench = _Bench(scenario, robot, planned, seeds, vary or {}, threads)
+    for step in range(bench.steps):
+        bench.advance(step)
+        if progress and step % max(1, bench.steps // 100) == 0:
+            progress(step / bench.steps)
+    return bench.run(skipped)
+
+
+def _planned(scenario: Scenario, robot: Robot) -> tuple[Reference, int]:
+    """Return the planned motion, the way to its start before it, and how many samples that takes."""
+    motion = scenario.trajectory.motion(robot)
+    if motion.duration * scenario.fs > MOST_SAMPLES:
+        raise ScenarioError(f"fs = {scenario.fs:g} Hz makes more than {MOST_SAMPLES:.0e} samples of this motion: lower it")
+    main = motion.sample(scenario.fs)
+    if not len(main.q):
+        raise ScenarioError(f"fs = {scenario.fs:g} Hz leaves no sample of a motion of {motion.duration:.3g} s: raise it")
+    if not scenario.start:
+        return main, 0
+    way = approach(robot, np.array(scenario.start), main.q[0], scenario.fs)
+    joined = (np.concatenate([getattr(way, x), getattr(main, x)]) for x in ("q", "qd", "qdd"))
+    return Reference(scenario.fs, *joined), len(way.q)
+
+
+class _Bench:
+    """A run in progress."""
+
+    def __init__(  # noqa: PLR0913, PLR0917
+        self,
+        scenario: Scenario,
+        robot: Robot,
+        planned: Reference,
+        seeds: tuple[int, ...],
+        vary: Mapping[str, npt.ArrayLike],
+        threads: int,
+    ) -> None:
+        fs, n, nsim, samples = scenario.fs, robot.n, len(seeds), len(planned.q)
+        self._scenario, self._planned, self._seeds = scenario, planned, seeds
+        self._h = scenario.drive.step_length(fs, scenario.physics.step)
+        self._per_sample = round(1 / fs / self._h)
+        late = scenario.timing.delay / self._h
+        self._late = int(late + 1e-9)
+        self._old = max(0.0, late - self._late)  # share of a step in which the command before still acts
+        self._plant = Plant(robot, nsim, scenario.physics, self._h, vary, threads)
+        self._plant.q[:], self._applied = planned.q[0], self._plant.applied
+        self._law = scenario.controller.start(Task(scenario.nominal_robot, planned, nsim))
+        self._drive = scenario.drive.start(robot, nsim, self._h)
+        self._ripple = scenario.ripple.start(robot)
+        self._friction = scenario.friction.start(self._plant.batch, self._plant.Fs, self._h)
+        self._encoder = scenario.encoder.start(n, samples, fs, _generators(seeds, 0))
+        self._sensor = CurrentSensor(scenario.torque, nsim, n, self._h)
+        self._jitter = self._drawn_jitter(samples)
+        self._history = History(self._late + self._per_sample, nsim, n, self._h)
+        at_rest = planned.q[:1], np.zeros((1, n)), np.zeros((1, n))
+        self._before = self._command = self._demand = np.repeat(inverse_dynamics(robot, *at_rest), nsim, axis=0)
+        self._qd = np.zeros((nsim, n))
+        self._measured, self._commands, self._currents, self._q, self._speeds, self._tau = np.zeros((6, samples, nsim, n))
+        self.steps = samples * self._per_sample + self._late
+
+    def _drawn_jitter(self, samples: int) -> Array:
+        """Return by how many steps each sample is off its claimed instant, shape (sample, nsim)."""
+        width = self._scenario.timing.jitter / self._h
+        if width / 2 > self._late:
+            raise ScenarioError(
+                f"timing.jitter = {self._scenario.timing.jitter:g} s needs a timing.delay of at least its half in whole "
+                f"physics steps of {self._h:g} s: a command cannot act before its sample is taken"
+            )
+        return np.stack([width * (rng.random(samples) - 0.5) for rng in _generators(self._seeds, 1)], axis=1)
+
+    def advance(self, step: int) -> None:
+        """Advance by a physics step."""
+        q, qd = self._plant.q, self._plant.qd
+        sample, after = divmod(step, self._per_sample)
+        if after == 0 and sample < len(self._q):
+            self._q[sample], self._speeds[sample], self._currents[sample] = q, qd, self._sensor.value
+        self._history.put(step, q, qd)
+        self._listen(step - self._late)
+        mid_qd = 1.5 * qd - 0.5 * self._qd
+        mid_q = q + (self._h / 2) * qd
+        self._qd = qd.copy()
+        constant = 1 + self._ripple.commutation.at(mid_q)
+        electric = self._drive.step(self._demand, mid_qd * constant)
+        self._sensor.step(electric)
+        tau = electric * constant + self._ripple.cogging.at(mid_q)
+        np.add(tau, self._friction.torque(mid_qd), out=self._applied)
+        self._plant.step()
+        if sample < len(self._tau):
+            self._tau[sample] += tau
+
+    def _listen(self, step: int) -> None:
+        """Let the command whose turn it is, `step` steps after the first sample, act."""
+        k, after = divmod(step, self._per_sample)
+        if after == 0 and step >= 0:
+            q = self._encoder.read(k, self._history.at(step + self._jitter[k]))
+            self._before, self._command = self._command, self._law.command(k, q)
+            self._measured[k], self._commands[k] = q, self._command
+            self._demand = self._old * self._before + (1 - self._old) * self._command
+        elif after == 1:
+            self._demand = self._command
+
+    def run(self, skipped: int) -> Run:
+        """Return what has happened since sample `skipped`."""
+        channels = self._measured, self._commands, self._currents, self._q, self._speeds, self._tau / self._per_sample
+        measured, command, current, q, qd, tau = (np.swapaxes(x[skipped:], 0, 1) for x in channels)
+        self._require_sane(q)
+        scenario, n = self._scenario, q.shape[-1]
+        logged = scenario.torque.logged(
+            current if scenario.torque.source == "current" else command, n, _generators(self._seeds, 2)
+        )
+        planned = replace(self._planned, **{x: getattr(self._planned, x)[skipped:] for x in ("q", "qd", "qdd")})
+        delay = scenario.timing.delay - scenario.physics.early * self._h + float(scenario.drive.lag(self._plant.robot).mean())
+        log = MotionLog(scenario.fs, measured, logged, scenario.torque.channel(delay, scenario.fs))
+        return Run(scenario, self._seeds, self._plant.robots, planned, log, q, qd, tau, command)
+
+    def _require_sane(self, q: Array) -> None:
+        """Raise ScenarioError if a joint has left its range: it ran into its stop, or the loop is unstable."""
+        low, high = self._plant.robot.ranges.T
+        outside = ~((q >= low) & (q <= high))
+        if outside.any():
+            sim, k, j = (int(i) for i in np.argwhere(outside)[0])
+            raise ScenarioError(
+                f"joint {self._plant.robot.joints[j]} leaves its range at t = {k / self._scenario.fs:.3g} s (seed "
+                f"{self._seeds[sim]}): the loop is unstable or too weak; lower controller.bandwidth or timing.delay, raise "
+                "fs, or ask less of the drive"
+            )
+
+
+def _generators(seeds: Sequence[int], stream: int) -> list[np.random.Generator]:
+    """Return a generator for each simulation, that depends on its seed and the purpose alone."""
+    return [np.random.default_rng([seed, stream]) for seed in seeds]

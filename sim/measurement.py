@@ -1,0 +1,67 @@
+"""How the torque comes into the log."""
+
+from collections.abc import Sequence
+from typing import Literal, final
+
+import numpy as np
+
+from identify.motion_log import TorqueChannel
+from sim.motors import Array
+from sim.settings import EachNotNegative, EachNumber, EachShareError, Positive, per_joint, settings
+
+
+@final
+@settings
+class TorqueMeasurement:
+    """What the log's torque is made of: the current reference, as in the paper (Eq. 13), or a measured current."""
+
+    source: Literal["reference", "current"] = "reference"
+    """reference: the commanded torque, sample by sample; current: the motor current, measured when a sample is taken."""
+    gain_error: EachShareError = (0.0,)
+    """Error of the gain G_T by which the log was turned into N m, as a share, of all joints or of each."""
+    offset: EachNumber = (0.0,)
+    """Constant error [N m], of all joints or of each."""
+    noise: EachNotNegative = (0.0,)
+    """White noise, rms [N m], of all joints or of each."""
+    resolution: EachNotNegative = (0.0,)
+    """Step of the converter [N m], of all joints or of each: twice its range over 2^bits; 0 is exact."""
+    cutoff: Positive | None = None
+    """Anti-alias filter of the measured current, first order [Hz]; without it none."""
+
+    def logged(self, tau: Array, n: int, rngs: Sequence[np.random.Generator]) -> Array:
+        """Return what the log says of the torques `tau` [N m], shape (nsim, time, joint)."""
+        gain, offset, noise, step = (
+            per_joint(getattr(self, name), n, f"torque.{name}") for name in ("gain_error", "offset", "noise", "resolution")
+        )
+        drawn = np.stack([rng.standard_normal(tau.shape[1:]) for rng in rngs])
+        said = (1 + gain) * tau + offset + noise * drawn
+        return np.where(step > 0, np.rint(said / np.where(step > 0, step, 1.0)) * step, said)
+
+    def channel(self, delay: float, fs: float) -> TorqueChannel:
+        """Return what the log's torque means, when a command acts `delay` [s] after its sample.
+
+        A measured current is what earlier commands have left when a sample is taken. The last of them had a share
+        1 - exp(-(T - r)/tau) of the filter's output, with T = 1/fs, r = delay modulo T and tau its time constant; those
+        before it follow geometrically. The channel states their mean delay.
+        """
+        if self.source == "reference":
+            return TorqueChannel("held", delay)
+        T = 1 / fs
+        periods, r = divmod(delay, T)
+        held = T - r
+        tau = 1 / (2 * np.pi * self.cutoff) if self.cutoff else 0.0
+        earlier = np.exp(-held / tau) / -np.expm1(-T / tau) if tau else 0.0
+        del periods
+        return TorqueChannel("held", r - T * (1 + earlier))
+
+
+class CurrentSensor:
+    """A first-order anti-alias filter on the motor's torque-making current, advanced by physics steps of `h` [s]."""
+
+    def __init__(self, settings: TorqueMeasurement, nsim: int, n: int, h: float) -> None:
+        self._share = -np.expm1(-2 * np.pi * settings.cutoff * h) if settings.cutoff else 1.0
+        self.value: Array = np.zeros((nsim, n))
+
+    def step(self, tau: Array) -> None:
+        """Take in the mean torque of a step [N m], before ripple."""
+        self.value = self.value + self._share * (tau - self.value) if self._share < 1 else tau

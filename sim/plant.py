@@ -1,0 +1,74 @@
+"""The rigid bodies of many simulations, in MuJoCo."""
+
+from collections.abc import Mapping
+from copy import copy
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+from mujoco.batch import Batch, SimulationError
+
+from sim.errors import ScenarioError
+from sim.motors import Array
+from sim.robot import Robot
+from sim.scenario import Physics
+
+
+class Plant:
+    """Simulations of a robot whose joints are driven by torques; its actuators are switched off.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    nsim : int
+        Number of simulations.
+    physics : Physics
+        Integrator.
+    h : float
+        Physics step [s].
+    vary : mapping of str to array_like
+        Fields of MuJoCo's model with a value for each simulation, shape (nsim, ...).
+    threads : int
+        Native threads; 0 for all processors.
+    """
+
+    def __init__(  # noqa: PLR0913, PLR0917
+        self, robot: Robot, nsim: int, physics: Physics, h: float, vary: Mapping[str, npt.ArrayLike], threads: int
+    ) -> None:
+        model = copy(robot.model)
+        model.opt.timestep = h
+        model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{physics.integrator.upper()}")
+        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+        self.robot, self.batch, self._varied = robot, Batch(model, nsim, threads), bool(vary)
+        for name, values in vary.items():
+            _vary(self.batch, name, np.asarray(values, dtype=np.float64))
+        self.q, self.qd, self.applied = (self.batch.bind(name) for name in ("qpos", "qvel", "qfrc_applied"))
+        expanded = self.batch.expanded("dof_frictionloss")
+        self.Fs: Array = np.array(np.broadcast_to(model.dof_frictionloss, (nsim, robot.n)) if expanded is None else expanded)
+
+    def step(self) -> None:
+        """Advance every simulation by a physics step, under the torques in `applied` [N m]."""
+        try:
+            self.batch.step()
+        except SimulationError as error:
+            raise ScenarioError(f"MuJoCo cannot go on: {' '.join(str(error).split())}") from error
+
+    @property
+    def robots(self) -> tuple[Robot, ...]:
+        """The robot of every simulation."""
+        if not self._varied:
+            return (self.robot,) * self.batch.nsim
+        return tuple(Robot(self.robot.name, self.batch.get_model(i)) for i in range(self.batch.nsim))
+
+
+def _vary(batch: Batch, name: str, values: Array) -> None:
+    """Give a field of the model the values of every simulation."""
+    try:
+        field = batch.expand(name)
+    except (AttributeError, ValueError, KeyError, TypeError) as error:
+        raise ScenarioError(f"vary: MuJoCo's model has no field {name!r} that could vary: {error}") from error
+    if values.shape != field.shape:
+        raise ScenarioError(f"vary: {name} needs the shape {field.shape}, not {values.shape}")
+    field[:] = values
+    batch.set_const()

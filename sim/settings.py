@@ -1,0 +1,159 @@
+"""Settings that check themselves: every field of a scenario has a type, a range, a unit and a description."""
+
+from collections.abc import Callable
+from difflib import get_close_matches
+from functools import wraps
+from typing import Annotated, Any, TypeVar, dataclass_transform
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import AllowInfNan, BeforeValidator, ConfigDict, Field, Strict, ValidationError
+from pydantic.dataclasses import dataclass
+
+from sim.errors import ScenarioError
+
+C = TypeVar("C", bound=type)
+
+_SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
+
+_CHECKED = ConfigDict(extra="forbid", use_attribute_docstrings=True, arbitrary_types_allowed=True)
+
+Number = Annotated[float, Strict(), AllowInfNan(False)]
+Positive = Annotated[Number, Field(gt=0)]
+NotNegative = Annotated[Number, Field(ge=0)]
+Share = Annotated[Number, Field(ge=0, le=1)]
+Whole = Annotated[int, Strict()]
+Seed = Annotated[Whole, Field(ge=0, lt=2**32)]
+
+
+def _as_many(value: object) -> object:
+    """Return a single number as a tuple of one: it holds for all joints."""
+    return value if value is None or isinstance(value, (list, tuple, np.ndarray)) else (value,)
+
+
+EachShareError = Annotated[
+    tuple[Annotated[Number, Field(gt=-1, lt=10)], ...], BeforeValidator(_as_many), Field(min_length=1)
+]
+EachNumber = Annotated[tuple[Number, ...], BeforeValidator(_as_many), Field(min_length=1)]
+EachPositive = Annotated[tuple[Positive, ...], BeforeValidator(_as_many), Field(min_length=1)]
+EachPositiveOrNone = Annotated[tuple[Positive, ...] | None, BeforeValidator(_as_many)]
+EachNotNegativeOrNone = Annotated[tuple[NotNegative, ...] | None, BeforeValidator(_as_many)]
+EachNotNegative = Annotated[tuple[NotNegative, ...], BeforeValidator(_as_many), Field(min_length=1)]
+EachCount = Annotated[tuple[Annotated[Whole, Field(ge=1)], ...], BeforeValidator(_as_many), Field(min_length=1)]
+"""One value for all joints, or one a joint; a tuple in either case."""
+
+Positions = tuple[tuple[Number, ...], ...]
+"""Waypoints, joint by joint [rad]."""
+
+
+@dataclass_transform(frozen_default=True)
+def settings(cls: C) -> C:
+    """Make `cls` a frozen dataclass that checks its fields when it is made; what is wrong is a ScenarioError.
+
+    The docstring below a field is its description. A ValueError of `__post_init__` is reported as well.
+    """
+    made = dataclass(frozen=True, config=_CHECKED)(cls)
+    made.__init__ = _reporting(made.__init__, made)  # type: ignore[misc]  # pydantic's own, told in our words
+    return made  # type: ignore[return-value]
+
+
+def _reporting(init: Callable[..., None], cls: type) -> Callable[..., None]:
+    @wraps(init)
+    def checked(self: object, *args: object, **kwargs: object) -> None:
+        try:
+            init(self, *args, **kwargs)
+        except ValidationError as error:
+            raise ScenarioError("; ".join(complaints(error, cls))) from None
+
+    return checked
+
+
+def make(cls: type, content: object, where: str) -> Any:
+    """Return `cls` made of the keys of a table; raise ScenarioError that says where in the scenario it is wrong."""
+    if not isinstance(content, dict):
+        raise ScenarioError(f"{where} = {content!r:.60} must be a table of settings")
+    try:
+        return cls.__pydantic_validator__.validate_python(content)  # type: ignore[attr-defined]
+    except ValidationError as error:
+        raise ScenarioError("; ".join(complaints(error, cls, where))) from None
+
+
+def complaints(error: ValidationError, cls: type, where: str = "") -> list[str]:
+    """Return what is wrong, one sentence a setting: its key, its value, what is allowed, the nearest known key."""
+    return list(dict.fromkeys(_complaint(detail, cls, where) for detail in error.errors(include_url=False)))
+
+
+def _complaint(detail: Any, cls: type, where: str) -> str:
+    kind, location = detail["type"], list(detail["loc"])
+    owner = _owner(cls, [part for part in location[:-1] if isinstance(part, str)])
+    key = ".".join(filter(None, [where, _written(location)]))
+    told = description(owner, next((part for part in reversed(location) if isinstance(part, str)), ""))
+    if kind in ("unexpected_keyword_argument", "unexpected_positional_argument"):
+        known = list(fields_of(owner))
+        close = get_close_matches(str(location[-1]), known, 1)
+        hint = f" (did you mean {close[0]!r}?)" if close else ""
+        return f"unknown key {key!r}{hint}; known: {', '.join(known)}"
+    if kind in ("missing", "missing_argument"):
+        return f"key {key!r} is missing" + (f": {told}" if told else "")
+    if kind == "value_error":
+        return ": ".join(filter(None, [key, str(detail["ctx"]["error"])]))
+    return f"{key} = {detail['input']!r:.60}: {_allowed(detail)}" + (f" ({told})" if told else "")
+
+
+def _written(location: list[Any]) -> str:
+    """Return a place in a document, as a.b[0].c."""
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
+
+
+def _allowed(detail: Any) -> str:
+    return str(detail["msg"]).replace("Input should be", "must be").replace("Value error, ", "")
+
+
+def _owner(cls: type, path: list[str]) -> type:
+    """Return the class of settings that a path of keys ends in."""
+    for key in path:
+        inner = [a for a in _annotations(cls, key) if hasattr(a, "__pydantic_fields__")]
+        cls = inner[0] if inner else cls
+    return cls
+
+
+def _annotations(cls: type, key: str) -> list[Any]:
+    field = fields_of(cls).get(key)
+    return [] if field is None else [field.annotation, *getattr(field.annotation, "__args__", ())]
+
+
+def fields_of(cls: type) -> dict[str, Any]:
+    """Return the fields of a class of settings, by name."""
+    found: dict[str, Any] = getattr(cls, "__pydantic_fields__", {})
+    return found
+
+
+def description(cls: type, key: str) -> str:
+    """Return what a field is, with its unit and range, in one line."""
+    field = fields_of(cls).get(key)
+    return " ".join(str(field.description).split()).rstrip(".") if field is not None and field.description else ""
+
+
+def for_all_joints(cls: type, key: str) -> bool:
+    """Return whether a single value of this setting holds for all joints."""
+    return any(isinstance(m, BeforeValidator) for m in fields_of(cls)[key].metadata)
+
+
+def limits(cls: type, key: str) -> str:
+    """Return the range of a setting, or of each of its values, such as `> 0, <= 1`; empty if there is none."""
+    field = fields_of(cls)[key]
+    found = [*field.metadata, *_metadata(field.annotation)]
+    return ", ".join(f"{sign} {getattr(m, name):g}" for m in found for name, sign in _SIGNS.items() if hasattr(m, name))
+
+
+def _metadata(annotation: Any) -> list[Any]:
+    """Return what is attached to a type and to the types that it is made of."""
+    own = [inner for m in getattr(annotation, "__metadata__", ()) for inner in getattr(m, "metadata", [m])]
+    return own + [m for part in getattr(annotation, "__args__", ()) for m in _metadata(part)]
+
+
+def per_joint(values: tuple[float, ...], n: int, name: str) -> npt.NDArray[np.float64]:
+    """Return a setting as an array of one value for each of `n` joints; raise ScenarioError if their numbers differ."""
+    if len(values) not in (1, n):
+        raise ScenarioError(f"{name} has {len(values)} values for {n} joints: give one for all, or one a joint")
+    return np.array(np.broadcast_to(np.asarray(values, dtype=np.float64), (n,)))

@@ -1,0 +1,19 @@
+"""Trajectories, and their table."""
+
+from identify.plugins import PluginTable
+from sim.trajectories.base import AbstractTrajectory as AbstractTrajectory
+from sim.trajectories.point_to_point import PointToPoint as PointToPoint
+from sim.trajectories.quintic import Quintic as Quintic
+from sim.trajectories.random_moves import RandomMoves as RandomMoves
+from sim.trajectories.reference import Reference as Reference
+from sim.trajectories.time_optimal import TimeOptimal as TimeOptimal
+
+TRAJECTORIES: PluginTable[AbstractTrajectory] = PluginTable(
+    "trajectories",
+    AbstractTrajectory,  # type: ignore[type-abstract]  # only asked whether an instance is one
+    {
+        "quintic": Quintic,
+        "random": RandomMoves,
+        "time_optimal": TimeOptimal,
+    },
+)

@@ -1,0 +1,49 @@
+"""What a trajectory of a scenario is."""
+
+from abc import ABC, abstractmethod
+from typing import final
+
+import numpy as np
+
+from sim.errors import ScenarioError
+from sim.robot import Robot
+from sim.trajectories.reference import AbstractMotion
+
+LONGEST = 1e6
+"""Duration [s] above which a motion is taken for a slip: eleven days."""
+
+
+class AbstractTrajectory(ABC):
+    """Where the joints shall go, and when."""
+
+    @abstractmethod
+    def plan(self, robot: Robot) -> AbstractMotion:
+        """Return the motion for `robot`; raise ScenarioError if it makes no sense."""
+
+    @final
+    def motion(self, robot: Robot) -> AbstractMotion:
+        """Return the motion, checked: it moves the robot's joints, inside their ranges.
+
+        Raises
+        ------
+        ScenarioError
+            If it does not, or lasts too long to be meant.
+        """
+        planned = self.plan(robot)
+        if not planned.duration < LONGEST:
+            raise ScenarioError(f"the motion lasts {planned.duration:.3g} s, more than {LONGEST:.0e} s")
+        # Extremes of smooth moves between waypoints lie at waypoints or a little beyond; 50 Hz finds them to 0.1 %.
+        q = planned.sample(50.0).q
+        if q.shape[1] != robot.n:
+            raise ScenarioError(f"the trajectory moves {q.shape[1]} joints, robot {robot.name!r} has {robot.n}")
+        require_in_range(robot, q)
+        return planned
+
+
+def require_in_range(robot: Robot, q: np.typing.NDArray[np.float64]) -> None:
+    """Raise ScenarioError if positions [rad], shape (time, joint), leave the joints' ranges."""
+    for name, x, (low, high) in zip(robot.joints, q.T, robot.ranges, strict=True):
+        if x.min() < low or x.max() > high:
+            raise ScenarioError(
+                f"{name} would move from {x.min():.3g} to {x.max():.3g} rad, its range is {low:.3g} to {high:.3g}"
+            )

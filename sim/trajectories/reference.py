@@ -1,0 +1,46 @@
+"""A planned motion, in closed form and sampled."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from sim.motors import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A planned motion, sampled.
+
+    Parameters
+    ----------
+    fs : float
+        [Hz].
+    q, qd, qdd : Array, shape (time, joint)
+        [rad], [rad/s], [rad/s^2].
+    """
+
+    fs: float
+    q: Array
+    qd: Array
+    qdd: Array
+
+
+class AbstractMotion(ABC):
+    """A planned motion as a function of time, at rest before its start and after its end."""
+
+    @property
+    @abstractmethod
+    def duration(self) -> float:
+        """Time from the first to the last instant, pauses included [s]."""
+
+    @abstractmethod
+    def at(self, t: Array, fs: float) -> Reference:
+        """Return the motion at the times `t` [s], shape (time,)."""
+
+    @final
+    def sample(self, fs: float) -> Reference:
+        """Return the motion at t = 0, 1/fs, 2/fs, ... below its duration, exactly."""
+        count = round(self.duration * fs)
+        return self.at(np.arange(count) / fs, fs)

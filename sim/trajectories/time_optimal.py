@@ -1,0 +1,126 @@
+"""Time-optimal moves with limited jerk, by ruckig."""
+
+from dataclasses import dataclass
+from typing import Self, final
+
+import numpy as np
+from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
+
+from sim.errors import ScenarioError
+from sim.motors import Array
+from sim.robot import Robot
+from sim.settings import EachPositive, NotNegative, Positions, per_joint, settings
+from sim.trajectories.base import AbstractTrajectory
+from sim.trajectories.reference import AbstractMotion, Reference
+
+
+@dataclass(frozen=True, eq=False)
+class JerkLimited(AbstractMotion):
+    """Moves of piecewise constant jerk.
+
+    Parameters
+    ----------
+    start : Array, shape (joint, piece)
+        Time at which each piece begins [s]; the first at or before 0.
+    states : Array, shape (joint, piece, 4)
+        Position, velocity, acceleration and jerk at that time.
+    end : float
+        Duration [s].
+    """
+
+    start: Array
+    states: Array
+    end: float
+
+    @classmethod
+    def between(cls, points: Array, velocity: Array, acceleration: Array, jerk: Array, rest: float) -> Self:
+        """Return the fastest moves from each of `points`, shape (w, joint), to the next, at rest in all of them.
+
+        Raises
+        ------
+        ScenarioError
+            If ruckig finds no such moves.
+        """
+        n, clock = points.shape[1], rest
+        start = [np.zeros((n, 1))]
+        states = [_standing(points[0])]
+        for before, after in zip(points[:-1], points[1:], strict=True):
+            move = _fastest(before, after, velocity, acceleration, jerk)
+            pieces = [_pieces(profile) for profile in move.profiles[0]]
+            start.append(clock + np.array([t for t, _ in pieces]))
+            states.append(np.array([x for _, x in pieces]))
+            clock += move.duration
+            start.append(np.full((n, 1), clock))
+            states.append(_standing(after))
+        return cls(np.concatenate(start, axis=1), np.concatenate(states, axis=1), clock + rest)
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last instant, pauses included [s]."""
+        return self.end
+
+    def at(self, t: Array, fs: float) -> Reference:
+        """Return the motion at the times `t` [s], shape (time,)."""
+        q, qd, qdd = np.empty((3, len(t), len(self.start)))
+        for j, (start, states) in enumerate(zip(self.start, self.states, strict=True)):
+            piece = np.clip(np.searchsorted(start, t, side="right") - 1, 0, None)
+            dt, (p, v, a, jerk) = np.maximum(t - start[piece], 0.0), states[piece].T
+            q[:, j] = p + dt * (v + dt * (a / 2 + dt * jerk / 6))
+            qd[:, j] = v + dt * (a + dt * jerk / 2)
+            qdd[:, j] = a + dt * jerk
+        return Reference(fs, q, qd, qdd)
+
+
+@final
+@settings
+class TimeOptimal(AbstractTrajectory):
+    """Time-optimal moves under limits of velocity, acceleration and jerk (ruckig), at rest in every waypoint."""
+
+    waypoints: Positions = ((0.0, 0.0), (1.0, -1.0))
+    """Positions at rest, joint by joint [rad]; at least two."""
+    velocity: EachPositive = (7.0,)
+    """Largest speed [rad/s], of all joints or of each."""
+    acceleration: EachPositive = (18.0, 25.0)
+    """Largest acceleration [rad/s^2], of all joints or of each."""
+    jerk: EachPositive = (300.0,)
+    """Largest jerk [rad/s^3], of all joints or of each."""
+    rest: NotNegative = 3.0
+    """Time at rest before the first and after the last move [s]."""
+
+    def __post_init__(self) -> None:
+        if len(self.waypoints) < 2 or len({len(point) for point in self.waypoints}) != 1 or not self.waypoints[0]:
+            raise ScenarioError("waypoints must be at least 2, all with the same number of joints")
+
+    def plan(self, robot: Robot) -> JerkLimited:
+        """Return ruckig's moves."""
+        n, points = len(self.waypoints[0]), np.array(self.waypoints)
+        del robot
+        names = ("velocity", "acceleration", "jerk")
+        limits = [per_joint(getattr(self, name), n, f"trajectory.{name}") for name in names]
+        return JerkLimited.between(points, *limits, self.rest)
+
+
+def _fastest(before: Array, after: Array, velocity: Array, acceleration: Array, jerk: Array) -> Trajectory:
+    n = len(before)
+    wanted, move = InputParameter(n), Trajectory(n)
+    wanted.current_position, wanted.target_position = before.tolist(), after.tolist()
+    wanted.max_velocity, wanted.max_acceleration, wanted.max_jerk = velocity.tolist(), acceleration.tolist(), jerk.tolist()
+    try:
+        result = Ruckig(n).calculate(wanted, move)
+    except RuckigError as error:
+        raise ScenarioError(f"ruckig refuses the move to {after.tolist()}: {' '.join(str(error).split())}") from error
+    if result not in (Result.Working, Result.Finished):
+        raise ScenarioError(f"ruckig finds no move to {after.tolist()}: {result.name}")
+    return move
+
+
+def _pieces(profile: object) -> tuple[Array, Array]:
+    """Return the beginnings [s] and states of the seven pieces of one joint's move."""
+    t, a, v, p, jerk = (np.array(getattr(profile, name), dtype=np.float64) for name in ("t", "a", "v", "p", "j"))
+    return np.concatenate([[0.0], t.cumsum()[:-1]]), np.stack([p[:7], v[:7], a[:7], jerk], axis=-1)
+
+
+def _standing(point: Array) -> Array:
+    states = np.zeros((len(point), 1, 4))
+    states[:, 0, 0] = point
+    return states

@@ -1,0 +1,38 @@
+"""Random waypoints, inside the joints' ranges and a fair move from their neighbours."""
+
+import numpy as np
+
+from sim.errors import ScenarioError
+from sim.motors import Array
+
+DRAWS = 10000
+"""Draws after which no waypoint is believed to exist."""
+
+
+def draw_waypoint(rng: np.random.Generator, ranges: Array, neighbours: Array, clearance: float, smallest_move: float) -> Array:
+    """Return a random waypoint [rad], shape (joint,).
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    ranges : Array, shape (joint, 2)
+        Lowest and highest position [rad].
+    neighbours : Array, shape (any, joint)
+        Waypoints before and after it; every joint moves at least `smallest_move` [rad] from and to them.
+    clearance, smallest_move : float
+        Distance from the ends of the ranges, and of a move [rad].
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such waypoint.
+    """
+    low, high = ranges.T + np.array([[clearance], [-clearance]])
+    for _ in range(DRAWS if (low < high).all() and np.isfinite(ranges).all() else 0):
+        point = rng.uniform(low, high)
+        if (np.abs(neighbours - point) >= smallest_move).all():
+            return point
+    raise ScenarioError(
+        f"no waypoint is {smallest_move:g} rad from its neighbours and {clearance:g} rad inside the joints' "
+        f"ranges, {ranges.tolist()}: lower smallest_move or clearance"
+    )
