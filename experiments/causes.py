@@ -14,6 +14,7 @@ from identify import (
     Estimate,
     ExplicitModel,
     NoPrefilter,
+    OrdinaryLeastSquares,
     PowerModel,
     ReversalMask,
     identify_each,
@@ -62,10 +63,10 @@ class Worst:
 def causes(table: Table1) -> Iterator[tuple[str, dict[str, Worst]]]:
     """Yield, for every combination, the worst errors of each model on the data of `table`."""
     for name, changes in CHANGES.items():
-        chain = replace(paper_chain(), trim=table.scenario.rest)
+        chain = replace(paper_chain(), trim=table.scenario.quintic().rest)
         for change in changes:
             chain = change(chain)
-        estimates = identify_each(table.log, scara(), COMPARED, chain)
+        estimates = identify_each(table.log, scara(), COMPARED, chain, OrdinaryLeastSquares())
         yield name, {form: _worst(table, estimate) for form, estimate in estimates.items()}
 
 

@@ -8,7 +8,6 @@ from io import StringIO
 from pathlib import Path
 from typing import Annotated
 
-import tomli_w
 import tyro
 from rich.console import Console
 
@@ -21,24 +20,26 @@ from identify.log_file import write_log
 from sim.errors import BenchError
 from sim.robot import Robot
 from sim.scenario import Scenario
+from sim.scenario_file import load, to_toml
 
 DESCRIPTION = "A MuJoCo testbench for the dynamic identification of robots."
 
 app = tyro.extras.SubcommandApp()
 
 Seed = Annotated[int | None, tyro.conf.arg(metavar="INT")]
+Name = Annotated[str | None, tyro.conf.arg(metavar="NAME")]
 File = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
 
 
 @app.command(name="table1")
-def table1(out: Path = Path("runs/table1"), chain: str = "both", seed: Seed = None, scenario: File = None) -> None:
+def table1(out: Path = Path("runs/table1"), chain: str = "both", seed: Seed = None, scenario: Name = None) -> None:
     """Reproduce the paper's simulation comparison (Table 1) and record it.
 
     Args:
         out: Folder for summary.json, recording.rrd and log.parquet.
         chain: Signal processing: both, or the name of one chain (paper, idbench, ...).
         seed: Search another trajectory from this seed instead of taking the one that ships.
-        scenario: Scenario file (TOML), as `idbench search` writes it, instead of the one that ships.
+        scenario: Name of a scenario, or a file (TOML), as `idbench search` writes it, instead of the one that ships.
     """
     os.environ.setdefault("RUST_LOG", "off")  # what goes wrong in rerun we say ourselves, in one line
     with importing():
@@ -51,7 +52,7 @@ def table1(out: Path = Path("runs/table1"), chain: str = "both", seed: Seed = No
     chains = ("paper", "idbench") if chain == "both" else (chain,)
     page = _page()
     with results_folder(out) as folder:
-        table = Table1(Scenario.load(scenario or SCENARIO) if seed is None else _search(seed), chains)
+        table = Table1(load(scenario or SCENARIO) if seed is None else _search(seed), chains)
         print_table1(page, table)
         page.print(f"written to {out}; see it: uv run idbench view {out}", soft_wrap=True)
         write_log(table.log, folder / "log.parquet")
@@ -69,7 +70,7 @@ def search(seed: int = 0, out: File = None) -> None:
         out: Scenario file (TOML) to write; printed if none is given.
     """
     scenario, page = _search(seed), _page()
-    text = tomli_w.dumps(scenario.to_dict())
+    text = to_toml(scenario)
     if out is not None:
         write_whole(out, text)
     page.out(f"{out}: {scenario.origin}" if out is not None else text.rstrip("\n"))

@@ -14,14 +14,14 @@ from experiments.errors import ExperimentError
 from experiments.table1 import PAPER
 from identify import MODELS, MotionLog, TorqueChannel, idbench_chain, scara
 from sim.ideal import ideal_log
-from sim.robot import Array, Robot
+from sim.motors import Array
+from sim.robot import Robot
 from sim.scenario import Scenario
+from sim.trajectories import Quintic
+from sim.trajectories.waypoints import draw_waypoint
 
 PAPER_CONDITION = {MODELS.create(name): PAPER[name].condition_number for name in ("explicit", "power")}
 """Cond(W) of the paper's Table 1; that of the implicit model is the explicit one's."""
-
-WAYPOINT_DRAWS = 10_000
-"""Draws after which there is no such waypoint."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class Search:
         best, distance = self._scenario(robot, self._drawn(rng, robot), durations), inf
         excess = self.excess(robot, best)
         for number in range(self.rounds):
-            points = [self._redrawn(rng, robot, np.array(best.waypoints)) for _ in range(self.candidates)]
+            points = [self._redrawn(rng, robot, np.array(best.quintic().waypoints)) for _ in range(self.candidates)]
             others = [self._scenario(robot, p, durations) for p in points]
             if excess > 0:
                 best, excess = min([(best, excess), *((o, self.excess(robot, o)) for o in others)], key=lambda pair: pair[1])
@@ -106,7 +106,7 @@ class Search:
 
     def distances(self, scenarios: Sequence[Scenario]) -> Array:
         """Return the largest departure from the paper's condition numbers, as a share; infinite if a row would be void."""
-        q = np.stack([scenario.trajectory.sample(self.fs).q for scenario in scenarios])
+        q = np.stack([scenario.quintic().points.sample(self.fs).q for scenario in scenarios])
         log = MotionLog(self.fs, q, np.zeros_like(q), TorqueChannel("instantaneous"))  # W holds no torque
         systems = replace(idbench_chain(), trim=self.rest).build_each(log, scara(), list(PAPER_CONDITION))
         worst = np.zeros(len(scenarios))
@@ -127,8 +127,8 @@ class Search:
 
     def excess(self, robot: Robot, scenario: Scenario) -> float:
         """Return by how much a motion exceeds the limits of speed and torque, as a share; 0 or less if it keeps them."""
-        torque = np.abs(ideal_log(robot, scenario.trajectory.sample(self.fs)).tau).max(axis=0)
-        used = np.concatenate([scenario.trajectory.peak_velocity / self.velocity, torque / robot.torque_limits])
+        torque = np.abs(ideal_log(robot, scenario.quintic().points.sample(self.fs)).tau).max(axis=0)
+        used = np.concatenate([scenario.quintic().points.peak_velocity / self.velocity, torque / robot.torque_limits])
         return float(used.max() - 1)
 
     def _drawn(self, rng: np.random.Generator, robot: Robot) -> Array:
@@ -143,24 +143,9 @@ class Search:
         return points
 
     def _waypoint(self, rng: np.random.Generator, robot: Robot, neighbours: Array) -> Array:
-        """Return a random waypoint within the ranges, every joint of it at least `smallest_move` from its neighbours."""
-        low, high = robot.ranges.T + np.array([[self.clearance], [-self.clearance]])
-        for _ in range(WAYPOINT_DRAWS if (low < high).all() else 0):
-            point = rng.uniform(low, high)
-            if (np.abs(neighbours - point) >= self.smallest_move).all():
-                return point
-        raise ExperimentError(
-            f"no waypoint is {self.smallest_move:g} rad from its neighbours and {self.clearance:g} rad inside the joints' "
-            f"ranges, {robot.ranges.tolist()}: lower smallest_move or clearance"
-        )
+        return draw_waypoint(rng, robot.ranges, neighbours, self.clearance, self.smallest_move)
 
     def _scenario(self, robot: Robot, points: Array, durations: Array) -> Scenario:
-        return Scenario(
-            name=f"search-{self.seed}",
-            robot=robot.name,
-            fs=self.fs,
-            rest=self.rest,
-            waypoints=tuple(tuple(float(x) for x in point) for point in points),
-            durations=tuple(float(T) for T in durations),
-            seed=self.seed,
-        )
+        waypoints = tuple(tuple(float(x) for x in point) for point in points)
+        trajectory = Quintic(waypoints, tuple(float(T) for T in durations), self.rest)
+        return Scenario(f"search-{self.seed}", trajectory, robot.name, self.fs, self.seed)

@@ -7,19 +7,31 @@ models, by reversals; with chain `idbench` no error above 0.001 %, so that nothi
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 from experiments.errors import ExperimentError
 from experiments.results import summarize
-from identify import CHAINS, MODELS, Chain, Estimate, MotionLog, Windows, identify, identify_each, scara
+from identify import (
+    CHAINS,
+    MODELS,
+    Chain,
+    Estimate,
+    MotionLog,
+    OrdinaryLeastSquares,
+    Windows,
+    identify,
+    identify_each,
+    scara,
+)
 from sim.ideal import ideal_log
 from sim.robot import Robot
 from sim.scara import scara_truth
 from sim.scenario import Scenario
-from sim.trajectory import Reference
+from sim.scenario_file import to_dict
+from sim.trajectories import Reference
 
-SCENARIO = Path(__file__).parent / "scenarios" / "table1.toml"
+SCENARIO = "table1"
+"""The scenario that ships."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +109,7 @@ class Table1:
     @cached_property
     def reference(self) -> Reference:
         """The motion, sampled."""
-        return self.scenario.trajectory.sample(self.scenario.fs)
+        return self.scenario.trajectory.motion(self.robot).sample(self.scenario.fs)
 
     @cached_property
     def log(self) -> MotionLog:
@@ -117,7 +129,7 @@ class Table1:
         return {
             "experiment": "table1",
             "seed": self.scenario.seed,
-            "scenario": self.scenario.to_dict(),
+            "scenario": to_dict(self.scenario),
             "parameters": list(self.truth),
             "truth": truth,
             "chain": main,
@@ -127,7 +139,7 @@ class Table1:
 
     def _settled(self, name: str) -> Chain:
         """Return the chain `name`, its filters settling while the robot rests."""
-        chain, rest = CHAINS.create(name), self.scenario.rest
+        chain, rest = CHAINS.create(name), self.scenario.quintic().rest
         if (halo := chain.halo(self.log.fs, self.log.torque)) > rest:
             raise ExperimentError(f"rest = {rest:g} s is shorter than the {halo:.3g} s that chain {name} looks: raise it")
         return replace(chain, trim=rest)
@@ -137,6 +149,6 @@ class Table1:
         models = {name: MODELS.create(name) for name in PAPER}
         windows = replace(chain, operator=Windows())
         return {
-            **identify_each(self.log, scara(), models, chain),
-            "energy": identify(self.log, scara(), models["power"], windows),
+            **identify_each(self.log, scara(), models, chain, OrdinaryLeastSquares()),
+            "energy": identify(self.log, scara(), models["power"], windows, OrdinaryLeastSquares()),
         }

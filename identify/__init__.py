@@ -35,6 +35,7 @@ from identify.estimators import ESTIMATORS as ESTIMATORS
 from identify.estimators import AbstractEstimator as AbstractEstimator
 from identify.estimators import OrdinaryLeastSquares as OrdinaryLeastSquares
 from identify.estimators import Problem as Problem
+from identify.estimators import WeightedLeastSquares as WeightedLeastSquares
 from identify.masks import MASKS as MASKS
 from identify.masks import AbstractMask as AbstractMask
 from identify.masks import NoMask as NoMask

@@ -23,6 +23,8 @@ class Balance:
         Columns that are still to be differentiated.
     weight : Array, shape (..., row, time)
         Weight of every row at every sample, between 0 and 1.
+    noise : Array, shape (..., row, time)
+        How noisy a row is, relative to the same row at other samples.
     s : callable
         d/dt along the last axis.
     fs : float
@@ -35,6 +37,7 @@ class Balance:
     c: Columns
     e: Columns
     weight: Array
+    noise: Array
     s: Callable[[Array], Array]
     fs: float
     parameters: tuple[str, ...]

@@ -8,7 +8,7 @@ from identify.basis import Basis
 from identify.chain import Chain, idbench_chain
 from identify.errors import IdentificationError
 from identify.estimate import Estimate
-from identify.estimators import AbstractEstimator, OrdinaryLeastSquares, Problem
+from identify.estimators import AbstractEstimator, Problem, WeightedLeastSquares
 from identify.models import AbstractModel
 from identify.motion_log import MotionLog
 
@@ -36,7 +36,7 @@ def identify(
     chain : Chain, optional
         Signal processing; chain `idbench` by default.
     estimator : AbstractEstimator, optional
-        Ordinary least squares by default.
+        Weighted least squares by default.
     simulate : callable, optional
         Simulates the robot with given parameters, for estimators that need it.
     throw : bool
@@ -66,7 +66,7 @@ def identify_each(
     throw: bool = True,
 ) -> dict[str, Estimate]:
     """Identify with several models, by name, from the same filtered signals; otherwise as `identify`."""
-    chain, estimator = chain or idbench_chain(), estimator or OrdinaryLeastSquares()
+    chain, estimator = chain or idbench_chain(), estimator or WeightedLeastSquares()
     _require(log, Sequence, "a MotionLog or a sequence of them, such as read_log(path)", MotionLog)
     _require(basis, Basis, "a Basis, such as scara()")
     _require(chain, Chain, 'a Chain, such as CHAINS.create("paper")')

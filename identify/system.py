@@ -35,6 +35,8 @@ class System:
         Measurement vector.
     W : Array, shape (..., r, p)
         Observation matrix.
+    noise : Array, shape (..., r)
+        How noisy a row is, relative to the other rows of its group; positive where the row is valid.
     valid : bool array, shape (..., r)
         False where a row is void (masked out); such rows of Y and W are zero.
     time : Array, shape (r,)
@@ -47,6 +49,7 @@ class System:
 
     Y: Array
     W: Array
+    noise: Array
     valid: npt.NDArray[np.bool_]
     time: Array
     group: npt.NDArray[np.intp]
@@ -147,6 +150,7 @@ class System:
         return cls(
             Y=np.concatenate([s.Y for s in systems], axis=-1),
             W=np.concatenate([s.W for s in systems], axis=-2),
+            noise=np.concatenate([s.noise for s in systems], axis=-1),
             valid=np.concatenate([s.valid for s in systems], axis=-1),
             time=np.concatenate([s.time for s in systems]),
             group=np.concatenate([s.group for s in systems]),

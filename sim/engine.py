@@ -83,7 +83,7 @@ def _planned(scenario: Scenario, robot: Robot) -> tuple[Reference, int]:
 class _Bench:
     """A run in progress."""
 
-    def __init__(  # noqa: PLR0913, PLR0917
+    def __init__(
         self,
         scenario: Scenario,
         robot: Robot,

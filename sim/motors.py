@@ -11,7 +11,14 @@ from sim.errors import RobotError
 
 Array = npt.NDArray[np.float64]
 
-_SLOTS = {"R": ("gain", 0), "K": ("gain", 1), "V": ("gain", 7), "cogging": ("bias", 0), "order": ("bias", 1), "phase": ("bias", 2)}
+_SLOTS = {
+    "R": ("gain", 0),
+    "K": ("gain", 1),
+    "V": ("gain", 7),
+    "cogging": ("bias", 0),
+    "order": ("bias", 1),
+    "phase": ("bias", 2),
+}
 """Where MuJoCo 4 compiles the attributes of a `dcmotor` to; L/R is the first of its dynamic parameters."""
 
 

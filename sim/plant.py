@@ -33,7 +33,7 @@ class Plant:
         Native threads; 0 for all processors.
     """
 
-    def __init__(  # noqa: PLR0913, PLR0917
+    def __init__(
         self, robot: Robot, nsim: int, physics: Physics, h: float, vary: Mapping[str, npt.ArrayLike], threads: int
     ) -> None:
         model = copy(robot.model)

@@ -104,4 +104,3 @@ class Scenario:
         if not isinstance(self.trajectory, Quintic):
             raise ScenarioError(f"scenario {self.name!r}: only a trajectory of kind quintic will do here")
         return self.trajectory
-

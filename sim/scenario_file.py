@@ -115,7 +115,7 @@ def _kind(key: str, value: Any) -> str:
     for name in KINDS[key]:
         if KINDS[key][name] is type(value):
             return name
-    raise ScenarioError(f"{key}: {type(value).__name__} is in no plug-in table; name it in the entry points idbench.{KINDS[key].point}")
+    raise ScenarioError(f"{key}: {type(value).__name__} is not in the table of {KINDS[key].point}")
 
 
 def to_toml(scenario: Scenario) -> str:

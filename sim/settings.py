@@ -31,9 +31,7 @@ def _as_many(value: object) -> object:
     return value if value is None or isinstance(value, (list, tuple, np.ndarray)) else (value,)
 
 
-EachShareError = Annotated[
-    tuple[Annotated[Number, Field(gt=-1, lt=10)], ...], BeforeValidator(_as_many), Field(min_length=1)
-]
+EachShareError = Annotated[tuple[Annotated[Number, Field(gt=-1, lt=10)], ...], BeforeValidator(_as_many), Field(min_length=1)]
 EachNumber = Annotated[tuple[Number, ...], BeforeValidator(_as_many), Field(min_length=1)]
 EachPositive = Annotated[tuple[Positive, ...], BeforeValidator(_as_many), Field(min_length=1)]
 EachPositiveOrNone = Annotated[tuple[Positive, ...] | None, BeforeValidator(_as_many)]
@@ -53,7 +51,7 @@ def settings(cls: C) -> C:
     The docstring below a field is its description. A ValueError of `__post_init__` is reported as well.
     """
     made = dataclass(frozen=True, config=_CHECKED)(cls)
-    made.__init__ = _reporting(made.__init__, made)  # type: ignore[misc]  # pydantic's own, told in our words
+    made.__init__ = _reporting(made.__init__, made)  # type: ignore[method-assign]  # pydantic's own, told in our words
     return made  # type: ignore[return-value]
 
 

@@ -8,7 +8,7 @@ import pytest
 from experiments.table1 import SCENARIO, Table1
 from identify import MotionLog
 from sim.robot import Robot
-from sim.scenario import Scenario
+from sim.scenario_file import load
 
 X = np.array([3.5, 0.05, 0.5, 0.06, 0.12, 0.005, 0.01, 0.1])
 """The paper's supposed true values (section 7.2), typed here and nowhere else: ZZR1 Fv1 Fs1 ZZ2 LMX2 LMY2 Fv2 Fs2."""
@@ -31,7 +31,7 @@ def robot() -> Robot:
 
 @pytest.fixture(scope="session")
 def table1() -> Table1:
-    return Table1(Scenario.load(SCENARIO), ("paper", "idbench"))
+    return Table1(load(SCENARIO), ("paper", "idbench"))
 
 
 @pytest.fixture(scope="session")

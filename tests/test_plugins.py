@@ -61,8 +61,8 @@ def test_the_readmes_friction_is_identified_by_all_models_with_its_estimator(rea
         import numpy as np
         from experiments.table1 import SCENARIO, Table1
         from identify import BLOCKS, ESTIMATORS, MODELS, MotionLog, identify, scara
-        from sim.scenario import Scenario
-        table = Table1(Scenario.load(SCENARIO), ("idbench",))
+        from sim.scenario_file import load
+        table = Table1(load(SCENARIO), ("idbench",))
         log, qd = table.log, table.reference.qd
         dragged = MotionLog(log.fs, log.q, log.tau + [0.03, 0.004] * qd * abs(qd), log.torque)
         basis = scara() + BLOCKS.create("drag")
@@ -82,8 +82,8 @@ def test_the_readmes_estimator_identifies_every_run_by_itself(readme_package, mo
         import numpy as np
         from experiments.table1 import SCENARIO, Table1
         from identify import ESTIMATORS, ExplicitModel, MotionLog, identify, scara
-        from sim.scenario import Scenario
-        log = Table1(Scenario.load(SCENARIO), ()).log
+        from sim.scenario_file import load
+        log = Table1(load(SCENARIO), ()).log
         noise = np.random.default_rng(1).normal(size=(40, *log.tau.shape)) * [2.0, 0.02]
         noisy = MotionLog(log.fs, np.broadcast_to(log.q, noise.shape), log.tau + noise, log.torque)
         for name in ("OLS", "WLS"):

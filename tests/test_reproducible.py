@@ -14,9 +14,9 @@ import hashlib, os, sys
 if sys.argv[1] == "1":
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
 from experiments.table1 import SCENARIO, Table1
-from sim.scenario import Scenario
+from sim.scenario_file import load
 from dataclasses import replace
-table = Table1(replace(Scenario.load(SCENARIO), fs=1000.0), ("paper", "idbench"))
+table = Table1(replace(load(SCENARIO), fs=1000.0), ("paper", "idbench"))
 digest = hashlib.sha256(table.log.tau.tobytes())
 for estimates in table.estimates.values():
     for estimate in estimates.values():

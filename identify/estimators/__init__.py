@@ -5,6 +5,9 @@ from identify.estimators.base import Problem as Problem
 from identify.estimators.ordinary_least_squares import (
     OrdinaryLeastSquares as OrdinaryLeastSquares,
 )
+from identify.estimators.weighted_least_squares import (
+    WeightedLeastSquares as WeightedLeastSquares,
+)
 from identify.plugins import PluginTable
 
 ESTIMATORS: PluginTable[AbstractEstimator] = PluginTable(
@@ -12,5 +15,6 @@ ESTIMATORS: PluginTable[AbstractEstimator] = PluginTable(
     AbstractEstimator,  # type: ignore[type-abstract]  # only asked whether an instance is one
     {
         "OLS": OrdinaryLeastSquares,
+        "WLS": WeightedLeastSquares,
     },
 )

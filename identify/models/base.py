@@ -28,6 +28,10 @@ class AbstractModel(ABC):
     def weight(self, signals: Signals) -> Array:
         """Return the weight of every row, shape (..., row, time)."""
 
+    @abstractmethod
+    def noise(self, signals: Signals) -> Array:
+        """Return how noisy a row is at every instant, relative to its other instants, shape (..., row, time)."""
+
     @final
     def balance(self, basis: Basis, signals: Signals) -> Balance:
         """Return the model's sentence, its columns averaged over the same windows as the torque."""
@@ -37,6 +41,7 @@ class AbstractModel(ABC):
             c={address: average(column) for address, column in self.c(basis, signals).items()},
             e={address: average(column) for address, column in self.e(basis, signals).items()},
             weight=self.weight(signals),
+            noise=self.noise(signals),
             s=signals.state.s,
             fs=signals.fs,
             parameters=basis.parameters,

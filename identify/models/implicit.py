@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import final
 
+import numpy as np
+
 from identify.arrays import Array, Columns
 from identify.basis import Basis
 from identify.models.base import AbstractModel
@@ -29,3 +31,7 @@ class ImplicitModel(AbstractModel):
     def weight(self, signals: Signals) -> Array:
         """Return the weight of each joint for its own row."""
         return signals.weight
+
+    def noise(self, signals: Signals) -> Array:
+        """Return ones: torque noise reaches all rows of a joint alike."""
+        return np.ones_like(signals.weight)

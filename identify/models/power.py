@@ -10,6 +10,9 @@ from identify.basis import Basis
 from identify.models.base import AbstractModel
 from identify.signals import Signals
 
+SLOW = 1.5
+"""Speed [rad/s] below which the noise of a power row does not fall any more: that of the measured velocity remains."""
+
 
 @final
 @dataclass(frozen=True)
@@ -29,5 +32,9 @@ class PowerModel(AbstractModel):
         return basis.energy(signals.state)
 
     def weight(self, signals: Signals) -> Array:
-        """Return the product of the joints' weights: one row holds the power of all of them."""
-        return np.prod(signals.weight, axis=-2, keepdims=True)
+        """Return ones: the power of a friction, Fs |qd|, is continuous where a joint turns, and needs no mask."""
+        return np.ones_like(signals.weight[..., :1, :])
+
+    def noise(self, signals: Signals) -> Array:
+        """Return sqrt(|qd|^2 + SLOW^2): torque noise reaches a row multiplied by the velocities."""
+        return np.sqrt(np.sum(signals.state.qd**2, axis=-2, keepdims=True) + SLOW**2)

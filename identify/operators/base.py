@@ -20,6 +20,9 @@ class Rows(NamedTuple):
     columns: Array
     """c + s e in the order of the balance's addresses, shape (..., k, count)."""
 
+    noise: Array
+    """How noisy each row is, relative to others of its kind, shape (..., row, count)."""
+
     valid: np.typing.NDArray[np.bool_]
     """Whether the row says anything, shape (..., row, count)."""
 
@@ -62,7 +65,7 @@ class AbstractOperator(ABC):
     def system(self, balance: Balance, grid: Grid) -> System:
         """Return Y = W X + rho at the rows of `grid`, ordered by time, then row (Eq. 14)."""
         fs, (*runs, n, _) = balance.fs, balance.y.shape
-        y, columns, valid, lag = self.apply(balance, grid)
+        y, columns, noise, valid, lag = self.apply(balance, grid)
         row = [address[0] for address in balance.addresses]
         parameter = [balance.parameters.index(address[1]) for address in balance.addresses]
         W = np.zeros((*runs, n, len(balance.parameters), grid.count))
@@ -70,6 +73,7 @@ class AbstractOperator(ABC):
         return System(
             Y=np.swapaxes(y * valid, -1, -2).reshape(*runs, -1),
             W=np.moveaxis(W, -1, -3).reshape(*runs, grid.count * n, -1),
+            noise=np.swapaxes(noise, -1, -2).reshape(*runs, -1),
             valid=np.swapaxes(valid, -1, -2).reshape(*runs, -1),
             time=np.repeat((grid.first + grid.step * np.arange(grid.count) + lag) / fs, n),
             group=np.tile(np.arange(n), grid.count),

@@ -29,8 +29,10 @@ class AbstractLowPass(AbstractOperator):
         fs, n = balance.fs, balance.y.shape[-2]
         filtered = self.decimate(balance.weighted(), fs, grid)
         reach = ceil(self.halo(fs) * fs - 1e-9)
-        seen = grid.weighted_sums(balance.weight, np.ones(2 * reach + 1), reach)
-        return Rows(filtered[..., :n, :], filtered[..., n:, :], seen > 0, 0.0)
+        near = np.ones(2 * reach + 1)
+        seen = grid.weighted_sums(balance.weight, near, reach)
+        noise = grid.weighted_sums(balance.noise, near / len(near), reach)
+        return Rows(filtered[..., :n, :], filtered[..., n:, :], noise, seen > 0, 0.0)
 
 
 def decimation(share: float, cutoff: float, fs: float) -> int:

@@ -24,7 +24,8 @@ class Kernels(NamedTuple):
 class AbstractWeakForm(AbstractOperator):
     """Rows that are integrals over a stretch of time, s e integrated by parts, so that no velocity is differentiated.
 
-    A stretch that touches a masked instant is left out whole: weights inside it would have to be differentiated too.
+    A stretch that touches a masked instant is left out whole, and one weight holds for the rest, the mean over it: weights
+    inside a stretch would have to be differentiated too.
     """
 
     @abstractmethod
@@ -38,7 +39,7 @@ class AbstractWeakForm(AbstractOperator):
 
     @final
     def apply(self, balance: Balance, grid: Grid) -> Rows:
-        """Return the integrals; a row is void if its stretch touches a masked instant."""
+        """Return the integrals, weighted; a row is void if its stretch touches a masked instant."""
         kernels = self.kernels(balance.fs)
         length = len(kernels.integral)
         before = (length - 1) // 2
@@ -47,6 +48,9 @@ class AbstractWeakForm(AbstractOperator):
             if part:
                 place = [balance.addresses.index(address) for address in part]
                 columns[..., place, :] += grid.weighted_sums(np.stack(list(part.values()), axis=-2), kernel, before)
-        touched = grid.weighted_sums(1 - balance.weight, np.ones(length), before)
+        touched = grid.weighted_sums((balance.weight == 0).astype(np.float64), np.ones(length), before)
+        weight = grid.weighted_sums(balance.weight, np.full(length, 1 / length), before)
+        row = [address[0] for address in balance.addresses]
         y = grid.weighted_sums(balance.y, kernels.integral, before)
-        return Rows(y, columns, touched == 0, (length - 1) / 2 - before)
+        noise = weight * grid.weighted_sums(balance.noise, np.full(length, 1 / length), before)
+        return Rows(weight * y, weight[..., row, :] * columns, noise, touched == 0, (length - 1) / 2 - before)

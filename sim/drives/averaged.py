@@ -3,6 +3,7 @@
 from typing import final
 
 import numpy as np
+import numpy.typing as npt
 
 from sim.drives.base import AbstractAmplifier, AbstractDrive
 from sim.errors import ScenarioError
@@ -50,7 +51,7 @@ class AveragedDrive(AbstractDrive):
 class _Amplifier(AbstractAmplifier):
     """i follows the loop with rate w; where that needs more than the bus voltage, the winding's own rate R/L comes first."""
 
-    def __init__(self, motors: Motors, w: float, V: Array, I: Array, nsim: int, h: float) -> None:  # noqa: E741, PLR0913, PLR0917
+    def __init__(self, motors: Motors, w: float, V: Array, I: Array, nsim: int, h: float) -> None:  # noqa: E741
         if (w * motors.L <= motors.R).any():
             raise ScenarioError(
                 f"drive.bandwidth = {w / 2 / np.pi:g} Hz must be above that of the bare winding, "
@@ -72,7 +73,7 @@ class _Amplifier(AbstractAmplifier):
         self._i = target + away * self._kept
         return self._K * (target + away * self._moved)
 
-    def _with_limit(self, saturated: Array, v: Array, target: Array, e: Array) -> Array:
+    def _with_limit(self, saturated: npt.NDArray[np.bool_], v: Array, target: Array, e: Array) -> Array:
         """Advance where the voltage `v` is all there is at first; return the mean currents."""
         R, L, w, h, i0 = self._R, self._L, self._w, self._h, self._i
         end = (v - e) / R

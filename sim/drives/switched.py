@@ -77,7 +77,7 @@ class SwitchedDrive(AbstractDrive):
 class SwitchedAmplifier(AbstractAmplifier):
     """The chopper at work; `electrical` and `copper` [J] count what came in and what became heat, shape (nsim, joint)."""
 
-    def __init__(self, settings: SwitchedDrive, motors: Motors, V: Array, I: Array, nsim: int, h: float) -> None:  # noqa: E741, PLR0913, PLR0917
+    def __init__(self, settings: SwitchedDrive, motors: Motors, V: Array, I: Array, nsim: int, h: float) -> None:  # noqa: E741
         self._settings, self._motors, self._V, self._I, self._h = settings, motors, V, I, h
         lost = -np.expm1(-h * motors.R / motors.L)
         self._kp = motors.R / lost * -np.expm1(-2 * np.pi * settings.bandwidth * h)
@@ -86,6 +86,7 @@ class SwitchedAmplifier(AbstractAmplifier):
         self.i, self._sum, self.electrical, self.copper = np.zeros((4, nsim, len(V)))
 
     def step(self, demand: Array, speed: Array) -> Array:
+        """Advance by a PWM period; return the mean torque in it."""
         passage = pass_period(self.i, self.pieces(demand), self._V, self._motors.K * speed, self._motors.R, self._motors.L)
         self.i = passage.i
         self.electrical += passage.electrical

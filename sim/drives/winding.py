@@ -68,7 +68,8 @@ def pass_period(i: Array, pieces: Pieces, V: Array, e: Array, R: Array, L: Array
     if doubtful.any():
         wide_R, wide_L = np.broadcast_to(R, i.shape)[doubtful], np.broadcast_to(L, i.shape)[doubtful]
         parts = i[doubtful], ahead[:, doubtful], behind[:, doubtful], kept[:, doubtful], pieces.duration[:, doubtful]
-        for whole, part in zip(passage, _booked(_step_by_step(*parts, wide_R / wide_L), wide_R, wide_L, e[doubtful]), strict=True):
+        careful = _booked(_step_by_step(*parts, wide_R / wide_L), wide_R, wide_L, e[doubtful])
+        for whole, part in zip(passage, careful, strict=True):
             whole[doubtful] = part
     return passage
 

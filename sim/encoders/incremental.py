@@ -34,7 +34,7 @@ class IncrementalEncoder(AbstractEncoder):
         if self.missed_counts > fs:
             raise ScenarioError(f"encoder.missed_counts = {self.missed_counts:g} 1/s must be at most fs = {fs:g} Hz")
         noise = np.stack([self.noise * rng.standard_normal((samples, n)) for rng in rngs], axis=1)
-        missed = np.stack([rng.random((samples, n)) < self.missed_counts / fs for rng in rngs], axis=1)
+        missed = np.stack([(rng.random((samples, n)) < self.missed_counts / fs).astype(np.float64) for rng in rngs], axis=1)
         return _Reader(self, per_joint(self.lines, n, "encoder.lines"), noise, missed)
 
 

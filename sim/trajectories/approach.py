@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from sim.errors import ScenarioError
 from sim.motors import Array
 from sim.robot import Robot
 from sim.trajectories.base import require_in_range
@@ -24,8 +23,6 @@ def approach(robot: Robot, start: Array, goal: Array, fs: float) -> Reference:
     ScenarioError
         If `start` is not a position of the robot's joints.
     """
-    if start.shape != (robot.n,):
-        raise ScenarioError(f"start has {start.size} positions, robot {robot.name!r} has {robot.n} joints")
     require_in_range(robot, start[None])
-    limits = [np.full(robot.n, x) for x in (VELOCITY, ACCELERATION, JERK)]
-    return JerkLimited.between(np.stack([start, goal]), *limits, REST).sample(fs)
+    limits = np.repeat([[VELOCITY], [ACCELERATION], [JERK]], robot.n, axis=1)
+    return JerkLimited.between(np.stack([start, goal]), limits, REST).sample(fs)

@@ -3,9 +3,8 @@
 from abc import ABC, abstractmethod
 from typing import final
 
-import numpy as np
-
 from sim.errors import ScenarioError
+from sim.motors import Array
 from sim.robot import Robot
 from sim.trajectories.reference import AbstractMotion
 
@@ -34,14 +33,14 @@ class AbstractTrajectory(ABC):
             raise ScenarioError(f"the motion lasts {planned.duration:.3g} s, more than {LONGEST:.0e} s")
         # Extremes of smooth moves between waypoints lie at waypoints or a little beyond; 50 Hz finds them to 0.1 %.
         q = planned.sample(50.0).q
-        if q.shape[1] != robot.n:
-            raise ScenarioError(f"the trajectory moves {q.shape[1]} joints, robot {robot.name!r} has {robot.n}")
         require_in_range(robot, q)
         return planned
 
 
-def require_in_range(robot: Robot, q: np.typing.NDArray[np.float64]) -> None:
-    """Raise ScenarioError if positions [rad], shape (time, joint), leave the joints' ranges."""
+def require_in_range(robot: Robot, q: Array) -> None:
+    """Raise ScenarioError if positions [rad], shape (time, joint), are not of the robot's joints, or leave their ranges."""
+    if q.shape[1] != robot.n:
+        raise ScenarioError(f"the trajectory moves {q.shape[1]} joints, robot {robot.name!r} has {robot.n}")
     for name, x, (low, high) in zip(robot.joints, q.T, robot.ranges, strict=True):
         if x.min() < low or x.max() > high:
             raise ScenarioError(

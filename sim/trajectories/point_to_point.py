@@ -109,3 +109,10 @@ class PointToPoint(AbstractMotion):
         qd = change / T * 30 * u**2 * (1 - u) ** 2
         qdd = change / T**2 * 60 * u * (1 - u) * (1 - 2 * u)
         return Reference(fs, q, qd, qdd)
+
+
+def at_rest(waypoints: Array, durations: Array, rest: float) -> PointToPoint:
+    """Return moves without pauses between them, and `rest` [s] before the first and after the last."""
+    dwells = np.zeros(len(waypoints))
+    dwells[[0, -1]] = rest
+    return PointToPoint(waypoints, durations, dwells)

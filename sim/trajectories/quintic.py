@@ -8,7 +8,7 @@ from sim.errors import ScenarioError
 from sim.robot import Robot
 from sim.settings import NotNegative, Positions, Positive, settings
 from sim.trajectories.base import AbstractTrajectory
-from sim.trajectories.point_to_point import PointToPoint
+from sim.trajectories.point_to_point import PointToPoint, at_rest
 
 
 @final
@@ -33,9 +33,7 @@ class Quintic(AbstractTrajectory):
     @property
     def points(self) -> PointToPoint:
         """The moves, with their rest at both ends."""
-        dwells = np.zeros(len(self.waypoints))
-        dwells[[0, -1]] = self.rest
-        return PointToPoint(np.array(self.waypoints), np.array(self.durations), dwells)
+        return at_rest(np.array(self.waypoints), np.array(self.durations), self.rest)
 
     def plan(self, robot: Robot) -> PointToPoint:
         """Return the moves."""

@@ -1,6 +1,7 @@
 """Time-optimal moves with limited jerk, by ruckig."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Self, final
 
 import numpy as np
@@ -33,8 +34,10 @@ class JerkLimited(AbstractMotion):
     end: float
 
     @classmethod
-    def between(cls, points: Array, velocity: Array, acceleration: Array, jerk: Array, rest: float) -> Self:
+    def between(cls, points: Array, limits: Array, rest: float) -> Self:
         """Return the fastest moves from each of `points`, shape (w, joint), to the next, at rest in all of them.
+
+        `limits` are those of velocity, acceleration and jerk, shape (3, joint); `rest` [s] is spent at both ends.
 
         Raises
         ------
@@ -44,8 +47,8 @@ class JerkLimited(AbstractMotion):
         n, clock = points.shape[1], rest
         start = [np.zeros((n, 1))]
         states = [_standing(points[0])]
-        for before, after in zip(points[:-1], points[1:], strict=True):
-            move = _fastest(before, after, velocity, acceleration, jerk)
+        for before, after in pairwise(points):
+            move = _fastest(before, after, limits)
             pieces = [_pieces(profile) for profile in move.profiles[0]]
             start.append(clock + np.array([t for t, _ in pieces]))
             states.append(np.array([x for _, x in pieces]))
@@ -96,15 +99,15 @@ class TimeOptimal(AbstractTrajectory):
         n, points = len(self.waypoints[0]), np.array(self.waypoints)
         del robot
         names = ("velocity", "acceleration", "jerk")
-        limits = [per_joint(getattr(self, name), n, f"trajectory.{name}") for name in names]
-        return JerkLimited.between(points, *limits, self.rest)
+        limits = np.array([per_joint(getattr(self, name), n, f"trajectory.{name}") for name in names])
+        return JerkLimited.between(points, limits, self.rest)
 
 
-def _fastest(before: Array, after: Array, velocity: Array, acceleration: Array, jerk: Array) -> Trajectory:
+def _fastest(before: Array, after: Array, limits: Array) -> Trajectory:
     n = len(before)
     wanted, move = InputParameter(n), Trajectory(n)
     wanted.current_position, wanted.target_position = before.tolist(), after.tolist()
-    wanted.max_velocity, wanted.max_acceleration, wanted.max_jerk = velocity.tolist(), acceleration.tolist(), jerk.tolist()
+    wanted.max_velocity, wanted.max_acceleration, wanted.max_jerk = limits.tolist()
     try:
         result = Ruckig(n).calculate(wanted, move)
     except RuckigError as error:

@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from experiments.table1 import SCENARIO, Table1
 from identify import CHAINS, MODELS, Chain, MotionLog, identify_each, scara
-from sim.scenario import Scenario
+from sim.scenario_file import load
 
 SAMPLES, RUNS = 4000, 60
 
@@ -36,7 +36,7 @@ def seconds(function: Callable[[], object]) -> float:
 
 def main() -> None:
     """Print medians and the ratio for each chain."""
-    table = Table1(Scenario.load(SCENARIO), ())
+    table = Table1(load(SCENARIO), ())
     part = slice(300, 300 + SAMPLES)
     log = MotionLog(100.0, table.log.q[part], table.log.tau[part], table.log.torque)
     q, qd, qdd = (getattr(table.reference, name)[part] for name in ("q", "qd", "qdd"))

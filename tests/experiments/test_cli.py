@@ -7,7 +7,7 @@ import sys
 from experiments.cli import main
 from experiments.table1 import SCENARIO
 from identify.log_file import read_log
-from sim.scenario import Scenario
+from sim.scenario_file import from_dict, load
 
 
 def test_table1_prints_and_writes_everything(out, capsys):
@@ -29,7 +29,7 @@ def test_table1_prints_and_writes_everything(out, capsys):
     summary = json.loads((out / "summary.json").read_text())
     assert (summary["experiment"], summary["seed"], summary["chain"]) == ("table1", 0, "idbench")
     assert summary["models"]["explicit"]["rows"] == 800
-    assert Scenario.from_dict(summary["scenario"]) == Scenario.load(SCENARIO)
+    assert from_dict(summary["scenario"]) == load(SCENARIO)
     assert read_log(out / "log.parquet").samples == 4600
     assert list(out.parent.iterdir()) == [out]
 
@@ -40,7 +40,7 @@ def test_table1_repeats_itself(tmp_path, capsys):
     a, b = (json.loads((tmp_path / name / "summary.json").read_text()) for name in ("a", "b"))
     assert a == b
     assert a["seed"] == 5
-    assert a["scenario"]["waypoints"] != list(map(list, Scenario.load(SCENARIO).waypoints))
+    assert a["scenario"]["waypoints"] != list(map(list, load(SCENARIO).waypoints))
 
 
 def test_one_chain_may_be_asked_for(out, capsys):
@@ -62,10 +62,10 @@ def test_results_go_through_a_link(tmp_path, capsys):
 def test_search_writes_a_scenario(tmp_path, capsys):
     path = tmp_path / "found.toml"
     assert main(["search", "--seed", "5", "--out", str(path)]) == 0
-    found = Scenario.load(path)
+    found = load(str(path))
     assert found.seed == 5
     assert main(["table1", "--scenario", str(path), "--chain", "idbench", "--out", str(tmp_path / "out")]) == 0
-    assert Scenario.from_dict(json.loads((tmp_path / "out" / "summary.json").read_text())["scenario"]) == found
+    assert from_dict(json.loads((tmp_path / "out" / "summary.json").read_text())["scenario"]) == found
     assert main(["search", "--seed", "5"]) == 0
     assert path.read_text() in capsys.readouterr().out
 

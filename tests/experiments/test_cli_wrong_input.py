@@ -7,7 +7,7 @@ import tomli_w
 
 from experiments.cli import main
 from experiments.table1 import SCENARIO
-from sim.scenario import Scenario
+from sim.scenario_file import load
 
 
 def test_an_unknown_chain_lists_the_known_and_leaves_nothing(out, complaint):
@@ -57,7 +57,7 @@ def test_more_wrong_input_is_one_line(args, message, tmp_path, monkeypatch, comp
 )
 def test_scenarios_that_make_no_sense_are_one_line(changes, message, tmp_path, complaint):
     path = tmp_path / "scenario.toml"
-    path.write_text(tomli_w.dumps({**Scenario.load(SCENARIO).to_dict(), **changes}))
+    path.write_text(tomli_w.dumps({**load(SCENARIO).to_dict(), **changes}))
     assert message in complaint("table1", "--scenario", str(path), "--out", str(tmp_path / "out"))
     assert list(tmp_path.iterdir()) == [path]
 

@@ -8,17 +8,18 @@ import pytest
 from experiments.errors import ExperimentError
 from experiments.search import Search
 from experiments.table1 import SCENARIO, Table1
-from sim.scenario import Scenario
+from sim.errors import ScenarioError
+from sim.scenario_file import load
 
 
 def test_the_scenario_that_ships_is_what_its_command_finds(robot):
     """Numbers to 1e-9 rad: another machine may round Cond(W) differently, but must take the same way."""
-    shipped = Scenario.load(SCENARIO)
+    shipped = load(SCENARIO)
     assert f"--seed {shipped.seed}" in shipped.origin
     found = Search(seed=shipped.seed).run(robot)
     assert found.origin == shipped.origin
-    np.testing.assert_allclose(found.waypoints, shipped.waypoints, atol=1e-9)
-    np.testing.assert_allclose(found.durations, shipped.durations, atol=1e-9)
+    np.testing.assert_allclose(found.trajectory.waypoints, shipped.trajectory.waypoints, atol=1e-9)
+    np.testing.assert_allclose(found.trajectory.durations, shipped.trajectory.durations, atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", [11, 12, 13, 14, 15])
@@ -36,12 +37,12 @@ def test_other_trajectories_of_the_search_are_identified_as_well(seed, robot, tr
 def test_limits_are_kept(robot):
     search = Search(seed=3, velocity=5.0)
     scenario = search.run(robot)
-    points = np.array(scenario.waypoints)
+    points = np.array(scenario.trajectory.waypoints)
     assert (np.abs(points) <= robot.ranges[:, 1] - search.clearance).all()
     assert (np.abs(np.diff(points, axis=0)) >= search.smallest_move).all()
-    assert (scenario.trajectory.peak_velocity <= 5.0).all()
+    assert (scenario.trajectory.points.peak_velocity <= 5.0).all()
     assert (np.abs(Table1(scenario, ()).log.tau) <= robot.torque_limits).all()
-    assert sum(scenario.durations) == pytest.approx(40.0)
+    assert sum(scenario.trajectory.durations) == pytest.approx(40.0)
 
 
 def test_a_torque_limit_turns_motions_away(robot):
@@ -64,7 +65,7 @@ def test_it_never_sees_an_error_of_identification(robot):
     spec = mujoco.MjSpec.from_file(str(models.path("scara")))
     spec.joint("joint1").damping, spec.joint("joint1").armature = [0.1, 0, 0], 0.5
     other = Robot("scara", spec.compile())
-    assert Search(seed=4).run(other).waypoints == Search(seed=4).run(robot).waypoints
+    assert Search(seed=4).run(other).trajectory == Search(seed=4).run(robot).trajectory
 
 
 def test_it_gives_up_with_advice(robot):
@@ -74,7 +75,7 @@ def test_it_gives_up_with_advice(robot):
 
 @pytest.mark.parametrize("settings", [{"smallest_move": 4.0}, {"clearance": 3.0}])
 def test_impossible_waypoints_are_told(settings, robot):
-    with pytest.raises(ExperimentError, match=r"no waypoint is .* lower smallest_move or clearance"):
+    with pytest.raises(ScenarioError, match=r"no waypoint is .* lower smallest_move or clearance"):
         Search(**settings).run(robot)
 
 

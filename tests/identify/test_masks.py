@@ -7,7 +7,7 @@ from identify import NoMask, ReversalMask, SettingError
 @pytest.mark.parametrize("fs", [100.0, 1000.0])
 def test_instants_near_standstill_are_left_out_with_their_surroundings(fs):
     t = np.arange(-fs, fs + 1) / fs
-    weight = ReversalMask(threshold=0.1, width=0.03).weight(t[None, :], fs)[0]  # qd = t: slow while |t| <= 0.1 s
+    weight = ReversalMask(threshold=0.1, width=0.03, taper=0.0).weight(t[None, :], fs)[0]  # qd = t: slow while |t| <= 0.1 s
     np.testing.assert_array_equal(weight, np.abs(t) > 0.13 + 1e-9)
 
 
@@ -17,7 +17,7 @@ def test_each_joint_has_its_own_weights():
     np.testing.assert_array_equal(NoMask().weight(qd, 100.0), np.ones((2, 50)))
 
 
-@pytest.mark.parametrize("settings", [{"threshold": 0.0}, {"width": -0.1}, {"width": np.nan}])
+@pytest.mark.parametrize("settings", [{"threshold": 0.0}, {"width": -0.1}, {"width": np.nan}, {"taper": -0.1}])
 def test_impossible_settings_are_refused(settings):
     with pytest.raises(SettingError):
         ReversalMask(**settings)
@@ -27,5 +27,29 @@ def test_a_turn_between_two_samples_is_seen():
     """So fast that no sample is below the threshold."""
     qd = np.array([[3.0] * 10 + [-3.0] * 10])
     np.testing.assert_array_equal(
-        ReversalMask(0.1, 0.03).weight(qd, 100.0)[0] == 0, (np.arange(20) >= 6) & (np.arange(20) <= 13)
+        ReversalMask(0.1, 0.03, 0.0).weight(qd, 100.0)[0] == 0, (np.arange(20) >= 6) & (np.arange(20) <= 13)
     )
+
+
+@pytest.mark.parametrize("fs", [100.0, 1000.0])
+def test_weights_rise_over_the_taper(fs):
+    """From the end of the width to its end, smoothly: no step is larger than twice that of a straight rise."""
+    t = np.arange(-fs, fs + 1) / fs
+    weight = ReversalMask(0.1, 0.03, 0.1).weight(t[None, :], fs)[0]
+    np.testing.assert_array_equal(weight[np.abs(t) <= 0.13 + 1e-9], 0)
+    np.testing.assert_allclose(weight[np.abs(t) >= 0.23 + 1.5 / fs], 1)
+    assert (np.diff(weight[t > 0]) >= 0).all()
+    assert np.diff(weight).max() <= 2 / (0.1 * fs)
+
+
+def test_a_gradual_mask_keeps_high_frequencies_out_of_low_ones():
+    """White noise differentiated twice, times the weights: what reaches 0 to 5 Hz falls by 20 with the taper."""
+    fs, rng = 100.0, np.random.default_rng(0)
+    noise = np.diff(rng.normal(size=20002), 2)
+    qd = np.sin(2 * np.pi * 0.4 * np.arange(20000) / fs)[None]
+
+    def leaked(taper):
+        weight = ReversalMask(taper=taper).weight(qd, fs)[0]
+        return np.abs(np.fft.rfft(weight * noise))[:1000].std()
+
+    assert leaked(0.1) < leaked(0.0) / 20

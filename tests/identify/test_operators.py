@@ -26,6 +26,7 @@ def balance(y=None, weight=None, t=T):
         c=c,
         e=e,
         weight=np.ones((2, len(t))) if weight is None else weight,
+        noise=np.ones((2, len(t))),
         s=lambda x: CentralDifference(6).derivative(x, fs),
         fs=fs,
         parameters=("a", "b"),
@@ -101,7 +102,7 @@ def test_leading_axes_are_independent_runs_with_the_same_bits(operator, rng):
     def spread(columns):
         return {address: np.broadcast_to(signal, (3, len(T))) for address, signal in columns.items()}
 
-    together = at(operator, Balance(y, spread(one.c), spread(one.e), weight, one.s, FS, one.parameters))
+    together = at(operator, Balance(y, spread(one.c), spread(one.e), weight, np.ones_like(weight), one.s, FS, one.parameters))
     for run in range(3):
         alone = at(operator, balance(y[run], weight[run]))
         np.testing.assert_array_equal(together.Y[run], alone.Y)

@@ -11,7 +11,7 @@ NAMES = ("a", "b", "c")
 def system(W, Y, valid=None):
     r = Y.shape[-1]
     valid = np.ones(Y.shape, dtype=bool) if valid is None else valid
-    return System(Y, W, valid, np.arange(r) / 10, np.zeros(r, dtype=np.intp), NAMES)
+    return System(Y, W, np.ones(Y.shape), valid, np.arange(r) / 10, np.zeros(r, dtype=np.intp), NAMES)
 
 
 def fit(*args):

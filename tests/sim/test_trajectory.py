@@ -6,7 +6,7 @@ import ruckig
 from scipy.interpolate import BPoly
 
 from sim.errors import ScenarioError
-from sim.trajectory import PointToPoint
+from sim.trajectories import PointToPoint
 
 POINTS = [[0.0, 1.0, -0.5], [0.7, -0.4, 0.1], [0.2, 0.9, 1.3]]
 
