@@ -109,7 +109,7 @@ class Table1:
     @cached_property
     def reference(self) -> Reference:
         """The motion, sampled."""
-        return self.scenario.trajectory.motion(self.robot).sample(self.scenario.fs)
+        return self.scenario.trajectory.sample(self.robot, self.scenario.fs)
 
     @cached_property
     def log(self) -> MotionLog:

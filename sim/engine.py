@@ -16,7 +16,7 @@ from sim.motors import Array
 from sim.plant import Plant
 from sim.robot import Robot
 from sim.run import Run
-from sim.scenario import MOST_SAMPLES, Scenario
+from sim.scenario import Scenario
 from sim.trajectories import Reference
 from sim.trajectories.approach import approach
 
@@ -67,12 +67,7 @@ def simulate(
 
 def _planned(scenario: Scenario, robot: Robot) -> tuple[Reference, int]:
     """Return the planned motion, the way to its start before it, and how many samples that takes."""
-    motion = scenario.trajectory.motion(robot)
-    if motion.duration * scenario.fs > MOST_SAMPLES:
-        raise ScenarioError(f"fs = {scenario.fs:g} Hz makes more than {MOST_SAMPLES:.0e} samples of this motion: lower it")
-    main = motion.sample(scenario.fs)
-    if not len(main.q):
-        raise ScenarioError(f"fs = {scenario.fs:g} Hz leaves no sample of a motion of {motion.duration:.3g} s: raise it")
+    main = scenario.trajectory.sample(robot, scenario.fs)
     if not scenario.start:
         return main, 0
     way = approach(robot, np.array(scenario.start), main.q[0], scenario.fs)

@@ -16,9 +16,6 @@ from sim.robot import Robot
 from sim.settings import NotNegative, Number, Positive, Seed, settings
 from sim.trajectories import AbstractTrajectory, Quintic
 
-MOST_SAMPLES = 1e8
-"""Samples of a joint above which a scenario is taken for a slip: 0.8 GB."""
-
 
 @final
 @settings

@@ -6,7 +6,10 @@ from typing import final
 from sim.errors import ScenarioError
 from sim.motors import Array
 from sim.robot import Robot
-from sim.trajectories.reference import AbstractMotion
+from sim.trajectories.reference import AbstractMotion, Reference
+
+MOST_SAMPLES = 1e8
+"""Samples of a joint above which a motion is taken for a slip: 0.8 GB."""
 
 LONGEST = 1e6
 """Duration [s] above which a motion is taken for a slip: eleven days."""
@@ -20,13 +23,13 @@ class AbstractTrajectory(ABC):
         """Return the motion for `robot`; raise ScenarioError if it makes no sense."""
 
     @final
-    def motion(self, robot: Robot) -> AbstractMotion:
-        """Return the motion, checked: it moves the robot's joints, inside their ranges.
+    def sample(self, robot: Robot, fs: float) -> Reference:
+        """Return the motion at `fs` [Hz], checked: it moves the robot's joints, inside their ranges.
 
         Raises
         ------
         ScenarioError
-            If it does not, or lasts too long to be meant.
+            If it does not, or has no sample, or too many to be meant.
         """
         planned = self.plan(robot)
         if not planned.duration < LONGEST:
@@ -34,7 +37,11 @@ class AbstractTrajectory(ABC):
         # Extremes of smooth moves between waypoints lie at waypoints or a little beyond; 50 Hz finds them to 0.1 %.
         q = planned.sample(50.0).q
         require_in_range(robot, q)
-        return planned
+        if not 1 <= planned.duration * fs <= MOST_SAMPLES:
+            raise ScenarioError(
+                f"fs = {fs:g} Hz makes {planned.duration * fs:.3g} samples of this motion; 1 to {MOST_SAMPLES:.0e} are allowed"
+            )
+        return planned.sample(fs)
 
 
 def require_in_range(robot: Robot, q: Array) -> None:

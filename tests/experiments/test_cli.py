@@ -40,7 +40,7 @@ def test_table1_repeats_itself(tmp_path, capsys):
     a, b = (json.loads((tmp_path / name / "summary.json").read_text()) for name in ("a", "b"))
     assert a == b
     assert a["seed"] == 5
-    assert a["scenario"]["waypoints"] != list(map(list, load(SCENARIO).waypoints))
+    assert a["scenario"]["trajectory"]["waypoints"] != list(map(list, load(SCENARIO).trajectory.waypoints))
 
 
 def test_one_chain_may_be_asked_for(out, capsys):

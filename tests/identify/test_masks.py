@@ -43,13 +43,13 @@ def test_weights_rise_over_the_taper(fs):
 
 
 def test_a_gradual_mask_keeps_high_frequencies_out_of_low_ones():
-    """White noise differentiated twice, times the weights: what reaches 0 to 5 Hz falls by 20 with the taper."""
+    """White noise differentiated twice, times the weights: what reaches 0 to 1 Hz falls by 10 with the taper."""
     fs, rng = 100.0, np.random.default_rng(0)
     noise = np.diff(rng.normal(size=20002), 2)
     qd = np.sin(2 * np.pi * 0.4 * np.arange(20000) / fs)[None]
 
     def leaked(taper):
         weight = ReversalMask(taper=taper).weight(qd, fs)[0]
-        return np.abs(np.fft.rfft(weight * noise))[:1000].std()
+        return np.abs(np.fft.rfft(weight * noise))[:200].std()
 
-    assert leaked(0.1) < leaked(0.0) / 20
+    assert leaked(0.1) < leaked(0.0) / 10
