@@ -58,9 +58,11 @@ def simulate(
     robot = scenario.real_robot
     planned, skipped = _planned(scenario, robot)
     bench = _Bench(scenario, robot, planned, seeds, vary or {}, threads)
-    for step in range(bench.steps):
-        bench.advance(step)
-        if progress and step % max(1, bench.steps // 100) == 0:
+    step, told = 0, -1
+    while step < bench.steps:
+        step += bench.advance(step)
+        if progress and 100 * step // bench.steps > told:
+            told = 100 * step // bench.steps
             progress(step / bench.steps)
     return bench.run(skipped)
 
@@ -101,12 +103,14 @@ class _Bench:
         self._ripple = scenario.ripple.start(robot)
         self._friction = scenario.friction.start(self._plant.batch, self._plant.Fs, self._h)
         self._encoder = scenario.encoder.start(n, samples, fs, _generators(seeds, 0))
-        self._sensor = CurrentSensor(scenario.torque, nsim, n, self._h)
+        self._sensor = CurrentSensor(scenario.torque, nsim, n)
         self._jitter = self._drawn_jitter(samples)
         self._history = History(self._late + self._per_sample, nsim, n, self._h)
         at_rest = planned.q[:1], np.zeros((1, n)), np.zeros((1, n))
         self._before = self._command = self._demand = np.repeat(inverse_dynamics(robot, *at_rest), nsim, axis=0)
-        self._qd = np.zeros((nsim, n))
+        self._qd, self._steps = np.zeros((nsim, n)), 1
+        parts = scenario.drive.steady, scenario.friction.steady, scenario.ripple.steady, not scenario.timing.jitter
+        self._steady = all(parts)
         self._measured, self._commands, self._currents, self._q, self._speeds, self._tau = np.zeros((6, samples, nsim, n))
         self.steps = samples * self._per_sample + self._late
 
@@ -120,36 +124,41 @@ class _Bench:
             )
         return np.stack([width * (rng.random(samples) - 0.5) for rng in _generators(self._seeds, 1)], axis=1)
 
-    def advance(self, step: int) -> None:
-        """Advance by a physics step."""
+    def advance(self, step: int) -> int:
+        """Advance from physics step `step` to where something may change; return how many steps that were."""
         q, qd = self._plant.q, self._plant.qd
         sample, after = divmod(step, self._per_sample)
         if after == 0 and sample < len(self._q):
             self._q[sample], self._speeds[sample], self._currents[sample] = q, qd, self._sensor.value
         self._history.put(step, q, qd)
-        self._listen(step - self._late)
-        mid_qd = 1.5 * qd - 0.5 * self._qd
-        mid_q = q + (self._h / 2) * qd
-        self._qd = qd.copy()
+        steps = self._listen(step)
+        dt = steps * self._h
+        mid_qd = qd + (qd - self._qd) * (steps / (2 * self._steps))  # accelerating as in the steps before
+        mid_q = q + (dt / 2) * qd
+        self._qd, self._steps = qd.copy(), steps
         constant = 1 + self._ripple.commutation.at(mid_q)
-        electric = self._drive.step(self._demand, mid_qd * constant)
-        self._sensor.step(electric)
+        electric = self._drive.step(self._demand, mid_qd * constant, steps)
+        self._sensor.step(electric, dt)
         tau = electric * constant + self._ripple.cogging.at(mid_q)
         np.add(tau, self._friction.torque(mid_qd), out=self._applied)
-        self._plant.step()
+        self._plant.step(steps)
         if sample < len(self._tau):
-            self._tau[sample] += tau
+            self._tau[sample] += tau * steps
+        return steps
 
-    def _listen(self, step: int) -> None:
-        """Let the command whose turn it is, `step` steps after the first sample, act."""
-        k, after = divmod(step, self._per_sample)
-        if after == 0 and step >= 0:
-            q = self._encoder.read(k, self._history.at(step + self._jitter[k]))
+    def _listen(self, step: int) -> int:
+        """Let the command whose turn it is act; return for how many steps nothing changes."""
+        k, after = divmod(step - self._late, self._per_sample)
+        if after == 0 and k >= 0:
+            q = self._encoder.read(k, self._history.at(step - self._late + self._jitter[k]))
             self._before, self._command = self._command, self._law.command(k, q)
             self._measured[k], self._commands[k] = q, self._command
             self._demand = self._old * self._before + (1 - self._old) * self._command
         elif after == 1:
             self._demand = self._command
+        if after == 0 or not self._steady:  # the current of a new command settles in a step of its own
+            return 1
+        return min(self._per_sample - after, self._per_sample - step % self._per_sample)
 
     def run(self, skipped: int) -> Run:
         """Return what has happened since sample `skipped`."""

@@ -56,12 +56,12 @@ class TorqueMeasurement:
 
 
 class CurrentSensor:
-    """A first-order anti-alias filter on the motor's torque-making current, advanced by physics steps of `h` [s]."""
+    """A first-order anti-alias filter on the motor's torque-making current, advanced by times given in [s]."""
 
-    def __init__(self, settings: TorqueMeasurement, nsim: int, n: int, h: float) -> None:
-        self._share = -np.expm1(-2 * np.pi * settings.cutoff * h) if settings.cutoff else 1.0
+    def __init__(self, settings: TorqueMeasurement, nsim: int, n: int) -> None:
+        self._rate = 2 * np.pi * settings.cutoff if settings.cutoff else np.inf
         self.value: Array = np.zeros((nsim, n))
 
-    def step(self, tau: Array) -> None:
-        """Take in the mean torque of a step [N m], before ripple."""
-        self.value = self.value + self._share * (tau - self.value) if self._share < 1 else tau
+    def step(self, tau: Array, dt: float) -> None:
+        """Take in the mean torque [N m], before ripple, of the next `dt` [s]."""
+        self.value = tau - (tau - self.value) * np.exp(-self._rate * dt)

@@ -47,10 +47,10 @@ class Plant:
         expanded = self.batch.expanded("dof_frictionloss")
         self.Fs: Array = np.array(np.broadcast_to(model.dof_frictionloss, (nsim, robot.n)) if expanded is None else expanded)
 
-    def step(self) -> None:
-        """Advance every simulation by a physics step, under the torques in `applied` [N m]."""
+    def step(self, steps: int) -> None:
+        """Advance every simulation by `steps` physics steps, under the torques in `applied` [N m]."""
         try:
-            self.batch.step()
+            self.batch.step(nstep=steps)
         except SimulationError as error:
             raise ScenarioError(f"MuJoCo cannot go on: {' '.join(str(error).split())}") from error
 

@@ -31,6 +31,11 @@ class Ripple:
         if max(self.commutation) * sum(abs(a) for a in self.commutation_harmonics) >= 1:
             raise ScenarioError("commutation ripple must stay below the torque constant: lower commutation or its harmonics")
 
+    @property
+    def steady(self) -> bool:
+        """Whether there is none."""
+        return not (self.cogging or any(self.commutation))
+
     def start(self, robot: Robot) -> "RotorRipple":
         """Return the ripple of the robot's motors, which are only asked for if there is any.
 

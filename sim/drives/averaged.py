@@ -3,7 +3,6 @@
 from typing import final
 
 import numpy as np
-import numpy.typing as npt
 
 from sim.drives.base import AbstractAmplifier, AbstractDrive
 from sim.errors import ScenarioError
@@ -47,6 +46,11 @@ class AveragedDrive(AbstractDrive):
         """Return 1 / w."""
         return np.full(robot.n, 1 / (2 * np.pi * self.bandwidth))
 
+    @property
+    def steady(self) -> bool:
+        """True."""
+        return True
+
 
 class _Amplifier(AbstractAmplifier):
     """i follows the loop with rate w; where that needs more than the bus voltage, the winding's own rate R/L comes first."""
@@ -59,30 +63,28 @@ class _Amplifier(AbstractAmplifier):
             )
         self._R, self._L, self._K, self._V, self._I, self._w, self._h = motors.R, motors.L, motors.K, V, I, w, h
         self._i = np.zeros((nsim, len(motors.R)))
-        self._kept, self._moved = np.exp(-w * h), -np.expm1(-w * h) / w / h
 
-    def step(self, demand: Array, speed: Array) -> Array:
-        e, i0 = self._K * speed, self._i
+    def step(self, demand: Array, speed: Array, steps: int) -> Array:
+        dt, e, i0 = steps * self._h, self._K * speed, self._i
         limited = np.minimum(np.maximum(demand / self._K, -self._I), self._I)
         target = np.minimum(np.maximum(limited, (-self._V - e) / self._R), (self._V - e) / self._R)
         asked = self._R * i0 + self._L * self._w * (target - i0) + e
         saturated = np.abs(asked) > self._V
         if saturated.any():
-            return self._K * self._with_limit(saturated, np.copysign(self._V, asked), target, e)
-        away = i0 - target
-        self._i = target + away * self._kept
-        return self._K * (target + away * self._moved)
+            v = np.copysign(self._V, asked)
+            t = np.where(saturated, np.minimum(self._release(v, target, e), dt), 0.0)
+            end = (v - e) / self._R
+            i1 = np.where(saturated, end + (i0 - end) * np.exp(-t * self._R / self._L), i0)
+            charge = np.where(saturated, end * t - (i1 - i0) * self._L / self._R, 0.0)
+        else:
+            t, i1, charge = 0.0, i0, 0.0
+        away, rest = i1 - target, dt - t
+        self._i = target + away * np.exp(-self._w * rest)
+        return self._K * ((charge + target * rest - away * (np.expm1(-self._w * rest) / self._w)) / dt)
 
-    def _with_limit(self, saturated: npt.NDArray[np.bool_], v: Array, target: Array, e: Array) -> Array:
-        """Advance where the voltage `v` is all there is at first; return the mean currents."""
-        R, L, w, h, i0 = self._R, self._L, self._w, self._h, self._i
-        end = (v - e) / R
-        released = (v - e - L * w * target) / (R - L * w)  # the current at which the loop asks for less than v
-        share = np.where(saturated, (released - end) / np.where(i0 == end, 1.0, i0 - end), 1.0)
-        t = np.minimum(-np.log(np.clip(share, 1e-300, 1.0)) * L / R, h)
-        i1 = np.where(saturated, end + (i0 - end) * np.exp(-t * R / L), i0)
-        charge = (end * t - (i1 - i0) * L / R) * saturated
-        away, rest = i1 - target, h - t
-        self._i = np.where(saturated, target + away * np.exp(-w * rest), target + away * self._kept)
-        mean = (charge + target * rest - away * np.expm1(-w * rest) / w) / h
-        return np.where(saturated, mean, target + away * self._moved)
+    def _release(self, v: Array, target: Array, e: Array) -> Array:
+        """Return how long [s] the loop asks for more than the voltage `v`, which is all there is."""
+        R, L, w = self._R, self._L, self._w
+        end, released = (v - e) / R, (v - e - L * w * target) / (R - L * w)  # currents far later, and when it asks for v
+        share = (released - end) / np.where(self._i == end, 1.0, self._i - end)
+        return -np.log(np.minimum(np.maximum(share, 1e-300), 1.0)) * L / R

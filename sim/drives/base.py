@@ -12,15 +12,17 @@ class AbstractAmplifier(ABC):
     """A drive at work; what it remembers is of shape (nsim, joint)."""
 
     @abstractmethod
-    def step(self, demand: Array, speed: Array) -> Array:
-        """Advance by one physics step; return the mean torque in it [N m], shape (nsim, joint).
+    def step(self, demand: Array, speed: Array, steps: int) -> Array:
+        """Advance by some physics steps; return the mean torque in them [N m], shape (nsim, joint).
 
         Parameters
         ----------
         demand : Array, shape (nsim, joint)
-            Torque asked for, its mean over the step [N m].
+            Torque asked for, its mean over the steps [N m].
         speed : Array, shape (nsim, joint)
-            Speed in the middle of the step, times the share by which the torque constant is above nominal [rad/s].
+            Speed in the middle of the steps, times the torque constant over its nominal value [rad/s].
+        steps : int
+            How many; one unless the drive is steady.
         """
 
 
@@ -42,6 +44,11 @@ class AbstractDrive(ABC):
     @abstractmethod
     def lag(self, robot: Robot) -> Array:
         """Return how late the torque follows a slow command [s], shape (joint,)."""
+
+    @property
+    @abstractmethod
+    def steady(self) -> bool:
+        """Whether the torque stays as it is while the demand does, so that many physics steps may be taken at once."""
 
     def step_length(self, fs: float, longest: float) -> float:
         """Return the physics step [s] that fits whole times into a sample of 1/`fs` and is not above `longest`."""

@@ -24,8 +24,13 @@ class IdealDrive(AbstractDrive):
         """Return zeros."""
         return np.zeros(robot.n)
 
+    @property
+    def steady(self) -> bool:
+        """True."""
+        return True
+
 
 class _Amplifier(AbstractAmplifier):
-    def step(self, demand: Array, speed: Array) -> Array:
-        del speed
+    def step(self, demand: Array, speed: Array, steps: int) -> Array:
+        del speed, steps
         return demand

@@ -1,4 +1,4 @@
-"""Pulse patterns of an H-bridge: what voltage lies at the winding in every piece of a PWM period."""
+"""Pulse patterns of an H-bridge: what voltage lies at the winding, and when, in a PWM period."""
 
 from collections.abc import Callable
 from typing import Literal, NamedTuple
@@ -10,87 +10,104 @@ from sim.motors import Array
 Modulation = Literal["unipolar", "bipolar", "sign_magnitude"]
 
 
-class Pieces(NamedTuple):
-    """A PWM period cut at its edges; leading axis: piece."""
+class Pulse(NamedTuple):
+    """A stretch of a period in which the voltage is not the base voltage."""
 
-    duration: Array
-    """[s], shape (piece, ...)."""
+    start: Array
+    """[s]."""
 
-    forward: Array
-    """Voltage over the winding while the current is positive, in bus voltages, shape (piece, ...)."""
+    end: Array
+    """[s]."""
 
-    backward: Array
-    """The same while the current is negative: it differs while a leg is dead and a diode conducts."""
+    level: Array
+    """Voltage, in bus voltages."""
 
 
-def bridge(m: Array, period: float, dead_time: float, modulation: Modulation) -> Pieces:
-    """Return the pieces of one centre-aligned period for the modulation index `m`.
+class Pattern(NamedTuple):
+    """A PWM period: a base voltage, in bus voltages, and pulses that follow each other."""
+
+    base: float
+    pulses: tuple[Pulse, ...]
+
+
+class Modulator(NamedTuple):
+    """A centre-aligned chopper.
 
     Parameters
     ----------
-    m : Array
-        Mean voltage over bus voltage, -1 to 1.
-    period, dead_time : float
-        [s]. Each transistor turns on `dead_time` after its partner has been turned off.
     modulation : str
         unipolar: two legs, each with the same carrier and opposite references (phase-shifted, two pulses a period);
         bipolar: the legs switch together, always one up and one down; sign_magnitude: one leg rests at the bus's end.
+    period, dead_time : float
+        [s]. Each transistor turns on `dead_time` after its partner has been turned off.
     """
-    return _PATTERNS[modulation](m, period, dead_time)
+
+    modulation: Modulation
+    period: float
+    dead_time: float
+
+    def pattern(self, m: Array, forward: Array) -> Pattern:
+        """Return the pulses for the modulation index `m`, mean voltage over bus voltage, -1 to 1.
+
+        `forward` is 1 where the current is positive and 0 where it is negative. It decides what a leg does while it is dead,
+        both its transistors off: a diode connects it to the low end of the bus while current flows out of it, and to the high
+        end while current flows in. A positive current flows out of the first leg and into the second.
+        """
+        return _PATTERNS[self.modulation](m, self.period, self.dead_time * forward, self.dead_time * (1 - forward))
 
 
-def _unipolar(m: Array, period: float, dead_time: float) -> Pieces:
-    edges = np.empty((8, *m.shape))
-    _leg((1 + m) / 2, period, dead_time, edges[:4])
-    _leg((1 - m) / 2, period, dead_time, edges[4:])
-    duration, at = _cut(np.sort(edges, axis=0), period)
-    up1, up2 = _up(at, edges[:4]), _up(at, edges[4:])
-    # A positive current flows out of the first leg, which gives way to low, and into the second, which gives way to high.
-    return Pieces(duration, _difference(up1[0], up2[1]), _difference(up1[1], up2[0]))
+def _unipolar(m: Array, period: float, late: Array, long: Array) -> Pattern:
+    first, second = (1 + m) * (period / 4), (1 - m) * (period / 4)  # half the time for which each leg is up
+    up1, up2 = period / 2 - first + late, period / 2 - second + long
+    down1, down2 = period / 2 + first + long, period / 2 + second + late
+    rising = Pulse(np.minimum(up1, up2), np.maximum(up1, up2), np.sign(up2 - up1))
+    falling = Pulse(np.minimum(down1, down2), np.maximum(down1, down2), np.sign(down1 - down2))
+    return Pattern(0.0, (rising, falling))
 
 
-def _bipolar(m: Array, period: float, dead_time: float) -> Pieces:
-    edges = _leg((1 + m) / 2, period, dead_time, np.empty((4, *m.shape)))
-    duration, at = _cut(edges, period)
-    narrow, wide = _up(at, edges)  # the second leg is high where the first is low, and dead with it
-    return Pieces(duration, _difference(narrow, ~narrow), _difference(wide, ~wide))
+def _bipolar(m: Array, period: float, late: Array, long: Array) -> Pattern:
+    half = (1 + m) * (period / 4)
+    return Pattern(-1.0, (Pulse(period / 2 - half + late, period / 2 + half + long, np.ones_like(m)),))
 
 
-def _sign_magnitude(m: Array, period: float, dead_time: float) -> Pieces:
-    edges = _leg(np.abs(m), period, dead_time, np.empty((4, *m.shape)))
-    duration, at = _cut(edges, period)
-    narrow, wide = _up(at, edges)
-    positive = m > 0
-    return Pieces(duration, np.where(positive, narrow, -1.0 * wide), np.where(positive, wide, -1.0 * narrow))
+def _sign_magnitude(m: Array, period: float, late: Array, long: Array) -> Pattern:
+    half, positive = np.abs(m) * (period / 2), m >= 0
+    start = period / 2 - half + np.where(positive, late, long)
+    end = period / 2 + half + np.where(positive, long, late)
+    return Pattern(0.0, (Pulse(np.minimum(start, end), end, np.sign(m)),))
 
 
-_PATTERNS: dict[Modulation, Callable[[Array, float, float], Pieces]] = {
+_PATTERNS: dict[Modulation, Callable[[Array, float, Array, Array], Pattern]] = {
     "unipolar": _unipolar,
     "bipolar": _bipolar,
     "sign_magnitude": _sign_magnitude,
 }
 
 
-def _leg(duty: Array, period: float, dead_time: float, edges: Array) -> Array:
-    """Write the instants between low, dead, high, dead and low of a leg; one that never rises is never dead."""
-    half = duty * (period / 2)
-    edges[0], edges[2] = period / 2 - half, period / 2 + half
-    edges[1] = np.minimum(edges[0] + dead_time, edges[2])
-    edges[3] = edges[2] + dead_time * (duty > 0)
-    return edges
+class Pieces(NamedTuple):
+    """A period cut where the voltage changes, for either sign of the current; leading axis: piece."""
+
+    duration: Array
+    """[s]."""
+
+    forward: Array
+    """Voltage while the current is positive, in bus voltages."""
+
+    backward: Array
+    """Voltage while the current is negative: it differs while a leg is dead."""
 
 
-def _cut(edges: Array, period: float) -> tuple[Array, Array]:
-    """Return durations and middles of the pieces between sorted edges."""
-    ends = np.empty((len(edges) + 2, *edges.shape[1:]))
-    ends[0], ends[1:-1], ends[-1] = 0.0, edges, period
-    return ends[1:] - ends[:-1], (ends[1:] + ends[:-1]) / 2
+def pieces(modulator: Modulator, m: Array) -> Pieces:
+    """Return the pieces of a period in which the current may change its sign."""
+    both = [modulator.pattern(m, np.full(m.shape, sign)) for sign in (1.0, 0.0)]
+    edges = np.sort([edge for pattern in both for pulse in pattern.pulses for edge in pulse[:2]], axis=0)
+    ends = np.concatenate([np.zeros((1, *m.shape)), edges, np.full((1, *m.shape), modulator.period)])
+    middle = (ends[1:] + ends[:-1]) / 2
+    return Pieces(np.diff(ends, axis=0), *(_level(pattern, middle) for pattern in both))
 
 
-def _up(at: Array, edges: Array) -> tuple[np.typing.NDArray[np.bool_], np.typing.NDArray[np.bool_]]:
-    """Return whether a leg is high at the instants `at`, if being dead counts as low, and if it counts as high."""
-    return (at > edges[1]) & (at < edges[2]), (at > edges[0]) & (at < edges[3])
-
-
-def _difference(first: np.typing.NDArray[np.bool_], second: np.typing.NDArray[np.bool_]) -> Array:
-    return np.subtract(first, second, dtype=np.float64)
+def _level(pattern: Pattern, t: Array) -> Array:
+    level = np.full(t.shape, pattern.base)
+    for pulse in pattern.pulses:
+        level += (pulse.level - pattern.base) * ((t > pulse.start) & (t < pulse.end))
+    return level

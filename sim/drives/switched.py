@@ -7,8 +7,8 @@ from pydantic import Field
 
 from sim.drives.averaged import limits
 from sim.drives.base import AbstractAmplifier, AbstractDrive
-from sim.drives.pwm import Modulation, Pieces, bridge
-from sim.drives.winding import pass_period
+from sim.drives.pwm import Modulation, Modulator
+from sim.drives.winding import Winding, pass_period
 from sim.errors import ScenarioError
 from sim.motors import Array, Motors
 from sim.robot import Robot
@@ -58,6 +58,11 @@ class SwitchedDrive(AbstractDrive):
         T = 1 / self.pwm
         return np.full(robot.n, T / -np.expm1(-2 * np.pi * self.bandwidth * T) - T / 2)
 
+    @property
+    def steady(self) -> bool:
+        """False: every PWM period is a step of its own."""
+        return False
+
     def step_length(self, fs: float, longest: float) -> float:
         """Return the PWM period [s].
 
@@ -75,30 +80,39 @@ class SwitchedDrive(AbstractDrive):
 
 
 class SwitchedAmplifier(AbstractAmplifier):
-    """The chopper at work; `electrical` and `copper` [J] count what came in and what became heat, shape (nsim, joint)."""
+    """The chopper at work.
+
+    `i` is the current [A], `electrical` and `copper` count what came in at the terminals and what became heat [J], all of
+    shape (nsim, joint).
+    """
 
     def __init__(self, settings: SwitchedDrive, motors: Motors, V: Array, I: Array, nsim: int, h: float) -> None:  # noqa: E741
-        self._settings, self._motors, self._V, self._I, self._h = settings, motors, V, I, h
+        self._K, self._I, self._h = motors.K, I, h
+        self._winding = Winding(V, motors.R, motors.L)
+        self._modulator = Modulator(settings.modulation, h, settings.dead_time)
         lost = -np.expm1(-h * motors.R / motors.L)
         self._kp = motors.R / lost * -np.expm1(-2 * np.pi * settings.bandwidth * h)
         self._ki = self._kp * lost
         self._most = (1 - 4 * settings.dead_time / h) * V
+        self._least = 2 * settings.duty_resolution
         self.i, self._sum, self.electrical, self.copper = np.zeros((4, nsim, len(V)))
 
-    def step(self, demand: Array, speed: Array) -> Array:
+    def step(self, demand: Array, speed: Array, steps: int) -> Array:
         """Advance by a PWM period; return the mean torque in it."""
-        passage = pass_period(self.i, self.pieces(demand), self._V, self._motors.K * speed, self._motors.R, self._motors.L)
-        self.i = passage.i
+        del steps
+        e = self._K * speed
+        passage = pass_period(self.i, self._index(demand), e, self._winding, self._modulator)
+        stored = (passage.i**2 - self.i**2) * (self._winding.L / 2)
         self.electrical += passage.electrical
-        self.copper += passage.copper
-        return passage.charge * (self._motors.K / self._h)
+        self.copper += passage.electrical - stored - e * passage.charge
+        self.i = passage.i
+        return passage.charge * (self._K / self._h)
 
-    def pieces(self, demand: Array) -> Pieces:
-        """Return the pulses that the current loop asks for; its integrator rests while the voltage is at its limit."""
-        error = np.minimum(np.maximum(demand / self._motors.K, -self._I), self._I) - self.i
+    def _index(self, demand: Array) -> Array:
+        """Return the modulation that the current loop asks for; its integrator rests while the voltage is at its limit."""
+        error = np.minimum(np.maximum(demand / self._K, -self._I), self._I) - self.i
         asked = self._kp * error + self._sum
         v = np.minimum(np.maximum(asked, -self._most), self._most)
-        self._sum = self._sum + self._ki * error * (v == asked)
-        step = 2 * self._settings.duty_resolution
-        m = np.rint(v / (step * self._V)) * step if step else v / self._V
-        return bridge(m, self._h, self._settings.dead_time, self._settings.modulation)
+        self._sum += self._ki * error * (v == asked)
+        m = v / self._winding.V
+        return np.rint(m / self._least) * self._least if self._least else m

@@ -26,6 +26,11 @@ class AbstractContact(ABC):
 class AbstractFrictionLaw(ABC):
     """The settings of a friction."""
 
+    @property
+    @abstractmethod
+    def steady(self) -> bool:
+        """Whether MuJoCo alone makes the friction, so that many physics steps may be taken at once."""
+
     @abstractmethod
     def edit(self, spec: mujoco.MjSpec) -> None:
         """Write viscous and Coulomb friction into the robot before it is compiled."""

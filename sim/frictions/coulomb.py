@@ -20,6 +20,11 @@ class CoulombViscous(AbstractFrictionLaw):
     coulomb: EachNotNegativeOrNone = None
     """Fs [N m], of all joints or of each; without it the robot's own."""
 
+    @property
+    def steady(self) -> bool:
+        """True."""
+        return True
+
     def edit(self, spec: mujoco.MjSpec) -> None:
         """Write both into the robot."""
         write(spec, self.viscous, self.coulomb)

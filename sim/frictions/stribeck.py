@@ -26,6 +26,11 @@ class Stribeck(AbstractFrictionLaw):
     coulomb: EachNotNegativeOrNone = None
     """Fs [N m], of all joints or of each; without it the robot's own."""
 
+    @property
+    def steady(self) -> bool:
+        """False."""
+        return False
+
     def edit(self, spec: mujoco.MjSpec) -> None:
         """Write Fv and Fs into the robot."""
         write(spec, self.viscous, self.coulomb)
