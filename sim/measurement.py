@@ -62,6 +62,7 @@ class CurrentSensor:
         self._rate = 2 * np.pi * settings.cutoff if settings.cutoff else np.inf
         self.value: Array = np.zeros((nsim, n))
 
-    def step(self, tau: Array, dt: float) -> None:
-        """Take in the mean torque [N m], before ripple, of the next `dt` [s]."""
-        self.value = tau - (tau - self.value) * np.exp(-self._rate * dt)
+    def take(self, tau: Array, dt: float) -> None:
+        """Take in the torques [N m], before ripple, of equal parts of the next `dt` [s], shape (part, nsim, joint)."""
+        for part in tau if np.isfinite(self._rate) else tau[-1:]:
+            self.value = part - (part - self.value) * np.exp(-self._rate * dt / len(tau))

@@ -43,14 +43,27 @@ class Plant:
         self.robot, self.batch, self._varied = robot, Batch(model, nsim, threads), bool(vary)
         for name, values in vary.items():
             _vary(self.batch, name, np.asarray(values, dtype=np.float64))
-        self.q, self.qd, self.applied = (self.batch.bind(name) for name in ("qpos", "qvel", "qfrc_applied"))
+        self.q, self.qd, self._applied = (self.batch.bind(name) for name in ("qpos", "qvel", "qfrc_applied"))
         expanded = self.batch.expanded("dof_frictionloss")
         self.Fs: Array = np.array(np.broadcast_to(model.dof_frictionloss, (nsim, robot.n)) if expanded is None else expanded)
 
-    def step(self, steps: int) -> None:
-        """Advance every simulation by `steps` physics steps, under the torques in `applied` [N m]."""
+    def step(self, torques: Array, steps: int) -> None:
+        """Advance every simulation by `steps` physics steps.
+
+        Parameters
+        ----------
+        torques : Array, shape (steps or 1, nsim, joint)
+            On the joints in every step, or the same in all of them [N m].
+        steps : int
+            How many.
+        """
         try:
-            self.batch.step(nstep=steps)
+            if len(torques) == 1:
+                self._applied[:] = torques[0]
+                self.batch.step(nstep=steps)
+            else:
+                control = np.ascontiguousarray(np.swapaxes(torques, 0, 1))
+                self.batch.rollout(steps, control, int(mujoco.mjtState.mjSTATE_QFRC_APPLIED), record=())
         except SimulationError as error:
             raise ScenarioError(f"MuJoCo cannot go on: {' '.join(str(error).split())}") from error
 

@@ -4,7 +4,7 @@ from typing import final
 
 import numpy as np
 
-from sim.drives.base import AbstractAmplifier, AbstractDrive
+from sim.drives.base import AbstractAmplifier, AbstractDrive, every
 from sim.errors import ScenarioError
 from sim.motors import Array, Motors
 from sim.robot import Robot
@@ -61,11 +61,12 @@ class _Amplifier(AbstractAmplifier):
                 f"drive.bandwidth = {w / 2 / np.pi:g} Hz must be above that of the bare winding, "
                 f"{(motors.R / motors.L / 2 / np.pi).max():.3g} Hz"
             )
-        self._R, self._L, self._K, self._V, self._I, self._w, self._h = motors.R, motors.L, motors.K, V, I, w, h
-        self._i = np.zeros((nsim, len(motors.R)))
+        self._w, self._h = w, h
+        self._R, self._L, self._K, self._V, self._I = (every(x, nsim) for x in (motors.R, motors.L, motors.K, V, I))
+        self._i = np.zeros(self._R.shape)
 
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
-        dt, e, i0 = steps * self._h, self._K * speed, self._i
+        dt, e, i0 = steps * self._h, self._K * speed[0], self._i
         limited = np.minimum(np.maximum(demand / self._K, -self._I), self._I)
         target = np.minimum(np.maximum(limited, (-self._V - e) / self._R), (self._V - e) / self._R)
         asked = self._R * i0 + self._L * self._w * (target - i0) + e
@@ -77,10 +78,10 @@ class _Amplifier(AbstractAmplifier):
             i1 = np.where(saturated, end + (i0 - end) * np.exp(-t * self._R / self._L), i0)
             charge = np.where(saturated, end * t - (i1 - i0) * self._L / self._R, 0.0)
         else:
-            t, i1, charge = 0.0, i0, 0.0
+            t, i1, charge = np.zeros(1), i0, np.zeros(1)
         away, rest = i1 - target, dt - t
         self._i = target + away * np.exp(-self._w * rest)
-        return self._K * ((charge + target * rest - away * (np.expm1(-self._w * rest) / self._w)) / dt)
+        return (self._K * ((charge + target * rest - away * (np.expm1(-self._w * rest) / self._w)) / dt))[None]
 
     def _release(self, v: Array, target: Array, e: Array) -> Array:
         """Return how long [s] the loop asks for more than the voltage `v`, which is all there is."""

@@ -13,16 +13,22 @@ class AbstractAmplifier(ABC):
 
     @abstractmethod
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
-        """Advance by some physics steps; return the mean torque in them [N m], shape (nsim, joint).
+        """Advance by some physics steps; return the torques in them [N m].
 
         Parameters
         ----------
         demand : Array, shape (nsim, joint)
             Torque asked for, its mean over the steps [N m].
-        speed : Array, shape (nsim, joint)
-            Speed in the middle of the steps, times the torque constant over its nominal value [rad/s].
+        speed : Array, shape (steps or 1, nsim, joint)
+            Speed in the middle of every step, times the torque constant over its nominal value [rad/s]; that in the middle of
+            all of them for a steady drive.
         steps : int
-            How many; one unless the drive is steady.
+            How many.
+
+        Returns
+        -------
+        Array, shape (steps or 1, nsim, joint)
+            The mean torque in every step, or in all of them.
         """
 
 
@@ -48,8 +54,13 @@ class AbstractDrive(ABC):
     @property
     @abstractmethod
     def steady(self) -> bool:
-        """Whether the torque stays as it is while the demand does, so that many physics steps may be taken at once."""
+        """Whether the torque stays as it is while the demand does, so that any number of physics steps are as one."""
 
     def step_length(self, fs: float, longest: float) -> float:
         """Return the physics step [s] that fits whole times into a sample of 1/`fs` and is not above `longest`."""
         return 1 / fs / max(1, int(np.ceil(1 / fs / longest - 1e-9)))
+
+
+def every(values: Array, nsim: int) -> Array:
+    """Return the values of the joints for every simulation, shape (nsim, joint): NumPy is slow where it must broadcast."""
+    return np.array(np.broadcast_to(values, (nsim, *values.shape)))

@@ -33,4 +33,4 @@ class IdealDrive(AbstractDrive):
 class _Amplifier(AbstractAmplifier):
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
         del speed, steps
-        return demand
+        return demand[None]

@@ -98,16 +98,13 @@ class Pieces(NamedTuple):
 
 
 def pieces(modulator: Modulator, m: Array) -> Pieces:
-    """Return the pieces of a period in which the current may change its sign."""
-    both = [modulator.pattern(m, np.full(m.shape, sign)) for sign in (1.0, 0.0)]
-    edges = np.sort([edge for pattern in both for pulse in pattern.pulses for edge in pulse[:2]], axis=0)
-    ends = np.concatenate([np.zeros((1, *m.shape)), edges, np.full((1, *m.shape), modulator.period)])
-    middle = (ends[1:] + ends[:-1]) / 2
-    return Pieces(np.diff(ends, axis=0), *(_level(pattern, middle) for pattern in both))
-
-
-def _level(pattern: Pattern, t: Array) -> Array:
-    level = np.full(t.shape, pattern.base)
-    for pulse in pattern.pulses:
-        level += (pulse.level - pattern.base) * ((t > pulse.start) & (t < pulse.end))
-    return level
+    """Return the pieces of a period in which the current may change its sign; `m` has the shape (winding,)."""
+    both = modulator.pattern(m, np.array([[1.0], [0.0]]))
+    edges = np.array([np.broadcast_to(edge, (2, *m.shape)) for pulse in both.pulses for edge in pulse[:2]])
+    ends = np.empty((2 * len(edges) + 2, *m.shape))
+    ends[0], ends[1:-1], ends[-1] = 0.0, np.sort(edges.reshape(-1, *m.shape), axis=0), modulator.period
+    middle = ((ends[1:] + ends[:-1]) / 2)[:, None]
+    level = np.full((len(middle), 2, *m.shape), both.base)
+    for pulse in both.pulses:
+        level += (pulse.level - both.base) * ((middle > pulse.start) & (middle < pulse.end))
+    return Pieces(ends[1:] - ends[:-1], level[:, 0], level[:, 1])

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from sim.drives.averaged import limits
-from sim.drives.base import AbstractAmplifier, AbstractDrive
+from sim.drives.base import AbstractAmplifier, AbstractDrive, every
 from sim.drives.pwm import Modulation, Modulator
 from sim.drives.winding import Winding, pass_period
 from sim.errors import ScenarioError
@@ -82,35 +82,40 @@ class SwitchedDrive(AbstractDrive):
 class SwitchedAmplifier(AbstractAmplifier):
     """The chopper at work.
 
-    `i` is the current [A], `electrical` and `copper` count what came in at the terminals and what became heat [J], all of
-    shape (nsim, joint).
+    `i` is the current [A], `electrical` and `mechanical` count what came in at the terminals and what went to the rotor [J],
+    all of shape (nsim, joint).
     """
 
     def __init__(self, settings: SwitchedDrive, motors: Motors, V: Array, I: Array, nsim: int, h: float) -> None:  # noqa: E741
-        self._K, self._I, self._h = motors.K, I, h
-        self._winding = Winding(V, motors.R, motors.L)
+        R, L, K, V, self._I = (every(x, nsim) for x in (motors.R, motors.L, motors.K, V, I))
+        self._K, self._h, self._winding = K, h, Winding(V, R, L)
         self._modulator = Modulator(settings.modulation, h, settings.dead_time)
-        lost = -np.expm1(-h * motors.R / motors.L)
-        self._kp = motors.R / lost * -np.expm1(-2 * np.pi * settings.bandwidth * h)
+        lost = -np.expm1(-h * R / L)
+        self._kp = R / lost * -np.expm1(-2 * np.pi * settings.bandwidth * h)
         self._ki = self._kp * lost
         self._most = (1 - 4 * settings.dead_time / h) * V
         self._least = 2 * settings.duty_resolution
-        self.i, self._sum, self.electrical, self.copper = np.zeros((4, nsim, len(V)))
+        self.i, self._sum, self.electrical, self.mechanical = np.zeros((4, *V.shape))
 
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
-        """Advance by a PWM period; return the mean torque in it."""
-        del steps
+        """Advance by PWM periods; return the mean torque in each."""
+        wanted = np.minimum(np.maximum(demand / self._K, -self._I), self._I)
         e = self._K * speed
-        passage = pass_period(self.i, self._index(demand), e, self._winding, self._modulator)
-        stored = (passage.i**2 - self.i**2) * (self._winding.L / 2)
-        self.electrical += passage.electrical
-        self.copper += passage.electrical - stored - e * passage.charge
-        self.i = passage.i
-        return passage.charge * (self._K / self._h)
+        charge = np.empty((steps, *demand.shape))
+        for k in range(steps):
+            self.i, charge[k], electrical = pass_period(self.i, self._index(wanted), e[k], self._winding, self._modulator)
+            self.electrical += electrical
+        self.mechanical += (e * charge).sum(axis=0)
+        return charge * (self._K / self._h)
 
-    def _index(self, demand: Array) -> Array:
+    @property
+    def copper(self) -> Array:
+        """What became heat [J]: what came in, less what went to the rotor and what is stored, L i^2 / 2."""
+        return self.electrical - self.mechanical - self._winding.L / 2 * self.i**2
+
+    def _index(self, wanted: Array) -> Array:
         """Return the modulation that the current loop asks for; its integrator rests while the voltage is at its limit."""
-        error = np.minimum(np.maximum(demand / self._K, -self._I), self._I) - self.i
+        error = wanted - self.i
         asked = self._kp * error + self._sum
         v = np.minimum(np.maximum(asked, -self._most), self._most)
         self._sum += self._ki * error * (v == asked)

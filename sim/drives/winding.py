@@ -14,7 +14,7 @@ class Winding(NamedTuple):
 
     Parameters
     ----------
-    V, R, L : Array, shape (joint,)
+    V, R, L : Array, shape (sim, joint)
         Bus voltage [V], resistance [ohm], inductance [H].
     """
 
@@ -55,7 +55,7 @@ def pass_period(i: Array, m: Array, e: Array, winding: Winding, modulator: Modul
     passage, edges = _straight(i, e, winding, modulator.pattern(m, forward), modulator.period)
     turning = (edges * i <= 0).any(axis=0)
     if modulator.dead_time and turning.any():
-        some = Winding(*(np.broadcast_to(x, i.shape)[turning] for x in winding))
+        some = Winding(*(x[turning] for x in winding))
         careful = _step_by_step(i[turning], e[turning], some, pieces(modulator, m[turning]))
         for whole, part in zip(passage, careful, strict=True):
             whole[turning] = part
@@ -65,53 +65,60 @@ def pass_period(i: Array, m: Array, e: Array, winding: Winding, modulator: Modul
 def _straight(i: Array, e: Array, winding: Winding, pattern: Pattern, period: float) -> tuple[Passage, Array]:
     """Return the passage of a current that keeps its sign, and the current at every edge."""
     V, R, L = winding
-    rate, t, now, edges = R / L, 0.0, i, []
-    rest = (pattern.base * V - e) / R
-    charge, extra = np.zeros_like(i), np.zeros_like(i)  # all of it, and that of the pulses times their voltage
+    rate, now, edges = R / L, i, []
+    t, rest = np.zeros(1), (pattern.base * V - e) / R
+    push = np.full(i.shape, pattern.base * period)  # volt-seconds, in bus voltages
+    extra = np.zeros_like(i)  # charge of the pulses, times their level
     for pulse in pattern.pulses:
-        for goal, until in ((rest, pulse.start), ((pulse.level * V - e) / R, pulse.end)):
-            dt = until - t
-            after = goal + (now - goal) * np.exp(-rate * dt)
-            part = goal * dt + (now - after) / rate
-            charge += part
-            t, now = until, after
-            edges.append(after)
-        extra += (pulse.level - pattern.base) * part
-    dt = period - t
-    after = rest + (now - rest) * np.exp(-rate * dt)
-    charge += rest * dt + (now - after) / rate
+        before = rest + (now - rest) * np.exp(rate * (t - pulse.start))
+        goal, dt = (pulse.level * V - e) / R, pulse.end - pulse.start
+        now, t, above = goal + (before - goal) * np.exp(-rate * dt), pulse.end, pulse.level - pattern.base
+        push = push + above * dt
+        extra += above * (goal * dt + (before - now) / rate)
+        edges += [before, now]
+    after = rest + (now - rest) * np.exp(rate * (t - period))
+    charge = (push * V - e * period - L * (after - i)) / R
     return Passage(after, charge, V * (pattern.base * charge + extra)), np.array([*edges, after])
 
 
+class _Stretch(NamedTuple):
+    """Current that goes from `start` to `end` in `dt`, exponentially towards `goal`."""
+
+    start: Array
+    end: Array
+    goal: Array
+    dt: Array
+
+
 def _step_by_step(i: Array, e: Array, winding: Winding, period: Pieces) -> Passage:
-    """Return the passage of a current that may change its sign."""
+    """Return the passage of a current that may change its sign; all arrays have the shape (winding,)."""
     V, R, L = winding
-    charge, electrical = np.zeros_like(i), np.zeros_like(i)
-    for dt, forward, backward in zip(*period, strict=True):
-        ahead, behind = (forward * V - e) / R, (backward * V - e) / R
-        goal = np.where(i > 0, ahead, behind)
-        after = goal + (i - goal) * np.exp(-dt * R / L)
-        at_zero = (forward != backward) & (i * after <= 0)
-        if at_zero.any():
-            until, onward = _at_zero(at_zero, i, goal, ahead, behind, R / L)
-            until = np.minimum(until, dt)
-            before, rest = np.where(at_zero, until, dt), np.where(at_zero, dt - until, 0.0)
-            end = np.where(at_zero, -onward * np.expm1(-rest * R / L), after)
-            meeting = np.where(at_zero, 0.0, after)
-            second = onward * rest + (meeting - end) * L / R
-        else:
-            before, end, meeting, second, onward = dt, after, after, 0.0, goal
-        first = goal * before + (i - meeting) * L / R
-        charge += first + second
-        electrical += (goal * R + e) * first + (onward * R + e) * second
-        i = end
-    return Passage(i, charge, electrical)
+    ahead, behind = (period.forward * V - e) / R, (period.backward * V - e) / R
+    kept, dead = np.exp(-period.duration * (R / L)), ahead != behind
+    some_dead, found = dead.any(axis=1), []
+    for k, dt in enumerate(period.duration):
+        goal = np.where(i > 0, ahead[k], behind[k]) if some_dead[k] else ahead[k]
+        whole = _Stretch(i, goal + (i - goal) * kept[k], goal, dt)
+        at_zero = dead[k] & (i * whole.end <= 0)
+        found += _over_zero(at_zero, whole, ahead[k], behind[k], R / L) if at_zero.any() else [whole]
+        i = found[-1].end
+    start, end, goal, dt = (np.array(x) for x in zip(*found, strict=True))
+    charge = goal * dt + (start - end) * (L / R)
+    # In the order of time: empty stretches, which others need, change no bit.
+    total, electrical = (np.add.accumulate(x, axis=0)[-1] for x in (charge, (goal * R + e) * charge))
+    return Passage(i, total, electrical)
 
 
-def _at_zero(
-    at_zero: npt.NDArray[np.bool_], i: Array, goal: Array, ahead: Array, behind: Array, rate: Array
-) -> tuple[Array, Array]:
-    """Return when the current is zero [s], and where it goes from there: nowhere, unless the back-EMF drives it."""
+def _over_zero(at_zero: npt.NDArray[np.bool_], whole: _Stretch, ahead: Array, behind: Array, rate: Array) -> list[_Stretch]:
+    """Return the stretch up to the instant at which the current is zero and the one after it, empty where it never is.
+
+    At zero the current stays, unless the back-EMF drives it on.
+    """
+    i, after, goal, dt = whole
     crossing = at_zero & (goal != 0) & (i != 0)
-    share = np.where(crossing, 1 - i / np.where(crossing, goal, 1.0), 1.0)
-    return np.log(share) / rate, np.maximum(ahead, 0.0) + np.minimum(behind, 0.0)
+    until = np.log(np.where(crossing, 1 - i / np.where(crossing, goal, 1.0), 1.0)) / rate
+    rest = np.where(at_zero, dt - np.minimum(until, dt), 0.0)
+    onward = np.maximum(ahead, 0.0) + np.minimum(behind, 0.0)
+    meeting = np.where(at_zero, 0.0, after)
+    end = np.where(at_zero, -onward * np.expm1(-rest * rate), after)
+    return [_Stretch(i, meeting, goal, dt - rest), _Stretch(meeting, end, onward, rest)]
