@@ -4,15 +4,18 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
-from io import StringIO
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 from rich.console import Console
 
+import experiments.log_commands
+import experiments.run_commands  # noqa: F401  # both register their commands
+from experiments.app import app
 from experiments.errors import ExperimentError
 from experiments.interruption import INTERRUPTED, importing, terminating
+from experiments.page import new_page, show
 from experiments.results import results_folder, write_summary, write_whole
 from experiments.search import Search
 from identify import IdentificationError
@@ -23,8 +26,6 @@ from sim.scenario import Scenario
 from sim.scenario_file import load, to_toml
 
 DESCRIPTION = "A MuJoCo testbench for the dynamic identification of robots."
-
-app = tyro.extras.SubcommandApp()
 
 Seed = Annotated[int | None, tyro.conf.arg(metavar="INT")]
 Name = Annotated[str | None, tyro.conf.arg(metavar="NAME")]
@@ -50,7 +51,7 @@ def table1(out: Path = Path("runs/table1"), chain: str = "both", seed: Seed = No
     if seed is not None and scenario is not None:
         raise ExperimentError(f"--seed {seed} and --scenario {scenario} name two trajectories: give one")
     chains = ("paper", "idbench") if chain == "both" else (chain,)
-    page = _page()
+    page = new_page()
     with results_folder(out) as folder:
         table = Table1(load(scenario or SCENARIO) if seed is None else _search(seed), chains)
         print_table1(page, table)
@@ -58,7 +59,7 @@ def table1(out: Path = Path("runs/table1"), chain: str = "both", seed: Seed = No
         write_log(table.log, folder / "log.parquet")
         record_table1(folder / "recording.rrd", table)
         write_summary(folder / "summary.json", table.summary())
-    _show(page)
+    show(page)
 
 
 @app.command(name="search")
@@ -69,12 +70,12 @@ def search(seed: int = 0, out: File = None) -> None:
         seed: The same seed gives the same trajectory.
         out: Scenario file (TOML) to write; printed if none is given.
     """
-    scenario, page = _search(seed), _page()
+    scenario, page = _search(seed), new_page()
     text = to_toml(scenario)
     if out is not None:
         write_whole(out, text)
     page.out(f"{out}: {scenario.origin}" if out is not None else text.rstrip("\n"))
-    _show(page)
+    show(page)
 
 
 @app.command(name="list")
@@ -82,9 +83,9 @@ def list_plugins() -> None:
     """List the plug-ins: what can be combined, one line each."""
     from experiments.plugins import print_plugins
 
-    page = _page()
+    page = new_page()
     print_plugins(page)
-    _show(page)
+    show(page)
 
 
 @app.command(name="view")
@@ -113,9 +114,9 @@ def run(args: Sequence[str] | None = None) -> int:
     try:
         with terminating():
             if words == ["--version"]:
-                page = _page()
+                page = new_page()
                 page.print(f"idbench {version('idbench')}")
-                _show(page)
+                show(page)
             else:
                 app.cli(prog="idbench", description=DESCRIPTION, args=words)
     except (IdentificationError, BenchError, ExperimentError) as error:
@@ -125,23 +126,6 @@ def run(args: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has gone, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 0
-
-
-def _page() -> Console:
-    """Return a console that keeps what is printed: it is shown when everything has gone well, whatever the terminal does."""
-    terminal = Console()
-    return Console(file=StringIO(), width=terminal.width, force_terminal=terminal.is_terminal, highlight=False)
-
-
-def _show(page: Console) -> None:
-    if sys.stdout is not None and isinstance(page.file, StringIO):  # None where it was closed before we began
-        try:
-            sys.stdout.write(page.file.getvalue())
-            sys.stdout.flush()
-        except BrokenPipeError:
-            raise
-        except OSError as error:
-            raise ExperimentError(f"cannot print: {error.strerror}") from error
 
 
 def _complain(what: str, code: int) -> int:

@@ -62,11 +62,11 @@ def write_summary(path: Path, summary: dict[str, Any]) -> None:
     path.write_text(json.dumps({"version": version("idbench"), **summary}, indent=2, allow_nan=False) + "\n")
 
 
-def summarize(estimate: Estimate, truth: list[float]) -> dict[str, Any]:
-    """Return one model's entry of a summary: estimate, error, sigma, condition number, rows, residual."""
+def summarize(estimate: Estimate, truth: list[float] | None) -> dict[str, Any]:
+    """Return one model's entry of a summary: estimate, error if the truth is known, sigma, Cond(W), rows, residual."""
     return {
         "estimate": estimate.X.tolist(),
-        "relative_error_percent": estimate.relative_error_percent(truth).tolist(),
+        "relative_error_percent": None if truth is None else estimate.relative_error_percent(truth).tolist(),
         "sigma": estimate.sigma.tolist(),
         "relative_sigma_percent": estimate.relative_sigma_percent.tolist(),
         "condition_number": float(estimate.condition_number),

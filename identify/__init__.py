@@ -29,6 +29,7 @@ from identify.errors import IdentificationError as IdentificationError
 from identify.errors import LogError as LogError
 from identify.errors import PluginError as PluginError
 from identify.errors import SettingError as SettingError
+from identify.errors import TimeError as TimeError
 from identify.errors import UnknownNameError as UnknownNameError
 from identify.estimate import Estimate as Estimate
 from identify.estimators import ESTIMATORS as ESTIMATORS

@@ -9,6 +9,10 @@ class LogError(IdentificationError):
     """A motion log that cannot be used as it is."""
 
 
+class TimeError(LogError):
+    """Sample times that are not uniform."""
+
+
 class SettingError(IdentificationError):
     """A setting that is out of its range, or does not fit the log it meets."""
 

@@ -1,12 +1,13 @@
-"""Motion logs on disk: Parquet with the columns t, q1, q2, ..., tau1, tau2, ... in SI units."""
+"""Motion logs on disk: CSV or Parquet with the columns t, q1, q2, ..., tau1, tau2, ... in SI units."""
 
 import json
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-from pyarrow import parquet
+from pyarrow import csv, parquet
 
 from identify.arrays import Array
 from identify.errors import LogError
@@ -14,9 +15,32 @@ from identify.motion_log import MotionLog, TorqueChannel
 
 _TORQUE = b"idbench.torque"
 
+CSV = ".csv"
+"""What the name of a CSV file ends with; every other file is taken for Parquet."""
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """The columns of a file, as they are.
+
+    Parameters
+    ----------
+    t : Array, shape (time,)
+        [s].
+    q, tau : Array, shape (time, joint)
+        [rad], [N m].
+    torque : TorqueChannel or None
+        What the file says of its torque.
+    """
+
+    t: Array
+    q: Array
+    tau: Array
+    torque: TorqueChannel | None
+
 
 def write_log(log: MotionLog, path: Path) -> None:
-    """Write one run to a Parquet file; the torque channel goes into its metadata.
+    """Write one run to a CSV or Parquet file; the torque channel goes into the metadata of Parquet, CSV has no place for it.
 
     Raises
     ------
@@ -31,18 +55,21 @@ def write_log(log: MotionLog, path: Path) -> None:
     columns = {"t": log.t}
     columns |= {f"q{j + 1}": log.q[:, j] for j in joints}
     columns |= {f"tau{j + 1}": log.tau[:, j] for j in joints}
-    torque = {"meaning": log.torque.meaning, "delay": log.torque.delay, "gain": log.torque.gain}
     table = pa.table({name: pa.array(values) for name, values in columns.items()})
+    if path.suffix == CSV:
+        csv.write_csv(table, path)
+        return
+    torque = {"meaning": log.torque.meaning, "delay": log.torque.delay, "gain": log.torque.gain}
     parquet.write_table(table.replace_schema_metadata({_TORQUE: json.dumps(torque).encode()}), path)
 
 
 def read_log(path: Path, torque: TorqueChannel | None = None) -> MotionLog:
-    """Read a log from a Parquet file.
+    """Read a log from a CSV or Parquet file.
 
     Parameters
     ----------
     path : Path
-        The file.
+        The file; CSV if its name ends with .csv.
     torque : TorqueChannel, optional
         What its torque means; by default what the file says of it.
 
@@ -52,31 +79,53 @@ def read_log(path: Path, torque: TorqueChannel | None = None) -> MotionLog:
         If the file cannot be read, lacks a column, does not say what its torque means and `torque` does not either, or
         holds values that make no log.
     """
-    try:
-        with Path(path).open("rb") as file:
-            table = parquet.read_table(file)
-    except OSError as error:
-        raise LogError(f"cannot read the log {path}: {error.strerror or error}") from error
-    except pa.ArrowException as error:
-        raise LogError(f"cannot read the log {path} as Parquet: {str(error).splitlines()[0]}") from error
-    names = table.column_names
-    n = max(sum(name.startswith("q") and name[1:].isdigit() for name in names), 1)
-    needed = ["t", *(f"q{j + 1}" for j in range(n)), *(f"tau{j + 1}" for j in range(n))]
-    if wrong := set(needed) ^ {name for name in names if re.fullmatch(r"t|(q|tau)\d+", name)}:
-        raise LogError(f"{path} must have the columns {', '.join(needed)}; missing or left over: {', '.join(sorted(wrong))}")
-    said = (table.schema.metadata or {}).get(_TORQUE)
-    if torque is None and said is None:
+    found = read_columns(path)
+    channel = torque or found.torque
+    if channel is None:
         raise LogError(
             f"{path} does not say what its torque means: instantaneous, held or averaged, and with what "
             "delay; say it with torque=TorqueChannel(...)"
         )
-    channel = torque or _channel(path, said or b"")
-    q, tau = _columns(table, "q", n), _columns(table, "tau", n)
-    return MotionLog.at_times(table["t"].to_numpy(), q, tau, channel)
+    return MotionLog.at_times(found.t, found.q, found.tau, channel)
 
 
-def _columns(table: pa.Table, letter: str, n: int) -> Array:
-    return np.stack([table[f"{letter}{j + 1}"].to_numpy() for j in range(n)], axis=-1)
+def read_columns(path: Path) -> Columns:
+    """Read t, q and tau from a file, whatever their times; raise LogError as `read_log`.
+
+    Columns qd1, qd2, ... are allowed and not used: velocities come from the positions, by the chain's own differences.
+    """
+    table = _table(Path(path))
+    names = table.column_names
+    n = max(sum(bool(re.fullmatch(r"q\d+", name)) for name in names), 1)
+    needed = ["t", *(f"q{j + 1}" for j in range(n)), *(f"tau{j + 1}" for j in range(n))]
+    if wrong := set(needed) ^ {name for name in names if re.fullmatch(r"t|(q|tau)\d+", name)}:
+        raise LogError(
+            f"{path} must have a header with the columns {', '.join(needed)}; missing or left over: {', '.join(sorted(wrong))}"
+        )
+    said = (table.schema.metadata or {}).get(_TORQUE)
+    numbers = {name: _numbers(path, table, name) for name in needed}
+    q, tau = (np.stack([numbers[f"{letter}{j + 1}"] for j in range(n)], axis=-1) for letter in ("q", "tau"))
+    return Columns(numbers["t"], q, tau, None if said is None else _channel(path, said))
+
+
+def _table(path: Path) -> pa.Table:
+    try:
+        with path.open("rb") as file:
+            return csv.read_csv(file) if path.suffix == CSV else parquet.read_table(file)
+    except OSError as error:
+        raise LogError(f"cannot read the log {path}: {error.strerror or error}") from error
+    except pa.ArrowException as error:
+        kind = "CSV" if path.suffix == CSV else "Parquet (a CSV file's name must end with .csv)"
+        raise LogError(f"cannot read the log {path} as {kind}: {str(error).splitlines()[0]}") from error
+
+
+def _numbers(path: Path, table: pa.Table, name: str) -> Array:
+    """Return a column as numbers; an empty cell is NaN, which no log may have."""
+    column = table[name]
+    if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type)):
+        raise LogError(f"{path}: column {name} holds {column.type}, not numbers")
+    values: Array = column.cast(pa.float64()).to_numpy()
+    return values
 
 
 def _channel(path: Path, said: bytes) -> TorqueChannel:

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from identify.arrays import Array, frozen, require_finite, require_positive
-from identify.errors import LogError, SettingError
+from identify.errors import LogError, SettingError, TimeError
 
 Meaning = Literal["instantaneous", "held", "averaged"]
 
@@ -154,14 +154,14 @@ def sampling_frequency(t: Array) -> float:
     mean = (t[-1] - t[0]) / (len(t) - 1)
     k = int(np.argmax(np.abs(step - mean)))
     if abs(step[k] - mean) > UNIFORMITY * mean:
-        raise LogError(
+        raise TimeError(
             f"time is not uniform: a step of {step[k]:.6g} s after t = {t[k]:.6g} s, where the mean step is {mean:.6g} s; "
             "resample the log at a fixed frequency first"
         )
     late = t - t[0] - mean * np.arange(len(t))
     if np.abs(late).max() > mean / 2:
         k = int(np.argmax(np.abs(late)))
-        raise LogError(
+        raise TimeError(
             f"time drifts: t = {t[k]:.6g} s is {abs(late[k]):.3g} s from where uniform sampling at {1 / mean:.6g} Hz puts "
             "it; resample the log at a fixed frequency first"
         )

@@ -12,7 +12,7 @@ from sim.drives.winding import Winding, pass_period
 from sim.errors import ScenarioError
 from sim.motors import Array, Motors
 from sim.robot import Robot
-from sim.settings import EachPositiveOrNone, NotNegative, Number, Positive, settings
+from sim.settings import EachPositiveOrNone, NotNegative, Number, Positive, Share, settings
 
 
 @final
@@ -33,6 +33,8 @@ class SwitchedDrive(AbstractDrive):
     """Bandwidth of the current loop [Hz], below a fifth of the switching frequency."""
     dead_time: NotNegative = 520e-9
     """Time for which both transistors of a leg are off before one turns on [s]; below a tenth of the PWM period."""
+    emf_compensation: Share = 1.0
+    """Share of the back-EMF that the current loop feeds forward; without it the motor seems to have more inertia."""
     duty_resolution: Annotated[Number, Field(ge=0, le=0.1)] = 0.001
     """Step of the duty, as a share of the period; 0 is exact."""
     bus_voltage: EachPositiveOrNone = None
@@ -94,7 +96,7 @@ class SwitchedAmplifier(AbstractAmplifier):
         self._kp = R / lost * -np.expm1(-2 * np.pi * settings.bandwidth * h)
         self._ki = self._kp * lost
         self._most = (1 - 4 * settings.dead_time / h) * V
-        self._least = 2 * settings.duty_resolution
+        self._least, self._known = 2 * settings.duty_resolution, settings.emf_compensation
         self.i, self._sum, self.electrical, self.mechanical = np.zeros((4, *V.shape))
 
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
@@ -103,7 +105,8 @@ class SwitchedAmplifier(AbstractAmplifier):
         e = self._K * speed
         charge = np.empty((steps, *demand.shape))
         for k in range(steps):
-            self.i, charge[k], electrical = pass_period(self.i, self._index(wanted), e[k], self._winding, self._modulator)
+            m = self._index(wanted, self._known * e[k])
+            self.i, charge[k], electrical = pass_period(self.i, m, e[k], self._winding, self._modulator)
             self.electrical += electrical
         self.mechanical += (e * charge).sum(axis=0)
         return charge * (self._K / self._h)
@@ -113,10 +116,10 @@ class SwitchedAmplifier(AbstractAmplifier):
         """What became heat [J]: what came in, less what went to the rotor and what is stored, L i^2 / 2."""
         return self.electrical - self.mechanical - self._winding.L / 2 * self.i**2
 
-    def _index(self, wanted: Array) -> Array:
+    def _index(self, wanted: Array, emf: Array) -> Array:
         """Return the modulation that the current loop asks for; its integrator rests while the voltage is at its limit."""
         error = wanted - self.i
-        asked = self._kp * error + self._sum
+        asked = self._kp * error + self._sum + emf
         v = np.minimum(np.maximum(asked, -self._most), self._most)
         self._sum += self._ki * error * (v == asked)
         m = v / self._winding.V

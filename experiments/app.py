@@ -1,0 +1,5 @@
+"""The application that commands register with."""
+
+import tyro
+
+app = tyro.extras.SubcommandApp()

@@ -1,0 +1,109 @@
+"""A log identified by some models: what every experiment prints, records and writes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from experiments.results import summarize
+from identify import (
+    CHAINS,
+    ESTIMATORS,
+    MODELS,
+    Array,
+    Basis,
+    Chain,
+    Estimate,
+    ExplicitModel,
+    MotionLog,
+    UnknownNameError,
+    identify_each,
+    scara,
+)
+
+BASES = {"scara": scara}
+"""Bases of the robots that ship."""
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """A log, or several of one fit, identified when it is asked for.
+
+    Parameters
+    ----------
+    logs : tuple of MotionLog
+        What was logged.
+    robot : str
+        Name of the robot.
+    truth : mapping of str to float, optional
+        The true parameters, where they are known.
+    models : tuple of str
+        Names of the models.
+    chain, estimator : str
+        Their names.
+    """
+
+    logs: tuple[MotionLog, ...]
+    robot: str = "scara"
+    truth: Mapping[str, float] | None = None
+    models: tuple[str, ...] = ("explicit", "implicit", "power")
+    chain: str = "idbench"
+    estimator: str = "WLS"
+
+    def __post_init__(self) -> None:
+        if self.robot not in BASES:
+            raise UnknownNameError(f"no basis for robot {self.robot!r}; known: {', '.join(BASES)}")
+        _ = self.processing, ESTIMATORS.create(self.estimator), [MODELS.create(name) for name in self.models]
+
+    @property
+    def basis(self) -> Basis:
+        """The robot, linear in its parameters."""
+        return BASES[self.robot]()
+
+    @property
+    def processing(self) -> Chain:
+        """The chain."""
+        return CHAINS.create(self.chain)
+
+    @cached_property
+    def estimates(self) -> dict[str, Estimate]:
+        """The estimate of every model."""
+        models = {name: MODELS.create(name) for name in self.models}
+        return identify_each(self._fit, self.basis, models, self.processing, ESTIMATORS.create(self.estimator))
+
+    @cached_property
+    def explained(self) -> dict[str, Array]:
+        """How much of each joint's torque every estimate explains, as a share of its variance, shape (joint,)."""
+        system = self.processing.build(self._fit, self.basis, ExplicitModel())
+        return {name: _explained(system.Y, system.W @ e.X, system.group) for name, e in self.estimates.items()}
+
+    @property
+    def _fit(self) -> MotionLog | Sequence[MotionLog]:
+        return self.logs[0] if len(self.logs) == 1 else list(self.logs)
+
+    def summary(self) -> dict[str, Any]:
+        """Return what a summary.json says of it."""
+        truth = None if self.truth is None else list(self.truth.values())
+        models = {name: summarize(e, truth) for name, e in self.estimates.items()}
+        for name, share in self.explained.items():
+            models[name]["explained_share"] = share.tolist()
+        channel = self.logs[0].torque
+        return {
+            "parameters": list(self.basis.parameters),
+            "truth": truth,
+            "robot": self.robot,
+            "chain": self.chain,
+            "estimator": self.estimator,
+            "torque": {"meaning": channel.meaning, "delay": channel.delay, "gain": channel.gain},
+            "models": models,
+        }
+
+
+def _explained(measured: Array, predicted: Array, group: np.typing.NDArray[np.intp]) -> Array:
+    shares = []
+    for joint in np.unique(group):
+        y, rest = measured[group == joint], (measured - predicted)[group == joint]
+        shares.append(1 - np.sum(rest**2) / max(np.sum((y - y.mean()) ** 2), 1e-300))
+    return np.array(shares)

@@ -1,0 +1,150 @@
+"""Commands that work on logs."""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from experiments.app import app
+from experiments.errors import ExperimentError
+from experiments.interruption import importing
+from experiments.page import new_page, show
+from experiments.results import results_folder, write_summary
+from identify import MODELS, Basis, Chain, MotionLog, TimeError, TorqueChannel
+from identify.log_file import read_columns, read_log, write_log
+
+Meaning = Literal["held", "instantaneous", "averaged"]
+File = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
+Delay = Annotated[str | None, tyro.conf.arg(metavar="SECONDS|estimate")]
+Held = Annotated[Meaning | None, tyro.conf.arg(metavar="held|instantaneous|averaged")]
+
+
+@app.command(name="identify")
+def identify(  # noqa: PLR0913, PLR0917  # the options of a command
+    log: tyro.conf.Positional[Path],
+    robot: str = "scara",
+    torque: Held = None,
+    torque_delay: Delay = None,
+    chain: str = "idbench",
+    model: str = "all",
+    estimator: str = "WLS",
+    out: File = None,
+) -> None:
+    """Identify a log: CSV or Parquet with the columns t, q1, q2, ..., tau1, tau2, ... in SI units.
+
+    Args:
+        log: The file; its times uniform to 1 %.
+        robot: Name of the robot.
+        torque: What a torque sample means: held from its sample on for a period (a controller's command), the torque at an
+            instant (a measurement), or the mean over a period. Asked for unless the file says it.
+        torque_delay: From a sample to the instant it speaks for, in seconds, or `estimate` to find it from the log.
+        chain: Signal processing.
+        model: all, explicit, implicit or power.
+        estimator: OLS, WLS, ...
+        out: Folder for summary.json, recording.rrd and log.parquet.
+    """
+    os.environ.setdefault("RUST_LOG", "off")  # what goes wrong in rerun we say ourselves, in one line
+    with importing():
+        from experiments.identified import Identified
+        from experiments.tables import print_identified
+
+    page, models = new_page(), tuple(MODELS) if model == "all" else (model,)
+    named = Identified((), robot, models=models, chain=chain, estimator=estimator)  # complains of names first
+    known, said = _read(log, torque, torque_delay, named.basis, named.processing)
+    found = replace(named, logs=(known,))
+    print_identified(page, found, str(log))
+    if said:
+        page.print(said)
+    if out is not None:
+        from experiments.recording.identified import record_log
+
+        with results_folder(out) as folder:
+            write_log(known, folder / "log.parquet")
+            record_log(folder / "recording.rrd", found)
+            write_summary(folder / "summary.json", {"experiment": "identify", "log": log.name, **found.summary()})
+        page.print(f"written to {out}; see it: uv run idbench view {out}", soft_wrap=True)
+    show(page)
+
+
+@app.command(name="resample")
+def resample(log: tyro.conf.Positional[Path], fs: float, out: Path, torque: Held = None) -> None:
+    """Write a log anew at a fixed sampling frequency.
+
+    Args:
+        log: The file, CSV or Parquet, its times in any steps.
+        fs: Sampling frequency [Hz].
+        out: File to write, CSV or Parquet.
+        torque: What a torque sample means; asked for unless the file says it.
+    """
+    from identify.resample import resample as at
+
+    columns, page = read_columns(log), new_page()
+    channel = columns.torque if torque is None else TorqueChannel(torque)
+    if channel is None:
+        raise ExperimentError(f"{log} does not say what its torque means: add --torque held, instantaneous or averaged")
+    _write(at(columns.t, columns.q, columns.tau, channel, fs), out)
+    page.print(f"written to {out}", soft_wrap=True)
+    show(page)
+
+
+@app.command(name="export")
+def export(folder: tyro.conf.Positional[Path], out: File = None) -> None:
+    """Write the logs of a results folder as CSV.
+
+    Args:
+        folder: Results folder, such as runs/table2.
+        out: Folder to write to; the results folder itself by default.
+    """
+    logs, page = sorted(folder.glob("log*.parquet")), new_page()
+    if not logs:
+        raise ExperimentError(f"there is no log in {folder}: name a results folder, such as runs/table1")
+    for path in logs:
+        log, target = read_log(path), (out or folder) / f"{path.stem}.csv"
+        _write(log, target)
+        delay = f"--torque-delay {log.torque.delay:g}"
+        page.print(f"written to {target}; idbench identify {target} --torque {log.torque.meaning} {delay}", soft_wrap=True)
+    show(page)
+
+
+def _write(log: MotionLog, path: Path) -> None:
+    try:
+        with results_folder(path.parent) as folder:
+            write_log(log, folder / path.name)
+    except ValueError as error:
+        raise ExperimentError(f"cannot write {path}: {error}") from error
+
+
+def _read(path: Path, torque: Meaning | None, delay: str | None, basis: Basis, chain: Chain) -> tuple[MotionLog, str]:
+    """Return the log, its torque read as the options say, and what is to be said of its delay."""
+    columns = read_columns(path)
+    meaning = torque or (columns.torque.meaning if columns.torque else None)
+    if meaning is None:
+        raise ExperimentError(
+            f"{path} does not say what its torque means: add --torque held (a controller's command), instantaneous (a "
+            "measurement) or averaged, and --torque-delay SECONDS or estimate"
+        )
+    stated = columns.torque or TorqueChannel(meaning)
+    channel = replace(stated, meaning=meaning, delay=_seconds(delay, 0.0 if torque else stated.delay))
+    try:
+        log = MotionLog.at_times(columns.t, columns.q, columns.tau, channel)
+    except TimeError as error:
+        fs = (len(columns.t) - 1) / (columns.t[-1] - columns.t[0])
+        raise ExperimentError(f"{path}: {error}: idbench resample {path} --fs {fs:.4g} --out uniform{path.suffix}") from error
+    if delay != "estimate":
+        return log, ""
+    from identify.delay import estimate_delay
+
+    found = estimate_delay(log, basis, chain)
+    told = MotionLog(log.fs, log.q, log.tau, replace(channel, delay=found.delay))
+    return told, f"torque delay estimated from the log: {1e3 * found.delay:.4g} ms, sigma {1e3 * found.sigma:.2g} ms"
+
+
+def _seconds(delay: str | None, otherwise: float) -> float:
+    if delay is None or delay == "estimate":
+        return otherwise
+    try:
+        return float(delay)
+    except ValueError:
+        raise ExperimentError(f"--torque-delay {delay} must be seconds, such as 0.002, or estimate") from None

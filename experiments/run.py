@@ -1,0 +1,55 @@
+"""A scenario, simulated and identified: what do its imperfections do to each model?"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from experiments.identified import Identified
+from sim.engine import Progress, simulate
+from sim.run import Run
+from sim.scara import scara_truth
+from sim.scenario import Scenario
+from sim.scenario_file import to_dict
+
+
+@dataclass(frozen=True, eq=False)
+class ScenarioRun:
+    """A scenario, simulated and identified when it is asked for.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What to run.
+    chain, estimator : str
+        Their names.
+    progress : callable, optional
+        Hears how much of the simulation is done.
+    """
+
+    scenario: Scenario
+    chain: str = "idbench"
+    estimator: str = "WLS"
+    progress: Progress | None = None
+
+    def __post_init__(self) -> None:
+        Identified((), truth=None, chain=self.chain, estimator=self.estimator)  # names are checked before the simulation
+
+    @cached_property
+    def run(self) -> Run:
+        """The simulation."""
+        return simulate(self.scenario, progress=self.progress)
+
+    @cached_property
+    def identified(self) -> Identified:
+        """What the models make of its log."""
+        truth = scara_truth(self.run.robots[0])
+        return Identified((self.run.alone(),), truth=truth, chain=self.chain, estimator=self.estimator)
+
+    def summary(self) -> dict[str, Any]:
+        """Return summary.json."""
+        return {
+            "experiment": "run",
+            "seed": self.scenario.seed,
+            "scenario": to_dict(self.scenario),
+            **self.identified.summary(),
+        }

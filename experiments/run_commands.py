@@ -1,0 +1,81 @@
+"""Commands that simulate."""
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+from rich.console import Console
+
+from experiments.app import app
+from experiments.errors import ExperimentError
+from experiments.interruption import importing
+from experiments.page import new_page, show
+from experiments.results import results_folder, write_summary, write_whole
+from identify.log_file import write_log
+from sim.scenario_file import load, names, to_toml
+
+File = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
+
+
+@app.command(name="run")
+def run(scenario: tyro.conf.Positional[str], out: File = None, chain: str = "idbench", estimator: str = "WLS") -> None:
+    """Simulate a scenario in closed loop, identify it with all models, and record it.
+
+    Args:
+        scenario: Name of a scenario that ships, or a file (TOML).
+        out: Folder for summary.json, recording.rrd, log.parquet and scenario.toml; runs/<name of the scenario> by default.
+        chain: Signal processing.
+        estimator: OLS, WLS, ...
+    """
+    os.environ.setdefault("RUST_LOG", "off")  # what goes wrong in rerun we say ourselves, in one line
+    with importing():
+        from experiments.recording.identified import record_run
+        from experiments.run import ScenarioRun
+        from experiments.tables import print_identified
+
+    page, described = new_page(), load(scenario)
+    folder_name = out or Path("runs") / described.name
+    with results_folder(folder_name) as folder:
+        ran = ScenarioRun(described, chain, estimator, watch(f"simulating {described.name}"))
+        print_identified(page, ran.identified, f"Scenario {described.name}")
+        page.print(f"written to {folder_name}; see it: uv run idbench view {folder_name}", soft_wrap=True)
+        write_log(ran.run.alone(), folder / "log.parquet")
+        (folder / "scenario.toml").write_text(to_toml(described))
+        record_run(folder / "recording.rrd", ran)
+        write_summary(folder / "summary.json", ran.summary())
+    show(page)
+
+
+@app.command(name="scenario")
+def scenario(name: tyro.conf.Positional[Annotated[str | None, tyro.conf.arg(metavar="NAME")]] = None, out: File = None) -> None:
+    """Write a scenario out to start from, every setting explained; without a name, list those that ship.
+
+    Args:
+        name: Name of a scenario, or a file.
+        out: File (TOML) to write; printed if none is given.
+    """
+    page = new_page()
+    if name is None:
+        for known in names():
+            page.out(f"{known:16} {load(known).origin}")
+    elif out is None:
+        page.out(to_toml(load(name)).rstrip("\n"))
+    elif out.exists():
+        raise ExperimentError(f"{out} exists: choose another --out")
+    else:
+        write_whole(out, to_toml(load(name)))
+        page.out(f"written to {out}; run it: uv run idbench run {out}")
+    show(page)
+
+
+class watch:  # noqa: N801  # used as a function
+    """Shows progress on the terminal's error stream, if it is a terminal."""
+
+    def __init__(self, what: str) -> None:
+        self._what, self._console = what, Console(stderr=True)
+
+    def __call__(self, share: float) -> None:
+        """Hear the share that is done."""
+        if self._console.is_terminal:
+            self._console.print(f"{self._what}: {share:4.0%}", end="\r" if share < 0.99 else "\n", highlight=False)
