@@ -1,7 +1,7 @@
 """A log identified by some models: what every experiment prints, records and writes."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -43,6 +43,8 @@ class Identified:
         Names of the models.
     chain, estimator : str
         Their names.
+    trim : float, optional
+        Time at either end of a log that makes no rows [s]; by default what the chain needs.
     """
 
     logs: tuple[MotionLog, ...]
@@ -51,6 +53,7 @@ class Identified:
     models: tuple[str, ...] = ("explicit", "implicit", "power")
     chain: str = "idbench"
     estimator: str = "WLS"
+    trim: float | None = None
 
     def __post_init__(self) -> None:
         if self.robot not in BASES:
@@ -65,7 +68,7 @@ class Identified:
     @property
     def processing(self) -> Chain:
         """The chain."""
-        return CHAINS.create(self.chain)
+        return replace(CHAINS.create(self.chain), trim=self.trim)
 
     @cached_property
     def estimates(self) -> dict[str, Estimate]:

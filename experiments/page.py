@@ -7,7 +7,6 @@ from rich.console import Console
 
 from experiments.errors import ExperimentError
 
-
 WIDTH = 120
 """Characters that the widest table needs."""
 

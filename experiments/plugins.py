@@ -18,6 +18,7 @@ from identify import (
     PREFILTERS,
 )
 from identify.plugins import PluginTable
+from sim.scenario_file import KINDS
 
 TABLES: tuple[PluginTable[Any], ...] = (
     BLOCKS,
@@ -29,6 +30,7 @@ TABLES: tuple[PluginTable[Any], ...] = (
     OPERATORS,
     CHAINS,
     ESTIMATORS,
+    *KINDS.values(),
 )
 """Every plug-in point."""
 

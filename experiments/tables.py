@@ -2,19 +2,21 @@
 
 from collections.abc import Iterable
 
-import numpy as np
 from rich import box
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from experiments.identified import Identified
+from experiments.table2 import PAPER, REALIZATIONS, Table2
 from identify import Estimate
 
 
 def new_table(title: str, columns: Iterable[str]) -> Table:
     """Return an empty table, its first column of names, the others of numbers."""
-    grid = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    grid = Table(
+        title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0)
+    )
     grid.add_column("", no_wrap=True)
     for heading in columns:
         grid.add_column(heading, justify="right", no_wrap=True)
@@ -44,8 +46,56 @@ def print_identified(console: Console, found: Identified, title: str) -> None:
 
 def _cells(estimate: Estimate, found: Identified, i: int) -> tuple[str, str, str]:
     if found.truth is None:
-        second = estimate.sigma[i]
+        second = f"{estimate.sigma[i]:.2g}"
     else:
-        truth = np.array(list(found.truth.values()))
-        second = 100 * (estimate.X[i] - truth[i]) / truth[i] if truth[i] else np.nan
-    return f"{estimate.X[i]:#.5g}", f"{second:.2g}", f"{estimate.relative_sigma_percent[i]:.2g}"
+        true = list(found.truth.values())[i]
+        second = percent(100 * (estimate.X[i] - true) / abs(true)) if true else ""
+    return f"{estimate.X[i]:#.5g}", second, f"{estimate.relative_sigma_percent[i]:.2g}"
+
+
+def percent(share: float) -> str:
+    """Return a signed percentage to two decimals, to none from a hundred on, to one digit below a hundredth."""
+    size = abs(share)
+    return f"{share:+.0f}" if size >= 100 else f"{share:+.2f}" if size >= 0.01 else f"{share:+.0e}" if size else "0"
+
+
+def print_table2(console: Console, table: Table2) -> None:
+    """Print the paper's Table 2 beside its twin, processed twice, and what each imperfection does alone."""
+    console.print(Text(f"Scenario {table.scenario.name}: {table.scenario.origin}\n"))
+    for model in REALIZATIONS:
+        console.print(_twin(table, model))
+    console.print(
+        Text("2s: 2 sigma, %s: %sigma, %e: error. Processed as in the paper (chain paper, OLS), and by chain idbench, WLS.\n")
+    )
+    console.print(Text("What each imperfection does alone, chain idbench: error of each parameter [%]\n"))
+    for form in next(iter(table.attribution.values())):
+        grid = new_table(f"{form} model", table.truth)
+        for name, errors in table.attribution.items():
+            grid.add_row(name, *(percent(error) for error in errors[form]))
+        console.print(grid)
+
+
+def _twin(table: Table2, model: str) -> Table:
+    paper, found = PAPER[model], {name: each[model] for name, each in table.found.items()}
+    estimates = {name: one.estimates[model] for name, one in found.items()}
+    heads = [f"{name}\n{what}" for name in found for what in ("X", "2s", "%s", "%e")]
+    columns = ["true\nX", *(f"Table 2\n{what}" for what in ("X", "2s", "%s")), *heads]
+    grid = new_table(f"{model} model, {REALIZATIONS[model]} realizations", columns)
+    for i, (name, true) in enumerate(table.truth.items()):
+        printed = f"{paper.estimate[i]:g}", f"{paper.two_sigma[i]:g}", f"{paper.relative_sigma_percent[i]:g}"
+        cells = [c for e in estimates.values() for c in _with_sigma(e, i, true)]
+        grid.add_row(name, f"{true:g}", *printed, *cells)
+    grid.add_section()
+    conds = [c for e in estimates.values() for c in (f"{e.condition_number:.0f}", "", "", "")]
+    grid.add_row("Cond(W)", "", f"{paper.condition_number:g}", "", "", *conds)
+    grid.add_row("rows", "", "1600", "", "", *(c for e in estimates.values() for c in (f"{e.rows}", "", "", "")))
+    return grid
+
+
+def _with_sigma(estimate: Estimate, i: int, true: float) -> tuple[str, str, str, str]:
+    return (
+        f"{estimate.X[i]:.4f}",
+        f"{2 * estimate.sigma[i]:.2g}",
+        f"{estimate.relative_sigma_percent[i]:.2g}",
+        percent(100 * (estimate.X[i] - true) / abs(true)),
+    )

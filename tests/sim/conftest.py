@@ -1,0 +1,22 @@
+"""What the tests of the bench share."""
+
+from dataclasses import replace
+
+import pytest
+
+from sim.scenario import Scenario
+from sim.scenario_file import load
+from sim.trajectories import Quintic
+
+MOVE = Quintic(((0.0, 0.0), (1.2, -1.0), (-0.4, 0.8), (0.6, -0.3)), (0.8, 1.0, 0.9), 0.3)
+
+
+@pytest.fixture(scope="session")
+def ideal() -> Scenario:
+    return load("ideal")
+
+
+@pytest.fixture(scope="session")
+def short(ideal: Scenario) -> Scenario:
+    """The ideal loop on three moves, 3.3 s."""
+    return replace(ideal, trajectory=MOVE)

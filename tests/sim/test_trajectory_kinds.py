@@ -1,0 +1,83 @@
+"""Trajectories of scenarios: ruckig's keep their limits and take no longer than they must; random ones repeat themselves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sim.errors import ScenarioError
+from sim.trajectories import TRAJECTORIES, Quintic, RandomMoves, TimeOptimal
+
+POINTS = ((0.0, 0.0), (1.5, -1.0), (1.4, 1.0), (-1.0, 0.9))
+FAST = TimeOptimal(POINTS, velocity=(4.0, 5.0), acceleration=(15.0, 20.0), jerk=(200.0, 300.0), rest=0.5)
+
+
+def test_ruckigs_moves_keep_their_limits_and_reach_one(robot):
+    """In every move some joint is at a limit all the time: none is slower than its limits allow."""
+    motion = FAST.plan(robot)
+    t = np.arange(0, motion.duration, 1e-4)
+    reference = motion.at(t, 1e4)
+    jerk = np.diff(reference.qdd, axis=0) * 1e4
+    for signal, limit in ((reference.qd, FAST.velocity), (reference.qdd, FAST.acceleration)):
+        assert (np.abs(signal).max(axis=0) <= np.array(limit) * (1 + 1e-9)).all()
+    moving = (t[:-1] > 0.51) & (t[:-1] < motion.duration - 0.51)
+    used = np.max(
+        [np.abs(reference.qd[:-1]) / FAST.velocity, np.abs(reference.qdd[:-1]) / FAST.acceleration, np.abs(jerk) / FAST.jerk],
+        axis=0,
+    ).max(axis=1)
+    assert np.quantile(used[moving], 0.02) > 0.99
+
+
+def test_its_derivatives_are_its_own(robot):
+    motion = FAST.plan(robot)
+    t, h = np.linspace(0.01, motion.duration - 0.01, 997), 1e-6
+    before, here, after = (motion.at(t + d, 1.0) for d in (-h, 0.0, h))
+    np.testing.assert_allclose((after.q - before.q) / (2 * h), here.qd, atol=1e-7)
+    np.testing.assert_allclose((after.qd - before.qd) / (2 * h), here.qdd, atol=2e-4)  # 300 rad/s^3 of jerk, and its steps
+
+
+def test_it_rests_at_its_waypoints_and_ends(robot):
+    motion = FAST.plan(robot)
+    ends = motion.at(np.array([0.0, 0.4, motion.duration - 0.4, motion.duration + 1.0]), 1.0)
+    np.testing.assert_allclose(ends.q[[0, 1]], [POINTS[0]] * 2, atol=1e-12)
+    np.testing.assert_allclose(ends.q[[2, 3]], [POINTS[-1]] * 2, atol=1e-9)
+    np.testing.assert_allclose(ends.qd, 0.0, atol=1e-9)
+
+
+def test_it_is_faster_than_fifth_order_moves_under_the_same_limits(robot):
+    from sim.trajectories import PointToPoint
+
+    quintic = PointToPoint.fastest(np.array(POINTS), FAST.velocity, FAST.acceleration, np.zeros(4))
+    assert FAST.plan(robot).duration - 1.0 < quintic.duration
+
+
+def test_random_moves_repeat_themselves_and_keep_their_settings(robot):
+    moves = RandomMoves(moves=8, durations=(0.3, 1.0), velocity=(3.0, 5.0), clearance=0.5, smallest_move=0.6, rest=1.0, seed=4)
+    planned = moves.plan(robot)
+    np.testing.assert_array_equal(planned.waypoints, moves.plan(robot).waypoints)
+    assert not np.array_equal(planned.waypoints, replace(moves, seed=5).plan(robot).waypoints)
+    assert (planned.peak_velocity <= np.array([3.0, 5.0]) * (1 + 1e-12)).all()
+    assert (np.abs(planned.waypoints) <= robot.ranges[:, 1] - 0.5).all()
+    assert (np.abs(np.diff(planned.waypoints, axis=0)) >= 0.6).all()
+    assert (planned.durations >= 0.3).all()
+    assert planned.dwells[0] == planned.dwells[-1] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("trajectory", "message"),
+    [
+        (TimeOptimal(((0.0, 0.0), (4.0, 0.0))), r"joint1 would move from 0 to 4 rad"),
+        (TimeOptimal(((0.0,), (1.0,)), velocity=1.0, acceleration=1.0), "the trajectory moves 1 joints, robot 'scara' has 2"),
+        (RandomMoves(clearance=3.0), "no waypoint is 0.4 rad from its neighbours"),
+        (Quintic(((0.0, 0.0), (1.0, 1.0)), (1e7,)), "the motion lasts 1e"),
+        (TimeOptimal(((0.0, 0.0), (1.0, 0.0)), velocity=(1.0, 2.0, 3.0)), "trajectory.velocity has 3 values for 2 joints"),
+    ],
+)
+def test_motions_that_make_no_sense_are_told(trajectory, message, robot):
+    with pytest.raises(ScenarioError, match=message):
+        trajectory.sample(robot, 100.0)
+
+
+@pytest.mark.parametrize("name", TRAJECTORIES.builtin)
+def test_every_kind_has_defaults_that_the_scara_can_follow(name, robot):
+    assert len(TRAJECTORIES.create(name).sample(robot, 100.0).q) > 100
