@@ -27,7 +27,7 @@ def test_the_excerpt_is_what_table1_prints_and_the_example_prints_its_answer(rea
     printed = {line.rstrip() for line in capsys.readouterr().out.splitlines()}
     shown = [line.rstrip() for line in block(readme, "The first simulates", "text").splitlines()]
     assert [line for line in shown if line not in printed] == []
-    example, answer = block(readme, "## Identify", "python"), block(readme, "## Identify", "text")
+    example, answer = block(readme, "## Identify in Python", "python"), block(readme, "## Identify in Python", "text")
     done = subprocess.run([sys.executable, "-c", example], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stdout == answer

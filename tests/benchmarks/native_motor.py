@@ -14,7 +14,9 @@ from scipy.integrate import solve_ivp
 R, L, K, V, T = 3.0, 0.012, 5.0, 160.0, 2e-4
 MODEL = """
 <mujoco><option timestep="{h}" integrator="{integrator}"/>
-  <worldbody><body><inertial pos="0 0 0" mass="1" diaginertia="{J} {J} {J}"/><joint name="hinge" axis="0 0 1"/></body></worldbody>
+  <worldbody>
+    <body><inertial pos="0 0 0" mass="1" diaginertia="{J} {J} {J}"/><joint name="hinge" axis="0 0 1"/></body>
+  </worldbody>
   <actuator><dcmotor name="motor" joint="hinge" resistance="3" motorconst="5" inductance="0.012"/></actuator>
 </mujoco>"""
 

@@ -7,6 +7,7 @@ positions, and gets the torque as it was held; its body is one that stays physic
 """
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 
 import mujoco
@@ -25,9 +26,8 @@ STEP, WINDOW, GUESS = 0.002, 5.0, 0.7
 NAMES = ("ZZR1", "Fv1", "Fs1", "ZZ2", "LMX2", "LMY2", "Fv2", "Fs2")
 
 
-def body(name: str, first: float, ZZ: float, mass: float, offset: tuple[float, float]):
+def body(name: str, ZZ: float, mass: float, offset: tuple[float, float]) -> Callable[[mujoco.MjSpec], None]:
     """Return a change of a link: its inertia about the joint's axis and its centre of mass."""
-    del first
 
     def change(spec: mujoco.MjSpec) -> None:
         link, about = spec.body(name), ZZ - mass * (offset[0] ** 2 + offset[1] ** 2)
@@ -39,12 +39,13 @@ def body(name: str, first: float, ZZ: float, mass: float, offset: tuple[float, f
 
 def apply(spec: mujoco.MjSpec, X: dict[str, float]) -> None:
     """Write eight parameters into a SCARA: L = 0.5 m, link 2 of 2 kg, link 1 with its centre of mass on its axis."""
-    body("link1", 0, X["ZZR1"] - 0.5, 1.0, (0.0, 0.0))(spec)
-    body("link2", 0, X["ZZ2"], 2.0, (X["LMX2"], X["LMY2"]))(spec)
+    body("link1", X["ZZR1"] - 0.5, 1.0, (0.0, 0.0))(spec)
+    body("link2", X["ZZ2"], 2.0, (X["LMX2"], X["LMY2"]))(spec)
     for j in (1, 2):
         joint = spec.joint(f"joint{j}")
         joint.armature, joint.frictionloss = 0.0, X[f"Fs{j}"]
         joint.damping = [X[f"Fv{j}"], 0.0, 0.0]
+        joint.limited = mujoco.mjtLimited.mjLIMITED_FALSE  # a wrong guess runs into the stops, where nothing can be learnt
 
 
 def start() -> mujoco.MjSpec:
