@@ -52,6 +52,8 @@ def imperfections(table2: Scenario) -> list[Imperfection]:
     chain, prompt = idbench_chain(), TorqueChannel("held")
     logged, unmasked = replace(chain, alignment=AsLogged()), replace(chain, mask=NoMask())
     delay, coarse = Timing(delay=table2.timing.delay), Physics(integrator="implicitfast")
+    chopper = table2.drive if isinstance(table2.drive, SwitchedDrive) else SwitchedDrive()
+    plain = replace(chopper, emf_compensation=0.0)
     ripple = replace(ideal, drive=AveragedDrive(), ripple=table2.ripple)
     return [
         Imperfection("nothing", ideal, chain),
@@ -62,8 +64,8 @@ def imperfections(table2: Scenario) -> list[Imperfection]:
         Imperfection("quantization", replace(ideal, encoder=table2.encoder), chain),
         Imperfection("quantization, 20 bits", replace(ideal, encoder=IncrementalEncoder(lines=(2**18,))), chain),
         Imperfection("cogging and commutation", ripple, chain),
-        Imperfection("chopper", replace(ideal, drive=table2.drive), chain),
-        Imperfection("chopper without EMF compensation", replace(ideal, drive=SwitchedDrive(emf_compensation=0.0)), chain),
+        Imperfection("chopper", replace(ideal, drive=chopper), chain),
+        Imperfection("chopper without EMF compensation", replace(ideal, drive=plain), chain),
         Imperfection("standstill, not masked", ideal, unmasked),
         Imperfection("Stribeck friction", replace(ideal, friction=Stribeck()), chain),
         Imperfection("gain error of 2 %", replace(ideal, torque=TorqueMeasurement(gain_error=(0.02,))), chain),

@@ -1,6 +1,7 @@
 """Commands that work on logs."""
 
 import os
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -69,21 +70,23 @@ def identify(  # noqa: PLR0913, PLR0917  # the options of a command
 
 
 @app.command(name="resample")
-def resample(log: tyro.conf.Positional[Path], fs: float, out: Path, torque: Held = None) -> None:
+def resample(log: tyro.conf.Positional[Path], fs: float, out: Path, torque: Held = None, torque_delay: Delay = None) -> None:
     """Write a log anew at a fixed sampling frequency.
 
     Args:
         log: The file, CSV or Parquet, its times in any steps.
         fs: Sampling frequency [Hz].
         out: File to write, CSV or Parquet.
-        torque: What a torque sample means; asked for unless the file says it.
+        torque: What a torque sample means; asked for unless the file says it. A held torque comes out averaged.
+        torque_delay: From a sample to the instant it speaks for, in seconds.
     """
     from identify.resample import resample as at
 
     columns, page = read_columns(log), new_page()
-    channel = columns.torque if torque is None else TorqueChannel(torque)
-    if channel is None:
+    meaning = torque or (columns.torque.meaning if columns.torque else None)
+    if meaning is None:
         raise ExperimentError(f"{log} does not say what its torque means: add --torque held, instantaneous or averaged")
+    channel = _channel(columns.torque, meaning, torque_delay)
     _write(at(columns.t, columns.q, columns.tau, channel, fs), out)
     page.print(f"written to {out}", soft_wrap=True)
     show(page)
@@ -125,13 +128,14 @@ def _read(path: Path, torque: Meaning | None, delay: str | None, basis: Basis, c
             f"{path} does not say what its torque means: add --torque held (a controller's command), instantaneous (a "
             "measurement) or averaged, and --torque-delay SECONDS or estimate"
         )
-    stated = columns.torque or TorqueChannel(meaning)
-    channel = replace(stated, meaning=meaning, delay=_seconds(delay, 0.0 if torque else stated.delay))
+    channel = _channel(columns.torque, meaning, delay)
     try:
         log = MotionLog.at_times(columns.t, columns.q, columns.tau, channel)
     except TimeError as error:
         fs = (len(columns.t) - 1) / (columns.t[-1] - columns.t[0])
-        raise ExperimentError(f"{path}: {error}: idbench resample {path} --fs {fs:.4g} --out uniform{path.suffix}") from error
+        raise ExperimentError(
+            f"{path}: {error}: idbench resample {shlex.quote(str(path))} --fs {fs:.4g} --torque {meaning} --out uniform.parquet"
+        ) from error
     if delay != "estimate":
         return log, ""
     from identify.delay import estimate_delay
@@ -139,6 +143,12 @@ def _read(path: Path, torque: Meaning | None, delay: str | None, basis: Basis, c
     found = estimate_delay(log, basis, chain)
     told = MotionLog(log.fs, log.q, log.tau, replace(channel, delay=found.delay))
     return told, f"torque delay estimated from the log: {1e3 * found.delay:.4g} ms, sigma {1e3 * found.sigma:.2g} ms"
+
+
+def _channel(said: TorqueChannel | None, meaning: Meaning, delay: str | None) -> TorqueChannel:
+    """Return the channel that a file and the options state together: another meaning voids the delay that the file states."""
+    stated = said or TorqueChannel(meaning)
+    return replace(stated, meaning=meaning, delay=_seconds(delay, stated.delay if stated.meaning == meaning else 0.0))
 
 
 def _seconds(delay: str | None, otherwise: float) -> float:

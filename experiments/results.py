@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.metadata import version
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -66,13 +67,22 @@ def summarize(estimate: Estimate, truth: list[float] | None) -> dict[str, Any]:
     """Return one model's entry of a summary: estimate, error if the truth is known, sigma, Cond(W), rows, residual."""
     return {
         "estimate": estimate.X.tolist(),
-        "relative_error_percent": None if truth is None else estimate.relative_error_percent(truth).tolist(),
+        "relative_error_percent": None if truth is None else _errors(estimate, truth),
         "sigma": estimate.sigma.tolist(),
-        "relative_sigma_percent": estimate.relative_sigma_percent.tolist(),
+        "relative_sigma_percent": [_finite(x) for x in estimate.relative_sigma_percent],
         "condition_number": float(estimate.condition_number),
         "rows": int(estimate.rows),
         "residual_rms": float(estimate.residual_rms),
     }
+
+
+def _errors(estimate: Estimate, truth: list[float]) -> list[float | None]:
+    """Return %e, None where the truth is 0."""
+    return [_finite(100 * abs(x - true) / abs(true)) if true else None for x, true in zip(estimate.X, truth, strict=True)]
+
+
+def _finite(x: float) -> float | None:
+    return float(x) if isfinite(x) else None
 
 
 def _nearest_folder(out: Path) -> Path:

@@ -32,7 +32,9 @@ class ScenarioRun:
     progress: Progress | None = None
 
     def __post_init__(self) -> None:
-        Identified((), truth=None, chain=self.chain, estimator=self.estimator)  # names are checked before the simulation
+        # What is wrong with names, or a robot that is no SCARA, is told before the simulation.
+        Identified((), chain=self.chain, estimator=self.estimator)
+        scara_truth(self.scenario.real_robot)
 
     @cached_property
     def run(self) -> Run:

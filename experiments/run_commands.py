@@ -13,6 +13,7 @@ from experiments.interruption import importing
 from experiments.page import new_page, show
 from experiments.results import results_folder, write_summary, write_whole
 from identify.log_file import write_log
+from sim.engine import Progress
 from sim.scenario_file import load, names, to_toml
 
 File = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
@@ -95,13 +96,12 @@ def scenario(name: tyro.conf.Positional[Annotated[str | None, tyro.conf.arg(meta
     show(page)
 
 
-class watch:  # noqa: N801  # used as a function
-    """Shows progress on the terminal's error stream, if it is a terminal."""
+def watch(what: str) -> Progress:
+    """Return what shows the share that is done on the terminal's error stream, if it is a terminal."""
+    console = Console(stderr=True)
 
-    def __init__(self, what: str) -> None:
-        self._what, self._console = what, Console(stderr=True)
+    def show_share(share: float) -> None:
+        if console.is_terminal:
+            console.print(f"{what}: {share:4.0%}", end="\r", highlight=False)
 
-    def __call__(self, share: float) -> None:
-        """Hear the share that is done."""
-        if self._console.is_terminal:
-            self._console.print(f"{self._what}: {share:4.0%}", end="\r" if share < 0.99 else "\n", highlight=False)
+    return show_share

@@ -14,7 +14,7 @@ import numpy as np
 from experiments.attribution import attribution
 from experiments.errors import ExperimentError
 from experiments.identified import Identified
-from identify import Array
+from identify import CHAINS, Array, TorqueChannel
 from sim.engine import Progress, simulate
 from sim.run import Run
 from sim.scara import scara_truth
@@ -84,14 +84,21 @@ class Table2:
     scenario: Scenario
     progress: Progress | None = None
 
+    def __post_init__(self) -> None:
+        scara_truth(self.scenario.real_robot)
+        held = TorqueChannel("held", self.scenario.timing.delay)
+        for name, _ in PROCESSINGS.values():
+            halo = CHAINS.create(name).halo(self.scenario.fs, held)
+            if halo > self.rest:
+                raise ExperimentError(
+                    f"rest = {self.rest:g} s is shorter than the {halo:.3g} s that chain {name} looks: raise it"
+                )
+
     @cached_property
     def run(self) -> Run:
         """As many realizations as the power model needs."""
-        first, most = self.scenario.seed, max(REALIZATIONS.values())
-        run = simulate(self.scenario, range(first, first + most), progress=self.progress)
-        if len(run.seeds) != most:
-            raise ExperimentError(f"{most} realizations are needed")
-        return run
+        first = self.scenario.seed
+        return simulate(self.scenario, range(first, first + max(REALIZATIONS.values())), progress=self.progress)
 
     @cached_property
     def truth(self) -> dict[str, float]:

@@ -122,9 +122,10 @@ class _Search:
         level = np.ones_like(rho)
         for group in np.unique(system.group):
             rows = system.group == group
-            level[rows] = np.sqrt(np.mean(rho[rows] ** 2))
+            level[rows] = np.sqrt(np.mean(rho[rows & system.valid] ** 2))
         A = np.concatenate([system.W, -slope[:, None]], axis=1) / level[:, None]
-        steps = _left_out(A, rho / level, np.arange(len(rho)) * BLOCKS // len(rho))
+        counted = np.cumsum(system.valid) - 1
+        steps = _left_out(A, rho / level, counted * BLOCKS // (counted[-1] + 1))
         return float(np.sqrt((BLOCKS - 1) / BLOCKS * np.sum((steps - steps.mean()) ** 2)))
 
 
@@ -138,5 +139,5 @@ def _left_out(A: Array, y: Array, block: npt.NDArray[np.signedinteger]) -> Array
     A = A / scale
     squares = np.array([A[block == b].T @ A[block == b] for b in range(BLOCKS)])
     products = np.array([A[block == b].T @ y[block == b] for b in range(BLOCKS)])
-    x = np.linalg.solve(squares.sum(axis=0) - squares, (products.sum(axis=0) - products)[..., None])
+    x = np.linalg.pinv(squares.sum(axis=0) - squares, hermitian=True) @ (products.sum(axis=0) - products)[..., None]
     return x[:, -1, 0] / scale[-1]

@@ -40,7 +40,9 @@ class Columns:
 
 
 def write_log(log: MotionLog, path: Path) -> None:
-    """Write one run to a CSV or Parquet file; the torque channel goes into the metadata of Parquet, CSV has no place for it.
+    """Write one run to a CSV or Parquet file; the torque channel goes into the metadata of Parquet.
+
+    CSV has no place for it; its torques are in N m, gain included.
 
     Raises
     ------
@@ -54,9 +56,11 @@ def write_log(log: MotionLog, path: Path) -> None:
     joints = range(log.n)
     columns = {"t": log.t}
     columns |= {f"q{j + 1}": log.q[:, j] for j in joints}
-    columns |= {f"tau{j + 1}": log.tau[:, j] for j in joints}
+    in_newton_metres = path.suffix.lower() == CSV
+    tau = log.tau * np.asarray(log.torque.gain) if in_newton_metres else log.tau
+    columns |= {f"tau{j + 1}": tau[:, j] for j in joints}
     table = pa.table({name: pa.array(values) for name, values in columns.items()})
-    if path.suffix == CSV:
+    if in_newton_metres:
         csv.write_csv(table, path)
         return
     torque = {"meaning": log.torque.meaning, "delay": log.torque.delay, "gain": log.torque.gain}
@@ -95,14 +99,18 @@ def read_columns(path: Path) -> Columns:
     Columns qd1, qd2, ... are allowed and not used: velocities come from the positions, by the chain's own differences.
     """
     table = _table(Path(path))
-    names = table.column_names
+    names = [name.strip(' "') for name in table.column_names]
+    if not table.num_rows:
+        raise LogError(f"{path} holds no samples")
+    said, table = (table.schema.metadata or {}).get(_TORQUE), table.rename_columns(names)
     n = max(sum(bool(re.fullmatch(r"q\d+", name)) for name in names), 1)
     needed = ["t", *(f"q{j + 1}" for j in range(n)), *(f"tau{j + 1}" for j in range(n))]
-    if wrong := set(needed) ^ {name for name in names if re.fullmatch(r"t|(q|tau)\d+", name)}:
+    present = [name for name in names if re.fullmatch(r"t|(q|tau)\d+", name)]
+    if wrong := set(needed) ^ set(present) | {name for name in present if present.count(name) > 1}:
         raise LogError(
-            f"{path} must have a header with the columns {', '.join(needed)}; missing or left over: {', '.join(sorted(wrong))}"
+            f"{path} must have a header with the columns {', '.join(needed)}; missing, left over or twice: "
+            f"{', '.join(sorted(wrong))}"
         )
-    said = (table.schema.metadata or {}).get(_TORQUE)
     numbers = {name: _numbers(path, table, name) for name in needed}
     q, tau = (np.stack([numbers[f"{letter}{j + 1}"] for j in range(n)], axis=-1) for letter in ("q", "tau"))
     return Columns(numbers["t"], q, tau, None if said is None else _channel(path, said))
@@ -111,11 +119,11 @@ def read_columns(path: Path) -> Columns:
 def _table(path: Path) -> pa.Table:
     try:
         with path.open("rb") as file:
-            return csv.read_csv(file) if path.suffix == CSV else parquet.read_table(file)
+            return csv.read_csv(file) if path.suffix.lower() == CSV else parquet.read_table(file)
     except OSError as error:
         raise LogError(f"cannot read the log {path}: {error.strerror or error}") from error
-    except pa.ArrowException as error:
-        kind = "CSV" if path.suffix == CSV else "Parquet (a CSV file's name must end with .csv)"
+    except (pa.ArrowException, UnicodeDecodeError) as error:
+        kind = "CSV" if path.suffix.lower() == CSV else "Parquet (a CSV file's name must end with .csv)"
         raise LogError(f"cannot read the log {path} as {kind}: {str(error).splitlines()[0]}") from error
 
 

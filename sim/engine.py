@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from identify.motion_log import MotionLog
 from sim.controllers import Task
+from sim.drives.base import every
 from sim.errors import ScenarioError
 from sim.history import History
 from sim.inverse_dynamics import inverse_dynamics
@@ -102,6 +103,7 @@ class _Bench:
         self._old = max(0.0, late - self._late)  # share of a step in which the command before still acts
         self._plant = Plant(robot, nsim, scenario.physics, self._h, vary, threads)
         self._plant.q[:] = planned.q[0]
+        self._ranges = tuple(every(limit, nsim) for limit in robot.ranges.T)
         self._law = scenario.controller.start(Task(scenario.nominal_robot, planned, nsim))
         self._drive = scenario.drive.start(robot, nsim, self._h)
         self._ripple = scenario.ripple.start(robot)
@@ -114,7 +116,8 @@ class _Bench:
         self._before = self._command = self._demand = np.repeat(inverse_dynamics(robot, *at_rest), nsim, axis=0)
         self._qd, self._steps = np.zeros((nsim, n)), 1
         self._steady = scenario.drive.steady and scenario.ripple.steady
-        one_by_one = scenario.timing.jitter or not scenario.friction.steady
+        watched = scenario.timing.jitter or scenario.torque.source == "current"
+        one_by_one = watched or not scenario.friction.steady
         self._most = 1 if one_by_one else self._per_sample if self._steady else max(1, round(BLOCK / self._h))
         self._measured, self._commands, self._currents, self._q, self._speeds, self._tau = np.zeros((6, samples, nsim, n))
         self.steps = samples * self._per_sample + self._late
@@ -122,6 +125,10 @@ class _Bench:
     def _drawn_jitter(self, samples: int) -> Array:
         """Return by how many steps each sample is off its claimed instant, shape (sample, nsim)."""
         width = self._scenario.timing.jitter / self._h
+        if width >= self._per_sample:
+            raise ScenarioError(
+                f"timing.jitter = {self._scenario.timing.jitter:g} s must be below 1/fs = {1 / self._scenario.fs:g} s"
+            )
         if width / 2 > self._late:
             raise ScenarioError(
                 f"timing.jitter = {self._scenario.timing.jitter:g} s needs a timing.delay of at least its half in whole "
@@ -135,6 +142,7 @@ class _Bench:
         sample, after = divmod(step, self._per_sample)
         if after == 0 and sample < len(self._q):
             self._q[sample], self._speeds[sample], self._currents[sample] = q, qd, self._sensor.value
+            self._require_in_range(sample)
         self._history.put(step, q, qd)
         steps = self._listen(step)
         t = self._middles(steps)
@@ -165,34 +173,33 @@ class _Bench:
             self._demand = self._old * self._before + (1 - self._old) * self._command
         elif after == 1:
             self._demand = self._command
-        if after == 0 and self._steady:  # the current of a new command settles in a step of its own
-            return 1
+        if after == 0 and (self._steady or self._old > 0):
+            return 1  # the current of a new command settles in a step of its own, and so does a mixture of two
         return min(self._per_sample - after, self._per_sample - step % self._per_sample, self._most)
 
     def run(self, skipped: int) -> Run:
         """Return what has happened since sample `skipped`."""
         channels = self._measured, self._commands, self._currents, self._q, self._speeds, self._tau / self._per_sample
         measured, command, current, q, qd, tau = (np.swapaxes(x[skipped:], 0, 1) for x in channels)
-        self._require_sane(q)
         scenario, n = self._scenario, q.shape[-1]
         logged = scenario.torque.logged(
             current if scenario.torque.source == "current" else command, n, _generators(self._seeds, 2)
         )
         planned = replace(self._planned, **{x: getattr(self._planned, x)[skipped:] for x in ("q", "qd", "qdd")})
-        delay = scenario.timing.delay - scenario.physics.early * self._h + float(scenario.drive.lag(self._plant.robot).mean())
-        log = MotionLog(scenario.fs, measured, logged, scenario.torque.channel(delay, scenario.fs))
+        lag = float(scenario.drive.lag(self._plant.robot).mean()) - scenario.physics.early * self._h
+        log = MotionLog(scenario.fs, measured, logged, scenario.torque.channel(scenario.timing.delay, lag, scenario.fs))
         return Run(scenario, self._seeds, self._plant.robots, planned, log, q, qd, tau, command)
 
-    def _require_sane(self, q: Array) -> None:
+    def _require_in_range(self, sample: int) -> None:
         """Raise ScenarioError if a joint has left its range: it ran into its stop, or the loop is unstable."""
-        low, high = self._plant.robot.ranges.T
-        outside = ~((q >= low) & (q <= high))
-        if outside.any():
-            sim, k, j = (int(i) for i in np.argwhere(outside)[0])
+        q, (low, high) = self._q[sample], self._ranges
+        inside = (q >= low) & (q <= high)
+        if not inside.all():
+            sim, j = (int(i) for i in np.argwhere(~inside)[0])
             raise ScenarioError(
-                f"joint {self._plant.robot.joints[j]} leaves its range at t = {k / self._scenario.fs:.3g} s (seed "
-                f"{self._seeds[sim]}): the loop is unstable or too weak; lower controller.bandwidth or timing.delay, raise "
-                "fs, or ask less of the drive"
+                f"joint {self._plant.robot.joints[j]} leaves its range {sample / self._scenario.fs:.3g} s after the start "
+                f"(seed {self._seeds[sim]}): the loop is unstable or too weak; lower controller.bandwidth or timing.delay, "
+                "raise fs, or ask less of the drive"
             )
 
 

@@ -6,6 +6,7 @@ from typing import Literal, final
 import numpy as np
 
 from identify.motion_log import TorqueChannel
+from sim.errors import ScenarioError
 from sim.motors import Array
 from sim.settings import EachNotNegative, EachNumber, EachShareError, Positive, per_joint, settings
 
@@ -28,6 +29,10 @@ class TorqueMeasurement:
     cutoff: Positive | None = None
     """Anti-alias filter of the measured current, first order [Hz]; without it none."""
 
+    def __post_init__(self) -> None:
+        if self.cutoff and self.source == "reference":
+            raise ScenarioError(f"cutoff = {self.cutoff:g} Hz needs source = 'current': a reference is not filtered")
+
     def logged(self, tau: Array, n: int, rngs: Sequence[np.random.Generator]) -> Array:
         """Return what the log says of the torques `tau` [N m], shape (nsim, time, joint)."""
         gain, offset, noise, step = (
@@ -37,22 +42,20 @@ class TorqueMeasurement:
         said = (1 + gain) * tau + offset + noise * drawn
         return np.where(step > 0, np.rint(said / np.where(step > 0, step, 1.0)) * step, said)
 
-    def channel(self, delay: float, fs: float) -> TorqueChannel:
-        """Return what the log's torque means, when a command acts `delay` [s] after its sample.
+    def channel(self, delay: float, lag: float, fs: float) -> TorqueChannel:
+        """Return what the log's torque means, when a command acts `delay` [s] after its sample and the torque `lag` later.
 
         A measured current is what earlier commands have left when a sample is taken. The last of them had a share
         1 - exp(-(T - r)/tau) of the filter's output, with T = 1/fs, r = delay modulo T and tau its time constant; those
         before it follow geometrically. The channel states their mean delay.
         """
         if self.source == "reference":
-            return TorqueChannel("held", delay)
+            return TorqueChannel("held", delay + lag)
         T = 1 / fs
-        periods, r = divmod(delay, T)
-        held = T - r
+        r = max(0.0, delay - int(delay * fs + 1e-9) * T)  # a command that acts as the sample is taken is not in it yet
         tau = 1 / (2 * np.pi * self.cutoff) if self.cutoff else 0.0
-        earlier = np.exp(-held / tau) / -np.expm1(-T / tau) if tau else 0.0
-        del periods
-        return TorqueChannel("held", r - T * (1 + earlier))
+        earlier = np.exp(-(T - r) / tau) / -np.expm1(-T / tau) if tau else 0.0
+        return TorqueChannel("held", float(r - T * (1 + earlier) + lag))
 
 
 class CurrentSensor:

@@ -40,9 +40,11 @@ class Plant:
         model.opt.timestep = h
         model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{physics.integrator.upper()}")
         model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
-        self.robot, self.batch, self._varied = robot, Batch(model, nsim, threads), bool(vary)
+        self.robot, self.batch = robot, Batch(model, nsim, threads)
         for name, values in vary.items():
             _vary(self.batch, name, np.asarray(values, dtype=np.float64))
+        varied = (Robot(robot.name, self.batch.get_model(i)) for i in range(nsim))
+        self.robots = tuple(varied) if vary else (robot,) * nsim
         self.q, self.qd, self._applied = (self.batch.bind(name) for name in ("qpos", "qvel", "qfrc_applied"))
         expanded = self.batch.expanded("dof_frictionloss")
         self.Fs: Array = np.array(np.broadcast_to(model.dof_frictionloss, (nsim, robot.n)) if expanded is None else expanded)
@@ -66,13 +68,6 @@ class Plant:
                 self.batch.rollout(steps, control, int(mujoco.mjtState.mjSTATE_QFRC_APPLIED), record=())
         except SimulationError as error:
             raise ScenarioError(f"MuJoCo cannot go on: {' '.join(str(error).split())}") from error
-
-    @property
-    def robots(self) -> tuple[Robot, ...]:
-        """The robot of every simulation."""
-        if not self._varied:
-            return (self.robot,) * self.batch.nsim
-        return tuple(Robot(self.robot.name, self.batch.get_model(i)) for i in range(self.batch.nsim))
 
 
 def _vary(batch: Batch, name: str, values: Array) -> None:

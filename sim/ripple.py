@@ -1,14 +1,17 @@
 """Torque ripple of a motor: cogging and commutation."""
 
 from dataclasses import dataclass
-from typing import final
+from typing import Annotated, final
 
 import numpy as np
+from pydantic import Field
 
 from sim.errors import ScenarioError
 from sim.motors import Array
 from sim.robot import Robot
 from sim.settings import EachCount, EachNotNegative, NotNegative, Number, per_joint, settings
+
+Harmonics = Annotated[tuple[Number, ...], Field(min_length=1)]
 
 
 @final
@@ -18,16 +21,20 @@ class Ripple:
 
     cogging: NotNegative = 0.0
     """Cogging torque, in multiples of what the robot's motors have (0: none, 1: theirs)."""
-    cogging_harmonics: tuple[Number, ...] = (1.0,)
+    cogging_harmonics: Harmonics = (1.0,)
     """Amplitudes of the cogging at once, twice, ... the motor's number of slots, relative to the first."""
     commutation: EachNotNegative = (0.0,)
     """Commutation ripple: amplitude as a share of the torque constant, of all joints or of each."""
-    commutator_bars: EachCount = (61, 47)
+    commutator_bars: EachCount = (61,)
     """Ripple cycles a turn, of all joints or of each."""
-    commutation_harmonics: tuple[Number, ...] = (1.0,)
+    commutation_harmonics: Harmonics = (1.0,)
     """Amplitudes of the commutation ripple at once, twice, ... the number of bars, relative to the first."""
 
     def __post_init__(self) -> None:
+        if not self.cogging and self.cogging_harmonics != (1.0,):
+            raise ScenarioError("cogging_harmonics say nothing without cogging above 0")
+        if not any(self.commutation) and self.commutation_harmonics != (1.0,):
+            raise ScenarioError("commutation_harmonics say nothing without commutation above 0")
         if max(self.commutation) * sum(abs(a) for a in self.commutation_harmonics) >= 1:
             raise ScenarioError("commutation ripple must stay below the torque constant: lower commutation or its harmonics")
 

@@ -53,8 +53,8 @@ class Physics:
 class Scenario:
     """A robot, a motion, and all that is imperfect about them."""
 
-    name: str
-    """Name of the run."""
+    name: Annotated[str, Field(pattern=r"^\w[\w .-]*$")]
+    """Name of the run: letters, digits, space, dot, hyphen and underscore."""
     trajectory: AbstractTrajectory
     """Where the joints shall go: a table with a kind, or the name of a scenario whose trajectory it takes."""
     robot: str = "scara"

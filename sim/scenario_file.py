@@ -47,33 +47,46 @@ def load(name: str) -> Scenario:
     ScenarioError
         If there is none, it is not TOML, or a key is unknown, missing, of the wrong type or out of its range.
     """
-    path = Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
-    if not name.endswith(".toml") and name not in names():
-        near = get_close_matches(name, names(), 1)
-        hint = f" (did you mean {near[0]!r}?)" if near else ""
-        raise ScenarioError(f"no scenario {name!r}{hint}; known: {', '.join(names())}, or give the path of a TOML file (.toml)")
-    try:
-        content = tomllib.loads(path.read_text())
-    except OSError as error:
-        raise ScenarioError(f"cannot read scenario {path}: {error.strerror}") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ScenarioError(f"cannot read scenario {path}: {error}") from error
+    content = _content(name)
     try:
         return from_dict(content)
     except ScenarioError as error:
         raise ScenarioError(f"scenario {name}: {error}") from error
 
 
+def _content(name: str) -> dict[str, Any]:
+    """Return the TOML document of a scenario."""
+    path = Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
+    if not name.endswith(".toml") and name not in names():
+        near = get_close_matches(name, names(), 1)
+        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        raise ScenarioError(f"no scenario {name!r}{hint}; known: {', '.join(names())}, or give the path of a TOML file (.toml)")
+    try:
+        return tomllib.loads(path.read_text())
+    except OSError as error:
+        raise ScenarioError(f"cannot read scenario {path}: {error.strerror}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ScenarioError(f"cannot read scenario {path}: {error}") from error
+
+
 def from_dict(content: Mapping[str, Any]) -> Scenario:
     """Make a scenario from the keys of a TOML document; raise ScenarioError as `load`."""
     made = dict(content)
     if isinstance(made.get("trajectory"), str):
-        made["trajectory"] = load(made["trajectory"]).trajectory
+        made["trajectory"] = _trajectory_of(made["trajectory"])
     for key, table in KINDS.items():
         if key in made and not isinstance(made[key], table.kind):
             made[key] = _plugin(key, table, made[key])
     scenario: Scenario = make(Scenario, made, "")
     return scenario
+
+
+def _trajectory_of(name: str) -> Any:
+    """Return the trajectory of another scenario, which must be its own."""
+    trajectory: Any = _content(name).get("trajectory")
+    if isinstance(trajectory, str):
+        raise ScenarioError(f"trajectory = {name!r}: that scenario has none of its own; name {trajectory!r}")
+    return _plugin("trajectory", TRAJECTORIES, trajectory)
 
 
 def _plugin(key: str, table: PluginTable[Any], content: Mapping[str, Any]) -> Any:
@@ -83,7 +96,7 @@ def _plugin(key: str, table: PluginTable[Any], content: Mapping[str, Any]) -> An
     if "kind" not in content:
         raise ScenarioError(f"key '{key}.kind' is missing; known: {', '.join(table)}")
     kind, rest = content["kind"], {name: value for name, value in content.items() if name != "kind"}
-    if kind not in table:
+    if not isinstance(kind, str) or kind not in table:
         near = get_close_matches(str(kind), list(table), 1)
         hint = f" (did you mean {near[0]!r}?)" if near else ""
         raise ScenarioError(f"{key}.kind = {kind!r} is unknown{hint}; known: {', '.join(table)}")

@@ -76,7 +76,7 @@ def test_the_readmes_friction_is_identified_by_all_models_with_its_estimator(rea
 
 
 def test_the_readmes_estimator_identifies_every_run_by_itself(readme_package, monkeypatch, truth):
-    """A run in a batch is what it is alone; without noise it is the truth, with some another one than ordinary least squares."""
+    """A run in a batch is what it is alone; without noise the truth, with noise not what OLS gives."""
     out = python(
         """
         import numpy as np

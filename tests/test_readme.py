@@ -87,3 +87,10 @@ def test_the_pendulum_of_the_docs_is_identified_by_all_models(root):
     models = {name: MODELS.create(name) for name in MODELS.builtin}
     for estimate in identify_each(log, page["pendulum"], models).values():
         np.testing.assert_allclose(estimate.X, [0.8, 1.2, -0.1, 0.3, 0.5], rtol=1e-4)
+
+
+def test_the_example_of_the_virtual_robot_runs(root):
+    (example,) = re.findall(r"```python\n(.*?)```", (root / "docs" / "virtual-robot.md").read_text(), re.DOTALL)
+    done = subprocess.run([sys.executable, "-c", example], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert [line.split()[0] for line in done.stdout.splitlines()] == ["explicit", "power"]

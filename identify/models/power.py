@@ -11,7 +11,9 @@ from identify.models.base import AbstractModel
 from identify.signals import Signals
 
 SLOW = 1.5
-"""Speed [rad/s] below which the noise of a power row does not fall any more: that of the measured velocity remains."""
+"""Speed [rad/s] below which the noise of a power row does not fall any more: that of the measured velocity remains.
+
+Chosen by simulations with 16-bit encoders and with torque noise; errors are within 20 % of the best between 0.6 and 2.5."""
 
 
 @final

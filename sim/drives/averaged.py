@@ -26,8 +26,8 @@ class AveragedDrive(AbstractDrive):
     """Current-controlled DC motor: winding, bus voltage and current limit; the current loop is of first order.
 
     L di/dt = v - R i - K qd with v = R i + L w (i_ref - i) + K qd as long as that is within the bus voltage: a PI controller
-    whose zero cancels the winding's pole, and that knows the back-EMF. The equation is solved exactly in every physics step,
-    for the speed in its middle.
+    whose zero cancels the winding's pole, and that knows the back-EMF. The equation is solved exactly for the speed in the
+    middle of a stretch: the first physics step of a command, and the rest of its period.
     """
 
     bandwidth: Positive = 1000.0
@@ -66,7 +66,7 @@ class _Amplifier(AbstractAmplifier):
         self._i = np.zeros(self._R.shape)
 
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
-        dt, e, i0 = steps * self._h, self._K * speed[0], self._i
+        dt, e, i0 = steps * self._h, self._K * speed[len(speed) // 2], self._i
         limited = np.minimum(np.maximum(demand / self._K, -self._I), self._I)
         target = np.minimum(np.maximum(limited, (-self._V - e) / self._R), (self._V - e) / self._R)
         asked = self._R * i0 + self._L * self._w * (target - i0) + e

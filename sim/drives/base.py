@@ -54,7 +54,7 @@ class AbstractDrive(ABC):
     @property
     @abstractmethod
     def steady(self) -> bool:
-        """Whether the torque stays as it is while the demand does, so that any number of physics steps are as one."""
+        """Whether the torque, once the first step of a command is over, may be taken as one mean for any number of steps."""
 
     def step_length(self, fs: float, longest: float) -> float:
         """Return the physics step [s] that fits whole times into a sample of 1/`fs` and is not above `longest`."""

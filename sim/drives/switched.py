@@ -95,8 +95,10 @@ class SwitchedAmplifier(AbstractAmplifier):
         lost = -np.expm1(-h * R / L)
         self._kp = R / lost * -np.expm1(-2 * np.pi * settings.bandwidth * h)
         self._ki = self._kp * lost
-        self._most = (1 - 4 * settings.dead_time / h) * V
-        self._least, self._known = 2 * settings.duty_resolution, settings.emf_compensation
+        self._least = settings.duty_resolution * (1 if settings.modulation == "sign_magnitude" else 2)
+        most = 1 - 4 * settings.dead_time / h
+        self._most = (np.floor(most / self._least) * self._least if self._least else most) * V
+        self._known = settings.emf_compensation
         self.i, self._sum, self.electrical, self.mechanical = np.zeros((4, *V.shape))
 
     def step(self, demand: Array, speed: Array, steps: int) -> Array:

@@ -18,8 +18,9 @@ from sim.settings import EachNotNegativeOrNone, Number, Positive, settings
 class LuGre(AbstractFrictionLaw):
     """LuGre: bristles that bend and slip; presliding, stiction and Stribeck in one (Canudas de Wit et al., 1995).
 
-    dz/dt = qd - |qd| z / z_max(qd), torque = Fs g z / z_max + damping dz/dt + Fv qd, with g = 1 + (static - 1)
-    exp(-(qd/velocity)^2) and z_max = deflection g; every step is solved exactly for the speed in its middle.
+    dz/dt = qd - |qd| z / (deflection g), torque = Fs z / deflection + s1 dz/dt + Fv qd, with g = 1 + (static - 1)
+    exp(-(qd/velocity)^2) and s1 = 2 damping sqrt(M Fs / deflection) exp(-(qd/velocity)^2), which fades so that the friction
+    stays passive; every step is solved exactly for the speed in its middle.
     """
 
     deflection: Positive = 1e-3

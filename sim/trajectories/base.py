@@ -3,6 +3,8 @@
 from abc import ABC, abstractmethod
 from typing import final
 
+import numpy as np
+
 from sim.errors import ScenarioError
 from sim.motors import Array
 from sim.robot import Robot
@@ -35,8 +37,8 @@ class AbstractTrajectory(ABC):
         if not planned.duration < LONGEST:
             raise ScenarioError(f"the motion lasts {planned.duration:.3g} s, more than {LONGEST:.0e} s")
         # Extremes of smooth moves between waypoints lie at waypoints or a little beyond; 50 Hz finds them to 0.1 %.
-        q = planned.sample(50.0).q
-        require_in_range(robot, q)
+        probe = np.linspace(0.0, planned.duration, 2 + int(50 * planned.duration))
+        require_in_range(robot, planned.at(probe, 50.0).q)
         if not 1 <= planned.duration * fs <= MOST_SAMPLES:
             raise ScenarioError(
                 f"fs = {fs:g} Hz makes {planned.duration * fs:.3g} samples of this motion; 1 to {MOST_SAMPLES:.0e} are allowed"

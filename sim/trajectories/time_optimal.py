@@ -83,7 +83,7 @@ class TimeOptimal(AbstractTrajectory):
     """Positions at rest, joint by joint [rad]; at least two."""
     velocity: EachPositive = (7.0,)
     """Largest speed [rad/s], of all joints or of each."""
-    acceleration: EachPositive = (18.0, 25.0)
+    acceleration: EachPositive = (18.0,)
     """Largest acceleration [rad/s^2], of all joints or of each."""
     jerk: EachPositive = (300.0,)
     """Largest jerk [rad/s^3], of all joints or of each."""

@@ -206,7 +206,7 @@ def test_a_filtered_current_states_its_mean_delay(cutoff, delay):
         if step % 100 == 0:
             said.append(sensor.value[0, 0])
         sensor.take(np.array([[[np.floor((step * h - delay + 1e-9) / T)]]]), h)  # command k has the value k
-    channel = settings.channel(delay, 100.0)
+    channel = settings.channel(delay, 0.0, 100.0)
     # Sample k speaks for the command u_i with t_i + delay = t_k + channel.delay.
     expected = np.arange(100) + (channel.delay - delay) / T
     np.testing.assert_allclose(said[60:], expected[60:], atol=1e-6)

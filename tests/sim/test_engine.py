@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identify import scara
+from identify.delay import estimate_delay
 from sim.controllers import ComputedTorque, PDFeedforward
 from sim.drives import AveragedDrive, SwitchedDrive
 from sim.encoders import IncrementalEncoder
@@ -14,8 +16,8 @@ from sim.frictions import LuGre, Stribeck
 from sim.measurement import TorqueMeasurement
 from sim.ripple import Ripple
 from sim.scara import scara_truth
-from sim.scenario import Timing
-from sim.trajectories import Quintic
+from sim.scenario import Physics, Timing
+from sim.trajectories import Quintic, RandomMoves
 
 BUSY = {
     "controller": ComputedTorque(model_error=0.1),
@@ -73,7 +75,7 @@ def test_what_cannot_vary_is_told(short, vary, message):
 
 def test_an_unstable_loop_is_told_with_joint_and_time(short):
     wild = replace(short, controller=PDFeedforward(bandwidth=90.0), timing=Timing(delay=0.03))
-    with pytest.raises(ScenarioError, match=r"joint joint\d leaves its range at t = .* s \(seed 0\): the loop is unstable"):
+    with pytest.raises(ScenarioError, match=r"joint joint\d leaves its range .* s after the start \(seed 0\): the loop"):
         simulate(wild)
 
 
@@ -102,3 +104,58 @@ def test_a_held_torque_moves_the_arm_by_newtons_law(short):
     coupling = 0.12 * np.cos(q2) - 0.005 * np.sin(q2)
     momentum = (3.5 + 0.06 + 2 * coupling) * v1 + (0.06 + coupling) * v2
     np.testing.assert_allclose(np.diff(momentum), 0.01 * run.tau[0, :-1, 0], atol=1e-9)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.00105, 0.0034, 0.0101, 0.03])
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {},
+        {"drive": AveragedDrive()},
+        {"drive": SwitchedDrive(dead_time=0.0)},
+        {"ripple": Ripple(cogging=0.01), "physics": Physics(step=1e-4)},
+        {"physics": Physics(step=1e-3, integrator="implicitfast")},
+        {"torque": TorqueMeasurement(source="current")},
+        {"torque": TorqueMeasurement(source="current", cutoff=100.0), "physics": Physics(integrator="implicitfast")},
+        {"drive": AveragedDrive(bandwidth=300.0), "torque": TorqueMeasurement(source="current")},
+    ],
+    ids=["ideal", "averaged", "switched", "ripple", "early", "current", "filtered", "slow loop"],
+)
+def test_the_log_states_the_delay_that_it_has(ideal, parts, delay):
+    """What is estimated from the log alone is what the channel says, to 0.1 ms, a hundredth of a sample."""
+    controller = PDFeedforward(bandwidth=8.0)
+    moves = RandomMoves(moves=6, rest=0.6)
+    log = simulate(replace(ideal, trajectory=moves, controller=controller, timing=Timing(delay=delay), **parts)).alone()
+    assert estimate_delay(log, scara()).delay == pytest.approx(log.torque.delay, abs=1e-4)
+
+
+def test_parameters_that_a_friction_law_uses_are_still_the_truth(short):
+    """Stribeck and LuGre write into MuJoCo's friction while they run; the robots keep theirs."""
+    for law in (Stribeck(), LuGre()):
+        run = simulate(replace(short, friction=law), vary={"dof_frictionloss": [[0.6, 0.2]]})
+        assert [scara_truth(run.robots[0])[x] for x in ("Fs1", "Fs2")] == [0.6, 0.2]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"timing": Timing(delay=0.05, jitter=0.02)}, r"timing.jitter = 0.02 s must be below 1/fs = 0.01 s"),
+        ({"trajectory": Quintic(((0.0, 0.0), (1.0, 1.0)), (0.004,), 0.0)}, "makes 0.4 samples of this motion"),
+    ],
+)
+def test_impossible_times_are_told(short, change, message):
+    with pytest.raises(ScenarioError, match=message):
+        simulate(replace(short, **change))
+
+
+def test_a_robot_of_one_joint_runs(tmp_path, short):
+    path = tmp_path / "pendulum.xml"
+    path.write_text(
+        '<mujoco><option gravity="0 0 -9.81"/><worldbody><body><inertial pos="0.3 0 0" mass="1" diaginertia="0.1 0.1 0.1"/>'
+        '<joint name="hip" axis="0 1 0" damping="0.1"/></body></worldbody></mujoco>'
+    )
+    moves = Quintic(((0.0,), (1.0,), (-0.5,)), (1.0, 1.0), 0.2)
+    run = simulate(replace(short, robot=str(path), trajectory=moves))
+    assert np.abs(run.reference.q - run.q[0]).max() < 0.02
+    gravity = -9.81 * 0.3 * np.cos(run.q[0, 0, 0])  # about y, a positive angle lowers the arm
+    np.testing.assert_allclose(run.command[0, 0, 0], gravity, atol=1e-9)

@@ -26,7 +26,8 @@ def test_what_ships_survives_its_file(name):
 
 def test_settings_made_in_python_survive_a_file(tmp_path):
     made = Scenario(
-        name='with "quotes"',
+        name="made",
+        origin='with "quotes"',
         trajectory=Quintic(((0, 0), (1, 1)), (2,)),
         fs=1000,
         start=(0.1, 0.2),
@@ -75,6 +76,12 @@ def test_every_setting_is_described():
         ({"trajectory": {**MOVE, "rest": -1.0}}, r"trajectory.rest = -1.0: must be greater than or equal to 0"),
         ({"trajectory": {"kind": "random", "durations": [2.0, 1.0]}}, "the shortest is above the longest"),
         ({"trajectory": "tabel1"}, r"no scenario 'tabel1' \(did you mean 'table1'\?\)"),
+        ({"name": "../x"}, r"name = '../x': must|name = '../x': String should match"),
+        ({"trajectory": "ideal"}, "that scenario has none of its own; name 'table1'"),
+        ({"drive": {"kind": ["a"]}}, r"drive.kind = \['a'\] is unknown"),
+        ({"ripple": {"cogging_harmonics": []}}, "ripple.cogging_harmonics"),
+        ({"ripple": {"cogging_harmonics": [1.0, 2.0]}}, "cogging_harmonics say nothing without cogging"),
+        ({"torque": {"cutoff": 50.0}}, "cutoff = 50 Hz needs source = 'current'"),
         ({"name": 3, "fs": -1.0}, r"name = 3: must be a valid string .*; fs = -1.0: must be greater"),
     ],
 )

@@ -1,0 +1,205 @@
+"""The commands on scenarios and logs, as a user calls them."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments import table2
+from experiments.attribution import imperfections
+from experiments.cli import main
+from experiments.table2 import PAPER, Table2
+from identify.log_file import read_log
+from sim.drives import AveragedDrive
+from sim.scenario_file import from_dict, load, names, to_dict, to_toml
+from sim.trajectories import Quintic, RandomMoves
+
+SHORT = RandomMoves(moves=4, rest=0.6)
+
+
+def shortened(name, tmp_path):
+    """Write a scenario that ships to a file, on a motion of five seconds; a payload needs no other robot."""
+    path = tmp_path / f"{name}.toml"
+    path.write_text(to_toml(replace(load(name), trajectory=SHORT)))
+    return path
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_scenario_that_ships_runs(name, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert main(["run", str(shortened(name, tmp_path)), "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert all(word in printed for word in ("ZZR1", "Cond(W)", "tau2 explained", "torque: held"))
+    assert sorted(x.name for x in out.iterdir()) == ["log.parquet", "recording.rrd", "scenario.toml", "summary.json"]
+    summary = json.loads((out / "summary.json").read_text())
+    assert list(summary["models"]) == ["explicit", "implicit", "power"]
+    assert summary["scenario"]["name"] == name
+    assert from_dict(summary["scenario"]) == load(str(out / "scenario.toml"))
+
+
+def test_scenarios_are_listed_printed_and_written(tmp_path, capfd, complaint):
+    assert main(["scenario"]) == 0
+    listed = capfd.readouterr().out
+    assert all(name in listed for name in names())
+    assert main(["scenario", "table2"]) == 0
+    assert "# Switching frequency [Hz]" in capfd.readouterr().out
+    path = tmp_path / "mine.toml"
+    assert main(["scenario", "table2", "--out", str(path)]) == 0
+    assert load(str(path)) == load("table2")
+    assert "exists: choose another --out" in complaint("scenario", "table2", "--out", str(path))
+
+
+@pytest.fixture
+def csv(tmp_path):
+    """A short closed loop as CSV, and its truth."""
+    out = tmp_path / "run"
+    assert main(["run", str(shortened("ideal", tmp_path)), "--out", str(out)]) == 0
+    assert main(["export", str(out)]) == 0
+    return out / "log.csv"
+
+
+def test_a_csv_is_identified_with_what_its_torque_means(csv, capsys, truth, tmp_path):
+    out = tmp_path / "found"
+    assert main(["identify", str(csv), "--torque", "held", "--out", str(out)]) == 0
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["truth"] is None
+    assert summary["models"]["explicit"]["relative_error_percent"] is None
+    np.testing.assert_allclose(summary["models"]["power"]["estimate"], truth, rtol=1e-3)
+    assert min(summary["models"]["power"]["explained_share"]) > 0.999
+    assert sorted(x.name for x in out.iterdir()) == ["log.parquet", "recording.rrd", "summary.json"]
+    assert read_log(out / "log.parquet").torque.meaning == "held"
+
+
+def test_one_model_and_an_estimated_delay(csv, capsys):
+    assert main(["identify", str(csv), "--torque", "held", "--torque-delay", "estimate", "--model", "explicit"]) == 0
+    printed = capsys.readouterr().out
+    assert "torque delay estimated from the log:" in printed
+    assert "power" not in printed
+
+
+def test_a_file_that_does_not_say_is_asked(csv, complaint):
+    assert "does not say what its torque means: add --torque held" in complaint("identify", str(csv))
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (["--torque-delay", "soon"], "--torque-delay soon must be seconds, such as 0.002, or estimate"),
+        (["--robot", "puma"], "no basis for robot 'puma'; known: scara"),
+        (["--chain", "papre"], "no 'papre' among the chains"),
+        (["--model", "powr"], "no 'powr' among the models (did you mean 'power'?)"),
+        (["--estimator", "LS"], "no 'LS' among the estimators"),
+    ],
+)
+def test_wrong_options_are_one_line(csv, args, message, complaint):
+    assert message in complaint("identify", str(csv), "--torque", "held", *args)
+
+
+def rewritten(csv, change):
+    lines = csv.read_text().splitlines()
+    csv.write_text("\n".join(change(lines)) + "\n")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda lines: lines[1:], "must have a header with the columns t"),
+        (lambda lines: [lines[0].replace("tau2", "tau3"), *lines[1:]], "missing, left over or twice: tau2, tau3"),
+        (lambda lines: [lines[0].replace("tau2", "tau1"), *lines[1:]], "missing, left over or twice: tau1, tau2"),
+        (lambda lines: [*lines[:50], lines[50].rsplit(",", 1)[0] + ",nan", *lines[51:]], "tau is nan at sample 49 of joint 2"),
+        (lambda lines: [*lines[:50], lines[50].rsplit(",", 1)[0] + ",x", *lines[51:]], "column tau2 holds string, not numbers"),
+        (lambda lines: lines[:30], "the log has 29 samples"),
+        (lambda lines: [*lines[:50], *lines[53:]], "idbench resample"),
+        (lambda lines: [lines[0]], "holds no samples"),
+        (lambda lines: [*lines[:5], "1,2"], "cannot read the log"),
+    ],
+    ids=["no header", "wrong column", "twice", "nan", "text", "short", "gap", "empty", "ragged"],
+)
+def test_files_that_cannot_be_used_are_one_line(csv, change, message, complaint):
+    rewritten(csv, change)
+    assert message in complaint("identify", str(csv), "--torque", "held")
+
+
+def test_a_header_may_have_spaces_and_quotes_and_velocities(csv):
+    rewritten(csv, lambda lines: [lines[0].replace(",", " , ") + ",qd1", *(f"{line},0" for line in lines[1:])])
+    assert main(["identify", str(csv), "--torque", "held"]) == 0
+
+
+def test_a_log_with_a_gap_is_resampled_by_the_command_that_is_told(csv, tmp_path, complaint, monkeypatch):
+    rewritten(csv, lambda lines: [*lines[:200], *lines[201:]])
+    told = complaint("identify", str(csv), "--torque", "held")
+    assert "a step of 0.02 s after t = 1.98 s" in told
+    monkeypatch.chdir(tmp_path)
+    words = told.split("idbench resample ")[1].split()
+    assert main(["resample", *words]) == 0
+    assert main(["identify", "uniform.parquet"]) == 0
+
+
+def test_there_must_be_a_log_to_export(tmp_path, complaint):
+    assert "there is no log in" in complaint("export", str(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"drive": {"kind": "averagd"}}, "drive.kind = 'averagd' is unknown"),
+        ({"robot": "nowhere.xml"}, "nowhere.xml"),
+        ({"controller": {"kind": "pd", "bandwidth": 200.0}}, "leaves its range"),
+    ],
+)
+def test_runs_that_cannot_be_made_are_one_line_and_leave_nothing(tmp_path, change, message, complaint):
+    path = tmp_path / "x.toml"
+    import tomli_w
+
+    path.write_text(tomli_w.dumps({**to_dict(replace(load("ideal"), trajectory=SHORT)), **change}))
+    assert message in complaint("run", str(path), "--out", str(tmp_path / "out"))
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_parameter_whose_truth_is_zero_is_reported(tmp_path):
+    path, out = tmp_path / "x.toml", tmp_path / "out"
+    content = to_dict(replace(load("ideal"), trajectory=SHORT))
+    content["friction"]["viscous"] = [0.0, 0.01]
+    import tomli_w
+
+    path.write_text(tomli_w.dumps(content))
+    assert main(["run", str(path), "--out", str(out)]) == 0
+    assert json.loads((out / "summary.json").read_text())["models"]["power"]["relative_error_percent"][1] is None
+
+
+def test_table2_on_a_short_motion(tmp_path, capsys, monkeypatch):
+    """Its own robot with an averaged drive, 12 moves: signature, rows, attribution."""
+    points = RandomMoves(moves=12).plan(load("table2").nominal_robot)
+    trajectory = Quintic(tuple(map(tuple, points.waypoints.tolist())), tuple(points.durations.tolist()), 3.0)
+    scenario = replace(load("table2"), trajectory=trajectory, drive=AveragedDrive())
+    path, out = tmp_path / "twin.toml", tmp_path / "out"
+    path.write_text(to_toml(scenario))
+    few = [i for i in imperfections(scenario) if i.name in ("nothing", "hold, not told", "gain error of 2 %")]
+    monkeypatch.setattr("experiments.attribution.imperfections", lambda _: few)
+    assert main(["table2", "--scenario", str(path), "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert "explicit model, 2 realizations" in printed
+    assert "gain error of 2 %" in printed
+    summary = json.loads((out / "summary.json").read_text())
+    rows = {name: model["rows"] for name, model in summary["paper_processing"].items()}
+    assert rows["explicit"] == rows["implicit"] == rows["power"]
+    for model in summary["paper_processing"].values():
+        assert model["estimate"][1] < 0  # Fv1
+        assert model["estimate"][2] > 0.5  # Fs1
+    np.testing.assert_allclose(
+        summary["paper_processing"]["explicit"]["estimate"], summary["paper_processing"]["implicit"]["estimate"], rtol=0.05
+    )
+    alone = summary["attribution_percent"]
+    np.testing.assert_allclose(alone["gain error of 2 %"]["explicit"], 2.0, atol=0.02)
+    assert np.abs(alone["nothing"]["power"]).max() < 0.1
+    assert alone["hold, not told"]["power"][1] < -100
+    assert len(list(out.glob("log*.parquet"))) == 4
+
+
+def test_table2_makes_the_papers_rows_on_the_motion_that_ships():
+    """1600 rows each: two realizations of 800, four of 400; the scenario is checked before anything is simulated."""
+    table = Table2(load(table2.SCENARIO))
+    assert table.rest == 3.0
+    assert sum(load("table1").trajectory.durations) == pytest.approx(40.0)
+    assert {name: len(column.estimate) for name, column in PAPER.items()} == dict.fromkeys(PAPER, 8)
