@@ -4,6 +4,7 @@ from dataclasses import is_dataclass
 
 import numpy as np
 import pytest
+from mujoco.batch import Batch
 
 from experiments.plugins import TABLES
 from identify import (
@@ -28,6 +29,11 @@ from identify import (
     scara,
 )
 from identify.operators.grid import Grid
+from sim.controllers import CONTROLLERS, Task
+from sim.drives import DRIVES
+from sim.encoders import ENCODERS
+from sim.frictions import FRICTIONS
+from sim.trajectories import TRAJECTORIES
 
 FS = 100.0
 T = np.arange(1200) / FS
@@ -190,3 +196,52 @@ def test_alignments_keep_shapes_and_constants(name, meaning):
     assert power.shape == (3, 1, len(T))
     np.testing.assert_allclose(torque.average(np.full(50, 7.0)), 7.0, rtol=1e-12)
     assert torque.halo() >= 0
+
+
+@pytest.mark.parametrize("name", CONTROLLERS.builtin)
+def test_controllers_command_every_simulation_by_itself(name, robot, table1):
+    law = CONTROLLERS.create(name).start(Task(robot, table1.reference, 3))
+    alone = CONTROLLERS.create(name).start(Task(robot, table1.reference, 1))
+    for k in range(5):
+        q = table1.reference.q[k] + np.array([[0.0, 0.0], [0.01, -0.02], [0.02, 0.01]])
+        u = law.command(k, q)
+        assert u.shape == (3, 2)
+        np.testing.assert_array_equal(alone.command(k, q[1:2]), u[1:2])
+
+
+@pytest.mark.parametrize("name", DRIVES.builtin)
+def test_drives_give_finite_torques_and_a_lag(name, robot):
+    drive = DRIVES.create(name)
+    amplifier = drive.start(robot, 3, drive.step_length(100.0, 1e-3))
+    for steps in (1, 1) if drive.steady else (1, 4):
+        tau = amplifier.step(np.full((3, 2), 2.0), np.zeros((1 if drive.steady else steps, 3, 2)), steps)
+        assert tau.shape in {(1, 3, 2), (steps, 3, 2)}
+        assert np.isfinite(tau).all()
+    assert (drive.lag(robot) >= 0).all()
+    assert 0 < drive.step_length(100.0, 1e-3) <= 1e-3 + 1e-12
+
+
+@pytest.mark.parametrize("name", ENCODERS.builtin)
+def test_encoders_read_what_is_there_to_a_count(name):
+    reader = ENCODERS.create(name).start(2, 10, FS, [np.random.default_rng(i) for i in range(3)])
+    for k in range(10):
+        q = np.full((3, 2), 0.1 * k)
+        np.testing.assert_allclose(reader.read(k, q), q, atol=2 * np.pi / 2**16)
+
+
+@pytest.mark.parametrize("name", FRICTIONS.builtin)
+def test_frictions_resist(name, robot):
+    """What a law adds to MuJoCo's own opposes the motion."""
+    law, qd = FRICTIONS.create(name), np.array([[1.0, -1.0]])
+    plant = Batch(robot.model, 1)
+    contact = law.start(plant, np.array([[0.5, 0.1]]), 1e-3)
+    for _ in range(50):
+        torque = contact.torque(qd)
+    assert (np.asarray(torque) * qd <= 0).all()
+
+
+@pytest.mark.parametrize("name", TRAJECTORIES.builtin)
+def test_trajectories_begin_and_end_at_rest(name, robot):
+    reference = TRAJECTORIES.create(name).sample(robot, FS)
+    np.testing.assert_allclose(reference.qd[[0, -1]], 0.0, atol=1e-9)
+    assert reference.q.shape[1] == 2

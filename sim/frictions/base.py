@@ -1,6 +1,7 @@
 """What a friction of a scenario is: how the joints of the simulated robot resist."""
 
 from abc import ABC, abstractmethod
+from typing import final
 
 import mujoco
 from mujoco.batch import Batch
@@ -24,16 +25,26 @@ class AbstractContact(ABC):
 
 
 class AbstractFrictionLaw(ABC):
-    """The settings of a friction."""
+    """The settings of a friction; all have Fv and Fs."""
+
+    viscous: EachNotNegativeOrNone
+    coulomb: EachNotNegativeOrNone
 
     @property
     @abstractmethod
     def steady(self) -> bool:
         """Whether MuJoCo alone makes the friction, so that many physics steps may be taken at once."""
 
-    @abstractmethod
+    @final
     def edit(self, spec: mujoco.MjSpec) -> None:
-        """Write viscous and Coulomb friction into the robot before it is compiled."""
+        """Write viscous and Coulomb friction into the joints of a robot, and leave its own where none is given."""
+        n = len(spec.joints)
+        if self.viscous is not None:
+            for joint, value in zip(spec.joints, per_joint(self.viscous, n, "friction.viscous"), strict=True):
+                joint.damping = [value, *([0.0] * (len(joint.damping) - 1))]
+        if self.coulomb is not None:
+            for joint, value in zip(spec.joints, per_joint(self.coulomb, n, "friction.coulomb"), strict=True):
+                joint.frictionloss = value
 
     @abstractmethod
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
@@ -48,14 +59,3 @@ class AbstractFrictionLaw(ABC):
         h : float
             Physics step [s].
         """
-
-
-def write(spec: mujoco.MjSpec, viscous: EachNotNegativeOrNone, coulomb: EachNotNegativeOrNone) -> None:
-    """Write the friction that is given into the joints of a robot, and leave its own where none is."""
-    for field, name, values in (("damping", "viscous", viscous), ("frictionloss", "coulomb", coulomb)):
-        if values is not None:
-            for joint, value in zip(spec.joints, per_joint(values, len(spec.joints), f"friction.{name}"), strict=True):
-                if field == "damping":
-                    joint.damping = [value, *([0.0] * (len(joint.damping) - 1))]
-                else:
-                    joint.frictionloss = value

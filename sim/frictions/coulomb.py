@@ -2,10 +2,9 @@
 
 from typing import final
 
-import mujoco
 from mujoco.batch import Batch
 
-from sim.frictions.base import AbstractContact, AbstractFrictionLaw, write
+from sim.frictions.base import AbstractContact, AbstractFrictionLaw
 from sim.motors import Array
 from sim.settings import EachNotNegativeOrNone, settings
 
@@ -24,10 +23,6 @@ class CoulombViscous(AbstractFrictionLaw):
     def steady(self) -> bool:
         """True."""
         return True
-
-    def edit(self, spec: mujoco.MjSpec) -> None:
-        """Write both into the robot."""
-        write(spec, self.viscous, self.coulomb)
 
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
         """Return nothing more than MuJoCo's."""

@@ -2,13 +2,12 @@
 
 from typing import Annotated, final
 
-import mujoco
 import numpy as np
 from mujoco.batch import Batch
 from pydantic import Field
 
 from sim.errors import ScenarioError
-from sim.frictions.base import AbstractContact, AbstractFrictionLaw, write
+from sim.frictions.base import AbstractContact, AbstractFrictionLaw
 from sim.motors import Array
 from sim.settings import EachNotNegativeOrNone, Number, Positive, settings
 
@@ -40,10 +39,6 @@ class LuGre(AbstractFrictionLaw):
     def steady(self) -> bool:
         """False."""
         return False
-
-    def edit(self, spec: mujoco.MjSpec) -> None:
-        """Write Fv and Fs into the robot."""
-        write(spec, self.viscous, self.coulomb)
 
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
         """Return unbent bristles; MuJoCo's own Coulomb friction is switched off.

@@ -2,12 +2,11 @@
 
 from typing import Annotated, final
 
-import mujoco
 import numpy as np
 from mujoco.batch import Batch
 from pydantic import Field
 
-from sim.frictions.base import AbstractContact, AbstractFrictionLaw, write
+from sim.frictions.base import AbstractContact, AbstractFrictionLaw
 from sim.motors import Array
 from sim.settings import EachNotNegativeOrNone, Number, Positive, settings
 
@@ -30,10 +29,6 @@ class Stribeck(AbstractFrictionLaw):
     def steady(self) -> bool:
         """False."""
         return False
-
-    def edit(self, spec: mujoco.MjSpec) -> None:
-        """Write Fv and Fs into the robot."""
-        write(spec, self.viscous, self.coulomb)
 
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
         """Return the law, which sets MuJoCo's Coulomb friction anew in every step: its constraint keeps standing joints."""

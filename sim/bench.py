@@ -1,0 +1,150 @@
+"""A run in progress: controller, drive and encoder in NumPy around MuJoCo."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from identify.motion_log import MotionLog
+from sim.clock import Clock
+from sim.controllers import Task
+from sim.drives.base import every
+from sim.errors import ScenarioError
+from sim.history import History
+from sim.inverse_dynamics import inverse_dynamics
+from sim.measurement import CurrentSensor
+from sim.motors import Array
+from sim.plant import Plant
+from sim.robot import Robot
+from sim.run import Run
+from sim.scenario import Scenario
+from sim.trajectories import Reference
+
+BLOCK = 1e-3
+"""Time [s] over which the motion of the rotors may be foretold, for their back-EMF and ripple: with a jerk of 1000 rad/s^3 they
+are then off by 2e-7 rad and 5e-4 rad/s."""
+
+
+class Bench:
+    """A run in progress: controller, drive and encoder around a plant."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        robot: Robot,
+        planned: Reference,
+        seeds: tuple[int, ...],
+        vary: Mapping[str, npt.ArrayLike],
+        threads: int,
+    ) -> None:
+        fs, n, nsim, samples = scenario.fs, robot.n, len(seeds), len(planned.q)
+        self._scenario, self._planned, self._seeds = scenario, planned, seeds
+        self._h = scenario.drive.step_length(fs, scenario.physics.step)
+        self._clock = clock = Clock(round(1 / fs / self._h), self._h, scenario.timing.delay)
+        self._plant = Plant(robot, nsim, scenario.physics, self._h, vary, threads)
+        self._plant.q[:] = planned.q[0]
+        self._ranges = tuple(every(limit, nsim) for limit in robot.ranges.T)
+        self._law = scenario.controller.start(Task(scenario.nominal_robot, planned, nsim))
+        self._drive = scenario.drive.start(robot, nsim, self._h)
+        self._ripple = scenario.ripple.start(robot)
+        self._friction = scenario.friction.start(self._plant.batch, self._plant.Fs, self._h)
+        self._encoder = scenario.encoder.start(n, samples, fs, _generators(seeds, 0))
+        self._sensor = CurrentSensor(scenario.torque, nsim, n)
+        self._jitter = self._drawn_jitter(samples)
+        self._history = History(clock.late + clock.per_sample, nsim, n, self._h)
+        at_rest = planned.q[:1], np.zeros((1, n)), np.zeros((1, n))
+        self._before = self._command = self._demand = np.repeat(inverse_dynamics(robot, *at_rest), nsim, axis=0)
+        self._qd, self._steps = np.zeros((nsim, n)), 1
+        self._steady = scenario.drive.steady and scenario.ripple.steady
+        watched = scenario.timing.jitter or scenario.torque.source == "current"
+        one_by_one = watched or not scenario.friction.steady
+        self._most = 1 if one_by_one else clock.per_sample if self._steady else max(1, round(BLOCK / self._h))
+        self._measured, self._commands, self._currents, self._q, self._speeds, self._tau = np.zeros((6, samples, nsim, n))
+        self.steps = samples * clock.per_sample + clock.late
+
+    def _drawn_jitter(self, samples: int) -> Array:
+        """Return by how many steps each sample is off its claimed instant, shape (sample, nsim)."""
+        width = self._scenario.timing.jitter / self._h
+        if width >= self._clock.per_sample:
+            raise ScenarioError(
+                f"timing.jitter = {self._scenario.timing.jitter:g} s must be below 1/fs = {1 / self._scenario.fs:g} s"
+            )
+        if width / 2 > self._clock.late:
+            raise ScenarioError(
+                f"timing.jitter = {self._scenario.timing.jitter:g} s needs a timing.delay of at least its half in whole "
+                f"physics steps of {self._h:g} s: a command cannot act before its sample is taken"
+            )
+        return np.stack([width * (rng.random(samples) - 0.5) for rng in _generators(self._seeds, 1)], axis=1)
+
+    def advance(self, step: int) -> int:
+        """Advance from physics step `step` to where something may change; return how many steps that were."""
+        q, qd = self._plant.q, self._plant.qd
+        sample = self._clock.sample(step)
+        if sample is not None and sample < len(self._q):
+            self._q[sample], self._speeds[sample], self._currents[sample] = q, qd, self._sensor.value
+            self._require_in_range(sample)
+        self._history.put(step, q, qd)
+        steps = self._listen(step)
+        t = self._middles(steps)
+        rate = (qd - self._qd) / (self._steps * self._h)  # accelerating as in the steps before
+        mid_qd, mid_q = qd + rate * t, q + qd * t + rate * (t**2 / 2)
+        self._qd, self._steps = qd.copy(), steps
+        constant = 1 + self._ripple.commutation.at(mid_q)
+        electric = self._drive.step(self._demand, mid_qd * constant, steps)
+        self._sensor.take(electric, steps * self._h)
+        tau = electric * constant + self._ripple.cogging.at(mid_q)
+        self._plant.step(tau + self._friction.torque(mid_qd[0]), steps)
+        current = step // self._clock.per_sample
+        if current < len(self._tau):
+            self._tau[current] += tau.mean(axis=0) * steps
+        return steps
+
+    def _middles(self, steps: int) -> Array:
+        """Return the middle of each of the steps to come [s], shape (steps, 1, 1), or of all of them for steady parts."""
+        count = 1 if self._steady else steps
+        return np.linspace(0.5, count - 0.5, count)[:, None, None] * (steps / count * self._h)
+
+    def _listen(self, step: int) -> int:
+        """Let the command whose turn it is act; return for how many steps nothing changes."""
+        clock, (k, after) = self._clock, self._clock.command(step)
+        if after == 0 and k >= 0:
+            q = self._encoder.read(k, self._history.at(step - clock.late + self._jitter[k]))
+            self._before, self._command = self._command, self._law.command(k, q)
+            self._measured[k], self._commands[k] = q, self._command
+            self._demand = clock.old * self._before + (1 - clock.old) * self._command
+        elif after == 1:
+            self._demand = self._command
+        if after == 0 and (self._steady or clock.old > 0):
+            return 1  # the current of a new command settles in a step of its own, and so does a mixture of two
+        return min(clock.undisturbed(step), self._most)
+
+    def run(self, skipped: int) -> Run:
+        """Return what has happened since sample `skipped`."""
+        channels = self._measured, self._commands, self._currents, self._q, self._speeds, self._tau / self._clock.per_sample
+        measured, command, current, q, qd, tau = (np.swapaxes(x[skipped:], 0, 1) for x in channels)
+        scenario, n = self._scenario, q.shape[-1]
+        logged = scenario.torque.logged(
+            current if scenario.torque.source == "current" else command, n, _generators(self._seeds, 2)
+        )
+        planned = replace(self._planned, **{x: getattr(self._planned, x)[skipped:] for x in ("q", "qd", "qdd")})
+        lag = float(scenario.drive.lag(self._plant.robot).mean()) - scenario.physics.early * self._h
+        log = MotionLog(scenario.fs, measured, logged, scenario.torque.channel(scenario.timing.delay, lag, scenario.fs))
+        return Run(scenario, self._seeds, self._plant.robots, planned, log, q, qd, tau, command)
+
+    def _require_in_range(self, sample: int) -> None:
+        """Raise ScenarioError if a joint has left its range: it ran into its stop, or the loop is unstable."""
+        q, (low, high) = self._q[sample], self._ranges
+        inside = (q >= low) & (q <= high)
+        if not inside.all():
+            sim, j = (int(i) for i in np.argwhere(~inside)[0])
+            raise ScenarioError(
+                f"joint {self._plant.robot.joints[j]} leaves its range {sample / self._scenario.fs:.3g} s after the start "
+                f"(seed {self._seeds[sim]}): the loop is unstable or too weak; lower controller.bandwidth or timing.delay, "
+                "raise fs, or ask less of the drive"
+            )
+
+
+def _generators(seeds: Sequence[int], stream: int) -> list[np.random.Generator]:
+    """Return a generator for each simulation, that depends on its seed and the purpose alone."""
+    return [np.random.default_rng([seed, stream]) for seed in seeds]
