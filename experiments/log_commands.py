@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
+import numpy as np
 import tyro
 
 from experiments.app import app
@@ -87,8 +88,11 @@ def resample(log: tyro.conf.Positional[Path], fs: float, out: Path, torque: Held
     if meaning is None:
         raise ExperimentError(f"{log} does not say what its torque means: add --torque held, instantaneous or averaged")
     channel = _channel(columns.torque, meaning, torque_delay)
-    _write(at(columns.t, columns.q, columns.tau, channel, fs), out)
-    page.print(f"written to {out}", soft_wrap=True)
+    made, widest = at(columns.t, columns.q, columns.tau, channel, fs), float(np.diff(columns.t).max())
+    _write(made, out)
+    page.print(f"written to {out}: torque {made.torque.meaning}, delay {made.torque.delay:g} s", soft_wrap=True)
+    if widest > 2 / fs:
+        page.print(f"doubtful: a gap of {widest:.3g} s was filled in, with positions and torques that nobody measured")
     show(page)
 
 
@@ -107,7 +111,9 @@ def export(folder: tyro.conf.Positional[Path], out: File = None) -> None:
         log, target = read_log(path), (out or folder) / f"{path.stem}.csv"
         _write(log, target)
         delay = f"--torque-delay {log.torque.delay:g}"
-        page.print(f"written to {target}; idbench identify {target} --torque {log.torque.meaning} {delay}", soft_wrap=True)
+        page.print(
+            f"written to {target}; uv run idbench identify {target} --torque {log.torque.meaning} {delay}", soft_wrap=True
+        )
     show(page)
 
 
@@ -132,17 +138,21 @@ def _read(path: Path, torque: Meaning | None, delay: str | None, basis: Basis, c
     try:
         log = MotionLog.at_times(columns.t, columns.q, columns.tau, channel)
     except TimeError as error:
-        fs = (len(columns.t) - 1) / (columns.t[-1] - columns.t[0])
+        fs = 1 / float(np.median(np.diff(columns.t)))
+        late = f" --torque-delay {channel.delay:g}" if channel.delay else ""
         raise ExperimentError(
-            f"{path}: {error}: idbench resample {shlex.quote(str(path))} --fs {fs:.4g} --torque {meaning} --out uniform.parquet"
+            f"{path}: {error}: uv run idbench resample {shlex.quote(str(path))} --fs {fs:.4g} --torque {meaning}{late} "
+            "--out uniform.parquet"
         ) from error
     if delay != "estimate":
-        return log, ""
+        assumed = delay is None and columns.torque is None
+        return log, "no --torque-delay was given, 0 is assumed: `estimate` finds it" if assumed else ""
     from identify.delay import estimate_delay
 
     found = estimate_delay(log, basis, chain)
     told = MotionLog(log.fs, log.q, log.tau, replace(channel, delay=found.delay))
-    return told, f"torque delay estimated from the log: {1e3 * found.delay:.4g} ms, sigma {1e3 * found.sigma:.2g} ms"
+    sure = f"{1e3 * found.delay:.4g} ms, sigma {1e3 * found.sigma:.2g} ms (not in the sigmas above)"
+    return told, f"torque delay estimated from the log: {sure}"
 
 
 def _channel(said: TorqueChannel | None, meaning: Meaning, delay: str | None) -> TorqueChannel:

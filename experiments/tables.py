@@ -1,6 +1,6 @@
 """Estimates as text."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from rich import box
 from rich.console import Console
@@ -9,7 +9,10 @@ from rich.text import Text
 
 from experiments.identified import Identified
 from experiments.table2 import PAPER, REALIZATIONS, Table2
-from identify import Estimate
+from identify import AsLogged, Estimate
+
+WELL_EXPLAINED = 0.95
+"""Share of a torque's variance that a model of the right robot explains on any log that is worth identifying."""
 
 
 def new_table(title: str, columns: Iterable[str]) -> Table:
@@ -41,7 +44,12 @@ def print_identified(console: Console, found: Identified, title: str) -> None:
         grid.add_row(f"tau{j + 1} explained", *lead, *(c for share in shares for c in (share, "", "")))
     console.print(grid)
     channel = found.logs[0].torque
-    console.print(Text(f"torque: {channel.meaning}, delay {1e3 * channel.delay:.4g} ms\n"))
+    read = f"{channel.meaning}, delay {1e3 * channel.delay:.4g} ms"
+    logged = isinstance(found.processing.alignment, AsLogged)
+    console.print(Text(f"torque: {read}" + (f", which chain {found.chain} ignores: it takes it as logged" if logged else "")))
+    for doubt in _doubts(found):
+        console.print(Text(f"doubtful: {doubt}"))
+    console.print()
 
 
 def _cells(estimate: Estimate, found: Identified, i: int) -> tuple[str, str, str]:
@@ -51,6 +59,18 @@ def _cells(estimate: Estimate, found: Identified, i: int) -> tuple[str, str, str
         true = list(found.truth.values())[i]
         second = percent(100 * (estimate.X[i] - true) / abs(true)) if true else ""
     return f"{estimate.X[i]:#.5g}", second, f"{estimate.relative_sigma_percent[i]:.2g}"
+
+
+def _doubts(found: Identified) -> Iterator[str]:
+    """Yield what no healthy identification shows."""
+    for name, estimate in found.estimates.items():
+        friction = zip(found.basis.parameters, estimate.X, estimate.sigma, strict=True)
+        negative = [p for p, x, sigma in friction if p.startswith("F") and x < -2 * sigma]
+        if negative:
+            yield f"{', '.join(negative)} below zero in the {name} model: is the torque's meaning or delay wrong?"
+        poor = [f"{100 * share:.0f} % of tau{j + 1}" for j, share in enumerate(found.explained[name]) if share < WELL_EXPLAINED]
+        if poor:
+            yield f"the {name} model explains {', '.join(poor)}: are units, signs and the torque's delay right?"
 
 
 def percent(share: float) -> str:

@@ -90,7 +90,7 @@ def _complaint(detail: Any, cls: type, where: str) -> str:
         known = list(fields_of(owner))
         close = get_close_matches(str(location[-1]), known, 1)
         hint = f" (did you mean {close[0]!r}?)" if close else ""
-        return f"unknown key {key!r}{hint}; known: {', '.join(known)}"
+        return f"unknown key {key!r}{hint}; " + (f"known: {', '.join(known)}" if known else "this kind has no settings")
     if kind in ("missing", "missing_argument"):
         return f"key {key!r} is missing" + (f": {told}" if told else "")
     if kind == "value_error":

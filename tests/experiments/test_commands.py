@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import tomli_w
 
 from experiments import table2
 from experiments.attribution import imperfections
@@ -136,6 +137,17 @@ def test_a_log_with_a_gap_is_resampled_by_the_command_that_is_told(csv, tmp_path
     assert main(["identify", "uniform.parquet"]) == 0
 
 
+def test_what_no_healthy_log_shows_is_said(csv, capsys):
+    rewritten(
+        csv, lambda lines: [lines[0], *(",".join([*x[:-1], str(-float(x[-1]))]) for x in (y.split(",") for y in lines[1:]))]
+    )
+    assert main(["identify", str(csv), "--torque", "held", "--model", "explicit"]) == 0
+    printed = capsys.readouterr().out
+    assert "doubtful: Fs2 below zero in the explicit model" in printed.replace("Fv2, ", "")
+    assert "% of tau2: are units, signs" in printed
+    assert "0 is assumed" in printed
+
+
 def test_there_must_be_a_log_to_export(tmp_path, complaint):
     assert "there is no log in" in complaint("export", str(tmp_path))
 
@@ -150,8 +162,6 @@ def test_there_must_be_a_log_to_export(tmp_path, complaint):
 )
 def test_runs_that_cannot_be_made_are_one_line_and_leave_nothing(tmp_path, change, message, complaint):
     path = tmp_path / "x.toml"
-    import tomli_w
-
     path.write_text(tomli_w.dumps({**to_dict(replace(load("ideal"), trajectory=SHORT)), **change}))
     assert message in complaint("run", str(path), "--out", str(tmp_path / "out"))
     assert list(tmp_path.iterdir()) == [path]
@@ -161,8 +171,6 @@ def test_a_parameter_whose_truth_is_zero_is_reported(tmp_path):
     path, out = tmp_path / "x.toml", tmp_path / "out"
     content = to_dict(replace(load("ideal"), trajectory=SHORT))
     content["friction"]["viscous"] = [0.0, 0.01]
-    import tomli_w
-
     path.write_text(tomli_w.dumps(content))
     assert main(["run", str(path), "--out", str(out)]) == 0
     assert json.loads((out / "summary.json").read_text())["models"]["power"]["relative_error_percent"][1] is None
