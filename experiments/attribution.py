@@ -8,8 +8,6 @@ the power model alone; a gain error scales everything.
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from identify import Array, AsLogged, Chain, MotionLog, NoMask, TorqueChannel, idbench_chain, identify_each, scara
 from identify.models import ExplicitModel, PowerModel
 from sim.drives import AveragedDrive, SwitchedDrive
@@ -83,7 +81,7 @@ def attribution(table2: Scenario, progress: Progress | None = None) -> Iterator[
 
 def _errors(imperfection: Imperfection) -> dict[str, Array]:
     run = simulate(imperfection.scenario)
-    log, truth = run.alone(), np.array(list(scara_truth(run.robots[0]).values()))
+    log, truth = run.alone(), list(scara_truth(run.robots[0]).values())
     told = MotionLog(log.fs, log.q, log.tau, imperfection.believed or log.torque)
     estimates = identify_each(told, scara(), COMPARED, imperfection.chain)
-    return {form: 100 * (estimate.X - truth) / np.abs(truth) for form, estimate in estimates.items()}
+    return {form: estimate.error_percent(truth) for form, estimate in estimates.items()}

@@ -67,18 +67,13 @@ def summarize(estimate: Estimate, truth: list[float] | None) -> dict[str, Any]:
     """Return one model's entry of a summary: estimate, error if the truth is known, sigma, Cond(W), rows, residual."""
     return {
         "estimate": estimate.X.tolist(),
-        "relative_error_percent": None if truth is None else _errors(estimate, truth),
+        "relative_error_percent": None if truth is None else [_finite(x) for x in estimate.relative_error_percent(truth)],
         "sigma": estimate.sigma.tolist(),
         "relative_sigma_percent": [_finite(x) for x in estimate.relative_sigma_percent],
         "condition_number": float(estimate.condition_number),
         "rows": int(estimate.rows),
         "residual_rms": float(estimate.residual_rms),
     }
-
-
-def _errors(estimate: Estimate, truth: list[float]) -> list[float | None]:
-    """Return %e, None where the truth is 0."""
-    return [_finite(100 * abs(x - true) / abs(true)) if true else None for x, true in zip(estimate.X, truth, strict=True)]
 
 
 def _finite(x: float) -> float | None:

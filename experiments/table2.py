@@ -68,6 +68,9 @@ PAPER: Mapping[str, PaperColumn] = {
 }
 """Table 2 of the paper."""
 
+PAPER_ROWS = 1600
+"""r of every column of Table 2 (section 7.3)."""
+
 
 @dataclass(frozen=True, eq=False)
 class Table2:

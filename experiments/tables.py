@@ -1,6 +1,7 @@
 """Estimates as text."""
 
 from collections.abc import Iterable, Iterator
+from math import isfinite
 
 from rich import box
 from rich.console import Console
@@ -8,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from experiments.identified import Identified
-from experiments.table2 import PAPER, REALIZATIONS, Table2
+from experiments.table2 import PAPER, PAPER_ROWS, REALIZATIONS, Table2
 from identify import AsLogged, Estimate
 
 WELL_EXPLAINED = 0.95
@@ -56,8 +57,8 @@ def _cells(estimate: Estimate, found: Identified, i: int) -> tuple[str, str, str
     if found.truth is None:
         second = f"{estimate.sigma[i]:.2g}"
     else:
-        true = list(found.truth.values())[i]
-        second = percent(100 * (estimate.X[i] - true) / abs(true)) if true else ""
+        error = float(estimate.error_percent(list(found.truth.values()))[i])
+        second = percent(error) if isfinite(error) else ""
     return f"{estimate.X[i]:#.5g}", second, f"{estimate.relative_sigma_percent[i]:.2g}"
 
 
@@ -103,19 +104,19 @@ def _twin(table: Table2, model: str) -> Table:
     grid = new_table(f"{model} model, {REALIZATIONS[model]} realizations", columns)
     for i, (name, true) in enumerate(table.truth.items()):
         printed = f"{paper.estimate[i]:g}", f"{paper.two_sigma[i]:g}", f"{paper.relative_sigma_percent[i]:g}"
-        cells = [c for e in estimates.values() for c in _with_sigma(e, i, true)]
+        cells = [c for e in estimates.values() for c in _with_sigma(e, i, list(table.truth.values()))]
         grid.add_row(name, f"{true:g}", *printed, *cells)
     grid.add_section()
     conds = [c for e in estimates.values() for c in (f"{e.condition_number:.0f}", "", "", "")]
     grid.add_row("Cond(W)", "", f"{paper.condition_number:g}", "", "", *conds)
-    grid.add_row("rows", "", "1600", "", "", *(c for e in estimates.values() for c in (f"{e.rows}", "", "", "")))
+    grid.add_row("rows", "", f"{PAPER_ROWS}", "", "", *(c for e in estimates.values() for c in (f"{e.rows}", "", "", "")))
     return grid
 
 
-def _with_sigma(estimate: Estimate, i: int, true: float) -> tuple[str, str, str, str]:
+def _with_sigma(estimate: Estimate, i: int, truth: list[float]) -> tuple[str, str, str, str]:
     return (
         f"{estimate.X[i]:.4f}",
         f"{2 * estimate.sigma[i]:.2g}",
         f"{estimate.relative_sigma_percent[i]:.2g}",
-        percent(100 * (estimate.X[i] - true) / abs(true)),
+        percent(float(estimate.error_percent(truth)[i])),
     )

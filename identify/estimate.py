@@ -88,10 +88,14 @@ class Estimate:
             [*lines, f"Cond(W) = {self.condition_number:.1f}, {self.rows} rows, residual rms {self.residual_rms:.3g}"]
         )
 
-    def relative_error_percent(self, truth: npt.ArrayLike) -> Array:
-        """Return 100 |X - truth| / |truth|, shape (..., p), the paper's %e."""
+    def error_percent(self, truth: npt.ArrayLike) -> Array:
+        """Return 100 (X - truth) / |truth|, shape (..., p); NaN where the truth is 0."""
         true = np.asarray(truth, dtype=np.float64)
-        return 100 * np.abs(self.X - true) / np.abs(true)
+        return 100 * (self.X - true) / np.where(true == 0, np.nan, np.abs(true))
+
+    def relative_error_percent(self, truth: npt.ArrayLike) -> Array:
+        """Return 100 |X - truth| / |truth|, shape (..., p), the paper's %e; NaN where the truth is 0."""
+        return np.abs(self.error_percent(truth))
 
 
 def _paper_covariance(system: System, X: Array) -> Array:

@@ -3,17 +3,16 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
 from experiments.identified import Identified
 from experiments.recording.arm import send_arm
-from experiments.recording.parts import EYE, UNITS, plot, send_bars, send_joints, send_model
+from experiments.recording.parts import UNITS, layout, plot, send_bars, send_joints, send_model
 from experiments.recording.stream import recording_file, time_columns
 from experiments.recording.style import FORMS
 from experiments.run import ScenarioRun
-from identify import Array
+from identify import Array, Estimate
 from sim.robot import Robot
 
 
@@ -43,14 +42,18 @@ def _record(path: Path, name: str, found: Identified, robot: Robot, q: Array, si
         send_joints(recording, times, signals)
         for form, estimate in found.estimates.items():
             send_model(recording, found.chain, form, estimate, FORMS[form], log.fs)
-            errors = estimate.relative_sigma_percent if found.truth is None else _error_percent(found, form)
+            errors = (
+                estimate.error_percent(list(found.truth.values()))
+                if found.truth is not None
+                else estimate.relative_sigma_percent
+            )
             send_bars(recording, f"error/{form}", errors, form)
         recording.log("report", rr.TextDocument(_markdown(found), media_type="text/markdown"), static=True)
 
 
-def _error_percent(found: Identified, form: str) -> Array:
-    truth = np.array(list((found.truth or {}).values()))
-    return 100 * (found.estimates[form].X - truth) / np.where(truth == 0, np.nan, np.abs(truth))
+def _judged(found: Identified, estimate: Estimate) -> Array:
+    """Return the errors [%] where the truth is known, %sigma where it is not."""
+    return estimate.relative_sigma_percent if found.truth is None else estimate.error_percent(list(found.truth.values()))
 
 
 def _blueprint(found: Identified, signals: list[str]) -> rrb.Blueprint:
@@ -58,21 +61,12 @@ def _blueprint(found: Identified, signals: list[str]) -> rrb.Blueprint:
     units["joint/disturbance"] = "true minus commanded torque, mean of each sample [N m]"
     shown = [form for form in UNITS if form in found.estimates]
     bars = f"{'sigma' if found.truth is None else 'error'} [%] of parameters 1 to {len(found.basis.parameters)}"
-    return rrb.Blueprint(
-        rrb.Horizontal(
-            rrb.Vertical(
-                rrb.Spatial3DView(origin="/world", name="arm", eye_controls=EYE),
-                rrb.TextDocumentView(origin="/report", name="parameters"),
-                row_shares=[5, 4],
-            ),
-            rrb.Vertical(*(plot(f"/{path}", units[path]) for path in signals), rrb.BarChartView(origin="/error", name=bars)),
-            rrb.Vertical(*(plot(f"/identify/{found.chain}/{f}/signal", f"{f} [{UNITS[f]}]") for f in shown)),
-            rrb.Vertical(*(plot(f"/identify/{found.chain}/{f}/residual", f"{f} residual [{UNITS[f]}]") for f in shown)),
-            column_shares=[7, 6, 5, 5],
-        ),
-        rrb.TimePanel(state="collapsed", timeline="sim_time"),
-        collapse_panels=True,
-    )
+    columns = [
+        rrb.Vertical(*(plot(f"/{path}", units[path]) for path in signals), rrb.BarChartView(origin="/error", name=bars)),
+        rrb.Vertical(*(plot(f"/identify/{found.chain}/{f}/signal", f"{f} [{UNITS[f]}]") for f in shown)),
+        rrb.Vertical(*(plot(f"/identify/{found.chain}/{f}/residual", f"{f} residual [{UNITS[f]}]") for f in shown)),
+    ]
+    return layout("parameters", [5, 4], columns, [7, 6, 5, 5])
 
 
 def _markdown(found: Identified) -> str:
@@ -86,7 +80,7 @@ def _markdown(found: Identified) -> str:
         cells = []
         for form in forms:
             estimate = found.estimates[form]
-            aside = f"{estimate.sigma[i]:.2g}" if found.truth is None else f"{_error_percent(found, form)[i]:+.2g} %"
+            aside = f"{estimate.sigma[i]:.2g}" if found.truth is None else f"{_judged(found, estimate)[i]:+.2g} %"
             cells.append(f"{estimate.X[i]:.4g} ({aside})")
         lines.append(f"| {i + 1} {name} | {true} | {' | '.join(cells)} |")
     conds = " | ".join(f"{e.condition_number:.1f}" for e in found.estimates.values())

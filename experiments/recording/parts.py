@@ -52,3 +52,14 @@ def plot(origin: str, name: str, contents: list[str] | None = None) -> rrb.TimeS
     """Return a view of curves over time, its time axis that of all others."""
     linked = rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal)
     return rrb.TimeSeriesView(origin=origin, name=name, contents=contents or "$origin/**", axis_x=linked)
+
+
+def layout(report: str, rows: list[float], columns: Sequence[rrb.Vertical], shares: list[float]) -> rrb.Blueprint:
+    """Return the layout of a recording: the arm above the report, named `report`, and then columns of views."""
+    first = rrb.Vertical(
+        rrb.Spatial3DView(origin="/world", name="arm", eye_controls=EYE),
+        rrb.TextDocumentView(origin="/report", name=report),
+        row_shares=rows,
+    )
+    time = rrb.TimePanel(state="collapsed", timeline="sim_time")
+    return rrb.Blueprint(rrb.Horizontal(first, *columns, column_shares=shares), time, collapse_panels=True)

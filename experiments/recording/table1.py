@@ -6,7 +6,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from experiments.recording.arm import send_arm
-from experiments.recording.parts import EYE, UNITS, plot, send_bars, send_joints, send_model
+from experiments.recording.parts import UNITS, layout, plot, send_bars, send_joints, send_model
 from experiments.recording.stream import recording_file, time_columns
 from experiments.recording.style import FORMS, MEASURED
 from experiments.report import markdown
@@ -32,26 +32,17 @@ def record_table1(path: Path, table: Table1) -> None:
 def _blueprint(table: Table1) -> rrb.Blueprint:
     """Return the layout: what moves, what was measured, what each model makes of it, what is left, how wrong it is."""
     *_, main = table.chains
-    return rrb.Blueprint(
-        rrb.Horizontal(
-            rrb.Vertical(
-                rrb.Spatial3DView(origin="/world", name="arm", eye_controls=EYE),
-                rrb.TextDocumentView(origin="/report", name="parameters"),
-                row_shares=[5, 4],
-            ),
-            rrb.Vertical(
-                plot("/joint/q", "q [rad]"),
-                plot("/joint/qd", "qd [rad/s]"),
-                plot("/joint/tau", "tau [N m]"),
-                *(_bars(table, chain) for chain in table.chains),
-            ),
-            rrb.Vertical(*(plot(f"/identify/{main}/{form}/signal", f"{form} [{UNITS[form]}]") for form in UNITS)),
-            rrb.Vertical(*(_residuals(table, form) for form in UNITS)),
-            column_shares=[7, 6, 5, 5],
+    columns = [
+        rrb.Vertical(
+            plot("/joint/q", "q [rad]"),
+            plot("/joint/qd", "qd [rad/s]"),
+            plot("/joint/tau", "tau [N m]"),
+            *(_bars(table, chain) for chain in table.chains),
         ),
-        rrb.TimePanel(state="collapsed", timeline="sim_time"),
-        collapse_panels=True,
-    )
+        rrb.Vertical(*(plot(f"/identify/{main}/{form}/signal", f"{form} [{UNITS[form]}]") for form in UNITS)),
+        rrb.Vertical(*(_residuals(table, form) for form in UNITS)),
+    ]
+    return layout("parameters", [5, 4], columns, [7, 6, 5, 5])
 
 
 def _bars(table: Table1, chain: str) -> rrb.BarChartView:

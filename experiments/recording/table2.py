@@ -7,7 +7,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from experiments.recording.arm import send_arm
-from experiments.recording.parts import EYE, plot, send_bars, send_joints
+from experiments.recording.parts import layout, plot, send_bars, send_joints
 from experiments.recording.stream import recording_file, time_columns
 from experiments.table2 import PAPER, Table2
 from identify import Array
@@ -29,16 +29,12 @@ def record_table2(path: Path, table: Table2) -> None:
         send_joints(recording, times, {"joint/tau": run.log.tau[0], "joint/disturbance": disturbance})
         for name, found in table.found.items():
             for form, one in found.items():
-                send_bars(recording, f"processing/{name}/{form}", _decades(_error(table, one.estimates[form].X)), form)
-        for k, errors in enumerate(table.attribution.values()):
-            for form, error in errors.items():
+                errors = one.estimates[form].error_percent(list(table.truth.values()))
+                send_bars(recording, f"processing/{name}/{form}", _decades(errors), form)
+        for k, alone in enumerate(table.attribution.values()):
+            for form, error in alone.items():
                 send_bars(recording, f"attribution/{k}/{form}", _decades(error), form)
         recording.log("report", rr.TextDocument(_markdown(table), media_type="text/markdown"), static=True)
-
-
-def _error(table: Table2, X: Array) -> Array:
-    truth = np.array(list(table.truth.values()))
-    return 100 * (X - truth) / np.abs(truth)
 
 
 def _decades(error_percent: Array) -> Array:
@@ -51,24 +47,12 @@ def _blueprint(table: Table2) -> rrb.Blueprint:
     hidden = rrb.PlotLegend(visible=False)
     charts = [rrb.BarChartView(origin=f"/attribution/{k}", name=name, plot_legend=hidden) for k, name in enumerate(names)]
     columns = [rrb.Vertical(*charts[k : k + ROWS]) for k in range(0, len(charts), ROWS)]
-    return rrb.Blueprint(
-        rrb.Horizontal(
-            rrb.Vertical(
-                rrb.Spatial3DView(origin="/world", name="arm", eye_controls=EYE),
-                rrb.TextDocumentView(origin="/report", name="Table 2"),
-                row_shares=[3, 5],
-            ),
-            rrb.Vertical(
-                plot("/joint/tau", "tau in the log [N m]"),
-                plot("/joint/disturbance", "true minus commanded torque [N m]"),
-                *(rrb.BarChartView(origin=f"/processing/{name}", name=f"processed as {name}") for name in table.found),
-            ),
-            *columns,
-            column_shares=[6, 4, *([4] * len(columns))],
-        ),
-        rrb.TimePanel(state="collapsed", timeline="sim_time"),
-        collapse_panels=True,
+    signals = rrb.Vertical(
+        plot("/joint/tau", "tau in the log [N m]"),
+        plot("/joint/disturbance", "true minus commanded torque [N m]"),
+        *(rrb.BarChartView(origin=f"/processing/{name}", name=f"processed as {name}") for name in table.found),
     )
+    return layout("Table 2", [3, 5], [signals, *columns], [6, 4, *([4] * len(columns))])
 
 
 def _markdown(table: Table2) -> str:

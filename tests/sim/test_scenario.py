@@ -8,8 +8,11 @@ import pytest
 from sim.drives import AveragedDrive, SwitchedDrive
 from sim.encoders import IncrementalEncoder
 from sim.errors import ScenarioError
+from sim.measurement import TorqueMeasurement
+from sim.payload import Payload
+from sim.ripple import Ripple
 from sim.scenario import Physics, Scenario, Timing
-from sim.scenario_file import from_dict, load, names, to_dict, to_toml
+from sim.scenario_file import KINDS, from_dict, load, names, to_dict, to_toml
 from sim.settings import description, fields_of, per_joint
 from sim.trajectories import Quintic
 
@@ -40,14 +43,14 @@ def test_settings_made_in_python_survive_a_file(tmp_path):
 
 
 def test_every_setting_is_described():
-    """With its unit where it has one: the description of a number with a unit holds it in brackets."""
-    pending, seen = [Scenario, AveragedDrive, SwitchedDrive, IncrementalEncoder, Quintic, Physics, Timing], set()
-    while pending:
-        cls = pending.pop()
+    """Nothing that a scenario explains is left without words."""
+    plugins = [table[name] for table in KINDS.values() for name in table.builtin]
+    seen = set()
+    for cls in (Scenario, Timing, Physics, Payload, Ripple, TorqueMeasurement, *plugins):
         for key in fields_of(cls):
             assert len(description(cls, key)) > 3, f"{cls.__name__}.{key}"
             seen.add(f"{cls.__name__}.{key}")
-    assert len(seen) > 35
+    assert len(seen) > 70
 
 
 @pytest.mark.parametrize(

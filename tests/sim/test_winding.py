@@ -53,8 +53,8 @@ def test_current_ripple_is_that_of_the_closed_form(modulation):
     np.testing.assert_allclose(np.ptp(current, axis=0)[counted], expected[counted], rtol=0.02)
 
 
-@pytest.mark.parametrize(("modulation", "share"), [("sign_magnitude", 1.0), ("bipolar", 1.0), ("unipolar", 1.0)])
-def test_rms_of_the_ripple_is_that_of_a_triangle(modulation, share):
+@pytest.mark.parametrize("modulation", FORMS)
+def test_rms_of_the_ripple_is_that_of_a_triangle(modulation):
     """A triangle's rms is its peak-to-peak value over 2 sqrt(3); unipolar pulses are two equal triangles a period."""
     m = np.array([0.3, 0.5, -0.4])
     e = m * V - R * 10.0
@@ -66,7 +66,7 @@ def test_rms_of_the_ripple_is_that_of_a_triangle(modulation, share):
         ripple = goal + (now - goal) * np.exp(-t * R / L) - 10.0
         squares = squares + np.trapezoid(ripple**2, t, axis=0)
         now = ripple[-1] + 10.0
-    np.testing.assert_allclose(np.sqrt(squares / T), FORMS[modulation](m) / (2 * np.sqrt(3)) * share, rtol=0.02)
+    np.testing.assert_allclose(np.sqrt(squares / T), FORMS[modulation](m) / (2 * np.sqrt(3)), rtol=0.02)
 
 
 @pytest.mark.parametrize("modulation", FORMS)
