@@ -64,11 +64,12 @@ def write_summary(path: Path, summary: dict[str, Any]) -> None:
 
 
 def summarize(estimate: Estimate, truth: list[float] | None) -> dict[str, Any]:
-    """Return one model's entry of a summary: estimate, error if the truth is known, sigma, Cond(W), rows, residual."""
+    """Return one model's entry of a summary: estimate, error if the truth is known, sigma (the paper's, and corrected), Cond(W), ..."""
     return {
         "estimate": estimate.X.tolist(),
         "relative_error_percent": None if truth is None else [_finite(x) for x in estimate.relative_error_percent(truth)],
         "sigma": estimate.sigma.tolist(),
+        "corrected_sigma": estimate.corrected_sigma.tolist(),
         "relative_sigma_percent": [_finite(x) for x in estimate.relative_sigma_percent],
         "condition_number": float(estimate.condition_number),
         "rows": int(estimate.rows),

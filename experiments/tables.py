@@ -28,7 +28,10 @@ def new_table(title: str, columns: Iterable[str]) -> Table:
 
 
 def print_identified(console: Console, found: Identified, title: str) -> None:
-    """Print truth, if it is known, and of each model estimate, error or sigma, %sigma, Cond(W) and what is explained."""
+    """Print truth, if it is known, and of each model estimate, error or sigma, %sigma, Cond(W) and what is explained.
+
+    Sigma is the corrected one; the paper's is in the summary.
+    """
     known = found.truth is not None
     what = ("X", "%e" if known else "sigma", "%sigma")
     heads = [f"{model}\n{w}" for model in found.estimates for w in what]
@@ -55,17 +58,17 @@ def print_identified(console: Console, found: Identified, title: str) -> None:
 
 def _cells(estimate: Estimate, found: Identified, i: int) -> tuple[str, str, str]:
     if found.truth is None:
-        second = f"{estimate.sigma[i]:.2g}"
+        second = f"{estimate.corrected_sigma[i]:.2g}"
     else:
         error = float(estimate.error_percent(list(found.truth.values()))[i])
         second = percent(error) if isfinite(error) else ""
-    return f"{estimate.X[i]:#.5g}", second, f"{estimate.relative_sigma_percent[i]:.2g}"
+    return f"{estimate.X[i]:#.5g}", second, f"{100 * estimate.corrected_sigma[i] / abs(estimate.X[i]):.2g}"
 
 
 def _doubts(found: Identified) -> Iterator[str]:
     """Yield what no healthy identification shows."""
     for name, estimate in found.estimates.items():
-        friction = zip(found.basis.parameters, estimate.X, estimate.sigma, strict=True)
+        friction = zip(found.basis.parameters, estimate.X, estimate.corrected_sigma, strict=True)
         negative = [p for p, x, sigma in friction if p.startswith("F") and x < -2 * sigma]
         if negative:
             yield f"{', '.join(negative)} below zero in the {name} model: is the torque's meaning or delay wrong?"

@@ -48,6 +48,7 @@ from identify.models import ImplicitModel as ImplicitModel
 from identify.models import PowerModel as PowerModel
 from identify.motion_log import MotionLog as MotionLog
 from identify.motion_log import TorqueChannel as TorqueChannel
+from identify.noise import torque_noise as torque_noise
 from identify.operators import OPERATORS as OPERATORS
 from identify.operators import AbstractOperator as AbstractOperator
 from identify.operators import FirLowPass as FirLowPass

@@ -1,6 +1,6 @@
 """The sentence that every model says at every sample of a log."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -27,6 +27,10 @@ class Balance:
         How noisy a row is, relative to the same row at other samples.
     s : callable
         d/dt along the last axis.
+    B : mapping of (int, int) to Array, shape (..., time)
+        (row, joint) -> what the row multiplies the joint's torque by.
+    transposed : callable
+        What has been done to the torques before, transposed.
     fs : float
         [Hz].
     parameters : tuple of str
@@ -39,6 +43,8 @@ class Balance:
     weight: Array
     noise: Array
     s: Callable[[Array], Array]
+    B: Mapping[tuple[int, int], Array]
+    transposed: Callable[[Array], Array]
     fs: float
     parameters: tuple[str, ...]
 

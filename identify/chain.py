@@ -90,7 +90,12 @@ class Chain:
         q = self.prefilter.apply(_time_last(log.q), fs)
         tau = self.prefilter.apply(_time_last(log.tau * np.asarray(log.torque.gain)), fs)
         state = State(q, s(q), s)
-        return Signals(state, self.alignment.align(tau, log.torque, fs), self.mask.weight(state.qd, fs), fs)
+        torque, weight = self.alignment.align(tau, log.torque, fs), self.mask.weight(state.qd, fs)
+        return Signals(state, torque, weight, fs, partial(self._transposed, channel=log.torque, fs=fs))
+
+    def _transposed(self, x: Array, channel: TorqueChannel, fs: float) -> Array:
+        """Return prefilter and alignment transposed: both are the same at all times, so it is they in reversed time."""
+        return self.alignment.align(self.prefilter.apply(x[..., ::-1], fs), channel, fs).mean()[..., ::-1]
 
     def halo(self, fs: float, channel: TorqueChannel) -> float:
         """Return how far [s] a row looks to either side of its instant, in a log at `fs` [Hz] with this torque channel."""

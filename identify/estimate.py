@@ -22,21 +22,32 @@ class Estimate:
     X : Array, shape (..., p)
         Estimated parameters; NaN where the system's status is not OK.
     covariance : Array, shape (..., p, p)
-        Covariance of the error of X.
+        Covariance of the error of X, as the estimator has it: as if rows were independent.
+    solved : System
+        The rows as they were weighted: X is their least-squares solution, or close to it.
     """
 
     system: System
     X: Array
     covariance: Array
+    solved: System
 
     @classmethod
-    def judge(cls, system: System, X: npt.ArrayLike, covariance: npt.ArrayLike | None = None) -> Self:
+    def judge(
+        cls,
+        system: System,
+        X: npt.ArrayLike,
+        covariance: npt.ArrayLike | None = None,
+        *,
+        solved: System | None = None,
+    ) -> Self:
         """Return the estimate X of a system.
 
-        Without a `covariance` that of section 7.3 is used: sigma_rho^2 (W' W)^-1 with sigma_rho^2 = |Y - W X|^2 / (r - p).
+        Without a `covariance` that of section 7.3 is used: sigma_rho^2 (W' W)^-1 with sigma_rho^2 = |Y - W X|^2 / (r - p),
+        of the rows as they were `solved`: those of the system, unless they were weighted.
         """
-        x = frozen(X)
-        return cls(system, x, frozen(_paper_covariance(system, x) if covariance is None else covariance))
+        x, rows = frozen(X), system if solved is None else solved
+        return cls(system, x, frozen(_paper_covariance(rows, x) if covariance is None else covariance), rows)
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -47,6 +58,34 @@ class Estimate:
     def sigma(self) -> Array:
         """Standard deviation of every parameter, shape (..., p)."""
         return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
+
+    @cached_property
+    def corrected_covariance(self) -> Array:
+        """Covariance of the error of X that white noise of the torques makes, shape (..., p, p); NaN if its level is unknown.
+
+        X = G' Y with G = W (W' W)^-1 of the rows as they were solved, and each row is a sum over the torque samples of a log
+        (`Carrier`). So X is such a sum too, and its covariance is sum_j sigma_j^2 H_j H_j' with H_j the weights of the torque
+        of joint j: rows may overlap, be weighted or multiplied by velocities, and joints may differ.
+        """
+        solved, p = self.solved, len(self.parameters)
+        total = np.zeros(self.covariance.shape)
+        if solved.levels is None or not solved.carriers:
+            return np.full(total.shape, np.nan)
+        inverse = _inverse(solved)
+        G = np.matmul(solved.W, np.matmul(inverse, np.swapaxes(inverse, -1, -2)))
+        if solved.weight is not None:
+            G *= solved.weight[..., None]
+        first = 0
+        for carrier in solved.carriers:
+            for joint, H in carrier.pull(G[..., first : first + carrier.rows, :]).items():
+                total += solved.levels[..., joint, None, None] ** 2 * np.matmul(H, np.swapaxes(H, -1, -2))
+            first += carrier.rows
+        return np.where((solved.status == Status.OK)[..., None, None], total, np.full((p, p), np.nan))
+
+    @property
+    def corrected_sigma(self) -> Array:
+        """Standard deviation of every parameter, from `corrected_covariance`, shape (..., p)."""
+        return np.sqrt(np.diagonal(self.corrected_covariance, axis1=-2, axis2=-1))
 
     @property
     def relative_sigma_percent(self) -> Array:
@@ -100,11 +139,16 @@ class Estimate:
 
 def _paper_covariance(system: System, X: Array) -> Array:
     """Return sigma_rho^2 (W' W)^-1 (section 7.3), NaN where the system cannot be solved."""
-    ok = (system.status == Status.OK)[..., None, None]
-    inverse = np.linalg.inv(np.where(ok, system.R_W, np.eye(len(system.parameters))))
+    ok, inverse = (system.status == Status.OK)[..., None, None], _inverse(system)
     freedom = np.maximum(system.rows - len(system.parameters), 1)
     variance = np.sum((system.Y - _predicted(system, X)) ** 2, axis=-1) / freedom
     return np.where(ok, variance[..., None, None] * np.matmul(inverse, np.swapaxes(inverse, -1, -2)), np.nan)
+
+
+def _inverse(system: System) -> Array:
+    """Return R^-1, shape (..., p, p); that of ones where W has not full rank."""
+    ok = (system.status == Status.OK)[..., None, None]
+    return np.linalg.inv(np.where(ok, system.R_W, np.eye(len(system.parameters))))
 
 
 def _predicted(system: System, X: Array) -> Array:

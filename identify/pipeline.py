@@ -1,6 +1,7 @@
 """The verbs of the package."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 
 from identify.arrays import Array
@@ -9,8 +10,9 @@ from identify.chain import Chain, idbench_chain
 from identify.errors import IdentificationError
 from identify.estimate import Estimate
 from identify.estimators import AbstractEstimator, Problem, WeightedLeastSquares
-from identify.models import AbstractModel
+from identify.models import AbstractModel, ExplicitModel
 from identify.motion_log import MotionLog
+from identify.noise import torque_noise
 
 
 def identify(
@@ -73,9 +75,11 @@ def identify_each(
     _require(estimator, AbstractEstimator, 'an estimator, such as ESTIMATORS.create("OLS")')
     for model in models.values():
         _require(model, AbstractModel, 'a model, such as MODELS.create("power")')
-    systems = chain.build_each(log, basis, list(models.values()))
+    *systems, explicit = chain.build_each(log, basis, [*models.values(), ExplicitModel()])
+    levels = torque_noise(explicit)
     estimates = {}
-    for (name, model), system in zip(models.items(), systems, strict=True):
+    for (name, model), rows in zip(models.items(), systems, strict=True):
+        system = replace(rows, levels=levels)
         if throw and estimator.full_rank:
             system.check()
         rebuild = partial(chain.build, basis=basis, model=model)

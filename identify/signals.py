@@ -1,5 +1,6 @@
 """What a chain knows of a log before a model looks at it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from identify.arrays import Array
@@ -21,9 +22,12 @@ class Signals:
         Weights of the mask.
     fs : float
         [Hz].
+    transposed : callable
+        What prefilter and alignment do to torques, turned around in time: (..., time) -> (..., time).
     """
 
     state: State
     torque: AbstractTorque
     weight: Array
     fs: float
+    transposed: Callable[[Array], Array]

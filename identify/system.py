@@ -1,7 +1,7 @@
 """The linear system Y = W X + rho."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
 from typing import Self
@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from identify.arrays import Array
+from identify.carrier import Carrier
 from identify.errors import ExcitationError, IdentificationError, LogError
 
 UNSEEN = 1e-6
@@ -45,6 +46,12 @@ class System:
         Row of the model that a row comes from: the joint, from 0, or 0 for all rows of the power model.
     parameters : tuple of str
         Names of X.
+    carriers : tuple of Carrier
+        How the torques of each log reach the rows.
+    levels : Array, shape (..., joint), optional
+        Rms of the noise of each joint's torque [N m], where it is known (`identify.noise`).
+    weight : Array, shape (..., r), optional
+        What the rows have been multiplied by since the operator made them; ones if it is not given.
     """
 
     Y: Array
@@ -54,6 +61,9 @@ class System:
     time: Array
     group: npt.NDArray[np.intp]
     parameters: tuple[str, ...]
+    carriers: tuple[Carrier, ...] = ()
+    levels: Array | None = None
+    weight: Array | None = None
 
     @cached_property
     def rows(self) -> npt.NDArray[np.intp]:
@@ -155,4 +165,15 @@ class System:
             time=np.concatenate([s.time for s in systems]),
             group=np.concatenate([s.group for s in systems]),
             parameters=first.parameters,
+            carriers=tuple(carrier for s in systems for carrier in s.carriers),
+        )
+
+    def weighted(self, weight: Array) -> Self:
+        """Return this system with its rows multiplied by `weight`, shape (..., r)."""
+        return replace(
+            self,
+            Y=self.Y * weight,
+            W=self.W * weight[..., None],
+            noise=self.noise * weight,
+            weight=weight if self.weight is None else self.weight * weight,
         )

@@ -28,7 +28,7 @@ from identify import (
     identify,
     scara,
 )
-from identify.operators.grid import Grid
+from identify.grid import Grid
 from sim.controllers import CONTROLLERS, Task
 from sim.drives import DRIVES
 from sim.encoders import ENCODERS

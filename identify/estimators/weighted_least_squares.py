@@ -1,6 +1,6 @@
 """Weighted least squares."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import final
 
 import numpy as np
@@ -34,11 +34,11 @@ class WeightedLeastSquares(AbstractEstimator):
 
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate of the weighted rows."""
-        system = _divided(problem.system, np.where(problem.system.valid, problem.system.noise, 1.0))
+        system = problem.system.weighted(1 / np.where(problem.system.valid, problem.system.noise, 1.0))
         estimate = OrdinaryLeastSquares().solve(Problem(system))
         for _ in range(self.rounds):
-            estimate = OrdinaryLeastSquares().solve(Problem(_divided(system, _level(system, estimate.X))))
-        return Estimate.judge(problem.system, estimate.X, estimate.covariance)
+            estimate = OrdinaryLeastSquares().solve(Problem(system.weighted(1 / _level(system, estimate.X))))
+        return Estimate.judge(problem.system, estimate.X, solved=estimate.system)
 
 
 def _level(system: System, X: Array) -> Array:
@@ -53,7 +53,3 @@ def _level(system: System, X: Array) -> Array:
     # Noise-free rows leave residuals of rounding; weights below 1e-12 of the measurements would say nothing.
     floor = 1e-12 * np.sqrt(np.mean(system.Y**2, axis=-1, keepdims=True))
     return np.where(np.isfinite(level), np.maximum(level, np.maximum(floor, 1e-300)), 1.0)
-
-
-def _divided(system: System, by: Array) -> System:
-    return replace(system, Y=system.Y / by, W=system.W / by[..., None], noise=np.ones_like(system.noise))

@@ -1,6 +1,7 @@
 """What a model is."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import final
 
 from identify.arrays import Array, Columns
@@ -25,6 +26,10 @@ class AbstractModel(ABC):
         """Return the columns that are still to be differentiated."""
 
     @abstractmethod
+    def B(self, signals: Signals) -> Mapping[tuple[int, int], Array]:
+        """Return what torques are multiplied by in `y`, (row of an instant, joint) -> (..., time), where it is not zero."""
+
+    @abstractmethod
     def weight(self, signals: Signals) -> Array:
         """Return the weight of every row, shape (..., row, time)."""
 
@@ -43,6 +48,8 @@ class AbstractModel(ABC):
             weight=self.weight(signals),
             noise=self.noise(signals),
             s=signals.state.s,
+            B=self.B(signals),
+            transposed=signals.transposed,
             fs=signals.fs,
             parameters=basis.parameters,
         )

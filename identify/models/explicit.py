@@ -1,5 +1,6 @@
 """The explicit dynamic model."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import final
 
@@ -28,6 +29,10 @@ class ExplicitModel(AbstractModel):
         """Return no columns."""
         del basis, signals
         return {}
+
+    def B(self, signals: Signals) -> Mapping[tuple[int, int], Array]:
+        """Return ones: a row a joint."""
+        return {(j, j): np.ones(1) for j in range(signals.state.n)}
 
     def weight(self, signals: Signals) -> Array:
         """Return the weight of each joint for its own row."""

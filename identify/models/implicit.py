@@ -1,5 +1,6 @@
 """The implicit dynamic model."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import final
 
@@ -27,6 +28,10 @@ class ImplicitModel(AbstractModel):
     def e(self, basis: Basis, signals: Signals) -> Columns:
         """Return M_i(q) qd."""
         return basis.momentum(signals.state)
+
+    def B(self, signals: Signals) -> Mapping[tuple[int, int], Array]:
+        """Return ones: a row a joint."""
+        return {(j, j): np.ones(1) for j in range(signals.state.n)}
 
     def weight(self, signals: Signals) -> Array:
         """Return the weight of each joint for its own row."""

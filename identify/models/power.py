@@ -1,5 +1,6 @@
 """The power model, which windows turn into the energy model."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import final
 
@@ -32,6 +33,10 @@ class PowerModel(AbstractModel):
     def e(self, basis: Basis, signals: Signals) -> Columns:
         """Return the energies h(q, qd)."""
         return basis.energy(signals.state)
+
+    def B(self, signals: Signals) -> Mapping[tuple[int, int], Array]:
+        """Return qd'."""
+        return {(0, j): signals.state.qd[..., j, :] for j in range(signals.state.n)}
 
     def weight(self, signals: Signals) -> Array:
         """Return ones: the power of a friction, Fs |qd|, is continuous where a joint turns, and needs no mask."""

@@ -7,7 +7,9 @@ import numpy as np
 
 from identify.arrays import Array
 from identify.balance import Balance
-from identify.operators.grid import Grid
+from identify.carrier import Carrier
+from identify.grid import Grid
+from identify.kernel import Kernel
 from identify.system import System
 
 
@@ -26,6 +28,12 @@ class Rows(NamedTuple):
     valid: np.typing.NDArray[np.bool_]
     """Whether the row says anything, shape (..., row, count)."""
 
+    inside: Array
+    """Weights of the samples of B tau before the operator, shape (..., row, time)."""
+
+    outside: Array
+    """Weights of the rows after it, shape (..., row, count)."""
+
     lag: float
     """Where the middle of a row lies after its sample, in samples."""
 
@@ -43,6 +51,10 @@ class AbstractOperator(ABC):
     @abstractmethod
     def halo(self, fs: float) -> float:
         """Return how far [s] a row looks to either side of its sample."""
+
+    @abstractmethod
+    def response(self, fs: float) -> Array:
+        """Return the weights of the samples around k in the row of sample k, shape (length,); k is (length - 1) // 2."""
 
     @abstractmethod
     def apply(self, balance: Balance, grid: Grid) -> Rows:
@@ -65,17 +77,20 @@ class AbstractOperator(ABC):
     def system(self, balance: Balance, grid: Grid) -> System:
         """Return Y = W X + rho at the rows of `grid`, ordered by time, then row (Eq. 14)."""
         fs, (*runs, n, _) = balance.fs, balance.y.shape
-        y, columns, noise, valid, lag = self.apply(balance, grid)
+        rows = self.apply(balance, grid)
+        valid, response = rows.valid, self.response(fs)
+        kernel = Kernel(response, (len(response) - 1) // 2, grid)
         row = [address[0] for address in balance.addresses]
         parameter = [balance.parameters.index(address[1]) for address in balance.addresses]
         W = np.zeros((*runs, n, len(balance.parameters), grid.count))
-        W[..., row, parameter, :] = columns * valid[..., row, :]
+        W[..., row, parameter, :] = rows.columns * valid[..., row, :]
         return System(
-            Y=np.swapaxes(y * valid, -1, -2).reshape(*runs, -1),
+            Y=np.swapaxes(rows.y * valid, -1, -2).reshape(*runs, -1),
             W=np.moveaxis(W, -1, -3).reshape(*runs, grid.count * n, -1),
-            noise=np.swapaxes(noise, -1, -2).reshape(*runs, -1),
+            noise=np.swapaxes(rows.noise, -1, -2).reshape(*runs, -1),
             valid=np.swapaxes(valid, -1, -2).reshape(*runs, -1),
-            time=np.repeat((grid.first + grid.step * np.arange(grid.count) + lag) / fs, n),
+            time=np.repeat((grid.first + grid.step * np.arange(grid.count) + rows.lag) / fs, n),
             group=np.tile(np.arange(n), grid.count),
             parameters=balance.parameters,
+            carriers=(Carrier(balance.B, rows.inside, rows.outside * valid, kernel, balance.transposed),),
         )

@@ -8,7 +8,7 @@ from typing import final
 from scipy import signal
 
 from identify.arrays import Array, frozen, require_below_nyquist, require_positive
-from identify.operators.grid import Grid
+from identify.grid import Grid
 from identify.operators.low_pass import AbstractLowPass, decimation
 
 
@@ -45,6 +45,10 @@ class FirLowPass(AbstractLowPass):
         """Return the filtered samples of the grid."""
         half = self._half(fs)
         return grid.weighted_sums(x, _taps(half, self.cutoff, fs), half)
+
+    def response(self, fs: float) -> Array:
+        """Return the impulse response."""
+        return _taps(self._half(fs), self.cutoff, fs)
 
     def _half(self, fs: float) -> int:
         require_below_nyquist("operator cutoff", self.cutoff, fs)

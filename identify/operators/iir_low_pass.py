@@ -1,12 +1,14 @@
 """IIR low-pass and decimate."""
 
 from dataclasses import dataclass
+from math import ceil
 from typing import final
 
+import numpy as np
 from scipy import signal
 
 from identify.arrays import Array, require_below_nyquist, require_positive, require_whole
-from identify.operators.grid import Grid
+from identify.grid import Grid
 from identify.operators.low_pass import AbstractLowPass, decimation
 from identify.recursive import forward_backward, settling_time
 
@@ -47,6 +49,13 @@ class IirLowPass(AbstractLowPass):
     def decimate(self, x: Array, fs: float, grid: Grid) -> Array:
         """Return the filtered samples of the grid."""
         return forward_backward(self._sections(fs), x)[..., grid.samples]
+
+    def response(self, fs: float) -> Array:
+        """Return the impulse response, as far as the halo."""
+        reach = ceil(self.halo(fs) * fs - 1e-9)
+        impulse = np.zeros(6 * reach + 1)
+        impulse[3 * reach] = 1.0
+        return forward_backward(self._sections(fs), impulse)[2 * reach : 4 * reach + 1]
 
     def _sections(self, fs: float) -> Array:
         require_below_nyquist("operator cutoff", self.cutoff, fs)

@@ -8,8 +8,8 @@ import numpy as np
 
 from identify.arrays import Array
 from identify.balance import Balance
+from identify.grid import Grid
 from identify.operators.base import AbstractOperator, Rows
-from identify.operators.grid import Grid
 
 
 class AbstractLowPass(AbstractOperator):
@@ -32,7 +32,7 @@ class AbstractLowPass(AbstractOperator):
         near = np.ones(2 * reach + 1)
         seen = grid.weighted_sums(balance.weight, near, reach)
         noise = grid.weighted_sums(balance.noise, near / len(near), reach)
-        return Rows(filtered[..., :n, :], filtered[..., n:, :], noise, seen > 0, 0.0)
+        return Rows(filtered[..., :n, :], filtered[..., n:, :], noise, seen > 0, balance.weight, np.ones_like(seen), 0.0)
 
 
 def decimation(share: float, cutoff: float, fs: float) -> int:

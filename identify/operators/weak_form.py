@@ -7,8 +7,8 @@ import numpy as np
 
 from identify.arrays import Array
 from identify.balance import Balance
+from identify.grid import Grid
 from identify.operators.base import AbstractOperator, Rows
-from identify.operators.grid import Grid
 
 
 class Kernels(NamedTuple):
@@ -53,4 +53,10 @@ class AbstractWeakForm(AbstractOperator):
         row = [address[0] for address in balance.addresses]
         y = grid.weighted_sums(balance.y, kernels.integral, before)
         noise = weight * grid.weighted_sums(balance.noise, np.full(length, 1 / length), before)
-        return Rows(weight * y, weight[..., row, :] * columns, noise, touched == 0, (length - 1) / 2 - before)
+        rows, ones = (weight * y, weight[..., row, :] * columns), np.ones_like(balance.weight)
+        return Rows(*rows, noise, touched == 0, ones, weight, (length - 1) / 2 - before)
+
+    @final
+    def response(self, fs: float) -> Array:
+        """Return the weights of B tau."""
+        return self.kernels(fs).integral

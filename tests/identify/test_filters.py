@@ -5,7 +5,7 @@ import pytest
 from scipy.special import eval_chebyt
 
 from identify import ButterworthPrefilter, FirLowPass, IirLowPass, LogError, SettingError
-from identify.operators.grid import Grid
+from identify.grid import Grid
 
 FS = 100.0
 T = np.arange(4000) / FS

@@ -1,5 +1,7 @@
 """Every operator keeps the sentence B tau = [c + s e] X true, looks no further than its halo, and honours the weights."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -29,6 +31,8 @@ def balance(y=None, weight=None, t=T):
         noise=np.ones((2, len(t))),
         s=lambda x: CentralDifference(6).derivative(x, fs),
         fs=fs,
+        B={},
+        transposed=lambda x: x,
         parameters=("a", "b"),
     )
 
@@ -102,7 +106,8 @@ def test_leading_axes_are_independent_runs_with_the_same_bits(operator, rng):
     def spread(columns):
         return {address: np.broadcast_to(signal, (3, len(T))) for address, signal in columns.items()}
 
-    together = at(operator, Balance(y, spread(one.c), spread(one.e), weight, np.ones_like(weight), one.s, FS, one.parameters))
+    many = replace(one, y=y, c=spread(one.c), e=spread(one.e), weight=weight, noise=np.ones_like(weight))
+    together = at(operator, many)
     for run in range(3):
         alone = at(operator, balance(y[run], weight[run]))
         np.testing.assert_array_equal(together.Y[run], alone.Y)
