@@ -64,7 +64,7 @@ def write_summary(path: Path, summary: dict[str, Any]) -> None:
 
 
 def summarize(estimate: Estimate, truth: list[float] | None) -> dict[str, Any]:
-    """Return one model's entry of a summary: estimate, error if the truth is known, sigma (the paper's, and corrected), Cond(W), ..."""
+    """Return one model's entry of a summary: estimate, error if known, sigmas, Cond(W), rows, residual."""
     return {
         "estimate": estimate.X.tolist(),
         "relative_error_percent": None if truth is None else [_finite(x) for x in estimate.relative_error_percent(truth)],

@@ -53,8 +53,10 @@ class Bench:
         self._sensor = CurrentSensor(scenario.torque, nsim, n)
         self._jitter = self._drawn_jitter(samples)
         self._history = History(clock.late + clock.per_sample, nsim, n, self._h)
-        at_rest = planned.q[:1], np.zeros((1, n)), np.zeros((1, n))
-        self._before = self._command = self._demand = np.repeat(inverse_dynamics(robot, *at_rest), nsim, axis=0)
+        self._failures: dict[int, str] = {}
+        at_rest = every(planned.q[0], nsim) if planned.q.ndim == 2 else planned.q[0]
+        self._at_rest, still = at_rest, np.zeros((nsim, n))
+        self._before = self._command = self._demand = inverse_dynamics(robot, at_rest, still, still)
         self._qd, self._steps = np.zeros((nsim, n)), 1
         self._steady = scenario.drive.steady and scenario.ripple.steady
         watched = scenario.timing.jitter or scenario.torque.source == "current"
@@ -83,7 +85,7 @@ class Bench:
         sample = self._clock.sample(step)
         if sample is not None and sample < len(self._q):
             self._q[sample], self._speeds[sample], self._currents[sample] = q, qd, self._sensor.value
-            self._require_in_range(sample)
+            self._stop_those_out_of_range(sample)
         self._history.put(step, q, qd)
         steps = self._listen(step)
         t = self._middles(steps)
@@ -94,6 +96,8 @@ class Bench:
         electric = self._drive.step(self._demand, mid_qd * constant, steps)
         self._sensor.take(electric, steps * self._h)
         tau = electric * constant + self._ripple.cogging.at(mid_q)
+        if self._failures:
+            tau[:, list(self._failures)] = 0.0
         self._plant.step(tau + self._friction.torque(mid_qd[0]), steps)
         current = step // self._clock.per_sample
         if current < len(self._tau):
@@ -123,6 +127,10 @@ class Bench:
         """Return what has happened since sample `skipped`."""
         channels = self._measured, self._commands, self._currents, self._q, self._speeds, self._tau / self._clock.per_sample
         measured, command, current, q, qd, tau = (np.swapaxes(x[skipped:], 0, 1) for x in channels)
+        for sim in np.flatnonzero(~np.isfinite(command).all(axis=(1, 2))):
+            self._failures.setdefault(int(sim), f"the controller commands no finite torque (seed {self._seeds[sim]})")
+        for sim in self._failures:
+            measured[sim] = command[sim] = current[sim] = 0.0
         scenario, n = self._scenario, q.shape[-1]
         logged = scenario.torque.logged(
             current if scenario.torque.source == "current" else command, n, _generators(self._seeds, 2)
@@ -130,19 +138,24 @@ class Bench:
         planned = replace(self._planned, **{x: getattr(self._planned, x)[skipped:] for x in ("q", "qd", "qdd")})
         lag = float(scenario.drive.lag(self._plant.robot).mean()) - scenario.physics.early * self._h
         log = MotionLog(scenario.fs, measured, logged, scenario.torque.channel(scenario.timing.delay, lag, scenario.fs))
-        return Run(scenario, self._seeds, self._plant.robots, planned, log, q, qd, tau, command)
+        return Run(scenario, self._seeds, self._plant.robots, planned, log, q, qd, tau, command, self._failures)
 
-    def _require_in_range(self, sample: int) -> None:
-        """Raise ScenarioError if a joint has left its range: it ran into its stop, or the loop is unstable."""
+    def _stop_those_out_of_range(self, sample: int) -> None:
+        """Leave simulations at rest, without torque, of which a joint has left its range: at its stop, or unstable."""
         q, (low, high) = self._q[sample], self._ranges
         inside = (q >= low) & (q <= high)
-        if not inside.all():
-            sim, j = (int(i) for i in np.argwhere(~inside)[0])
-            raise ScenarioError(
+        if inside.all():
+            return
+        for sim, j in np.argwhere(~inside):
+            reason = (
                 f"joint {self._plant.robot.joints[j]} leaves its range {sample / self._scenario.fs:.3g} s after the start "
                 f"(seed {self._seeds[sim]}): the loop is unstable or too weak; lower controller.bandwidth or timing.delay, "
                 "raise fs, or ask less of the drive"
             )
+            self._failures.setdefault(int(sim), reason)
+        failed = np.unique(np.argwhere(~inside)[:, 0])
+        self._plant.q[failed] = self._q[sample, failed] = self._at_rest[failed]
+        self._plant.qd[failed] = self._speeds[sample, failed] = 0.0
 
 
 def _generators(seeds: Sequence[int], stream: int) -> list[np.random.Generator]:

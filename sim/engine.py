@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.bench import Bench
+from sim.errors import ScenarioError
 from sim.robot import Robot
 from sim.run import Run
 from sim.scenario import Scenario
@@ -20,9 +21,11 @@ def simulate(
     scenario: Scenario,
     seeds: Sequence[int] = (),
     *,
+    motions: Sequence[Reference] = (),
     vary: Mapping[str, npt.ArrayLike] | None = None,
     threads: int = 0,
     progress: Progress | None = None,
+    throw: bool = True,
 ) -> Run:
     """Run a scenario in closed loop.
 
@@ -32,12 +35,16 @@ def simulate(
         What to run.
     seeds : sequence of int, optional
         A simulation for each; that of the scenario by default. What a simulation gives depends on its own seed alone.
+    motions : sequence of Reference, optional
+        A planned motion for each simulation, of equal numbers of samples; that of the scenario's trajectory by default.
     vary : mapping of str to array_like, optional
         Fields of MuJoCo's model, such as dof_damping, with a value for every simulation, shape (nsim, ...).
     threads : int
         Native threads; 0 for all processors. No bit depends on it.
     progress : callable, optional
         Hears the share of the run that is done, about a hundred times.
+    throw : bool
+        Raise if a simulation fails while it runs; otherwise `Run.failures` tells why, and the others go on.
 
     Raises
     ------
@@ -48,7 +55,7 @@ def simulate(
     """
     seeds = tuple(seeds) or (scenario.seed,)
     robot = scenario.real_robot
-    planned, skipped = _planned(scenario, robot)
+    planned, skipped = _joined([_planned(scenario, robot, motion) for motion in motions or (None,)])
     bench = Bench(scenario, robot, planned, seeds, vary or {}, threads)
     step, told = 0, -1
     while step < bench.steps:
@@ -56,12 +63,27 @@ def simulate(
         if progress and 100 * step // bench.steps > told:
             told = 100 * step // bench.steps
             progress(step / bench.steps)
-    return bench.run(skipped)
+    run = bench.run(skipped)
+    if throw and run.failures:
+        raise ScenarioError(next(iter(run.failures.values())))
+    return run
 
 
-def _planned(scenario: Scenario, robot: Robot) -> tuple[Reference, int]:
+def _joined(planned: Sequence[tuple[Reference, int]]) -> tuple[Reference, int]:
+    """Return the motion of all simulations, or of each of them, and the samples before the log begins."""
+    motions, skipped = zip(*planned, strict=True)
+    if len(motions) == 1:
+        return planned[0]
+    if len({(len(motion.q), before) for motion, before in planned}) > 1:
+        lengths = sorted({len(motion.q) for motion in motions})
+        raise ScenarioError(f"motions of {lengths[0]} to {lengths[-1]} samples cannot advance together: group them by length")
+    stacked = (np.stack([getattr(motion, x) for motion in motions], axis=1) for x in ("q", "qd", "qdd"))
+    return Reference(motions[0].fs, *stacked), skipped[0]
+
+
+def _planned(scenario: Scenario, robot: Robot, motion: Reference | None) -> tuple[Reference, int]:
     """Return the planned motion, the way to its start before it, and how many samples that takes."""
-    main = scenario.trajectory.sample(robot, scenario.fs)
+    main = scenario.trajectory.sample(robot, scenario.fs) if motion is None else motion
     if not scenario.start:
         return main, 0
     way = approach(robot, np.array(scenario.start), main.q[0], scenario.fs)

@@ -31,6 +31,8 @@ class Run:
         True mean torque of the motors between an instant of the log and the next, ripple included [N m].
     command : Array, shape (nsim, time, joint)
         Torque that the controller asked for [N m].
+    failures : dict of int to str
+        Why simulations failed, by their number; from then on their arrays hold nothing of use.
     """
 
     scenario: Scenario
@@ -42,6 +44,7 @@ class Run:
     qd: Array
     tau: Array
     command: Array
+    failures: dict[int, str]
 
     def alone(self, i: int = 0) -> MotionLog:
         """Return the log of simulation `i` by itself."""

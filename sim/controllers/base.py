@@ -20,7 +20,7 @@ class Task:
     nominal : Robot
         The robot as its maker describes it: without payload, with the friction of its MJCF.
     reference : Reference
-        The planned motion at the sample rate.
+        The planned motion at the sample rate, of all simulations or of each.
     nsim : int
         Number of simulations.
     """
@@ -31,16 +31,17 @@ class Task:
 
     @property
     def inertia(self) -> Array:
-        """Inertia that each joint's motor sees when the motion starts [kg m^2], shape (joint,)."""
-        at = self.reference.q[:1]
-        model = InverseDynamics(self.nominal, 1)
+        """Inertia that each joint's motor sees when the motion starts [kg m^2], shape (1 or nsim, joint)."""
+        at = np.atleast_2d(self.reference.q[0])
+        model = InverseDynamics(self.nominal, len(at))
         model(at, np.zeros_like(at), np.zeros_like(at))
-        return model.inertia()[0].copy()
+        return model.inertia().copy()
 
     @property
     def feedforward(self) -> Array:
-        """Torque of the nominal robot along the planned motion, without Coulomb friction [N m], shape (time, joint)."""
-        return inverse_dynamics(self.nominal, self.reference.q, self.reference.qd, self.reference.qdd)
+        """Torque of the nominal robot along the planned motion, without Coulomb friction [N m], shape as the motion's."""
+        q, qd, qdd = (x.reshape(-1, self.nominal.n) for x in (self.reference.q, self.reference.qd, self.reference.qdd))
+        return inverse_dynamics(self.nominal, q, qd, qdd).reshape(self.reference.q.shape)
 
 
 class AbstractLaw(ABC):
@@ -76,7 +77,7 @@ class Error:
         self._reference = reference
         self._share = 1 - np.exp(-2 * np.pi * cutoff / reference.fs)
         self._before: Array | None = None
-        self._rate = np.zeros((nsim, reference.q.shape[1]))
+        self._rate = np.zeros((nsim, reference.q.shape[-1]))
 
     def update(self, k: int, q: Array) -> tuple[Array, Array]:
         """Return e [rad] and its rate [rad/s] at sample `k`."""

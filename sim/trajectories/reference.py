@@ -17,7 +17,7 @@ class Reference:
     ----------
     fs : float
         [Hz].
-    q, qd, qdd : Array, shape (time, joint)
+    q, qd, qdd : Array, shape (time, joint), or (time, nsim, joint) for many simulations
         [rad], [rad/s], [rad/s^2].
     """
 

@@ -7,7 +7,7 @@ import pytest
 
 from identify import scara
 from identify.delay import estimate_delay
-from sim.controllers import ComputedTorque, PDFeedforward
+from sim.controllers import CONTROLLERS, ComputedTorque, PDFeedforward
 from sim.drives import AveragedDrive, SwitchedDrive
 from sim.encoders import IncrementalEncoder
 from sim.engine import simulate
@@ -159,3 +159,35 @@ def test_a_robot_of_one_joint_runs(tmp_path, short):
     assert np.abs(run.reference.q - run.q[0]).max() < 0.02
     gravity = -9.81 * 0.3 * np.cos(run.q[0, 0, 0])  # about y, a positive angle lowers the arm
     np.testing.assert_allclose(run.command[0, 0, 0], gravity, atol=1e-9)
+
+
+def test_a_simulation_that_fails_ends_alone(short):
+    """One of three is driven away by a negative friction: it says why, and the others do not notice."""
+    damping = np.array([[0.05, 0.01], [-400.0, 0.01], [0.05, 0.01]])
+    busy = replace(short, **BUSY)
+    with pytest.raises(ScenarioError, match="leaves its range"):
+        simulate(busy, (1, 2, 3), vary={"dof_damping": damping})
+    run = simulate(busy, (1, 2, 3), vary={"dof_damping": damping}, throw=False)
+    assert list(run.failures) == [1]
+    assert "(seed 2)" in run.failures[1]
+    alone = simulate(busy, (3,))
+    np.testing.assert_array_equal(run.log.tau[2], alone.log.tau[0])
+    np.testing.assert_array_equal(run.log.q[2], alone.log.q[0])
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS.builtin)
+def test_every_simulation_may_have_a_motion_of_its_own(short, robot, controller):
+    """With the bits that it has as the trajectory of a scenario."""
+    kinds = [RandomMoves(moves=1, durations=(0.5, 0.5), rest=0.05, smallest_move=0.1, seed=seed) for seed in (4, 5, 6)]
+    busy = replace(short, **BUSY | {"controller": CONTROLLERS.create(controller)})
+    run = simulate(busy, (1, 2, 3), motions=[kind.sample(robot, busy.fs) for kind in kinds])
+    for i, kind in enumerate(kinds):
+        alone = simulate(replace(busy, trajectory=kind), (i + 1,))
+        np.testing.assert_array_equal(run.log.tau[i], alone.log.tau[0])
+        np.testing.assert_array_equal(run.q[i], alone.q[0])
+
+
+def test_motions_of_unequal_length_are_refused(short, robot):
+    motions = [RandomMoves(moves=1, durations=(T, T), rest=0.1).sample(robot, short.fs) for T in (0.5, 0.6)]
+    with pytest.raises(ScenarioError, match="motions of 70 to 80 samples cannot advance together"):
+        simulate(short, (1, 2), motions=motions)
