@@ -178,8 +178,9 @@ def test_a_simulation_that_fails_ends_alone(short):
 @pytest.mark.parametrize("controller", CONTROLLERS.builtin)
 def test_every_simulation_may_have_a_motion_of_its_own(short, robot, controller):
     """With the bits that it has as the trajectory of a scenario."""
-    kinds = [RandomMoves(moves=1, durations=(0.5, 0.5), rest=0.05, smallest_move=0.1, seed=seed) for seed in (4, 5, 6)]
-    busy = replace(short, **BUSY | {"controller": CONTROLLERS.create(controller)})
+    kinds = [RandomMoves(moves=1, durations=(1.3, 1.3), rest=0.05, seed=seed) for seed in (4, 5, 6)]
+    calm = {"controller": CONTROLLERS.create(controller), "timing": Timing(), "encoder": IncrementalEncoder()}
+    busy = replace(short, **BUSY | calm)
     run = simulate(busy, (1, 2, 3), motions=[kind.sample(robot, busy.fs) for kind in kinds])
     for i, kind in enumerate(kinds):
         alone = simulate(replace(busy, trajectory=kind), (i + 1,))
