@@ -189,6 +189,6 @@ def test_every_simulation_may_have_a_motion_of_its_own(short, robot, controller)
 
 
 def test_motions_of_unequal_length_are_refused(short, robot):
-    motions = [RandomMoves(moves=1, durations=(T, T), rest=0.1).sample(robot, short.fs) for T in (0.5, 0.6)]
-    with pytest.raises(ScenarioError, match="motions of 70 to 80 samples cannot advance together"):
+    motions = [RandomMoves(moves=1, durations=(T, T), rest=0.1).sample(robot, short.fs) for T in (1.3, 1.4)]
+    with pytest.raises(ScenarioError, match="motions of 150 to 160 samples cannot advance together"):
         simulate(short, (1, 2), motions=motions)
