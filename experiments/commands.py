@@ -11,7 +11,8 @@ import tyro
 from rich.console import Console
 
 import experiments.log_commands
-import experiments.run_commands  # noqa: F401  # both register their commands
+import experiments.run_commands
+import experiments.study_commands  # noqa: F401  # all register their commands
 from experiments.app import app
 from experiments.errors import ExperimentError
 from experiments.interruption import INTERRUPTED, importing, terminating

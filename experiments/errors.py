@@ -7,3 +7,7 @@ class ExperimentError(Exception):
 
 class ResultsError(ExperimentError):
     """A results folder that cannot be written or read."""
+
+
+class StudyError(ExperimentError):
+    """A study that cannot be run: a file, an axis, a folder, a cluster."""

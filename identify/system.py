@@ -127,14 +127,19 @@ class System:
             return
         run = tuple(int(i) for i in failed[0])
         where = f" (run {run}, and {len(failed) - 1} more)" if run else ""
+        kind = IdentificationError if self.status[run] == Status.TOO_FEW_ROWS else ExcitationError
+        raise kind(self.explain(run) + where)
+
+    def explain(self, run: tuple[int, ...] = ()) -> str:
+        """Return why a run whose status is not OK cannot be solved, and what to do."""
         p = len(self.parameters)
         if self.status[run] == Status.TOO_FEW_ROWS:
-            raise IdentificationError(
-                f"{self.rows[run]} rows of {self.valid.shape[-1]} are left by the mask for {p} parameters{where}: use a longer "
+            return (
+                f"{self.rows[run]} rows of {self.valid.shape[-1]} are left by the mask for {p} parameters: use a longer "
                 "motion, in which every joint moves; in the power model all must move at once"
             )
-        raise ExcitationError(
-            f"the motion does not show {', '.join(self.unseen(run))}: W has rank {self.rank[run]} of {p}{where}; "
+        return (
+            f"the motion does not show {', '.join(self.unseen(run))}: W has rank {self.rank[run]} of {p}; "
             "move every joint, with others standing and moving, or leave these parameters out of the basis"
         )
 

@@ -129,8 +129,8 @@ class Bench:
         measured, command, current, q, qd, tau = (np.swapaxes(x[skipped:], 0, 1) for x in channels)
         for sim in np.flatnonzero(~np.isfinite(command).all(axis=(1, 2))):
             self._failures.setdefault(int(sim), f"the controller commands no finite torque (seed {self._seeds[sim]})")
-        for sim in self._failures:
-            measured[sim] = command[sim] = current[sim] = 0.0
+        for failed in self._failures:
+            measured[failed] = command[failed] = current[failed] = 0.0
         scenario, n = self._scenario, q.shape[-1]
         logged = scenario.torque.logged(
             current if scenario.torque.source == "current" else command, n, _generators(self._seeds, 2)

@@ -1,0 +1,1 @@
+"""Studies: a scenario over a grid of settings and independent seeds, identified by every model, chain and estimator."""

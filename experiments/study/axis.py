@@ -1,0 +1,140 @@
+"""What a study varies."""
+
+from dataclasses import dataclass, fields, replace
+from difflib import get_close_matches
+from typing import Any, Literal, final
+
+import numpy as np
+
+from experiments.errors import StudyError
+from identify import ALIGNMENTS, DIFFERENTIATORS, MASKS, OPERATORS, PREFILTERS, Chain, SettingError
+from identify.plugins import PluginTable
+from sim.settings import Number, Whole, settings
+
+STAGES: dict[str, PluginTable[Any]] = {
+    "prefilter": PREFILTERS,
+    "differentiator": DIFFERENTIATORS,
+    "alignment": ALIGNMENTS,
+    "mask": MASKS,
+    "operator": OPERATORS,
+}
+"""The stages of a chain that are plug-ins."""
+
+MOST_VALUES = 10000
+
+
+@final
+@settings
+class Axis:
+    """A setting and the values that it takes, listed or evenly spaced."""
+
+    field: str
+    """A setting of the scenario, such as encoder.lines, or of identification: chain.operator.cutoff, estimator.rounds."""
+    values: tuple[Any, ...] = ()
+    """The values; for a stage of the chain, such as chain.operator, names of plug-ins."""
+    lowest: Number | None = None
+    """Instead of values: the first of evenly spaced ones."""
+    highest: Number | None = None
+    """The last of them."""
+    count: Whole | None = None
+    """How many, at least 2."""
+    spacing: Literal["linear", "log"] = "linear"
+    """Even differences, or even ratios."""
+    also: tuple[str, ...] = ()
+    """Further fields that take the same value."""
+
+    def __post_init__(self) -> None:
+        spaced = self.lowest, self.highest, self.count
+        if self.values:
+            if any(x is not None for x in spaced):
+                raise ValueError(f"axis {self.field}: give values, or lowest, highest and count, not both")
+            if len({repr(value) for value in self.values}) < len(self.values):
+                raise ValueError(f"axis {self.field}: a value stands twice in {list(self.values)!r:.200}")
+        elif None in spaced:
+            raise ValueError(f"axis {self.field} is empty: give values, or lowest, highest and count")
+        elif not 2 <= (self.count or 0) <= MOST_VALUES or not (self.lowest or 0.0) < (self.highest or 0.0):
+            raise ValueError(f"axis {self.field}: lowest must be below highest, and count between 2 and {MOST_VALUES}")
+        elif self.spacing == "log" and (self.lowest or 0.0) <= 0:
+            raise ValueError(f"axis {self.field}: lowest = {self.lowest:g} must be above 0 for spacing log")
+
+    @property
+    def points(self) -> tuple[Any, ...]:
+        """The values, those of a range to six digits."""
+        if self.values:
+            return self.values
+        space = np.geomspace if self.spacing == "log" else np.linspace
+        return tuple(float(f"{x:.6g}") for x in space(self.lowest or 0.0, self.highest or 0.0, self.count or 0))
+
+    @property
+    def all_fields(self) -> tuple[str, ...]:
+        """Every field that takes the value."""
+        return (self.field, *self.also)
+
+    @property
+    def identification(self) -> bool:
+        """Whether it is a setting of identification: the same simulations serve all its values."""
+        return self.field.split(".")[0] in ("chain", "estimator")
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One value of one axis."""
+
+    axis: Axis
+    value: Any
+
+    @property
+    def label(self) -> Any:
+        """The value as a number, if it is one, or as text."""
+        return self.value if isinstance(self.value, (bool, int, float, str)) else repr(_plain(self.value))
+
+    def into(self, content: dict[str, Any]) -> None:
+        """Write the value into the tables of a scenario."""
+        for field in self.axis.all_fields:
+            *path, key = field.split(".")
+            table = content
+            for i, part in enumerate(path):
+                table = table.setdefault(part, {})
+                if not isinstance(table, dict):
+                    raise StudyError(f"axis {field}: {'.'.join(path[: i + 1])} is no table of settings")
+            if isinstance(self.value, dict) or key not in table or not isinstance(table[key], dict):
+                table[key] = self.value
+            else:
+                raise StudyError(f"axis {field} is a table of settings: give tables as values, or name one of its settings")
+
+    def chain(self, chain: Chain) -> Chain:
+        """Return `chain` with this value, if it is one of the chain's."""
+        for field in self.axis.all_fields:
+            root, *path = field.split(".")
+            if root == "chain":
+                chain = _replaced(chain, path, self.value, field)
+        return chain
+
+    def estimator(self, estimator: Any) -> Any:
+        """Return `estimator` with this value, if it is one of the estimator's."""
+        for field in self.axis.all_fields:
+            root, *path = field.split(".")
+            if root == "estimator":
+                estimator = _replaced(estimator, path, self.value, field)
+        return estimator
+
+
+def _replaced(part: Any, path: list[str], value: Any, field: str) -> Any:
+    """Return a frozen dataclass with the value of a field, or of a field of a field, replaced."""
+    known = [f.name for f in fields(part)]
+    if not path or path[0] not in known:
+        near = get_close_matches(path[0] if path else "", known, 1)
+        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        raise StudyError(f"axis {field}: {type(part).__name__} has no such setting{hint}; known: {', '.join(known) or 'none'}")
+    if len(path) > 1:
+        value = _replaced(getattr(part, path[0]), path[1:], value, field)
+    elif path[0] in STAGES and isinstance(part, Chain):
+        value = STAGES[path[0]].create(value)
+    try:
+        return replace(part, **{path[0]: value})
+    except (SettingError, TypeError, ValueError) as error:
+        raise StudyError(f"axis {field} = {value!r:.60}: {error}") from error
+
+
+def _plain(value: Any) -> Any:
+    return [_plain(x) for x in value] if isinstance(value, (list, tuple)) else value

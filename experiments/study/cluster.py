@@ -1,0 +1,95 @@
+"""Running the shards of a study on Dask workers: of this machine, or of many."""
+
+import logging
+from collections.abc import Iterator
+from concurrent.futures import Future
+from contextlib import ExitStack, contextmanager
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from threadpoolctl import threadpool_limits
+
+from experiments.errors import StudyError
+from experiments.study.shard import Shard, run_shard
+from experiments.study.store import require_versions, versions
+from experiments.study.study import Study
+from experiments.study.study_file import study_from_text
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+PATIENCE = 10.0
+"""How long [s] a scheduler may take to answer."""
+
+
+class ClusterPool:
+    """Shards on the workers of a Dask cluster, each on one thread; a lost worker's shards go to others.
+
+    Parameters
+    ----------
+    study : Study
+        What to run.
+    client : distributed.Client
+        The cluster.
+    """
+
+    def __init__(self, study: Study, client: "Client") -> None:
+        self._study, self._client = study, client
+        self._pool = client.get_executor(pure=False)
+
+    @property
+    def width(self) -> int:
+        """Number of threads of all workers; new workers count when they have come."""
+        return max(1, sum(self._client.nthreads().values()))
+
+    def submit(self, runs: range) -> Future[Shard]:
+        """Begin a shard."""
+        future: Future[Shard] = self._pool.submit(compute, self._study.text, runs.start, runs.stop, versions())
+        return future
+
+    def partial(self) -> float:
+        """Return 0: how far a worker is in a shard is not known."""
+        return 0.0
+
+
+@contextmanager
+def cluster_pool(study: Study, scheduler: str | None, workers: int) -> Iterator[ClusterPool]:
+    """Give the workers of a scheduler, or without one as many new processes of this machine.
+
+    Raises
+    ------
+    StudyError
+        If Dask is not installed, or the scheduler cannot be reached.
+    """
+    try:
+        from distributed import Client, LocalCluster
+    except ImportError as error:
+        raise StudyError(
+            "studies on workers need Dask: install the extra, as in uv sync --extra cluster, or pip install 'idbench[cluster]'"
+        ) from error
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong we say ourselves, in one line
+    with ExitStack() as stack:
+        if scheduler is None:
+            local = LocalCluster(
+                n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, silence_logs=logging.CRITICAL
+            )
+            address = stack.enter_context(local)
+        else:
+            address = scheduler
+        try:
+            client = stack.enter_context(Client(address, timeout=PATIENCE))
+        except (OSError, ValueError, TimeoutError) as error:
+            raise StudyError(f"cannot reach the scheduler {scheduler}: {error}") from error
+        yield ClusterPool(study, client)
+
+
+def compute(text: str, first: int, stop: int, theirs: dict[str, str]) -> Shard:
+    """Return a shard, on a worker; raise StudyError if its versions are not those of the process that asks."""
+    require_versions(theirs, "the process that runs the study")
+    threadpool_limits(1)
+    return run_shard(_study(text), range(first, stop))
+
+
+@lru_cache(maxsize=2)
+def _study(text: str) -> Study:
+    return study_from_text(text)

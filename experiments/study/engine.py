@@ -1,0 +1,102 @@
+"""Running a study: shards in parallel, each written when it is done."""
+
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
+
+from threadpoolctl import threadpool_limits
+
+from experiments.study.shard import Shard, run_shard
+from experiments.study.store import Store
+from experiments.study.study import Study
+
+POLL = 0.2
+"""How often [s] the progress is shown while shards are computed."""
+
+Watch = Callable[[float], None]
+"""Hears the number of runs that are done, parts of shards included."""
+
+
+class CancelledError(Exception):
+    """Raised inside shards that shall not go on."""
+
+
+class LocalPool:
+    """Shards on the threads of this process: MuJoCo and NumPy let each other run.
+
+    Parameters
+    ----------
+    study : Study
+        What to run.
+    threads : int
+        Shards at a time, each on one native thread.
+    """
+
+    def __init__(self, study: Study, threads: int) -> None:
+        self.width = threads
+        self._study, self._stop, self._done = study, threading.Event(), dict[int, float]()
+        self._pool: Executor = ThreadPoolExecutor(threads)
+        threadpool_limits(1)  # shards are the parallel work; a matrix product that forks would only be in their way
+
+    def submit(self, runs: range) -> Future[Shard]:
+        """Begin a shard."""
+        return self._pool.submit(self._run, runs)
+
+    def partial(self) -> float:
+        """Return how many runs the shards in progress amount to."""
+        return sum(list(self._done.values()))
+
+    def close(self) -> None:
+        """Stop at the next opportunity and wait for it."""
+        self._stop.set()
+        self._pool.shutdown(cancel_futures=True)
+
+    def _run(self, runs: range) -> Shard:
+        def hear(share: float) -> None:
+            self._done[runs[0]] = share * len(runs)
+            if self._stop.is_set():
+                raise CancelledError
+
+        try:
+            return run_shard(self._study, runs, progress=hear)
+        finally:
+            self._done.pop(runs[0], None)
+
+
+@contextmanager
+def local_pool(study: Study, threads: int) -> Iterator[LocalPool]:
+    """Give a pool of threads, closed at the end."""
+    pool = LocalPool(study, threads)
+    try:
+        yield pool
+    finally:
+        pool.close()
+
+
+def run_missing(store: Store, pool: LocalPool, shard: int, watch: Watch) -> None:
+    """Run what a study lacks; what is finished when this is interrupted is kept.
+
+    Parameters
+    ----------
+    store : Store
+        The study and its folder.
+    pool : LocalPool or the like
+        Where shards are computed.
+    shard : int
+        Most runs of a shard.
+    watch : callable
+        Hears how many runs of this call are done.
+    """
+    todo, pending, done = store.missing(shard), dict[Future[Shard], range](), 0
+    while True:
+        while len(pending) < 2 * pool.width and (runs := next(todo, None)) is not None:
+            pending[pool.submit(runs)] = runs
+        if not pending:
+            return
+        finished, _ = wait(pending, timeout=POLL, return_when=FIRST_COMPLETED)
+        for future in finished:
+            runs = pending.pop(future)
+            store.write(runs, future.result())
+            done += len(runs)
+        watch(done + pool.partial())

@@ -1,0 +1,121 @@
+"""The figures of a study's report, as SVG."""
+
+from collections.abc import Sequence
+from io import StringIO
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from experiments.recording.style import FORMS
+from experiments.study.answer import value
+from experiments.study.statistics import SIGMAS, Cell
+from identify import Array
+
+OTHER = [90, 90, 90]
+"""Colour of models that have none of their own."""
+
+WIDE = 20.0
+"""Ratio of the largest to the smallest value above which an axis is logarithmic."""
+
+mpl.rcParams.update({"svg.hashsalt": "idbench", "svg.fonttype": "none", "font.size": 8, "axes.grid": True, "grid.alpha": 0.3})
+
+
+def error_figure(cells: Sequence[Cell], axis: str) -> str:
+    """Return spread and bias of every parameter against an axis, a curve a model."""
+    figure, panels = _panels(cells[0].parameters)
+    for p, (name, panel) in enumerate(panels.items()):
+        for model, group in _models(cells).items():
+            x, color = _places(panel, group, axis), _color(model)
+            panel.plot(x, [100 * c.deviation[p] for c in group], color=color, label=f"{model}: spread", lw=1.4)
+            bias = np.array([100 * abs(c.bias[p]) for c in group])
+            panel.plot(x, bias, color=color, ls=":", label=f"{model}: |bias|", lw=1.2)
+            sure = np.array([abs(c.bias[p]) > c.bias_margin[p] for c in group])
+            panel.plot(np.array(x)[sure], bias[sure], "o", color=color, ms=3)
+        panel.set_yscale("log")
+        panel.set_title(name)
+    return _finished(figure, panels, axis, "error [%]")
+
+
+def coverage_figure(cells: Sequence[Cell], axis: str) -> str:
+    """Return the share of truths within two sigma against an axis: corrected, and the paper's."""
+    figure, panels = _panels(cells[0].parameters)
+    for p, (name, panel) in enumerate(panels.items()):
+        panel.axhline(95.4, color="black", lw=0.7)
+        for model, group in _models(cells).items():
+            x, color = _places(panel, group, axis), _color(model)
+            low, high = (np.array([100 * c.coverage_interval(c.sigma)[p, i] for c in group]) for i in (0, 1))
+            panel.plot(x, [100 * c.coverage(c.sigma)[p] for c in group], color=color, label=f"{model}: corrected", lw=1.4)
+            panel.fill_between(x, low, high, color=color, alpha=0.15, lw=0)
+            paper = [100 * c.coverage(c.paper_sigma)[p] for c in group]
+            panel.plot(x, paper, color=color, ls=":", label=f"{model}: paper's", lw=1.2)
+        panel.set_ylim(-3, 103)
+        panel.set_title(name)
+    return _finished(figure, panels, axis, f"truth within {SIGMAS:g} sigma [%]")
+
+
+def cost_figure(seconds: dict[str, float], runs: int) -> str:
+    """Return how long a run takes, in simulation and in each method."""
+    figure = Figure(figsize=(7, 0.6 + 0.3 * len(seconds)), layout="constrained")
+    panel: Any = figure.subplots()
+    values = [1e3 * s / max(runs, 1) for s in seconds.values()]
+    bars = panel.barh(list(seconds), values, color="#5b7db1")
+    panel.bar_label(bars, [f" {v:.3g} ms" for v in values])
+    panel.set_xscale("log")
+    panel.set_xlim(right=4 * max(values))
+    panel.set_xlabel("processor time of a run [ms]")
+    panel.invert_yaxis()
+    return _svg(figure)
+
+
+def _panels(parameters: Sequence[str]) -> tuple[Figure, dict[str, Axes]]:
+    columns = 4
+    rows = -(-len(parameters) // columns)
+    figure = Figure(figsize=(11, 2.2 * rows + 0.5), layout="constrained")
+    grid = np.atleast_1d(figure.subplots(rows, columns, sharex=True)).ravel()
+    for spare in grid[len(parameters) :]:
+        spare.set_visible(False)
+    return figure, dict(zip(parameters, grid, strict=False))
+
+
+def _models(cells: Sequence[Cell]) -> dict[str, list[Cell]]:
+    groups: dict[str, list[Cell]] = {}
+    for cell in cells:
+        groups.setdefault(cell.names[2], []).append(cell)
+    return groups
+
+
+def _places(panel: Axes, group: Sequence[Cell], axis: str) -> Array:
+    """Return where the cells lie on an axis, logarithmic if its values are far apart, counted if they are words."""
+    values = [cell.settings[axis] for cell in group]
+    if not all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in values):
+        panel.set_xticks(range(len(values)), [value(v) for v in values], rotation=20)
+        return np.arange(len(values), dtype=np.float64)
+    numbers = np.array(values, dtype=np.float64)
+    positive = numbers[numbers > 0]
+    if len(positive) and positive.max() > WIDE * positive.min():
+        if len(positive) == len(numbers):
+            panel.set_xscale("log")
+        else:
+            panel.set_xscale("symlog", linthresh=float(positive.min()))
+    return numbers
+
+
+def _color(model: str) -> tuple[float, ...]:
+    return tuple(c / 255 for c in FORMS.get(model, OTHER))
+
+
+def _finished(figure: Figure, panels: dict[str, Axes], axis: str, y: str) -> str:
+    handles, labels = next(iter(panels.values())).get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=6, frameon=False)
+    figure.supylabel(y, fontsize=9)
+    figure.supxlabel(axis, fontsize=9)
+    return _svg(figure)
+
+
+def _svg(figure: Figure) -> str:
+    text = StringIO()
+    figure.savefig(text, format="svg", metadata={"Date": None})
+    return text.getvalue()[text.getvalue().index("<svg") :]

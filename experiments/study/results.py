@@ -1,0 +1,76 @@
+"""What a finished study leaves: a summary, a report and a recording beside its shards."""
+
+from collections.abc import Sequence
+from math import isfinite
+from typing import Any
+
+from rich.console import Console
+from rich.text import Text
+
+from experiments.recording.study import record_study
+from experiments.results import results_folder, write_summary
+from experiments.study.answer import answer, percent, value
+from experiments.study.report import report
+from experiments.study.statistics import Cell, cells
+from experiments.study.store import Store, versions
+from experiments.tables import new_table
+
+
+def write_results(page: Console, store: Store) -> list[Cell]:
+    """Write summary.json, report.html and recording.rrd into the folder of a study, and print its answer."""
+    study, seconds = store.study, store.seconds()
+    found = cells(store.table().to_pydict(), [axis.field for axis in study.axes], study.parameters)
+    with results_folder(store.folder) as folder:
+        (folder / "report.html").write_text(report(study, found, seconds, store.folder), encoding="utf-8")
+        record_study(folder / "recording.rrd", study, found, store.folder)
+        write_summary(folder / "summary.json", _summary(store, found, seconds))
+    _print(page, store, found)
+    return found
+
+
+def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:
+    axes = [axis.field for axis in store.study.axes]
+    grid = new_table(store.study.question, [*axes[1:], "chain", "model", "runs", "failed", "typical error", "within 2 sigma"])
+    for cell in found:
+        settings = [value(x) for x in cell.settings.values()]
+        numbers = f"{cell.runs}", f"{cell.failures.total() or ''}"
+        judged = (percent(cell.typical), f"{100 * cell.coverage(cell.sigma).mean():.0f} %") if cell.runs else ("", "")
+        grid.add_row(*settings, cell.names[0], cell.names[2], *numbers, *judged)
+    grid.columns[0].header = axes[0]
+    page.print(grid)
+    page.print(Text(answer(found)))
+    page.print(f"\nwritten to {store.folder}: open {store.folder / 'report.html'}", soft_wrap=True)
+
+
+def _summary(store: Store, found: Sequence[Cell], seconds: dict[str, float]) -> dict[str, Any]:
+    return {
+        "experiment": "study",
+        "versions": versions(),
+        "seed": store.study.seed,
+        "study": store.study.content,
+        "scenario": store.study.scenario,
+        "answer": answer(found),
+        "parameters": list(store.study.parameters),
+        "cells": [_cell(cell) for cell in found],
+        "seconds": {**seconds, "runs": store.study.size},
+    }
+
+
+def _cell(cell: Cell) -> dict[str, Any]:
+    chain, estimator, model = cell.names
+    said: dict[str, Any] = {"settings": dict(cell.settings), "chain": chain, "estimator": estimator, "model": model}
+    said |= {"runs": cell.runs, "failures": dict(cell.failures)}
+    if cell.runs:
+        numbers = {
+            "truth": cell.truth.mean(axis=0),
+            "bias_percent": 100 * cell.bias,
+            "bias_margin_percent": 100 * cell.bias_margin,
+            "deviation_percent": 100 * cell.deviation,
+            "rmse_percent": 100 * cell.rmse,
+            "coverage": cell.coverage(cell.sigma),
+            "coverage_low": cell.coverage_interval(cell.sigma)[:, 0],
+            "coverage_high": cell.coverage_interval(cell.sigma)[:, 1],
+            "paper_coverage": cell.coverage(cell.paper_sigma),
+        }
+        said |= {name: [float(x) if isfinite(x) else None for x in values] for name, values in numbers.items()}
+    return said

@@ -1,0 +1,134 @@
+"""A shard: runs of one combination, simulated together and identified together."""
+
+import time
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from experiments.identified import BASES
+from experiments.study.study import Method, Study
+from identify import Estimate, IdentificationError, Status, identify_each
+from sim.engine import Progress, simulate
+from sim.errors import BenchError
+from sim.run import Run
+from sim.scara import scara_truth
+from sim.scenario import Scenario
+from sim.trajectories import Reference
+
+PARTS = ("", ".sigma", ".paper_sigma", ".truth")
+"""Of every parameter: the estimate, its corrected sigma, that of the paper's formula, and the truth."""
+
+
+@dataclass
+class Shard:
+    """What a shard has found: a row for every run, method and model, and how long it took."""
+
+    rows: list[dict[str, Any]] = field(default_factory=list)
+    seconds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
+
+
+def run_shard(study: Study, runs: range, *, threads: int = 1, progress: Progress | None = None) -> Shard:
+    """Simulate and identify runs of one combination of the grid; a run that fails leaves its reason in its rows.
+
+    Parameters
+    ----------
+    study : Study
+        What to run.
+    runs : range
+        Numbers of the runs, all of one point of the grid.
+    threads : int
+        Native threads of the simulation.
+    progress : callable, optional
+        Hears the share of the simulation that is done.
+    """
+    shard, scenarios = Shard(), {run: study.scenario_of(run) for run in runs}
+    for together in _groups(study, scenarios, shard):
+        start = time.perf_counter()
+        try:
+            simulated = _simulate(scenarios, together, threads, progress)
+        except BenchError as error:
+            _fail(shard, study, scenarios, list(together), str(error))
+            continue
+        shard.seconds["simulation"] += time.perf_counter() - start
+        for method in study.methods:
+            start = time.perf_counter()
+            shard.rows += _identify(study, method, simulated, list(together))
+            shard.seconds[f"{method.chain_name} {method.estimator_name}"] += time.perf_counter() - start
+    shard.rows.sort(key=lambda row: row["run"])
+    return shard
+
+
+def _groups(study: Study, scenarios: Mapping[int, Scenario], shard: Shard) -> Iterator[dict[int, Reference | None]]:
+    """Yield the runs that can advance together: those whose motions are of equal length."""
+    if study.motion == "shared":
+        yield dict.fromkeys(scenarios)
+        return
+    groups: dict[int, dict[int, Reference | None]] = defaultdict(dict)
+    for run, scenario in scenarios.items():
+        try:
+            motion = scenario.trajectory.sample(scenario.real_robot, scenario.fs)
+        except BenchError as error:
+            _fail(shard, study, scenarios, [run], str(error))
+        else:
+            groups[len(motion.q)][run] = motion
+    yield from groups.values()
+
+
+def _simulate(
+    scenarios: Mapping[int, Scenario], together: Mapping[int, Reference | None], threads: int, progress: Progress | None
+) -> Run:
+    first, motions = scenarios[next(iter(together))], [motion for motion in together.values() if motion is not None]
+    seeds = [scenarios[run].seed for run in together]
+    return simulate(first, seeds, motions=motions, threads=threads, progress=progress, throw=False)
+
+
+def _identify(study: Study, method: Method, simulated: Run, runs: Sequence[int]) -> Iterator[dict[str, Any]]:
+    """Yield a row for every run and model."""
+    basis = BASES[simulated.scenario.robot]()
+    truth = scara_truth(simulated.robots[0])
+    try:
+        found = identify_each(simulated.log, basis, study.created_models, method.chain, method.estimator, throw=False)
+    except IdentificationError as error:
+        found, reason = {}, str(error)
+    for model in study.models:
+        columns = _columns(found[model], truth) if found else {}
+        for i, run in enumerate(runs):
+            common = _common(study, method, run, model, simulated.seeds[i])
+            if i in simulated.failures or not found:
+                yield common | {"failure": simulated.failures.get(i) or reason}
+            elif found[model].system.status[i] != Status.OK:
+                yield common | {"failure": found[model].system.explain((i,))}
+            else:
+                yield common | {name: values[i] for name, values in columns.items()}
+
+
+def _columns(estimate: Estimate, truth: Mapping[str, float]) -> dict[str, list[Any]]:
+    """Return what an estimate of many runs found, a list with the value of each run."""
+    runs = len(estimate.X)
+    parts = estimate.X, estimate.corrected_sigma, estimate.sigma, np.tile(list(truth.values()), (runs, 1))
+    columns = {
+        "condition_number": estimate.condition_number.tolist(),
+        "rows": estimate.rows.tolist(),
+        "residual_rms": estimate.residual_rms.tolist(),
+    }
+    for p, name in enumerate(estimate.parameters):
+        columns |= {name + part: x[:, p].tolist() for part, x in zip(PARTS, parts, strict=True)}
+    return columns
+
+
+def _fail(shard: Shard, study: Study, scenarios: Mapping[int, Scenario], runs: Sequence[int], reason: str) -> None:
+    """Write the reason why runs could not be simulated into all their rows."""
+    for run in runs:
+        for method in study.methods:
+            for model in study.models:
+                shard.rows.append(_common(study, method, run, model, scenarios[run].seed) | {"failure": reason})
+
+
+def _common(study: Study, method: Method, run: int, model: str, seed: int) -> dict[str, Any]:
+    """Return what every row says."""
+    settings = {s.axis.field: s.label for s in (*study.points[run // study.seeds].settings, *method.settings)}
+    names = {"chain": method.chain_name, "estimator": method.estimator_name, "model": model}
+    return {"run": run, "seed": seed, **settings, **names, "failure": None}

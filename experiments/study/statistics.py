@@ -1,0 +1,186 @@
+"""What the runs of a study say, with confidence."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from identify import Array
+
+CONFIDENCE = 0.95
+"""Of every interval."""
+
+SIGMAS = 2.0
+"""Coverage is the share of truths inside this many sigma of the estimate; 95.4 % if sigma is right and errors are normal."""
+
+LEAST = 1e-16
+"""Relative error that counts as none: logarithms of 0 would say too much of rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """The runs of one combination of settings, identified by one model.
+
+    Parameters
+    ----------
+    settings : mapping of str to object
+        Value of each axis.
+    names : tuple of str
+        Chain, estimator and model.
+    parameters : tuple of str
+        Names of X.
+    run : int array, shape (runs,)
+        Numbers of the runs that gave an estimate.
+    X, sigma, paper_sigma, truth : Array, shape (runs, p)
+        Of those runs.
+    failures : Counter of str
+        Reasons of the others.
+    """
+
+    settings: Mapping[str, Any]
+    names: tuple[str, str, str]
+    parameters: tuple[str, ...]
+    run: np.typing.NDArray[np.int64]
+    X: Array
+    sigma: Array
+    paper_sigma: Array
+    truth: Array
+    failures: Counter[str]
+
+    @property
+    def runs(self) -> int:
+        """Number of runs that gave an estimate."""
+        return len(self.run)
+
+    @cached_property
+    def error(self) -> Array:
+        """(X - truth) / |truth|, shape (runs, p); absolute where the truth is 0."""
+        return (self.X - self.truth) / np.where(self.truth == 0, 1.0, np.abs(self.truth))
+
+    @property
+    def bias(self) -> Array:
+        """Mean relative error, shape (p,)."""
+        return self.error.mean(axis=0)
+
+    @property
+    def bias_margin(self) -> Array:
+        """Half the width of the confidence interval of the bias (Student's t), shape (p,)."""
+        t = stats.t.ppf((1 + CONFIDENCE) / 2, max(self.runs - 1, 1))
+        return t * self.deviation / np.sqrt(self.runs)
+
+    @property
+    def deviation(self) -> Array:
+        """Standard deviation of the relative error, shape (p,)."""
+        return self.error.std(axis=0, ddof=1) if self.runs > 1 else np.full(len(self.parameters), np.nan)
+
+    @property
+    def rmse(self) -> Array:
+        """Root mean square of the relative error, shape (p,)."""
+        return np.sqrt(np.mean(self.error**2, axis=0))
+
+    @property
+    def typical(self) -> float:
+        """Geometric mean over the parameters of their rmse: one figure that no parameter's unit or size decides."""
+        return float(np.exp(np.mean(np.log(np.maximum(self.rmse, LEAST)))))
+
+    def coverage(self, sigma: Array) -> Array:
+        """Return the share of truths within SIGMAS `sigma` of the estimate, shape (p,)."""
+        return np.mean(np.abs(self.X - self.truth) <= SIGMAS * sigma, axis=0)
+
+    def coverage_interval(self, sigma: Array) -> Array:
+        """Return the confidence interval of the coverage (Wilson), shape (p, 2)."""
+        inside = np.rint(self.coverage(sigma) * self.runs).astype(int)
+        found = [stats.binomtest(int(k), self.runs).proportion_ci(CONFIDENCE, "wilson") for k in inside]
+        return np.array([(i.low, i.high) for i in found])
+
+    def losses(self) -> dict[int, float]:
+        """Return, of each run, the mean over the parameters of log |relative error|."""
+        logs = np.log(np.maximum(np.abs(self.error), LEAST)).mean(axis=1)
+        return dict(zip(self.run.tolist(), logs.tolist(), strict=True))
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Whether two models differ, on the same runs.
+
+    Parameters
+    ----------
+    better, worse : str
+        Names of the models.
+    ratio : float
+        Typical error of the worse over that of the better, as the geometric mean over runs and parameters.
+    p : float
+        Probability of so clear a difference if there were none (Wilcoxon's signed-rank test, paired over the runs, Holm's
+        correction for all pairs).
+    runs : int
+        Runs that both could identify.
+    """
+
+    better: str
+    worse: str
+    ratio: float
+    p: float
+    runs: int
+
+
+def cells(rows: Mapping[str, Sequence[Any]], axes: Sequence[str], parameters: tuple[str, ...]) -> list[Cell]:
+    """Return the cells of a study's rows, a column each, in the order in which they appear."""
+    keys = list(zip(*(rows[name] for name in (*axes, "chain", "estimator", "model")), strict=True))
+    members: dict[tuple[Any, ...], list[int]] = {}
+    for i, key in enumerate(keys):
+        members.setdefault(key, []).append(i)
+    return [_cell(rows, key, np.array(index), axes, parameters) for key, index in members.items()]
+
+
+def _cell(
+    rows: Mapping[str, Any],
+    key: tuple[Any, ...],
+    index: np.typing.NDArray[np.intp],
+    axes: Sequence[str],
+    parameters: tuple[str, ...],
+) -> Cell:
+    failed = np.array([rows["failure"][i] is not None for i in index])
+    ok = index[~failed]
+
+    def of(part: str) -> Array:
+        return np.array([[rows[name + part][i] for name in parameters] for i in ok], dtype=np.float64).reshape(
+            -1, len(parameters)
+        )
+
+    return Cell(
+        settings=dict(zip(axes, key, strict=False)),
+        names=key[len(axes) :],
+        parameters=parameters,
+        run=np.array([rows["run"][i] for i in ok], dtype=np.int64),
+        X=of(""),
+        sigma=of(".sigma"),
+        paper_sigma=of(".paper_sigma"),
+        truth=of(".truth"),
+        failures=Counter(rows["failure"][i] for i in index[failed]),
+    )
+
+
+def differences(models: Sequence[Cell]) -> list[Difference]:
+    """Return, for every pair of models of the same runs, which is better and how sure that is."""
+    found = [_difference(a, b) for a, b in combinations(models, 2)]
+    order = sorted(range(len(found)), key=lambda i: found[i].p)
+    corrected, least = {}, 0.0
+    for rank, i in enumerate(order):
+        least = max(least, min(1.0, (len(found) - rank) * found[i].p))
+        corrected[i] = least
+    return [Difference(d.better, d.worse, d.ratio, corrected[i], d.runs) for i, d in enumerate(found)]
+
+
+def _difference(a: Cell, b: Cell) -> Difference:
+    one, other = a.losses(), b.losses()
+    both = sorted(one.keys() & other.keys())
+    gap = np.array([one[run] - other[run] for run in both])
+    mean = float(gap.mean()) if len(gap) else 0.0
+    better, worse = (a, b) if mean <= 0 else (b, a)
+    p = float(stats.wilcoxon(gap).pvalue) if np.any(gap) else 1.0
+    return Difference(better.names[2], worse.names[2], float(np.exp(abs(mean))), p, len(both))

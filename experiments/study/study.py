@@ -1,0 +1,189 @@
+"""The description of a study, and the runs that it makes."""
+
+import hashlib
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from math import prod
+from typing import Annotated, Any, Literal, final
+
+import numpy as np
+from pydantic import Field
+
+from experiments.errors import StudyError
+from experiments.identified import BASES
+from experiments.study.axis import Axis, Setting
+from identify import CHAINS, ESTIMATORS, MODELS, AbstractEstimator, AbstractModel, Chain
+from sim.scenario import Scenario
+from sim.scenario_file import from_dict
+from sim.settings import Seed, Whole, settings
+from sim.trajectories import RandomMoves
+
+MOST_METHODS = 1000
+"""Identifications of every run, above which axes are taken for a slip."""
+
+Names = Annotated[tuple[str, ...], Field(min_length=1)]
+
+
+@dataclass(frozen=True)
+class Point:
+    """One combination of the settings of simulation."""
+
+    scenario: Scenario
+    settings: tuple[Setting, ...]
+
+
+@dataclass(frozen=True)
+class Method:
+    """One combination of chain, estimator and their settings; all models of a study are identified with it."""
+
+    chain_name: str
+    estimator_name: str
+    chain: Chain
+    estimator: AbstractEstimator
+    settings: tuple[Setting, ...]
+
+
+@final
+@settings
+class Study:
+    """A scenario over axes and seeds, and how its logs are identified."""
+
+    name: Annotated[str, Field(pattern=r"^\w[\w.-]*$")]
+    """Name of the study: letters, digits, dot, hyphen and underscore."""
+    question: str
+    """What it is to answer."""
+    scenario: dict[str, Any]
+    """The scenario: name of one that ships, path of a file (TOML), or a table."""
+    axes: Annotated[tuple[Axis, ...], Field(min_length=1)]
+    """What varies: the grid is every combination."""
+    seeds: Annotated[Whole, Field(ge=2)] = 32
+    """Independent runs of every combination."""
+    seed: Seed = 0
+    """The same seed gives the same runs."""
+    motion: Literal["drawn", "shared"] = "drawn"
+    """drawn: every run draws a motion of its own (trajectory of kind random); shared: all follow the scenario's."""
+    models: Names = ("explicit", "implicit", "power")
+    """Names of models."""
+    chains: Names = ("idbench",)
+    """Names of chains."""
+    estimators: Names = ("WLS",)
+    """Names of estimators."""
+
+    def __post_init__(self) -> None:
+        every = [field for axis in self.axes for field in axis.all_fields]
+        if twice := {field for field in every if every.count(field) > 1}:
+            raise StudyError(f"two axes vary {', '.join(sorted(twice))}")
+        if fixed := {"seed", "name", "trajectory.seed"} & set(every):
+            raise StudyError(f"an axis varies {', '.join(sorted(fixed))}, which a study draws itself: use seeds")
+        for group in (self.models, self.chains, self.estimators):
+            if len(set(group)) < len(group):
+                raise StudyError(f"{', '.join(group)}: a name stands twice")
+        methods = prod(len(axis.points) for axis in self.axes if axis.identification)
+        if methods > MOST_METHODS:
+            raise StudyError(f"{methods:,} combinations of identification settings are more than {MOST_METHODS:,}")
+        _ = self.methods, self.created_models
+        base = next(self._points())  # the whole grid is looked at when it is known not to be endless
+        if base.scenario.robot not in BASES:
+            raise StudyError(f"no basis for robot {base.scenario.robot!r}; known: {', '.join(BASES)}")
+        if self.motion == "drawn":
+            _random(base.scenario)
+        if self.motion == "drawn" and base.scenario.start:
+            raise StudyError("motion = 'drawn' has no way to the start: leave out start, or motion = 'shared'")
+
+    @property
+    def size(self) -> int:
+        """Number of simulated runs."""
+        return self.seeds * prod(len(axis.points) for axis in self.axes if not axis.identification)
+
+    @cached_property
+    def points(self) -> tuple[Point, ...]:
+        """The grid of simulations; raise ScenarioError if a combination makes no sense."""
+        return tuple(self._points())
+
+    def _points(self) -> Iterator[Point]:
+        for combination in _combinations([axis for axis in self.axes if not axis.identification]):
+            content = json.loads(json.dumps(self.scenario))
+            for setting in combination:
+                setting.into(content)
+            yield Point(from_dict(content), combination)
+
+    @cached_property
+    def methods(self) -> tuple[Method, ...]:
+        """The grid of identifications."""
+        return tuple(self._methods())
+
+    def _methods(self) -> Iterator[Method]:
+        combinations = list(_combinations([axis for axis in self.axes if axis.identification]))
+        for name, way, combination in product(self.chains, self.estimators, combinations):
+            chain, estimator = CHAINS.create(name), ESTIMATORS.create(way)
+            for setting in combination:
+                chain, estimator = setting.chain(chain), setting.estimator(estimator)
+            yield Method(name, way, chain, estimator, combination)
+
+    @cached_property
+    def created_models(self) -> dict[str, AbstractModel]:
+        """The models, by name."""
+        return {name: MODELS.create(name) for name in self.models}
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters that are identified."""
+        return BASES[self.points[0].scenario.robot]().parameters
+
+    def with_seeds(self, seeds: int) -> "Study":
+        """Return this study with another number of independent runs."""
+        return replace(self, seeds=seeds)
+
+    def scenario_of(self, run: int) -> Scenario:
+        """Return the scenario of a run by itself; the same run of the same study is the same, whatever runs beside it.
+
+        Raises
+        ------
+        StudyError
+            If the study has no such run.
+        """
+        if not 0 <= run < self.size:
+            raise StudyError(f"run {run} does not exist: the study {self.name!r} has runs 0 to {self.size - 1}")
+        point, number = divmod(run, self.seeds)
+        scenario = self.points[point].scenario
+        drawn = np.random.SeedSequence(self.seed, spawn_key=(point, number)).generate_state(2, np.uint64) >> np.uint64(1)
+        if self.motion == "drawn":
+            scenario = replace(scenario, trajectory=replace(_random(scenario), seed=int(drawn[1])))
+        return replace(scenario, seed=int(drawn[0]))
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """What tells this study from any other."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+    @cached_property
+    def text(self) -> str:
+        """The study in JSON, the scenario in full."""
+        return json.dumps(self.content, sort_keys=True)
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """The study as the keys of a TOML document."""
+        axes = []
+        for axis in self.axes:
+            spaced = {k: getattr(axis, k) for k in ("lowest", "highest", "count", "spacing")} if not axis.values else {}
+            listed = {"values": list(axis.values)} if axis.values else {}
+            axes.append({"field": axis.field, **listed, **spaced, **({"also": list(axis.also)} if axis.also else {})})
+        plain = {key: getattr(self, key) for key in ("name", "question", "seeds", "seed", "motion")}
+        lists = {key: list(getattr(self, key)) for key in ("models", "chains", "estimators")}
+        return {**plain, **lists, "axes": axes, "scenario": self.scenario}
+
+
+def _random(scenario: Scenario) -> RandomMoves:
+    """Return the trajectory of a scenario whose motion can be drawn."""
+    if not isinstance(scenario.trajectory, RandomMoves):
+        raise StudyError("motion = 'drawn' needs a trajectory of kind random: write one, or motion = 'shared'")
+    return scenario.trajectory
+
+
+def _combinations(axes: list[Axis]) -> Iterator[tuple[Setting, ...]]:
+    """Yield every combination of the axes' values, the last axis fastest."""
+    return product(*([Setting(axis, value) for value in axis.points] for axis in axes))

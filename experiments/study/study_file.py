@@ -1,0 +1,87 @@
+"""Studies as TOML."""
+
+import json
+import tomllib
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from experiments.errors import StudyError
+from experiments.study.study import Study
+from sim.errors import ScenarioError
+from sim.scenario_file import from_dict, load, to_dict
+from sim.settings import make
+
+FOLDER = Path(__file__).parent.parent / "studies"
+
+
+def names() -> tuple[str, ...]:
+    """Return the names of the studies that ship."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
+
+
+def load_study(name: str) -> Study:
+    """Return the study that ships as `name`, or that of a TOML file.
+
+    Raises
+    ------
+    StudyError
+        If there is none, it is not TOML, or what it says cannot be run.
+    """
+    if not name.endswith(".toml") and name not in names():
+        near = get_close_matches(name, names(), 1)
+        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        raise StudyError(f"no study {name!r}{hint}; known: {', '.join(names())}, or give the path of a TOML file (.toml)")
+    path = Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
+    return study_from(read_toml(path), f"study {name}")
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Return the document of a study."""
+    try:
+        return tomllib.loads(path.read_text())
+    except OSError as error:
+        raise StudyError(f"cannot read study {path}: {error.strerror}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise StudyError(f"cannot read study {path}: {error}") from error
+
+
+def study_from(content: dict[str, Any], what: str) -> Study:
+    """Make a study from the keys of a TOML document, its scenario written out in full; raise StudyError."""
+    made = dict(content)
+    try:
+        made["scenario"] = _scenario(made.get("scenario"), made.pop("settings", {}))
+        made["axes"] = tuple(made.get("axes", ()))
+        study: Study = make(Study, made, "")
+    except ScenarioError as error:
+        raise StudyError(f"{what}: {error}") from error
+    except StudyError as error:
+        raise StudyError(f"{what}: {error}") from error
+    return study
+
+
+def study_from_text(text: str) -> Study:
+    """Make a study from `Study.text`."""
+    return study_from(json.loads(text), "study")
+
+
+def _scenario(base: Any, changes: Any) -> dict[str, Any]:
+    """Return the scenario `base`, a name or a table, with the settings that a study changes."""
+    if not isinstance(base, (str, dict)):
+        raise StudyError("key 'scenario' must name a scenario or a file (TOML), or be a table")
+    content = to_dict(load(base)) if isinstance(base, str) else base
+    if not isinstance(changes, dict):
+        raise StudyError(f"settings = {changes!r:.60} must be a table of settings of the scenario")
+    return to_dict(from_dict(_merged(content, changes)))
+
+
+def _merged(content: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """Return `content` with `changes`, table by table; a part of another kind is replaced whole."""
+    result = dict(content)
+    for key, value in changes.items():
+        old = result.get(key)
+        if isinstance(old, dict) and isinstance(value, dict) and value.get("kind", old.get("kind")) == old.get("kind"):
+            result[key] = _merged(old, value)
+        else:
+            result[key] = value
+    return result

@@ -1,0 +1,126 @@
+"""The command that runs studies."""
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from math import ceil
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from experiments.app import app
+from experiments.errors import StudyError
+from experiments.interruption import importing
+from experiments.page import new_page, show
+from experiments.study_progress import watching
+
+if TYPE_CHECKING:
+    from experiments.study.store import Store
+    from experiments.study.study import Study
+
+MANY = 100_000
+"""Runs beyond which a study is taken for a slip unless --yes says otherwise: days of a machine."""
+
+LARGEST_SHARD = 64
+
+Folder = Annotated[Path | None, tyro.conf.arg(metavar="DIR")]
+Number = Annotated[int | None, tyro.conf.arg(metavar="INT")]
+Name = Annotated[str | None, tyro.conf.arg(metavar="STUDY")]
+Url = Annotated[str | None, tyro.conf.arg(metavar="URL")]
+
+
+@app.command(name="study")
+def study(  # noqa: PLR0913, PLR0917  # the options of a command
+    study: tyro.conf.Positional[Name] = None,
+    out: Folder = None,
+    resume: Folder = None,
+    seeds: Number = None,
+    shard: Number = None,
+    threads: Number = None,
+    workers: Number = None,
+    scheduler: Url = None,
+    yes: bool = False,
+) -> None:
+    """Run a study: a scenario over a grid and many seeds, identified by every method; without a name, list those that ship.
+
+    Args:
+        study: Name of a study that ships, or a file (TOML).
+        out: Folder of the study; runs/<name of the study> by default.
+        resume: Folder of a study that was interrupted: what it lacks is run, and its report is made anew.
+        seeds: Independent runs of every combination, instead of the study's own number.
+        shard: Most runs that are simulated together; no bit depends on it.
+        threads: Shards at a time; all processors by default.
+        workers: Processes of this machine to run on instead (needs the extra `cluster`).
+        scheduler: Address of a Dask scheduler to run on instead, as tcp://host:8786 (needs the extra `cluster`).
+        yes: Run more than a hundred thousand runs.
+    """
+    os.environ.setdefault("RUST_LOG", "off")  # what goes wrong in rerun we say ourselves, in one line
+    with importing():
+        from experiments.study.engine import run_missing
+        from experiments.study.results import write_results
+    page = new_page()
+    if study is None and resume is None:
+        from experiments.study.study_file import load_study, names
+
+        for name in names():
+            page.out(f"{name:16} {load_study(name).question}")
+        show(page)
+        return
+    for name, value in (("seeds", seeds), ("shard", shard), ("threads", threads), ("workers", workers)):
+        if value is not None and value < 1:
+            raise StudyError(f"--{name} {value} must be at least 1")
+    store = _resumed(resume, study, out, seeds) if resume else _begun(str(study), out, seeds, yes)
+    width = workers or threads or os.cpu_count() or 1
+    runs = shard or min(LARGEST_SHARD, ceil(store.study.size / (2 * width)))
+    with store.locked(), _kept(store):
+        todo = sum(len(r) for r in store.missing(runs))
+        if todo:
+            with _pool(store.study, scheduler, workers, width) as pool, watching(store.study, todo) as watch:
+                run_missing(store, pool, runs, watch)
+        write_results(page, store)
+    show(page)
+
+
+def _begun(name: str, out: Path | None, seeds: int | None, yes: bool) -> "Store":
+    from experiments.study.store import Store
+    from experiments.study.study_file import load_study
+
+    described = load_study(name) if seeds is None else load_study(name).with_seeds(seeds)
+    if described.size > MANY and not yes:
+        raise StudyError(f"{name} has {described.size:,} runs, more than {MANY:,}: if you mean it, add --yes")
+    _ = described.points  # every combination is looked at before the first is run
+    return Store.create(described, out or Path("runs") / described.name)
+
+
+def _resumed(folder: Path, name: str | None, out: Path | None, seeds: int | None) -> "Store":
+    from experiments.study.store import Store
+
+    given = [f"--{what}" for what, value in (("out", out), ("seeds", seeds)) if value is not None]
+    if name is not None or given:
+        raise StudyError(
+            f"--resume {folder} goes on with the study of that folder: leave out {', '.join([name or '', *given])}"
+        )
+    return Store.open(folder)
+
+
+def _pool(study: "Study", scheduler: str | None, workers: int | None, width: int) -> AbstractContextManager[Any]:
+    from experiments.study.cluster import cluster_pool
+    from experiments.study.engine import local_pool
+
+    if scheduler and workers:
+        raise StudyError("--scheduler has workers of its own: leave out --workers")
+    return cluster_pool(study, scheduler, width) if scheduler or workers else local_pool(study, width)
+
+
+@contextmanager
+def _kept(store: "Store") -> Iterator[None]:
+    """Say what is kept and how to go on, if the block is interrupted."""
+    try:
+        yield
+    except (KeyboardInterrupt, SystemExit):
+        kept = store.study.size - sum(len(r) for r in store.missing(LARGEST_SHARD))
+        said = f"{kept:,} of {store.study.size:,} runs are kept; go on with: uv run idbench study --resume {store.folder}"
+        sys.stderr.write(f"\nidbench: {said}\n")
+        raise
