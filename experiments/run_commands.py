@@ -1,6 +1,7 @@
 """Commands that simulate."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -14,17 +15,30 @@ from experiments.page import new_page, show
 from experiments.results import results_folder, write_summary, write_whole
 from identify.log_file import write_log
 from sim.engine import Progress
+from sim.scenario import Scenario
 from sim.scenario_file import load, names, to_toml
 
 File = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
+Name = Annotated[str | None, tyro.conf.arg(metavar="SCENARIO")]
+From = Annotated[Path | None, tyro.conf.arg(name="from", metavar="DIR")]
+Index = Annotated[int | None, tyro.conf.arg(metavar="N")]
 
 
 @app.command(name="run")
-def run(scenario: tyro.conf.Positional[str], out: File = None, chain: str = "idbench", estimator: str = "WLS") -> None:
+def run(  # the options of a command
+    scenario: tyro.conf.Positional[Name] = None,
+    out: File = None,
+    chain: str = "idbench",
+    estimator: str = "WLS",
+    study: From = None,
+    index: Index = None,
+) -> None:
     """Simulate a scenario in closed loop, identify it with all models, and record it.
 
     Args:
         scenario: Name of a scenario that ships, or a file (TOML).
+        study: Instead of a scenario: the folder of a study, one run of which is made again.
+        index: Number of that run; its rows must come out with the same bits.
         out: Folder for summary.json, recording.rrd, log.parquet and scenario.toml; runs/<name of the scenario> by default.
         chain: Signal processing.
         estimator: OLS, WLS, ...
@@ -35,7 +49,8 @@ def run(scenario: tyro.conf.Positional[str], out: File = None, chain: str = "idb
         from experiments.run import ScenarioRun
         from experiments.tables import print_identified
 
-    page, described = new_page(), load(scenario)
+    page = new_page()
+    described = _again(page, study, index) if scenario is None else load(_alone(scenario, study, index))
     folder_name = out or Path("runs") / described.name
     with results_folder(folder_name) as folder:
         ran = ScenarioRun(described, chain, estimator, watch(f"simulating {described.name}"))
@@ -46,6 +61,31 @@ def run(scenario: tyro.conf.Positional[str], out: File = None, chain: str = "idb
         record_run(folder / "recording.rrd", ran)
         write_summary(folder / "summary.json", ran.summary())
     show(page)
+
+
+def _alone(scenario: str, study: Path | None, index: int | None) -> str:
+    if study is not None or index is not None:
+        raise ExperimentError(f"{scenario} and --from or --index: name a scenario, or a run of a study")
+    return scenario
+
+
+def _again(page: Console, folder: Path | None, index: int | None) -> Scenario:
+    """Return the scenario of a run of a study, whose rows come out again."""
+    from experiments.study.again import compare_again
+    from experiments.study.store import Store
+
+    if folder is None or index is None:
+        raise ExperimentError("name a scenario, as idbench scenario lists them, or a run of a study: --from DIR --index N")
+    store = Store.open(folder)
+    rows, known = compare_again(store, index)
+    page.print(
+        f"run {index} of {folder}: all {len(rows)} rows come out again, bit for bit"
+        if known
+        else f"run {index} of {folder}, which the study has not finished yet"
+    )
+    for reason in dict.fromkeys(row["failure"] for row in rows if row["failure"]):
+        page.print(f"doubtful: {reason}", soft_wrap=True)
+    return replace(store.study.scenario_of(index), name=f"{store.study.name}-{index}")
 
 
 @app.command(name="table2")

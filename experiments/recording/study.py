@@ -24,19 +24,20 @@ def record_study(path: Path, study: Study, cells: Sequence[Cell], folder: Path) 
     with recording_file(path, f"study-{study.name}", _blueprint(study)) as recording:
         recording.log("/report", rr.TextDocument(_text(study, cells, folder), media_type=rr.MediaType.MARKDOWN), static=True)
         for model in study.models:
-            _errors(recording, model, [cell for cell in solved if cell.names[2] == model], study.parameters)
+            size = 2.0 * (len(study.models) - study.models.index(model))
+            _errors(recording, model, [cell for cell in solved if cell.names[2] == model], size)
 
 
-def _errors(recording: rr.RecordingStream, model: str, cells: Sequence[Cell], parameters: Sequence[str]) -> None:
+def _errors(recording: rr.RecordingStream, model: str, cells: Sequence[Cell], size: float) -> None:
     """Send a point a run and parameter, and the histogram of all errors over their corrected sigma."""
     if not cells:
         return
     run = np.concatenate([cell.run for cell in cells])
     error = 100 * np.concatenate([cell.error for cell in cells])
     order, color = np.argsort(run, kind="stable"), FORMS.get(model, MEASURED)
-    for p, name in enumerate(parameters):
+    for p, name in enumerate(cells[0].parameters):
         at = f"/error/{name}/{model}"
-        recording.log(at, rr.SeriesPoints(names=model, colors=color, marker_sizes=2.0), static=True)
+        recording.log(at, rr.SeriesPoints(names=model, colors=color, marker_sizes=size), static=True)
         recording.send_columns(at, [rr.TimeColumn("run", sequence=run[order])], rr.Scalars.columns(scalars=error[order, p]))
     z = np.concatenate([((c.X - c.truth) / np.where(c.sigma > 0, c.sigma, np.inf)).ravel() for c in cells])
     counts, _ = np.histogram(np.clip(z, EDGES[0], EDGES[-1]), EDGES)
@@ -53,10 +54,16 @@ def _text(study: Study, cells: Sequence[Cell], folder: Path) -> str:
 
 
 def _blueprint(study: Study) -> rrb.Blueprint:
-    errors = [rrb.TimeSeriesView(origin=f"/error/{name}", name=f"error of {name} [%] over runs") for name in study.parameters]
+    hidden = rrb.PlotLegend(visible=False)  # the colours are those of the histograms
+    errors = [
+        rrb.TimeSeriesView(origin=f"/error/{name}", name=f"error of {name} [%] over runs", plot_legend=hidden)
+        for name in study.parameters
+    ]
     sigmas = [rrb.BarChartView(origin=f"/sigmas/{name}", name=f"{name}: error / corrected sigma") for name in study.models]
     left = rrb.Vertical(
         rrb.TextDocumentView(origin="/report", name=study.name), *sigmas, row_shares=[2.0, *[1.0] * len(sigmas)]
     )
     time = rrb.TimePanel(state="collapsed", timeline="run")
-    return rrb.Blueprint(rrb.Horizontal(left, rrb.Grid(*errors), column_shares=[1.0, 2.0]), time, collapse_panels=True)
+    return rrb.Blueprint(
+        rrb.Horizontal(left, rrb.Grid(*errors, grid_columns=2), column_shares=[1.0, 2.0]), time, collapse_panels=True
+    )

@@ -23,24 +23,21 @@ def answer(cells: Sequence[Cell]) -> str:
 
 
 def _who(groups: Sequence[Sequence[Cell]], best: Sequence[Cell]) -> str:
-    names = [cell.names[2] for cell in best]
-    winner = max(dict.fromkeys(names), key=names.count)
+    names = [_not_worse(group, cell) for group, cell in zip(groups, best, strict=True)]
+    winners = max(dict.fromkeys(names), key=names.count)
     low, high = min(best, key=lambda c: c.typical), max(best, key=lambda c: c.typical)
-    clear = sum(_clearly_best(group, cell) for group, cell in zip(groups, best, strict=True))
     ends = [f"{percent(cell.typical)} ({where(cell)})" for cell in (low, high)]
     span = f"the typical error of the best model goes from {ends[0]} to {ends[1]}"
     if len(groups[0]) == 1:
-        return f"With the {winner} model {span}."
-    return (
-        f"The {winner} model errs least in {names.count(winner)} of {len(groups)} combinations (the best model is clearly so, "
-        f"p < {SURE:g}, in {clear}), and {span}."
-    )
+        return f"With the {best[0].names[2]} model {span}."
+    tie = f", with no sure difference between them (p >= {SURE:g})" if len(winners) > 1 else f", surely so (p < {SURE:g})"
+    return f"Best in {names.count(winners)} of {len(groups)} combinations: {' and '.join(winners)}{tie}; {span}."
 
 
-def _clearly_best(group: Sequence[Cell], best: Cell) -> bool:
-    """Return whether every other model of a group is worse, and surely so."""
-    pairs = [d for d in differences(group) if best.names[2] in (d.better, d.worse)]
-    return bool(pairs) and all(d.better == best.names[2] and d.p < SURE for d in pairs)
+def _not_worse(group: Sequence[Cell], best: Cell) -> tuple[str, ...]:
+    """Return the best model of a group, and those that are not surely worse."""
+    worse = {d.worse for d in differences(group) if d.better == best.names[2] and d.p < SURE}
+    return tuple(cell.names[2] for cell in group if cell.names[2] not in worse)
 
 
 def _sigmas(cells: Sequence[Cell]) -> str:
@@ -74,4 +71,4 @@ def value(x: Any) -> str:
 
 def percent(share: float) -> str:
     """Return a share as a percentage of two digits."""
-    return f"{100 * share:.2g} %"
+    return f"{100 * share:.0f} %" if share >= 1 else f"{100 * share:.2g} %"

@@ -17,7 +17,7 @@ from identify import Array
 OTHER = [90, 90, 90]
 """Colour of models that have none of their own."""
 
-WIDE = 20.0
+WIDE = 8.0
 """Ratio of the largest to the smallest value above which an axis is logarithmic."""
 
 mpl.rcParams.update({"svg.hashsalt": "idbench", "svg.fonttype": "none", "font.size": 8, "axes.grid": True, "grid.alpha": 0.3})
@@ -28,10 +28,10 @@ def error_figure(cells: Sequence[Cell], axis: str) -> str:
     figure, panels = _panels(cells[0].parameters)
     for p, (name, panel) in enumerate(panels.items()):
         for model, group in _models(cells).items():
-            x, color = _places(panel, group, axis), _color(model)
-            panel.plot(x, [100 * c.deviation[p] for c in group], color=color, label=f"{model}: spread", lw=1.4)
+            x, color, wide = _places(panel, group, axis), _color(model), _width(cells, model)
+            panel.plot(x, [100 * c.deviation[p] for c in group], color=color, label=f"{model}: spread", lw=wide)
             bias = np.array([100 * abs(c.bias[p]) for c in group])
-            panel.plot(x, bias, color=color, ls=":", label=f"{model}: |bias|", lw=1.2)
+            panel.plot(x, bias, color=color, ls=":", label=f"{model}: |bias|", lw=wide)
             sure = np.array([abs(c.bias[p]) > c.bias_margin[p] for c in group])
             panel.plot(np.array(x)[sure], bias[sure], "o", color=color, ms=3)
         panel.set_yscale("log")
@@ -45,13 +45,13 @@ def coverage_figure(cells: Sequence[Cell], axis: str) -> str:
     for p, (name, panel) in enumerate(panels.items()):
         panel.axhline(95.4, color="black", lw=0.7)
         for model, group in _models(cells).items():
-            x, color = _places(panel, group, axis), _color(model)
+            x, color, wide = _places(panel, group, axis), _color(model), _width(cells, model)
             low, high = (np.array([100 * c.coverage_interval(c.sigma)[p, i] for c in group]) for i in (0, 1))
-            panel.plot(x, [100 * c.coverage(c.sigma)[p] for c in group], color=color, label=f"{model}: corrected", lw=1.4)
+            panel.plot(x, [100 * c.coverage(c.sigma)[p] for c in group], color=color, label=f"{model}: corrected", lw=wide)
             panel.fill_between(x, low, high, color=color, alpha=0.15, lw=0)
             paper = [100 * c.coverage(c.paper_sigma)[p] for c in group]
-            panel.plot(x, paper, color=color, ls=":", label=f"{model}: paper's", lw=1.2)
-        panel.set_ylim(-3, 103)
+            panel.plot(x, paper, color=color, ls=":", label=f"{model}: paper's", lw=wide)
+        panel.set_ylim(top=103)
         panel.set_title(name)
     return _finished(figure, panels, axis, f"truth within {SIGMAS:g} sigma [%]")
 
@@ -101,6 +101,11 @@ def _places(panel: Axes, group: Sequence[Cell], axis: str) -> Array:
         else:
             panel.set_xscale("symlog", linthresh=float(positive.min()))
     return numbers
+
+
+def _width(cells: Sequence[Cell], model: str) -> float:
+    """Return the width of a model's curves: those drawn first are wider, and show beneath others that they agree with."""
+    return 1.2 * (len(_models(cells)) - list(_models(cells)).index(model))
 
 
 def _color(model: str) -> tuple[float, ...]:

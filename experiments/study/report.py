@@ -64,8 +64,10 @@ def worst_runs(cells: Sequence[Cell]) -> list[tuple[Cell, str, float, int]]:
     for cell in cells:
         p = np.abs(cell.error).argmax(axis=1)
         found += [(cell, cell.parameters[j], float(cell.error[i, j]), int(cell.run[i])) for i, j in enumerate(p)]
-    found.sort(key=lambda entry: -abs(entry[2]))
-    return list({entry[3]: entry for entry in reversed(found)}.values())[::-1][:WORST]
+    worst: dict[int, tuple[Cell, str, float, int]] = {}
+    for entry in sorted(found, key=lambda entry: -abs(entry[2])):
+        worst.setdefault(entry[3], entry)
+    return list(worst.values())[:WORST]
 
 
 def command(folder: Path, run: int) -> str:
@@ -82,13 +84,13 @@ def _overview(cell: Cell) -> list[str]:
     settings = [value(x) for x in cell.settings.values()]
     head = [*settings, *cell.names, f"{cell.runs}", f"{cell.failures.total() or ''}"]
     if not cell.runs:
-        return [*head, *[""] * 6]
+        return [*head, *[""] * 4]
     worst = int(cell.rmse.argmax())
     shares = []
     for sigma in (cell.sigma, cell.paper_sigma):
         share = 100 * cell.coverage(sigma)
-        shares += [f"{share.mean():.0f} %", f"{share.min():.0f} to {share.max():.0f}"]
-    return [*head, percent(cell.typical), f"{percent(cell.rmse[worst])} {cell.parameters[worst]}", "", *shares]
+        shares.append(f"{share.mean():.0f} % ({share.min():.0f} to {share.max():.0f})")
+    return [*head, percent(cell.typical), f"{percent(cell.rmse[worst])} {cell.parameters[worst]}", *shares]
 
 
 def _details(cell: Cell) -> Iterator[list[str]]:

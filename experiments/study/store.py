@@ -145,6 +145,15 @@ class Store:
         table = pa.concat_tables([pq.read_table(path, partitioning=None) for path in self.shards()])
         return table.replace_schema_metadata(None)
 
+    def rows_of(self, run: int) -> list[dict[str, Any]]:
+        """Return the rows of a run, none if its shard is not finished."""
+        for path in self.shards():
+            first, last = _range(path)
+            if first <= run <= last:
+                rows: list[dict[str, Any]] = pq.read_table(path, filters=[("run", "=", run)], partitioning=None).to_pylist()
+                return rows
+        return []
+
     def seconds(self) -> dict[str, float]:
         """Return how long simulation and each method took, summed over the finished shards [s]."""
         total: dict[str, float] = {}
