@@ -74,11 +74,12 @@ def study(  # noqa: PLR0913, PLR0917  # the options of a command
     store = _resumed(resume, study, out, seeds) if resume else _begun(str(study), out, seeds, yes)
     width = workers or threads or os.cpu_count() or 1
     runs = shard or min(LARGEST_SHARD, ceil(store.study.size / (2 * width)))
-    with store.locked(), _kept(store):
-        todo = sum(len(r) for r in store.missing(runs))
-        if todo:
-            with _pool(store.study, scheduler, workers, width) as pool, watching(store.study, todo) as watch:
+    if todo := sum(len(r) for r in store.missing(runs)):
+        with _pool(store.study, scheduler, workers, width) as pool:
+            store.begin()
+            with store.locked(), _kept(store), watching(store.study, todo) as watch:
                 run_missing(store, pool, runs, watch)
+    with store.locked(), _kept(store):
         write_results(page, store)
     show(page)
 
@@ -91,7 +92,7 @@ def _begun(name: str, out: Path | None, seeds: int | None, yes: bool) -> "Store"
     if described.size > MANY and not yes:
         raise StudyError(f"{name} has {described.size:,} runs, more than {MANY:,}: if you mean it, add --yes")
     _ = described.points  # every combination is looked at before the first is run
-    return Store.create(described, out or Path("runs") / described.name)
+    return Store.new(described, out or Path("runs") / described.name)
 
 
 def _resumed(folder: Path, name: str | None, out: Path | None, seeds: int | None) -> "Store":

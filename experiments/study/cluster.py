@@ -1,6 +1,7 @@
 """Running the shards of a study on Dask workers: of this machine, or of many."""
 
 import logging
+import signal
 from collections.abc import Iterator
 from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager
@@ -70,10 +71,9 @@ def cluster_pool(study: Study, scheduler: str | None, workers: int) -> Iterator[
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong we say ourselves, in one line
     with ExitStack() as stack:
         if scheduler is None:
-            local = LocalCluster(
-                n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, silence_logs=logging.CRITICAL
-            )
-            address = stack.enter_context(local)
+            options = {"host": "127.0.0.1", "dashboard_address": None, "silence_logs": logging.CRITICAL}
+            with _deaf():
+                address = stack.enter_context(LocalCluster(n_workers=workers, threads_per_worker=1, **options))
         else:
             address = scheduler
         try:
@@ -81,6 +81,16 @@ def cluster_pool(study: Study, scheduler: str | None, workers: int) -> Iterator[
         except (OSError, ValueError, TimeoutError) as error:
             raise StudyError(f"cannot reach the scheduler {scheduler}: {error}") from error
         yield ClusterPool(study, client)
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Let processes that begin meanwhile not hear Ctrl-C, which a terminal sends to all: this one tells them to end."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def compute(text: str, first: int, stop: int, theirs: dict[str, str]) -> Shard:

@@ -65,8 +65,8 @@ class Store:
     folder: Path
 
     @classmethod
-    def create(cls, study: Study, folder: Path) -> Self:
-        """Begin a study in a new folder, or an empty one; raise StudyError if it holds another, or this one already."""
+    def new(cls, study: Study, folder: Path) -> Self:
+        """Return a study for a new folder, or an empty one; raise StudyError if it holds another, or this one already."""
         described = folder / "study.toml"
         if described.exists():
             same = _read(folder).fingerprint == study.fingerprint
@@ -75,14 +75,19 @@ class Store:
                 if same
                 else f"{folder} holds another study, or this one before it was changed: choose another --out"
             )
+        store = cls(study, folder)
+        if store.shards():
+            raise StudyError(f"{folder} holds shards but no study.toml: choose another --out")
+        return store
+
+    def begin(self) -> None:
+        """Make the folder, unless it is there; raise ResultsError if that fails."""
         try:
-            (folder / "shards").mkdir(parents=True, exist_ok=True)
-            if any((folder / "shards").iterdir()):
-                raise StudyError(f"{folder} holds shards but no study.toml: choose another --out")
+            (self.folder / "shards").mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise ResultsError(f"cannot write to {folder}: {error.strerror}; choose another --out") from error
-        write_whole(described, tomli_w.dumps(study.content))
-        return cls(study, folder)
+            raise ResultsError(f"cannot write to {self.folder}: {error.strerror}; choose another --out") from error
+        if not (self.folder / "study.toml").exists():
+            write_whole(self.folder / "study.toml", tomli_w.dumps(self.study.content))
 
     @classmethod
     def open(cls, folder: Path) -> Self:
