@@ -101,7 +101,7 @@ def _resumed(folder: Path, name: str | None, out: Path | None, seeds: int | None
     given = [f"--{what}" for what, value in (("out", out), ("seeds", seeds)) if value is not None]
     if name is not None or given:
         raise StudyError(
-            f"--resume {folder} goes on with the study of that folder: leave out {', '.join([name or '', *given])}"
+            f"--resume {folder} goes on with the study of that folder: leave out {', '.join(filter(None, [name, *given]))}"
         )
     return Store.open(folder)
 

@@ -30,9 +30,7 @@ def watching(study: Study, todo: int) -> Iterator[Callable[[float], None]]:
             task = bar.add_task(study.name, total=todo)
             yield lambda done: bar.update(task, completed=done)
         return
-    lines = _Lines(console, study.name, todo)
-    lines.say(0.0)
-    yield lines.hear
+    yield _Lines(console, study.name, todo).hear
 
 
 class _Lines:

@@ -1,0 +1,86 @@
+"""A study of 1000 runs of 40 s, three models each, against bare native `mj_step` for the same physics steps.
+
+    uv run --extra cluster python tests/benchmarks/study.py [RUNS] [MOVES]
+
+Averaged drive, 16-bit encoders, PD loop at 100 Hz, every run with a motion of its own. Both take the same threads, and take
+turns, shard by shard of the bare steps, so that the ratio holds when the machine's speed drifts. Then 256 runs on two worker
+processes. Peak memory is that of this process.
+"""
+
+import resource
+import sys
+import tempfile
+import time
+from copy import copy
+from pathlib import Path
+
+import mujoco
+from mujoco.batch import Batch
+
+from experiments.page import new_page
+from experiments.study.cluster import cluster_pool
+from experiments.study.engine import local_pool, run_missing
+from experiments.study.results import write_results
+from experiments.study.store import Store
+from experiments.study.study import Study
+from experiments.study.study_file import study_from
+
+RUNS = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
+MOVES = int(sys.argv[2]) if len(sys.argv) > 2 else 29
+SHARD, THREADS = 64, 2
+
+
+def study(runs: int) -> Study:
+    """Return a study of `runs` runs in two combinations, 40 s each."""
+    trajectory = {"kind": "random", "moves": MOVES, "durations": [1.3, 1.3], "rest": 1.15}
+    settings = {"trajectory": trajectory, "drive": {"kind": "averaged"}, "encoder": {"kind": "incremental"}}
+    axes = [{"field": "encoder.lines", "values": [4096, 16384]}]
+    content = {"name": "benchmark", "question": "How fast?", "scenario": "ideal", "seeds": runs // 2, "axes": axes}
+    return study_from({**content, "settings": settings}, "study")
+
+
+def bare(described: Study, runs: int) -> float:
+    """Return how long bare steps of as many simulations take [s], in batches of a shard for each thread."""
+    scenario = described.scenario_of(0)
+    model = copy(scenario.real_robot.model)
+    model.opt.timestep, model.opt.integrator = 0.001, mujoco.mjtIntegrator.mjINT_RK4
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    steps = round(scenario.trajectory.plan(scenario.nominal_robot).duration / 0.001)
+    batch = Batch(model, runs, THREADS)
+    batch.bind("qfrc_applied")[:] = [3.0, 0.3]
+    start = time.perf_counter()
+    batch.step(nstep=steps)
+    return time.perf_counter() - start
+
+
+def timed(runs: int, workers: int, report: bool) -> tuple[float, float]:
+    """Return how long a study takes, and bare steps before and after it [s]."""
+    described = study(runs)
+    before = bare(described, runs // 2)
+    with tempfile.TemporaryDirectory() as folder:
+        start = time.perf_counter()
+        store = Store.new(described, Path(folder) / "out")
+        with cluster_pool(described, None, workers) if workers else local_pool(described, THREADS) as pool:
+            store.begin()
+            run_missing(store, pool, SHARD, lambda done: None)
+        took = time.perf_counter() - start
+        if report:
+            write_results(new_page(), store)
+            print(f"  report, recording and summary: {time.perf_counter() - start - took:.1f} s more")
+        seconds = store.seconds()
+        print(f"  {', '.join(f'{what} {s:.1f} s' for what, s in seconds.items())} of processor time")
+    return took, before + bare(described, runs - runs // 2)
+
+
+def main() -> None:
+    """Print both ratios."""
+    for runs, workers in ((RUNS, 0), (256, 2)):
+        where = f"{workers} worker processes" if workers else f"{THREADS} threads"
+        print(f"{runs} runs on {where}:")
+        took, native = timed(runs, workers, not workers)
+        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        print(f"  {took:.1f} s, bare steps {native:.1f} s, ratio {took / native:.3f}; peak memory {memory:.0f} MB")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,169 @@
+"""The command `study`, `run --from`, and what they leave."""
+
+import json
+import re
+import subprocess
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+import rerun_cli
+from rerun.chunk import RrdReader
+
+from experiments import study_commands
+from experiments.cli import main
+from experiments.study import engine
+from experiments.study.store import Store
+
+
+def test_the_folder_has_all_that_is_promised(done, undisturbed):
+    names = {"study.toml", "shards", "summary.json", "report.html", "recording.rrd"}
+    assert names <= {path.name for path in done.iterdir()}
+    assert Store.open(done).table().equals(undisturbed)
+
+
+def test_the_summary_says_what_the_rows_say(done, undisturbed):
+    summary = json.loads((done / "summary.json").read_text())
+    assert len(summary["cells"]) == 8
+    rows = undisturbed.to_pylist()
+    for cell in summary["cells"]:
+        mine = [r for r in rows if r["model"] == cell["model"] and all(r[k] == v for k, v in cell["settings"].items())]
+        error = np.array([100 * (r["Fs1"] - 0.5) / 0.5 for r in mine])
+        place = summary["parameters"].index("Fs1")
+        assert cell["runs"] == len(mine) == 9
+        assert cell["bias_percent"][place] == pytest.approx(error.mean())
+        assert cell["rmse_percent"][place] == pytest.approx(np.sqrt(np.mean(error**2)))
+    assert summary["versions"]["idbench"]
+
+
+class Page(HTMLParser):
+    """What a page opens and loads."""
+
+    def __init__(self):
+        super().__init__()
+        self.tags, self.loads = [], []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.loads += [value for name, value in attrs if name in {"src", "href", "xlink:href"} and not value.startswith("#")]
+
+
+def test_the_report_is_one_file_with_everything_in_it(done):
+    text = (done / "report.html").read_text()
+    page = Page()
+    page.feed(text)
+    assert page.tags.count("svg") == 2 * 2 + 1  # error and coverage of two cut-offs, and cost
+    assert not page.loads
+    assert "script" not in page.tags
+    summary = json.loads((done / "summary.json").read_text())
+    for said in ("Does it work?", "idbench run --from", "SeedSequence(0", "mujoco", "lines = ", *summary["parameters"]):
+        assert said in text
+    assert summary["answer"].split(";")[0].split("(p")[0] in text
+
+
+def test_the_recording_holds_every_error(done, undisturbed):
+    path = done / "recording.rrd"
+    verified = subprocess.run(
+        [rerun_cli.__path__[0] + "/rerun", "rrd", "verify", str(path)], capture_output=True, text=True, check=False
+    )
+    assert verified.returncode == 0, verified.stderr
+    chunks = RrdReader(path).stream().filter(content="/error/Fv2/power", has_timeline="run").to_chunks()
+    batches = [chunk.to_record_batch() for chunk in chunks]
+    values = np.concatenate([np.ravel(batch.column("Scalars:scalars").to_pylist()) for batch in batches])
+    expected = [100 * (r["Fv2"] - 0.01) / 0.01 for r in undisturbed.to_pylist() if r["model"] == "power"]
+    np.testing.assert_allclose(np.sort(values), np.sort(expected), rtol=1e-9)
+
+
+def test_a_run_is_made_again_bit_for_bit(done, tmp_path, capfd):
+    assert main(["run", "--from", str(done), "--index", "13", "--out", str(tmp_path / "again")]) == 0
+    assert "run 13 of" in capfd.readouterr().out.splitlines()[0]
+    summary = json.loads((tmp_path / "again" / "summary.json").read_text())
+    row = next(r for r in Store.open(done).rows_of(13) if r["model"] == "power" and r["chain.operator.cutoff"] == 5.0)
+    assert summary["models"]["power"]["estimate"][0] == row["ZZR1"]
+    assert summary["models"]["power"]["corrected_sigma"][0] == row["ZZR1.sigma"]
+    assert summary["seed"] == row["seed"]
+
+
+def test_an_interrupted_study_says_how_to_go_on(file, tmp_path, capfd, monkeypatch, undisturbed):
+    out, real = tmp_path / "out", Store.write
+
+    def write(self, runs, shard):
+        real(self, runs, shard)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Store, "write", write)
+    assert main(["study", str(file), "--out", str(out), "--shard", "3", "--threads", "1"]) == 130
+    assert f"3 of 18 runs are kept; go on with: uv run idbench study --resume {out}" in capfd.readouterr().err
+    monkeypatch.setattr(Store, "write", real)
+    assert main(["study", "--resume", str(out)]) == 0
+    assert Store.open(out).table().equals(undisturbed)
+
+
+def test_studies_are_listed(capfd):
+    assert main(["study"]) == 0
+    assert re.search(r"^encoder +How fine", capfd.readouterr().out, re.MULTILINE)
+
+
+def test_number_of_seeds(file, tmp_path):
+    assert main(["study", str(file), "--seeds", "2", "--out", str(tmp_path / "out")]) == 0
+    assert Store.open(tmp_path / "out").table().num_rows == 2 * 2 * 2 * 2
+
+
+def test_a_thousand_million_runs_are_asked_for_twice(file, complaint, tmp_path, monkeypatch):
+    out = ("--out", str(tmp_path / "out"))
+    said = complaint("study", str(file), "--seeds", "1000000000", *out)
+    assert "2,000,000,000 runs, more than 100,000: if you mean it, add --yes" in said
+    assert not (tmp_path / "out").exists()
+    monkeypatch.setattr(study_commands, "MANY", 3)
+    assert "18 runs, more than 3" in complaint("study", str(file), *out)
+    assert main(["study", str(file), "--yes", *out]) == 0
+
+
+def test_wrong_calls(done, file, tmp_path, complaint):
+    out = ("--out", str(tmp_path / "out"))
+    assert "no study 'encodr' (did you mean 'encoder'?)" in complaint("study", "encodr")
+    assert "cannot read study" in complaint("study", str(tmp_path / "none.toml"))
+    assert "holds this study already" in complaint("study", str(file), "--out", str(done))
+    assert "holds another study" in complaint("study", str(file), "--seeds", "3", "--out", str(done))
+    assert "there is no study in" in complaint("study", "--resume", str(tmp_path))
+    assert "leave out --seeds" in complaint("study", "--resume", str(done), "--seeds", "3")
+    assert "--threads 0 must be at least 1" in complaint("study", str(file), "--threads", "0", *out)
+    assert "leave out --workers" in complaint("study", str(file), "--workers", "2", "--scheduler", "tcp://a:1", *out)
+    assert "run 18 does not exist" in complaint("run", "--from", str(done), "--index", "18")
+    assert "name a scenario, or a run of a study" in complaint("run", "ideal", "--index", "1")
+    assert "--from DIR --index N" in complaint("run")
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_unreachable_scheduler_leaves_nothing(file, tmp_path, complaint):
+    said = complaint("study", str(file), "--scheduler", "tcp://127.0.0.1:9", "--out", str(tmp_path / "out"))
+    assert "cannot reach the scheduler tcp://127.0.0.1:9" in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_without_dask_workers_are_refused_and_the_rest_works(file, tmp_path, complaint, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "distributed", None)
+    assert "install the extra" in complaint("study", str(file), "--workers", "2", "--out", str(tmp_path / "out"))
+
+
+def test_a_full_disk_is_one_line_and_keeps_what_there_is(file, tmp_path, complaint, monkeypatch):
+    out, real = tmp_path / "out", Store.write
+
+    def write(self, runs, shard):
+        if runs.start >= 9:
+            monkeypatch.setattr("pyarrow.parquet.write_table", full)
+        real(self, runs, shard)
+
+    def full(*args):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Store, "write", write)
+    assert "No space left on device; make room and go on" in complaint("study", str(file), "--out", str(out), "--threads", "1")
+    assert [path.name for path in Store.open(out).shards()] == ["runs-0000000000-0000000008.parquet"]
+
+
+def test_an_error_in_a_shard_is_not_taken_for_a_result(file, tmp_path, monkeypatch):
+    """A mistake in the program is no reason in a row."""
+    monkeypatch.setattr(engine, "run_shard", lambda *args, **kwargs: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        main(["study", str(file), "--out", str(tmp_path / "out")])

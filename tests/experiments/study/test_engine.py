@@ -1,0 +1,81 @@
+"""Running a study: the same bits however it is cut, and runs that fail by themselves."""
+
+import pytest
+
+from experiments.errors import StudyError
+from experiments.study import cluster
+from experiments.study.again import compare_again
+from experiments.study.cluster import cluster_pool, compute
+from experiments.study.shard import run_shard
+from experiments.study.store import Store, versions
+from experiments.study.study_file import study_from
+
+
+@pytest.mark.parametrize(("shard", "threads"), [(1, 2), (7, 1), (7, 2), (64, 1)])
+def test_same_bits_whatever_the_shards_and_threads(small, tmp_path, undisturbed, run_study, shard, threads):
+    assert run_study(small, tmp_path / "out", shard, threads).table().equals(undisturbed)
+
+
+@pytest.mark.parametrize("workers", [1, 2, 3])
+def test_same_bits_on_any_number_of_workers(small, tmp_path, undisturbed, run_study, workers):
+    with cluster_pool(small, None, workers) as pool:
+        assert run_study(small, tmp_path / "out", 5, pool=pool).table().equals(undisturbed)
+
+
+def test_rows_are_those_of_the_study(undisturbed, small):
+    rows = undisturbed.to_pylist()
+    assert [row["run"] for row in rows[::4]] == list(range(18))
+    assert {(row["encoder.lines"], row["chain.operator.cutoff"], row["model"]) for row in rows} == {
+        (lines, cutoff, model) for lines in (2048.0, 65536.0) for cutoff in (4.0, 5.0) for model in ("explicit", "power")
+    }
+    assert all(row["failure"] is None and row["ZZR1.sigma"] > 0 and row["ZZR1.truth"] == pytest.approx(3.5) for row in rows)
+    assert {row["seed"] for row in rows} == {small.scenario_of(run).seed for run in range(18)}
+
+
+def test_a_run_comes_out_again_by_itself(small, tmp_path, run_study):
+    store = run_study(small, tmp_path / "out")
+    rows, known = compare_again(store, 13)
+    assert known
+    assert len(rows) == 4
+
+
+def test_a_run_with_other_bits_is_told(small, tmp_path, run_study, monkeypatch):
+    store = run_study(small, tmp_path / "out")
+    rows = store.rows_of(13)
+    rows[2]["Fv1"] *= 1 + 1e-15
+    monkeypatch.setattr(Store, "rows_of", lambda self, run: rows)
+    with pytest.raises(StudyError, match=r"run 13 of .* does not come out again \(idbench, WLS, explicit\): Fv1"):
+        compare_again(store, 13)
+
+
+def test_runs_fail_alone_with_their_reasons(content):
+    """A weak drive loses some motions, and one rate is too low for the chain: the rest is as it would be without them."""
+    content["settings"]["drive"] = {"kind": "averaged", "current_limit": [4.0, 0.7]}
+    content["axes"] = [{"field": "fs", "values": [100.0, 9.0]}]
+    study = study_from(content, "study")
+    weak, slow = run_shard(study, range(9)).rows, run_shard(study, range(9, 18)).rows
+    failed = {row["run"] for row in weak if row["failure"]}
+    assert 0 < len(failed) < 9
+    assert all("leaves its range" in row["failure"] for row in weak if row["run"] in failed)
+    alone = next(run for run in range(9) if run not in failed)
+    assert run_shard(study, range(alone, alone + 1)).rows == [row for row in weak if row["run"] == alone]
+    assert all(row["failure"] for row in slow)
+
+
+def test_a_worker_with_another_version_is_refused(small):
+    with pytest.raises(StudyError, match=r"has mujoco 1\.0 \(here 4.*: the same study needs the same versions"):
+        compute(small.text, 0, 2, versions() | {"mujoco": "1.0"})
+
+
+def test_and_its_complaint_reaches_the_process_that_asks(small, tmp_path, run_study, monkeypatch):
+    monkeypatch.setattr(cluster, "versions", lambda: versions() | {"idbench": "0.0"})
+    with cluster_pool(small, None, 1) as pool, pytest.raises(StudyError, match=r"has idbench 0\.0"):
+        run_study(small, tmp_path / "out", pool=pool)
+
+
+def test_motion_can_be_shared(content):
+    study = study_from(content | {"motion": "shared", "seeds": 3}, "study")
+    rows = run_shard(study, range(3)).rows
+    power = [row for row in rows if row["model"] == "power"]
+    assert len({row["condition_number"] for row in power}) == 2  # the two methods'
+    assert len({row["ZZR1"] for row in power}) == 6  # the torques' noise is drawn anew

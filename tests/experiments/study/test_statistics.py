@@ -1,0 +1,128 @@
+"""Statistics against known distributions and against SciPy by another way."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from experiments.study.answer import answer
+from experiments.study.statistics import Cell, Difference, cells, differences
+
+TRUTH = np.array([2.0, -0.5])
+
+
+def cell(error, model="explicit", sigma=None, failures=(), runs=None, settings=None):
+    """A cell with the relative errors `error`, shape (runs, 2)."""
+    error = np.asarray(error, dtype=float)
+    absolute = error * np.abs(TRUTH)
+    known = np.broadcast_to(np.abs(TRUTH) if sigma is None else sigma, error.shape)
+    return Cell(
+        settings={"fs": 1.0} if settings is None else settings,
+        names=("chain", "OLS", model),
+        parameters=("a", "b"),
+        run=np.arange(len(error)) if runs is None else np.array(runs),
+        X=TRUTH + absolute,
+        sigma=known,
+        paper_sigma=known / 2,
+        truth=np.tile(TRUTH, (len(error), 1)),
+        failures=Counter(failures),
+    )
+
+
+def test_bias_and_its_interval_are_those_of_the_t_test(rng):
+    error = rng.normal([0.02, -0.01], [0.05, 0.2], (40, 2))
+    found = cell(error)
+    for p in range(2):
+        interval = stats.ttest_1samp(error[:, p], 0.0).confidence_interval(0.95)
+        assert found.bias[p] - found.bias_margin[p] == pytest.approx(interval.low)
+        assert found.bias[p] + found.bias_margin[p] == pytest.approx(interval.high)
+    np.testing.assert_allclose(found.rmse**2, found.bias**2 + found.deviation**2 * 39 / 40)
+
+
+def test_the_interval_of_a_bias_holds_it_in_95_percent_of_cases(rng):
+    """Over 1000 studies of 10 runs; binomial: 95 +- 2 % at three sigma."""
+    inside = []
+    for _ in range(1000):
+        found = cell(rng.normal(0.3, 1.0, (10, 2)))
+        inside.append(np.abs(found.bias - 0.3) < found.bias_margin)
+    assert np.mean(inside, axis=0) == pytest.approx([0.95, 0.95], abs=0.02)
+
+
+def test_coverage_of_normal_errors(rng):
+    found = cell(rng.normal(0, 1.0, (20000, 2)))
+    assert found.coverage(found.sigma) == pytest.approx([0.9545, 0.9545], abs=0.005)
+    assert found.coverage(found.paper_sigma) == pytest.approx([0.6827, 0.6827], abs=0.01)
+    low, high = found.coverage_interval(found.sigma).T
+    assert (low < found.coverage(found.sigma)).all()
+    np.testing.assert_allclose(high - low, 2 * 1.96 * np.sqrt(0.9545 * 0.0455 / 20000), rtol=0.05)
+
+
+def test_typical_is_no_parameters_alone():
+    assert cell(np.tile([0.01, 0.04], (3, 1))).typical == pytest.approx(0.02)
+
+
+def test_models_are_compared_on_the_same_runs(rng):
+    """An effect that two independent samples of this size would not show, since the runs differ far more than the models."""
+    scale = np.exp(rng.normal(0, 3.0, (30, 1)))
+    error = scale * rng.choice([-1, 1], (30, 2))
+    good, bad = cell(error), cell(1.1 * error * np.exp(rng.normal(0, 0.02, (30, 2))), "power")
+    (found,) = differences([good, bad])
+    assert (found.better, found.worse, found.runs) == ("explicit", "power", 30)
+    assert found.ratio == pytest.approx(1.1, rel=0.01)
+    assert found.p < 1e-6
+    assert stats.mannwhitneyu(list(good.losses().values()), list(bad.losses().values())).pvalue > 0.5
+
+
+def test_equal_models_differ_as_often_as_chance_says(rng):
+    """p below 0.05 in 5 +- 3 % of 300 studies without a difference."""
+    p = [differences([cell(rng.normal(size=(25, 2))), cell(rng.normal(size=(25, 2)), "power")])[0].p for _ in range(300)]
+    assert np.mean(np.array(p) < 0.05) == pytest.approx(0.05, abs=0.04)
+
+
+def test_many_pairs_are_corrected(rng):
+    """Holm: the smallest of three p is taken three times, the next twice, and none is smaller than one before it."""
+    group = [cell(rng.normal(size=(25, 2)), name) for name in ("a", "b", "c")]
+    plain = [differences([group[i], group[j]])[0].p for i, j in ((0, 1), (0, 2), (1, 2))]
+    order = np.argsort(plain)
+    expected = np.maximum.accumulate(np.minimum(1, np.array(plain)[order] * [3, 2, 1]))
+    assert [differences(group)[i].p for i in order] == pytest.approx(list(expected))
+
+
+def test_only_runs_that_both_could_identify_are_compared():
+    one, other = cell([[0.1, 0.1]] * 3, runs=[0, 1, 2]), cell([[0.2, 0.2]] * 3, "power", runs=[1, 2, 5])
+    assert differences([one, other]) == [Difference("explicit", "power", pytest.approx(2.0), pytest.approx(0.5), 2)]
+
+
+def test_failures_are_counted_and_never_in_the_figures():
+    rows = {
+        "run": [0, 1, 2],
+        "fs": [50.0] * 3,
+        "chain": ["idbench"] * 3,
+        "estimator": ["OLS"] * 3,
+        "model": ["power"] * 3,
+        "failure": [None, "left its range", None],
+        "a": [1.1, None, 0.9],
+        "a.sigma": [0.1, None, 0.1],
+        "a.paper_sigma": [0.1, None, 0.1],
+        "a.truth": [1.0, None, 1.0],
+    }
+    (found,) = cells(rows, ["fs"], ("a",))
+    assert found.runs == 2
+    assert found.failures == {"left its range": 1}
+    assert found.rmse == pytest.approx([0.1])
+    assert "1 of 3 identifications failed" in answer([found])
+
+
+def test_the_answer_names_the_better_model_and_both_sigmas(rng):
+    error = rng.normal(0, 1, (60, 2))
+    group = [cell(error, "explicit", settings={"fs": f}) for f in (1.0, 2.0)]
+    worse = [cell(3 * error, "power", settings={"fs": f}) for f in (1.0, 2.0)]
+    said = answer([group[0], worse[0], group[1], worse[1]])
+    assert said.startswith("Best in 2 of 2 combinations: explicit, surely so (p < 0.01)")
+    assert said.count(". ") == 1  # two sentences
+    assert "Two corrected sigma hold the truth in" in said
+
+
+def test_an_answer_without_estimates():
+    assert answer([cell(np.zeros((0, 2)), failures=["why"])]).startswith("No run gave an estimate. 1 of 1")

@@ -1,0 +1,144 @@
+"""What a study makes of its file: runs, seeds, methods; and what it refuses."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from experiments.errors import StudyError
+from experiments.study.axis import Axis
+from experiments.study.study_file import load_study, names, study_from, study_from_text
+from identify import IirLowPass, NoMask
+from sim.drives import AveragedDrive
+from sim.errors import ScenarioError
+
+
+def axes(content, *more, **first):
+    """Return the study with the fields of its first axis changed, and more axes."""
+    return content | {"axes": [content["axes"][0] | first, *more]}
+
+
+def test_the_grid_is_every_combination(content):
+    study = study_from(axes(content, {"field": "fs", "values": [50.0, 100.0, 200.0]}), "study")
+    assert study.size == 2 * 3 * 9
+    found = [(p.scenario.encoder.lines[0], p.scenario.fs) for p in study.points]
+    assert found == list(itertools.product([2048, 65536], [50.0, 100.0, 200.0]))
+
+
+def test_identification_is_varied_on_the_same_simulations(small):
+    assert small.size == 18
+    assert [method.chain.operator.cutoff for method in small.methods] == [4.0, 5.0]
+
+
+def test_stages_are_chosen_by_name_and_fields_go_together(content):
+    more = [
+        {"field": "chain.operator", "values": ["iir"]},
+        {"field": "chain.mask", "values": ["none", "reversal"]},
+        {"field": "estimator.rounds", "values": [1, 3]},
+        {"field": "chain.operator.cutoff", "values": [2.0, 3.0], "also": ["chain.trim"]},
+    ]
+    methods = study_from(axes(content, *more), "study").methods
+    assert len(methods) == 8
+    assert all(isinstance(method.chain.operator, IirLowPass) for method in methods)
+    assert {type(method.chain.mask) for method in methods} > {NoMask}
+    assert {method.estimator.rounds for method in methods} == {1, 3}
+    assert all(method.chain.trim == method.chain.operator.cutoff for method in methods)
+
+
+def test_a_part_of_another_kind_replaces_the_base_scenarios(content):
+    content["settings"]["drive"] = {"kind": "averaged", "bandwidth": 500.0}
+    assert study_from(content, "study").points[0].scenario.drive == AveragedDrive(bandwidth=500.0)
+
+
+def test_a_range_is_even(content):
+    linear = Axis(field="fs", lowest=50.0, highest=200.0, count=4)
+    log = Axis(field="fs", lowest=1.0, highest=1000.0, count=4, spacing="log")
+    np.testing.assert_allclose(linear.points, [50, 100, 150, 200])
+    np.testing.assert_allclose(log.points, [1, 10, 100, 1000])
+
+
+def test_every_run_has_seeds_of_its_own(small):
+    """For noise and for motion; those of numpy.random.SeedSequence, and the same whatever is asked first."""
+    scenarios = [small.scenario_of(run) for run in reversed(range(small.size))][::-1]
+    seeds = [s.seed for s in scenarios] + [s.trajectory.seed for s in scenarios]
+    assert len(set(seeds)) == 2 * small.size
+    point, number = 1, 4
+    first, second = np.random.SeedSequence(0, spawn_key=(point, number)).generate_state(2, np.uint64) >> np.uint64(1)
+    assert (scenarios[13].seed, scenarios[13].trajectory.seed) == (int(first), int(second))
+
+
+def test_more_seeds_keep_the_runs_that_there_were(small):
+    more = small.with_seeds(20)
+    for point, number in ((0, 3), (1, 8)):
+        assert more.scenario_of(20 * point + number) == small.scenario_of(9 * point + number)
+
+
+def test_shared_motion_is_the_scenarios(content):
+    study = study_from(content | {"motion": "shared"}, "study")
+    assert study.scenario_of(3).trajectory == study.scenario_of(17).trajectory
+
+
+def test_text_and_toml_say_it_all(small):
+    again = study_from_text(small.text)
+    assert again == small
+    assert again.fingerprint == small.fingerprint
+    assert small.with_seeds(8).fingerprint != small.fingerprint
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_study_that_ships_can_be_run(name):
+    study = load_study(name)
+    assert study.name == name
+    assert study.question.endswith("?")
+    assert len(study.points) * study.seeds == study.size
+    assert study.methods
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"axes": []}, "axes"),
+        ({"axes": [{"field": "encoder.lines"}]}, "axis encoder.lines is empty: give values"),
+        ({"axes": [{"field": "encoder.lines", "values": []}]}, "is empty"),
+        ({"axes": [{"field": "encoder.line", "values": [1]}]}, r"unknown key 'encoder.line' \(did you mean 'lines'\?\)"),
+        ({"axes": [{"field": "encoder.lines", "values": [-4]}]}, "encoder.lines.* = -4"),
+        ({"axes": [{"field": "encoder.lines", "values": [4, 4]}]}, "a value stands twice"),
+        ({"axes": [{"field": "encoder", "values": [4]}]}, "axis encoder is a table of settings"),
+        ({"axes": [{"field": "fs.x", "values": [4]}]}, "axis fs.x: fs is no table"),
+        ({"axes": [{"field": "fs", "values": [50.0], "lowest": 1.0}]}, "give values, or lowest, highest and count"),
+        ({"axes": [{"field": "fs", "lowest": 5.0, "highest": 1.0, "count": 3}]}, "lowest must be below highest"),
+        ({"axes": [{"field": "fs", "lowest": 0.0, "highest": 1.0, "count": 3, "spacing": "log"}]}, "above 0"),
+        ({"axes": [{"field": "fs", "lowest": 1.0, "highest": 2.0, "count": 10**9}]}, "count between 2 and"),
+        ({"axes": [{"field": "seed", "values": [1, 2]}]}, "an axis varies seed"),
+        ({"axes": [{"field": "fs", "values": [50.0]}, {"field": "fs", "values": [60.0]}]}, "two axes vary fs"),
+        ({"axes": [{"field": "chain.operatr.cutoff", "values": [1.0]}]}, r"no such setting \(did you mean 'operator'\?\)"),
+        ({"axes": [{"field": "chain.operator.order", "values": [1]}]}, "FirLowPass has no such setting.*cutoff, transition"),
+        ({"axes": [{"field": "chain.operator.cutoff", "values": [-1.0]}]}, "cutoff = -1.0"),
+        ({"axes": [{"field": "chain.operator", "values": ["firr"]}]}, "no 'firr' among the operators"),
+        ({"models": ["explicit", "powr"]}, "no 'powr' among the models"),
+        ({"models": ["power", "power"]}, "a name stands twice"),
+        ({"chains": ["x"]}, "no 'x' among the chains"),
+        ({"estimators": []}, "estimators"),
+        ({"seeds": 1}, "seeds = 1"),
+        ({"chain": ["idbench"]}, r"unknown key 'chain' \(did you mean 'chains'\?\)"),
+        ({"scenario": "idael"}, r"no scenario 'idael' \(did you mean 'ideal'\?\)"),
+        ({"scenario": 3}, "'scenario' must name a scenario"),
+        ({"settings": {"encoder": {"kind": "incremental", "line": 3}}}, "unknown key 'encoder.line'"),
+        ({"settings": {"encoder": {"kind": "incremental"}}}, "needs a trajectory of kind random"),
+        ({"name": "a/b"}, "name"),
+    ],
+)
+def test_a_wrong_study_is_refused_by_naming_what_is_wrong(content, change, message):
+    with pytest.raises((StudyError, ScenarioError), match=message):
+        _ = study_from(content | change, "study").points
+
+
+def test_a_combination_that_makes_no_sense_is_refused(content):
+    """The first is right, the second is not."""
+    with pytest.raises(ScenarioError, match="delay"):
+        _ = study_from(axes(content, {"field": "timing.delay", "values": [0.001, 2.0]}), "study").points
+
+
+def test_there_is_no_run_beyond_the_last(small):
+    with pytest.raises(StudyError, match="run 18 does not exist: the study 'small' has runs 0 to 17"):
+        small.scenario_of(18)
