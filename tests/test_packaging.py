@@ -23,7 +23,8 @@ def test_one_version(root, project):
 def test_everything_that_is_needed_is_pinned(project):
     """A new machine installs the versions that the tests passed with."""
     names = [re.match(r"[\w-]+", entry)[0] for entry in project["project"]["dependencies"]]
-    names += [re.match(r"[\w-]+", entry)[0] for group in project["dependency-groups"].values() for entry in group]
+    more = [*project["dependency-groups"].values(), *project["project"]["optional-dependencies"].values()]
+    names += [re.match(r"[\w-]+", entry)[0] for group in more for entry in group]
     pinned = {entry.split("==")[0] for entry in project["tool"]["uv"]["constraint-dependencies"]}
     assert set(names) <= pinned
 

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import tomli_w
 from jinja2 import Environment
-from markupsafe import Markup
 
 from experiments.study.answer import answer, percent, value, where
 from experiments.study.figures import cost_figure, coverage_figure, error_figure
@@ -38,7 +37,7 @@ def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folde
         details=[row for cell in solved for row in _details(cell)],
         failed=[(where(c), times, reason) for c in cells for reason, times in c.failures.most_common()],
         worst=[(where(c), name, signed(100 * e), command(folder, run)) for c, name, e, run in worst_runs(solved)],
-        cost=Markup(cost_figure(seconds, study.size)),  # our own figure
+        cost=cost_figure(seconds, study.size),
         versions=versions(),
         toml=tomli_w.dumps(study.content),
     )
@@ -77,7 +76,7 @@ def command(folder: Path, run: int) -> str:
 
 def _family(title: str, cells: Sequence[Cell], axis: str) -> dict[str, Any]:
     figures = {"error": error_figure(cells, axis), "coverage": coverage_figure(cells, axis)}
-    return {"title": title, **{name: Markup(svg) for name, svg in figures.items()}}  # our own figures
+    return {"title": title, **figures}
 
 
 def _overview(cell: Cell) -> list[str]:
