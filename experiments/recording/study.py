@@ -47,7 +47,7 @@ def _errors(recording: rr.RecordingStream, model: str, cells: Sequence[Cell], si
 
 def _text(study: Study, cells: Sequence[Cell], folder: Path) -> str:
     worst = [
-        f"- {name} {100 * e:+.2g} %: {where(cell)}\n  `{command(folder, run)}`"
+        f"- {name} {100 * e:+.2g} %: {where(cell, cells)}\n  `{command(folder, run)}`"
         for cell, name, e, run in worst_runs([cell for cell in cells if cell.runs > 1])
     ]
     return "\n\n".join([f"# {study.question}", answer(cells), "## Worst runs", "\n".join(worst)])

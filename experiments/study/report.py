@@ -9,7 +9,7 @@ import numpy as np
 import tomli_w
 from jinja2 import Environment
 
-from experiments.study.answer import answer, percent, value, where
+from experiments.study.answer import answer, combination, method, percent, short, value, where
 from experiments.study.figures import cost_figure, coverage_figure, error_figure
 from experiments.study.statistics import Cell, differences
 from experiments.study.store import versions
@@ -30,13 +30,13 @@ def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folde
         study=study,
         methods=len(study.methods),
         answer=answer(cells),
-        axes=[axis.field for axis in study.axes],
+        axes=[short(name) for name in cells[0].settings],
         overview=[_overview(cell) for cell in cells],
         families=[_family(title, group, main_axis(study)) for title, group in families(study, solved)],
         differences=list(_differences(solved)),
-        details=[row for cell in solved for row in _details(cell)],
-        failed=[(where(c), times, reason) for c in cells for reason, times in c.failures.most_common()],
-        worst=[(where(c), name, signed(100 * e), command(folder, run)) for c, name, e, run in worst_runs(solved)],
+        details=[row for cell in solved for row in _details(cell, where(cell, cells))],
+        failed=[(where(c, cells), times, reason) for c in cells for reason, times in c.failures.most_common()],
+        worst=[(where(c, cells), name, signed(100 * e), command(folder, run)) for c, name, e, run in worst_runs(solved)],
         cost=cost_figure(seconds, study.size),
         versions=versions(),
         toml=tomli_w.dumps(study.content),
@@ -52,7 +52,7 @@ def families(study: Study, cells: Sequence[Cell]) -> Iterator[tuple[str, list[Ce
     """Yield the cells that differ only in the main axis and the model, with what they have in common."""
     main, groups = main_axis(study), dict[str, list[Cell]]()
     for cell in cells:
-        fixed = [f"{name} {value(x)}" for name, x in cell.settings.items() if name != main]
+        fixed = [f"{short(name)} {value(x)}" for name, x in cell.settings.items() if name != main]
         groups.setdefault(", ".join([*fixed, f"chain {cell.names[0]}", cell.names[1]]), []).append(cell)
     yield from groups.items()
 
@@ -92,20 +92,19 @@ def _overview(cell: Cell) -> list[str]:
     return [*head, percent(cell.typical), f"{percent(cell.rmse[worst])} {cell.parameters[worst]}", *shares]
 
 
-def _details(cell: Cell) -> Iterator[list[str]]:
+def _details(cell: Cell, title: str) -> Iterator[list[str]]:
     interval, corrected, paper = cell.coverage_interval(cell.sigma), cell.coverage(cell.sigma), cell.coverage(cell.paper_sigma)
     for p, name in enumerate(cell.parameters):
         bias = f"{signed(100 * cell.bias[p])} ± {100 * cell.bias_margin[p]:.2g}"
         share = f"{100 * corrected[p]:.1f} ({100 * interval[p, 0]:.0f} to {100 * interval[p, 1]:.0f})"
         spread = f"{100 * cell.deviation[p]:.3g}", f"{100 * cell.rmse[p]:.3g}"
-        yield [where(cell), name, bias, *spread, share, f"{100 * paper[p]:.1f}"]
+        yield [title, name, bias, *spread, share, f"{100 * paper[p]:.1f}"]
 
 
 def _differences(cells: Sequence[Cell]) -> Iterator[list[str]]:
     groups: dict[str, list[Cell]] = {}
     for cell in cells:
-        settings = ", ".join(f"{name} {value(x)}" for name, x in cell.settings.items())
-        groups.setdefault(f"{settings}, {cell.names[0]}, {cell.names[1]}", []).append(cell)
+        groups.setdefault(combination(cell), []).append(cell)
     for title, group in groups.items():
         for d in differences(group):
-            yield [title, d.better, d.worse, f"{d.ratio:.3g}", f"{d.p:.1g}", f"{d.runs}"]
+            yield [title, method(d.better, cells), method(d.worse, cells), f"{d.ratio:.3g}", f"{d.p:.1g}", f"{d.runs}"]

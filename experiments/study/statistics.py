@@ -104,14 +104,14 @@ class Cell:
         return dict(zip(self.run.tolist(), logs.tolist(), strict=True))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Difference:
-    """Whether two models differ, on the same runs.
+    """Whether two ways of identification differ, on the same runs.
 
     Parameters
     ----------
-    better, worse : str
-        Names of the models.
+    better, worse : Cell
+        The two.
     ratio : float
         Typical error of the worse over that of the better, as the geometric mean over runs and parameters.
     p : float
@@ -121,8 +121,8 @@ class Difference:
         Runs that both could identify.
     """
 
-    better: str
-    worse: str
+    better: Cell
+    worse: Cell
     ratio: float
     p: float
     runs: int
@@ -165,9 +165,9 @@ def _cell(
     )
 
 
-def differences(models: Sequence[Cell]) -> list[Difference]:
-    """Return, for every pair of models of the same runs, which is better and how sure that is."""
-    found = [_difference(a, b) for a, b in combinations(models, 2)]
+def differences(group: Sequence[Cell]) -> list[Difference]:
+    """Return, for every pair of cells of the same runs, which is better and how sure that is."""
+    found = [_difference(a, b) for a, b in combinations(group, 2)]
     order = sorted(range(len(found)), key=lambda i: found[i].p)
     corrected, least = {}, 0.0
     for rank, i in enumerate(order):
@@ -183,4 +183,4 @@ def _difference(a: Cell, b: Cell) -> Difference:
     mean = float(gap.mean()) if len(gap) else 0.0
     better, worse = (a, b) if mean <= 0 else (b, a)
     p = float(stats.wilcoxon(gap).pvalue) if np.any(gap) else 1.0
-    return Difference(better.names[2], worse.names[2], float(np.exp(abs(mean))), p, len(both))
+    return Difference(better, worse, float(np.exp(abs(mean))), p, len(both))

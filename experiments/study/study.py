@@ -129,6 +129,11 @@ class Study:
         return {name: MODELS.create(name) for name in self.models}
 
     @property
+    def varied(self) -> tuple[str, ...]:
+        """Fields of the axes with more than one value, or of all axes if none has."""
+        return tuple(axis.field for axis in self.axes if len(axis.points) > 1) or tuple(axis.field for axis in self.axes)
+
+    @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the parameters that are identified."""
         return BASES[self.points[0].scenario.robot]().parameters
