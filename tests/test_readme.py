@@ -33,6 +33,21 @@ def test_the_excerpt_is_what_table1_prints_and_the_example_prints_its_answer(rea
     assert done.stdout == answer
 
 
+@pytest.mark.parametrize("page", ["README.md", "docs/studies.md"])
+def test_the_workers_of_slurm_are_jobs_of_eight(root, page):
+    """The script makes a job, here without SLURM and on loopback."""
+    (script,) = [code for code in re.findall(r"```python\n(.*?)```", (root / page).read_text(), re.DOTALL) if "SLURM" in code]
+    options = '{"host": "127.0.0.1", "dashboard_address": "127.0.0.1:0"}'
+    loopback = f"SLURMCluster(scheduler_options={options}, "
+    dry = script.replace("SLURMCluster(", loopback).replace("cluster.scale(jobs=10)", "print(cluster.job_script())")
+    dry = dry.replace('input("Enter ends the workers")', "cluster.close()")
+    done = subprocess.run([sys.executable, "-c", dry], capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert "#SBATCH --cpus-per-task=8" in done.stdout
+    assert "--nworkers 8" in done.stdout
+    assert "tcp://127.0.0.1" in done.stdout
+
+
 def test_every_file_it_links_to_is_there(root):
     for page in [root / "README.md", *(root / "docs").glob("*.md"), root / "CONTRIBUTING.md"]:
         for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text()):

@@ -8,6 +8,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 import rerun_cli
+from distributed import LocalCluster
 from rerun.chunk import RrdReader
 
 from experiments import study_commands
@@ -133,6 +134,14 @@ def test_wrong_calls(done, file, tmp_path, complaint):
     assert "name a scenario, or a run of a study" in complaint("run", "ideal", "--index", "1")
     assert "--from DIR --index N" in complaint("run")
     assert not (tmp_path / "out").exists()
+
+
+def test_a_scheduler_may_be_anywhere(file, tmp_path, undisturbed):
+    """Its workers have no part in the folder: rows travel."""
+    with LocalCluster(n_workers=1, threads_per_worker=2, host="127.0.0.1", dashboard_address=None) as cluster:
+        scheduler = cluster.scheduler_address
+        assert main(["study", str(file), "--scheduler", scheduler, "--out", str(tmp_path / "out")]) == 0
+    assert Store.open(tmp_path / "out").table().equals(undisturbed)
 
 
 def test_an_unreachable_scheduler_leaves_nothing(file, tmp_path, complaint):
