@@ -9,7 +9,7 @@ from rich.text import Text
 
 from experiments.recording.study import record_study
 from experiments.results import results_folder, write_summary
-from experiments.study.answer import answer, percent, short, value
+from experiments.study.answer import answer, method, percent, short, value
 from experiments.study.report import report
 from experiments.study.statistics import Cell, cells
 from experiments.study.store import Store, versions
@@ -19,7 +19,7 @@ from experiments.tables import new_table
 def write_results(page: Console, store: Store) -> list[Cell]:
     """Write summary.json, report.html and recording.rrd into the folder of a study, and print its answer."""
     study, seconds = store.study, store.seconds()
-    found = cells(store.table().to_pydict(), study.varied, study.parameters)
+    found = cells(store.columns(), study.varied, study.parameters)
     with results_folder(store.folder) as folder:
         (folder / "report.html").write_text(report(study, found, seconds, store.folder), encoding="utf-8")
         record_study(folder / "recording.rrd", study, found, store.folder)
@@ -30,12 +30,12 @@ def write_results(page: Console, store: Store) -> list[Cell]:
 
 def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:
     axes = [short(field) for field in store.study.varied]
-    grid = new_table(store.study.question, [*axes[1:], "chain", "model", "runs", "failed", "typical error", "within 2 sigma"])
+    grid = new_table(store.study.question, [*axes[1:], "identified by", "runs", "failed", "typical error", "within 2 sigma"])
     for cell in found:
         settings = [value(x) for x in cell.settings.values()]
         numbers = f"{cell.runs}", f"{cell.failures.total() or ''}"
         judged = (percent(cell.typical), f"{100 * cell.coverage(cell.sigma).mean():.0f} %") if cell.runs else ("", "")
-        grid.add_row(*settings, cell.names[0], cell.names[2], *numbers, *judged)
+        grid.add_row(*settings, method(cell, found), *numbers, *judged)
     grid.columns[0].header = axes[0]
     page.print(grid)
     page.print(Text(answer(found)))

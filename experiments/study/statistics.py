@@ -128,40 +128,38 @@ class Difference:
     runs: int
 
 
-def cells(rows: Mapping[str, Sequence[Any]], axes: Sequence[str], parameters: tuple[str, ...]) -> list[Cell]:
+def cells(rows: Mapping[str, np.typing.NDArray[Any]], axes: Sequence[str], parameters: tuple[str, ...]) -> list[Cell]:
     """Return the cells of a study's rows, a column each, in the order in which they appear."""
-    keys = list(zip(*(rows[name] for name in (*axes, "chain", "estimator", "model")), strict=True))
     members: dict[tuple[Any, ...], list[int]] = {}
-    for i, key in enumerate(keys):
+    for i, key in enumerate(zip(*(rows[name].tolist() for name in (*axes, "chain", "estimator", "model")), strict=True)):
         members.setdefault(key, []).append(i)
     return [_cell(rows, key, np.array(index), axes, parameters) for key, index in members.items()]
 
 
 def _cell(
-    rows: Mapping[str, Any],
+    rows: Mapping[str, np.typing.NDArray[Any]],
     key: tuple[Any, ...],
     index: np.typing.NDArray[np.intp],
     axes: Sequence[str],
     parameters: tuple[str, ...],
 ) -> Cell:
-    failed = np.array([rows["failure"][i] is not None for i in index])
+    failed = np.array([reason is not None for reason in rows["failure"][index]])
     ok = index[~failed]
 
     def of(part: str) -> Array:
-        return np.array([[rows[name + part][i] for name in parameters] for i in ok], dtype=np.float64).reshape(
-            -1, len(parameters)
-        )
+        return np.stack([rows[name + part][ok].astype(np.float64) for name in parameters], axis=-1)
 
+    chain, estimator, model = key[len(axes) :]
     return Cell(
         settings=dict(zip(axes, key, strict=False)),
-        names=key[len(axes) :],
+        names=(chain, estimator, model),
         parameters=parameters,
-        run=np.array([rows["run"][i] for i in ok], dtype=np.int64),
+        run=rows["run"][ok],
         X=of(""),
         sigma=of(".sigma"),
         paper_sigma=of(".paper_sigma"),
         truth=of(".truth"),
-        failures=Counter(rows["failure"][i] for i in index[failed]),
+        failures=Counter(rows["failure"][index[failed]]),
     )
 
 

@@ -10,6 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import tomli_w
@@ -150,6 +151,11 @@ class Store:
         table = pa.concat_tables([pq.read_table(path, partitioning=None) for path in self.shards()])
         return table.replace_schema_metadata(None)
 
+    def columns(self) -> dict[str, np.typing.NDArray[Any]]:
+        """Return the columns of that table; words stand once in memory, and None where there is none."""
+        table = self.table()
+        return {name: _array(table.column(name)) for name in table.column_names}
+
     def rows_of(self, run: int) -> list[dict[str, Any]]:
         """Return the rows of a run, none if its shard is not finished."""
         for path in self.shards():
@@ -203,6 +209,14 @@ def _said(path: Path) -> dict[str, str]:
     except (OSError, pa.ArrowInvalid) as error:
         raise StudyError(f"{path} is damaged ({error}): remove it, and go on with --resume") from error
     return {key.decode(): value.decode() for key, value in said.items()}
+
+
+def _array(column: Any) -> np.typing.NDArray[Any]:
+    if not pa.types.is_string(column.type):
+        return np.asarray(column.to_numpy())
+    coded = column.combine_chunks().dictionary_encode()
+    words = np.array([*coded.dictionary.to_pylist(), None], dtype=object)
+    return words[coded.indices.fill_null(-1).to_numpy(zero_copy_only=False)]
 
 
 def _range(path: Path) -> tuple[int, int]:

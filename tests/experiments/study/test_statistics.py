@@ -109,7 +109,8 @@ def test_failures_are_counted_and_never_in_the_figures():
         "a.paper_sigma": [0.1, None, 0.1],
         "a.truth": [1.0, None, 1.0],
     }
-    (found,) = cells(rows, ["fs"], ("a",))
+    columns = {name: np.array(column, dtype=object) for name, column in rows.items()}
+    (found,) = cells(columns, ["fs"], ("a",))
     assert found.runs == 2
     assert found.failures == {"left its range": 1}
     assert found.rmse == pytest.approx([0.1])
