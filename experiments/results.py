@@ -69,7 +69,7 @@ def summarize(estimate: Estimate, truth: list[float] | None) -> dict[str, Any]:
         "estimate": estimate.X.tolist(),
         "relative_error_percent": None if truth is None else [_finite(x) for x in estimate.relative_error_percent(truth)],
         "sigma": estimate.sigma.tolist(),
-        "corrected_sigma": estimate.corrected_sigma.tolist(),
+        "corrected_sigma": [_finite(x) for x in estimate.corrected_sigma],
         "relative_sigma_percent": [_finite(x) for x in estimate.relative_sigma_percent],
         "condition_number": float(estimate.condition_number),
         "rows": int(estimate.rows),

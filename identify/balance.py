@@ -31,6 +31,8 @@ class Balance:
         (row, joint) -> what the row multiplies the joint's torque by.
     transposed : callable
         What has been done to the torques before, transposed.
+    reach : int
+        How many samples that looks to either side.
     fs : float
         [Hz].
     parameters : tuple of str
@@ -45,6 +47,7 @@ class Balance:
     s: Callable[[Array], Array]
     B: Mapping[tuple[int, int], Array]
     transposed: Callable[[Array], Array]
+    reach: int
     fs: float
     parameters: tuple[str, ...]
 

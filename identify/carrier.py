@@ -29,6 +29,8 @@ class Carrier:
         h, at the rows of a grid.
     transposed : callable
         T transposed, along the last axis.
+    reach : int
+        How many samples T looks to either side.
     """
 
     B: Mapping[tuple[int, int], Array]
@@ -36,6 +38,7 @@ class Carrier:
     outside: Array
     kernel: Kernel
     transposed: Callable[[Array], Array]
+    reach: int
 
     @property
     def rows(self) -> int:
@@ -43,11 +46,15 @@ class Carrier:
         return self.outside.shape[-2] * self.outside.shape[-1]
 
     def variance(self) -> Array:
-        """Return the variance that white noise of variance 1 on every torque T tau gives each row, shape (..., rows)."""
+        """Return the variance that white noise of variance 1 on every torque gives each row, shape (..., rows).
+
+        Exact where weights and B are the same over what a row looks at, as they nearly are: T then acts on the kernel.
+        """
+        seen = self.kernel.through(self.transposed, self.reach)
         squares = np.zeros(self.inside.shape)
         for (row, _), B in self.B.items():
             squares[..., row, :] += (self.inside[..., row, :] * B) ** 2
-        variance = self.outside**2 * self.kernel.squared().apply(squares)
+        variance = self.outside**2 * seen.squared().apply(squares)
         return np.swapaxes(variance, -1, -2).reshape(*variance.shape[:-2], -1)
 
     def pull(self, G: Array) -> dict[int, Array]:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from math import ceil
 from typing import final
 
 import numpy as np
@@ -91,7 +92,8 @@ class Chain:
         tau = self.prefilter.apply(_time_last(log.tau * np.asarray(log.torque.gain)), fs)
         state = State(q, s(q), s)
         torque, weight = self.alignment.align(tau, log.torque, fs), self.mask.weight(state.qd, fs)
-        return Signals(state, torque, weight, fs, partial(self._transposed, channel=log.torque, fs=fs))
+        reach = ceil((self.prefilter.halo(fs) + torque.halo()) * fs - 1e-9)
+        return Signals(state, torque, weight, fs, reach, partial(self._transposed, channel=log.torque, fs=fs))
 
     def _transposed(self, x: Array, channel: TorqueChannel, fs: float) -> Array:
         """Return prefilter and alignment transposed: both are the same at all times, so it is they in reversed time."""

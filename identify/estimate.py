@@ -23,14 +23,14 @@ class Estimate:
         Estimated parameters; NaN where the system's status is not OK.
     covariance : Array, shape (..., p, p)
         Covariance of the error of X, as the estimator has it: as if rows were independent.
-    solved : System
-        The rows as they were weighted: X is their least-squares solution, or close to it.
+    solved : System, optional
+        The rows, as they were weighted, whose least-squares solution X is; without them there is no corrected sigma.
     """
 
     system: System
     X: Array
     covariance: Array
-    solved: System
+    solved: System | None
 
     @classmethod
     def judge(
@@ -44,10 +44,10 @@ class Estimate:
         """Return the estimate X of a system.
 
         Without a `covariance` that of section 7.3 is used: sigma_rho^2 (W' W)^-1 with sigma_rho^2 = |Y - W X|^2 / (r - p),
-        of the rows as they were `solved`: those of the system, unless they were weighted.
+        of the rows as they were weighted. An estimator whose X is a least-squares solution hands in the rows that it `solved`.
         """
-        x, rows = frozen(X), system if solved is None else solved
-        return cls(system, x, frozen(_paper_covariance(rows, x) if covariance is None else covariance), rows)
+        x = frozen(X)
+        return cls(system, x, frozen(_paper_covariance(solved or system, x) if covariance is None else covariance), solved)
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -61,7 +61,7 @@ class Estimate:
 
     @cached_property
     def corrected_covariance(self) -> Array:
-        """Covariance of the error of X that white noise of the torques makes, shape (..., p, p); NaN if its level is unknown.
+        """Covariance of the error of X that white noise of the torques makes, shape (..., p, p); NaN if it is not known.
 
         X = G' Y with G = W (W' W)^-1 of the rows as they were solved, and each row is a sum over the torque samples of a log
         (`Carrier`). So X is such a sum too, and its covariance is sum_j sigma_j^2 H_j H_j' with H_j the weights of the torque
@@ -69,7 +69,7 @@ class Estimate:
         """
         solved, p = self.solved, len(self.parameters)
         total = np.zeros(self.covariance.shape)
-        if solved.levels is None or not solved.carriers:
+        if solved is None or solved.levels is None or not solved.carriers:
             return np.full(total.shape, np.nan)
         inverse = _inverse(solved)
         G = np.matmul(solved.W, np.matmul(inverse, np.swapaxes(inverse, -1, -2)))

@@ -1,5 +1,6 @@
 """A window that slides from row to row of a grid, and back."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,15 +35,22 @@ class Kernel:
         """Return the kernel that turns variances of independent samples into variances of rows."""
         return Kernel(self.weights**2, self.before, self.grid)
 
+    def through(self, transposed: Callable[[Array], Array], reach: int) -> "Kernel":
+        """Return the kernel of samples that go through a filter first, `reach` samples to either side, given transposed."""
+        wide = transposed(np.pad(self.weights, reach))
+        return Kernel(wide, self.before + reach, self.grid)
+
     def transposed(self, rows: Array, samples: int) -> Array:
         """Return what each of `samples` samples counts for in sums of `rows`, shape (..., count), over the rows."""
         step, count = self.grid.step, self.grid.count
         parts = -(-len(self.weights) // step)
         W = np.zeros((parts, step))
         W.ravel()[: len(self.weights)] = self.weights
-        frames = np.zeros((*rows.shape[:-1], count + parts - 1, step))
-        for i in range(parts):
-            frames[..., i : i + count, :] += rows[..., None] * W[i]
+        padded = np.zeros((*rows.shape[:-1], count + 2 * (parts - 1)))
+        padded[..., parts - 1 : parts - 1 + count] = rows
+        # Frame f is made of the rows f - parts + 1 ... f, the last with the first part of the kernel.
+        near = np.stack([padded[..., i : i + count + parts - 1] for i in range(parts)], axis=-1)
+        frames = np.matmul(near, W[::-1])
         start = self.grid.first - self.before
         spread = np.zeros((*rows.shape[:-1], samples))
         end = min(samples, start + (count + parts - 1) * step)

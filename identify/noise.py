@@ -25,7 +25,7 @@ def torque_noise(explicit: System) -> Array:
         Whatever it is that the model does not explain counts as noise; NaN where the system cannot be solved.
     """
     estimate = WeightedLeastSquares().fit(Problem(explicit))
-    Q = np.linalg.qr(estimate.solved.W)[0]
+    Q = np.linalg.qr((estimate.solved or explicit).W)[0]
     free = np.concatenate([c.variance() for c in explicit.carriers], axis=-1) * (1 - np.sum(Q**2, axis=-1))
     joints = np.unique(explicit.group)[:, None] == explicit.group
     squares, expected = (np.sum(x[..., None, :] * joints, axis=-1) for x in (estimate.residual**2, free))

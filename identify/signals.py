@@ -22,6 +22,8 @@ class Signals:
         Weights of the mask.
     fs : float
         [Hz].
+    reach : int
+        How many samples those two look to either side.
     transposed : callable
         What prefilter and alignment do to torques, turned around in time: (..., time) -> (..., time).
     """
@@ -30,4 +32,5 @@ class Signals:
     torque: AbstractTorque
     weight: Array
     fs: float
+    reach: int
     transposed: Callable[[Array], Array]

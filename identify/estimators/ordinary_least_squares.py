@@ -22,4 +22,4 @@ class OrdinaryLeastSquares(AbstractEstimator):
         p = len(system.parameters)
         R = np.where(ok[..., None, None], system.R_W, np.eye(p))
         X = np.linalg.solve(R, system.R[..., :p, p:])[..., 0]
-        return Estimate.judge(system, np.where(ok[..., None], X, np.nan))
+        return Estimate.judge(system, np.where(ok[..., None], X, np.nan), solved=system)

@@ -50,6 +50,7 @@ class AbstractModel(ABC):
             s=signals.state.s,
             B=self.B(signals),
             transposed=signals.transposed,
+            reach=signals.reach,
             fs=signals.fs,
             parameters=basis.parameters,
         )

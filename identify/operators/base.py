@@ -92,5 +92,5 @@ class AbstractOperator(ABC):
             time=np.repeat((grid.first + grid.step * np.arange(grid.count) + rows.lag) / fs, n),
             group=np.tile(np.arange(n), grid.count),
             parameters=balance.parameters,
-            carriers=(Carrier(balance.B, rows.inside, rows.outside * valid, kernel, balance.transposed),),
+            carriers=(Carrier(balance.B, rows.inside, rows.outside * valid, kernel, balance.transposed, balance.reach),),
         )

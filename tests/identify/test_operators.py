@@ -33,6 +33,7 @@ def balance(y=None, weight=None, t=T):
         fs=fs,
         B={},
         transposed=lambda x: x,
+        reach=0,
         parameters=("a", "b"),
     )
 
