@@ -12,6 +12,7 @@ from identify import (
     CHAINS,
     ESTIMATORS,
     MODELS,
+    AbstractEstimator,
     Array,
     Basis,
     Chain,
@@ -43,6 +44,8 @@ class Identified:
         Names of the models.
     chain, estimator : str
         Their names.
+    method : tuple of Chain and AbstractEstimator, optional
+        Both with settings of their own, instead of those that have the names.
     trim : float, optional
         Time at either end of a log that makes no rows [s]; by default what the chain needs.
     """
@@ -53,6 +56,7 @@ class Identified:
     models: tuple[str, ...] = ("explicit", "implicit", "power")
     chain: str = "idbench"
     estimator: str = "WLS"
+    method: tuple[Chain, AbstractEstimator] | None = None
     trim: float | None = None
 
     def __post_init__(self) -> None:
@@ -68,13 +72,19 @@ class Identified:
     @property
     def processing(self) -> Chain:
         """The chain."""
-        return replace(CHAINS.create(self.chain), trim=self.trim)
+        chain = self.method[0] if self.method else CHAINS.create(self.chain)
+        return chain if self.trim is None else replace(chain, trim=self.trim)
+
+    @property
+    def solver(self) -> AbstractEstimator:
+        """The estimator."""
+        return self.method[1] if self.method else ESTIMATORS.create(self.estimator)
 
     @cached_property
     def estimates(self) -> dict[str, Estimate]:
         """The estimate of every model."""
         models = {name: MODELS.create(name) for name in self.models}
-        return identify_each(self._fit, self.basis, models, self.processing, ESTIMATORS.create(self.estimator))
+        return identify_each(self._fit, self.basis, models, self.processing, self.solver)
 
     @cached_property
     def explained(self) -> dict[str, Array]:

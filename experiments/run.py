@@ -5,6 +5,7 @@ from functools import cached_property
 from typing import Any
 
 from experiments.identified import Identified
+from identify import AbstractEstimator, Chain
 from sim.engine import Progress, simulate
 from sim.run import Run
 from sim.scara import scara_truth
@@ -22,6 +23,8 @@ class ScenarioRun:
         What to run.
     chain, estimator : str
         Their names.
+    method : tuple of Chain and AbstractEstimator, optional
+        Both with settings of their own, instead of those that have the names.
     progress : callable, optional
         Hears how much of the simulation is done.
     """
@@ -29,6 +32,7 @@ class ScenarioRun:
     scenario: Scenario
     chain: str = "idbench"
     estimator: str = "WLS"
+    method: tuple[Chain, AbstractEstimator] | None = None
     progress: Progress | None = None
 
     def __post_init__(self) -> None:
@@ -45,7 +49,8 @@ class ScenarioRun:
     def identified(self) -> Identified:
         """What the models make of its log."""
         truth = scara_truth(self.run.robots[0])
-        return Identified((self.run.alone(),), truth=truth, chain=self.chain, estimator=self.estimator)
+        log = (self.run.alone(),)
+        return Identified(log, truth=truth, chain=self.chain, estimator=self.estimator, method=self.method)
 
     def summary(self) -> dict[str, Any]:
         """Return summary.json."""

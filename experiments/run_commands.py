@@ -3,10 +3,11 @@
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 from rich.console import Console
+from rich.text import Text
 
 from experiments.app import app
 from experiments.errors import ExperimentError
@@ -15,8 +16,10 @@ from experiments.page import new_page, show
 from experiments.results import results_folder, write_summary, write_whole
 from identify.log_file import write_log
 from sim.engine import Progress
-from sim.scenario import Scenario
 from sim.scenario_file import load, names, to_toml
+
+if TYPE_CHECKING:
+    from experiments.run import ScenarioRun
 
 File = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
 Name = Annotated[str | None, tyro.conf.arg(metavar="SCENARIO")]
@@ -32,6 +35,7 @@ def run(  # the options of a command
     estimator: str = "WLS",
     study: From = None,
     index: Index = None,
+    method: Index = None,
 ) -> None:
     """Simulate a scenario in closed loop, identify it with all models, and record it.
 
@@ -39,6 +43,7 @@ def run(  # the options of a command
         scenario: Name of a scenario that ships, or a file (TOML).
         study: Instead of a scenario: the folder of a study, one run of which is made again.
         index: Number of that run; its rows must come out with the same bits.
+        method: Which of the study's combinations of chain, estimator and their settings is shown; the first by default.
         out: Folder for summary.json, recording.rrd, log.parquet and scenario.toml; runs/<name of the scenario> by default.
         chain: Signal processing.
         estimator: OLS, WLS, ...
@@ -50,10 +55,15 @@ def run(  # the options of a command
         from experiments.tables import print_identified
 
     page = new_page()
-    described = _again(page, study, index) if scenario is None else load(_alone(scenario, study, index))
+    made = (
+        _again(page, study, index, method)
+        if scenario is None
+        else ScenarioRun(load(_alone(scenario, study, index)), chain, estimator)
+    )
+    described = made.scenario
     folder_name = out or Path("runs") / described.name
     with results_folder(folder_name) as folder:
-        ran = ScenarioRun(described, chain, estimator, watch(f"simulating {described.name}"))
+        ran = replace(made, progress=watch(f"simulating {described.name}"))
         print_identified(page, ran.identified, f"Scenario {described.name}")
         page.print(f"written to {folder_name}; see it: uv run idbench view {folder_name}", soft_wrap=True)
         write_log(ran.run.alone(), folder / "log.parquet")
@@ -69,14 +79,19 @@ def _alone(scenario: str, study: Path | None, index: int | None) -> str:
     return scenario
 
 
-def _again(page: Console, folder: Path | None, index: int | None) -> Scenario:
-    """Return the scenario of a run of a study, whose rows come out again."""
+def _again(page: Console, folder: Path | None, index: int | None, method: int | None) -> "ScenarioRun":
+    """Return a run of a study, whose rows come out again, to be identified by one of its methods."""
+    from experiments.run import ScenarioRun
     from experiments.study.again import compare_again
     from experiments.study.store import Store
 
     if folder is None or index is None:
         raise ExperimentError("name a scenario, as idbench scenario lists them, or a run of a study: --from DIR --index N")
     store = Store.open(folder)
+    number, methods = method or 0, store.study.methods
+    if not 0 <= number < len(methods):
+        raise ExperimentError(f"--method {number} does not exist: the study has methods 0 to {len(methods) - 1}")
+    chosen = methods[number]
     rows, known = compare_again(store, index)
     page.print(
         f"run {index} of {folder}: all {len(rows)} rows come out again, bit for bit"
@@ -84,8 +99,9 @@ def _again(page: Console, folder: Path | None, index: int | None) -> Scenario:
         else f"run {index} of {folder}, which the study has not finished yet"
     )
     for reason in dict.fromkeys(row["failure"] for row in rows if row["failure"]):
-        page.print(f"doubtful: {reason}", soft_wrap=True)
-    return replace(store.study.scenario_of(index), name=f"{store.study.name}-{index}")
+        page.print(Text(f"doubtful: {reason}"), soft_wrap=True)
+    scenario = replace(store.study.scenario_of(index), name=f"{store.study.name}-{index}")
+    return ScenarioRun(scenario, *chosen.names, method=(chosen.chain, chosen.estimator))
 
 
 @app.command(name="table2")

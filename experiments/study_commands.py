@@ -3,7 +3,7 @@
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -18,7 +18,6 @@ from experiments.study_progress import watching
 
 if TYPE_CHECKING:
     from experiments.study.store import Store
-    from experiments.study.study import Study
 
 MANY = 100_000
 """Runs beyond which a study is taken for a slip unless --yes says otherwise: days of a machine."""
@@ -74,12 +73,10 @@ def study(  # noqa: PLR0913, PLR0917  # the options of a command
     store = _resumed(resume, study, out, seeds) if resume else _begun(str(study), out, seeds, yes)
     width = workers or threads or os.cpu_count() or 1
     runs = shard or min(LARGEST_SHARD, ceil(store.study.size / (2 * width)))
-    if todo := sum(len(r) for r in store.missing(runs)):
-        with _pool(store.study, scheduler, workers, width) as pool:
-            store.begin()
-            with store.locked(), _kept(store), watching(store.study, todo) as watch:
+    with _pool(store, scheduler, workers, threads, width) as pool, store.held(), _kept(store):
+        if pool is not None:
+            with watching(store.study, sum(len(r) for r in store.missing(runs))) as watch:
                 run_missing(store, pool, runs, watch)
-    with store.locked(), _kept(store):
         write_results(page, store)
     show(page)
 
@@ -106,13 +103,19 @@ def _resumed(folder: Path, name: str | None, out: Path | None, seeds: int | None
     return Store.open(folder)
 
 
-def _pool(study: "Study", scheduler: str | None, workers: int | None, width: int) -> AbstractContextManager[Any]:
+def _pool(
+    store: "Store", scheduler: str | None, workers: int | None, threads: int | None, width: int
+) -> AbstractContextManager[Any]:
+    """Return where shards are computed; nowhere, if nothing is missing."""
     from experiments.study.cluster import cluster_pool
     from experiments.study.engine import local_pool
 
-    if scheduler and workers:
-        raise StudyError("--scheduler has workers of its own: leave out --workers")
-    return cluster_pool(study, scheduler, width) if scheduler or workers else local_pool(study, width)
+    given = [f"--{what}" for what, value in (("workers", workers), ("threads", threads)) if value is not None]
+    if (scheduler and given) or len(given) > 1:
+        raise StudyError(f"{', '.join(['--scheduler'] * bool(scheduler) + given)} name several places to run: give one")
+    if next(store.missing(1), None) is None:
+        return nullcontext()
+    return cluster_pool(store.study, scheduler, width) if scheduler or workers else local_pool(store.study, width)
 
 
 @contextmanager

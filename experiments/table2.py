@@ -116,7 +116,7 @@ class Table2:
     def _identified(self, processing: str, model: str) -> Identified:
         logs = tuple(self.run.alone(i) for i in range(REALIZATIONS[model]))
         chain, estimator = PROCESSINGS[processing]
-        return Identified(logs, self.scenario.robot, self.truth, (model,), chain, estimator, self.rest)
+        return Identified(logs, self.scenario.robot, self.truth, (model,), chain, estimator, trim=self.rest)
 
     @property
     def rest(self) -> float:

@@ -20,7 +20,7 @@ EDGES = np.arange(-6.25, 6.3, 0.5)
 
 def record_study(path: Path, study: Study, cells: Sequence[Cell], folder: Path) -> None:
     """Record the errors of every run over its number, and their distribution in units of sigma."""
-    solved = [cell for cell in cells if cell.runs > 1]
+    solved = [cell for cell in cells if cell.runs]
     with recording_file(path, f"study-{study.name}", _blueprint(study)) as recording:
         recording.log("/report", rr.TextDocument(_text(study, cells, folder), media_type=rr.MediaType.MARKDOWN), static=True)
         for model in study.models:
@@ -39,16 +39,16 @@ def _errors(recording: rr.RecordingStream, model: str, cells: Sequence[Cell], si
         at = f"/error/{name}/{model}"
         recording.log(at, rr.SeriesPoints(names=model, colors=color, marker_sizes=size), static=True)
         recording.send_columns(at, [rr.TimeColumn("run", sequence=run[order])], rr.Scalars.columns(scalars=error[order, p]))
-    z = np.concatenate([((c.X - c.truth) / np.where(c.sigma > 0, c.sigma, np.inf)).ravel() for c in cells])
+    z = np.concatenate([((c.X - c.truth)[c.sigma > 0] / c.sigma[c.sigma > 0]) for c in cells])
     counts, _ = np.histogram(np.clip(z, EDGES[0], EDGES[-1]), EDGES)
-    bars = rr.BarChart(counts / counts.sum(), abscissa=(EDGES[:-1] + EDGES[1:]) / 2, widths=np.diff(EDGES), color=color)
+    bars = rr.BarChart(counts / max(counts.sum(), 1), abscissa=(EDGES[:-1] + EDGES[1:]) / 2, widths=np.diff(EDGES), color=color)
     recording.log(f"/sigmas/{model}", bars, static=True)
 
 
 def _text(study: Study, cells: Sequence[Cell], folder: Path) -> str:
     worst = [
-        f"- {name} {100 * e:+.2g} %: {where(cell, cells)}\n  `{command(folder, run)}`"
-        for cell, name, e, run in worst_runs([cell for cell in cells if cell.runs > 1])
+        f"- {name} {100 * e:+.2g} %: {where(cell, cells)}\n  `{command(study, folder, cell, run)}`"
+        for cell, name, e, run in worst_runs([cell for cell in cells if cell.runs])
     ]
     return "\n\n".join([f"# {study.question}", answer(cells), "## Worst runs", "\n".join(worst)])
 

@@ -18,7 +18,7 @@ def compare_again(store: Store, run: int) -> tuple[list[dict[str, Any]], bool]:
     """
     store.study.scenario_of(run)
     made, known = run_shard(store.study, range(run, run + 1)).rows, store.rows_of(run)
-    for here, there in zip(made, known, strict=False):
+    for here, there in zip(made, known, strict=bool(known)):
         other = [f"{name} {there[name]!r}, now {here.get(name)!r}" for name in there if not _same(here, there, name)]
         if other:
             what = f"{there['chain']}, {there['estimator']}, {there['model']}"

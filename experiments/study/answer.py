@@ -13,30 +13,45 @@ SURE = 0.01
 
 def answer(cells: Sequence[Cell]) -> str:
     """Return which model, in which chain, errs least and how clearly, and whether its sigma can be believed."""
-    solved = [cell for cell in cells if cell.runs > 1]
+    solved = [cell for cell in cells if cell.runs]
     if not solved:
         return f"No run gave an estimate. {failures(cells)}"
     return f"{_who(solved)} {_sigmas(solved)} {failures(cells)}".strip()
 
 
-def _who(cells: Sequence[Cell]) -> str:
+def grouped(cells: Sequence[Cell]) -> dict[str, list[Cell]]:
+    """Return the cells of the same runs, by their settings in words."""
     groups: dict[str, list[Cell]] = {}
     for cell in cells:
         groups.setdefault(combination(cell), []).append(cell)
-    best = [min(group, key=lambda cell: cell.typical) for group in groups.values()]
-    names = [_not_worse(group, cell, cells) for group, cell in zip(groups.values(), best, strict=True)]
-    winners = max(dict.fromkeys(names), key=names.count)
+    return groups
+
+
+def _who(cells: Sequence[Cell]) -> str:
+    groups = list(grouped(cells).values())
+    best = [_best(group) for group in groups]
     low, high = min(best, key=lambda c: c.typical), max(best, key=lambda c: c.typical)
     ends = [f"{percent(cell.typical)} ({combination(cell)})" for cell in (low, high)]
     span = (
-        f"the typical error of the best goes from {ends[0]} to {ends[1]}"
-        if len(best) > 1
-        else f"its typical error is {ends[0]}"
+        f"the typical error of the best goes from {' to '.join(ends)}" if len(best) > 1 else f"its typical error is {ends[0]}"
     )
     if len(cells) == len(groups):
-        return f"With the {method(best[0], cells)} {span}."
+        return f"With the {best[0].names[2]} model {span}."
+    names = [_not_worse(group, cell, cells) for group, cell in zip(groups, best, strict=True)]
+    winners = max(dict.fromkeys(names), key=names.count)
     tie = f", with no sure difference between them (p >= {SURE:g})" if len(winners) > 1 else f", surely so (p < {SURE:g})"
-    return f"Best in {names.count(winners)} of {len(groups)} combinations: {' and '.join(winners)}{tie}; {span}."
+    lonely = sum(len(group) == 1 for group in groups)
+    alone = f" (in {lonely} nothing else gave an estimate)" if lonely else ""
+    return f"Best in {names.count(winners)} of {len(groups)} combinations{alone}: {' and '.join(winners)}{tie}; {span}."
+
+
+def _best(group: Sequence[Cell]) -> Cell:
+    """Return the cell with the least errors, in the sense of the test, on the runs that most of the group could identify."""
+    most = max(cell.runs for cell in group)
+    losses = {id(cell): cell.losses() for cell in group if cell.runs > most / 2}
+    common = set.intersection(*(set(loss) for loss in losses.values()))
+    known = [cell for cell in group if id(cell) in losses]
+    return min(known, key=lambda cell: sum(losses[id(cell)][run] for run in sorted(common)))
 
 
 def _not_worse(group: Sequence[Cell], best: Cell, cells: Sequence[Cell]) -> tuple[str, ...]:
@@ -51,14 +66,18 @@ def _sigmas(cells: Sequence[Cell]) -> str:
     for chain in chains:
         mine = [cell for cell in cells if cell.names[0] == chain]
         ours, theirs = (100 * np.array([c.coverage(getattr(c, which)) for c in mine]) for which in ("sigma", "paper_sigma"))
-        spans = f"{ours.mean():.0f} % ({ours.min():.0f} to {ours.max():.0f} %)", f"{theirs.mean():.0f} %"
+        if not np.isfinite(ours).any():
+            continue
+        spans = f"{np.nanmean(ours):.0f} % ({np.nanmin(ours):.0f} to {np.nanmax(ours):.0f} %)", f"{np.nanmean(theirs):.0f} %"
         shares.append(f"{spans[0]} of cases{f' in chain {chain}' if len(chains) > 1 else ''}, two of the paper's in {spans[1]}")
+    if not shares:
+        return "There is no corrected sigma."
     return f"Two corrected sigma hold the truth in {'; '.join(shares)} (lowest to highest of single parameters; 95 % is right)."
 
 
 def failures(cells: Sequence[Cell]) -> str:
     """Return how many identifications failed; empty if none did."""
-    failed = sum(cell.failures.total() for cell in cells)
+    failed = sum(cell.failed for cell in cells)
     every = failed + sum(cell.runs for cell in cells)
     return f"{failed:,} of {every:,} identifications failed; their reasons are listed." if failed else ""
 
@@ -73,7 +92,7 @@ def method(cell: Cell, among: Sequence[Cell]) -> str:
     chain, estimator, model = cell.names
     told = [f"chain {chain}"] if any(other.names[0] != chain for other in among) else []
     told += [estimator] if any(other.names[1] != estimator for other in among) else []
-    return f"{model} ({', '.join(told)})" if told else f"{model} model" if len(among) == 1 else model
+    return f"{model} ({', '.join(told)})" if told else model
 
 
 def where(cell: Cell, among: Sequence[Cell]) -> str:

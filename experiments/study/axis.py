@@ -48,22 +48,37 @@ class Axis:
         if self.values:
             if any(x is not None for x in spaced):
                 raise ValueError(f"axis {self.field}: give values, or lowest, highest and count, not both")
-            if len({repr(value) for value in self.values}) < len(self.values):
-                raise ValueError(f"axis {self.field}: a value stands twice in {list(self.values)!r:.200}")
         elif None in spaced:
             raise ValueError(f"axis {self.field} is empty: give values, or lowest, highest and count")
         elif not 2 <= (self.count or 0) <= MOST_VALUES or not (self.lowest or 0.0) < (self.highest or 0.0):
             raise ValueError(f"axis {self.field}: lowest must be below highest, and count between 2 and {MOST_VALUES}")
         elif self.spacing == "log" and (self.lowest or 0.0) <= 0:
             raise ValueError(f"axis {self.field}: lowest = {self.lowest:g} must be above 0 for spacing log")
+        if len({self.label(value) for value in self.points}) < len(self.points):
+            raise ValueError(f"axis {self.field}: a value stands twice in {list(self.points)!r:.200}")
+        kinds = {_of_identification(field) for field in self.all_fields}
+        if len(kinds) > 1:
+            raise ValueError(f"axis {self.field}: also = {list(self.also)} mixes settings of simulation and identification")
 
     @property
     def points(self) -> tuple[Any, ...]:
-        """The values, those of a range to six digits."""
+        """The values, those inside a range to six digits."""
         if self.values:
             return self.values
+        low, high = self.lowest or 0.0, self.highest or 0.0
         space = np.geomspace if self.spacing == "log" else np.linspace
-        return tuple(float(f"{x:.6g}") for x in space(self.lowest or 0.0, self.highest or 0.0, self.count or 0))
+        return (low, *(float(f"{x:.6g}") for x in space(low, high, self.count or 0)[1:-1]), high)
+
+    @property
+    def numeric(self) -> bool:
+        """Whether all values are numbers."""
+        return all(isinstance(v, (int, float)) and not isinstance(v, bool) and v == v for v in self.points)  # noqa: PLR0124
+
+    def label(self, value: Any) -> float | str:
+        """Return a value as it stands in results: a number if all of the axis are, else text."""
+        if self.numeric:
+            return float(value)
+        return value if isinstance(value, str) else repr(_plain(value))
 
     @property
     def all_fields(self) -> tuple[str, ...]:
@@ -73,7 +88,7 @@ class Axis:
     @property
     def identification(self) -> bool:
         """Whether it is a setting of identification: the same simulations serve all its values."""
-        return self.field.split(".")[0] in ("chain", "estimator")
+        return _of_identification(self.field)
 
 
 @dataclass(frozen=True)
@@ -84,9 +99,9 @@ class Setting:
     value: Any
 
     @property
-    def label(self) -> Any:
-        """The value as a number, if it is one, or as text."""
-        return self.value if isinstance(self.value, (bool, int, float, str)) else repr(_plain(self.value))
+    def label(self) -> float | str:
+        """The value as it stands in results."""
+        return self.axis.label(self.value)
 
     def into(self, content: dict[str, Any]) -> None:
         """Write the value into the tables of a scenario."""
@@ -119,6 +134,10 @@ class Setting:
         return estimator
 
 
+def _of_identification(field: str) -> bool:
+    return field.split(".", maxsplit=1)[0] in ("chain", "estimator")
+
+
 def _replaced(part: Any, path: list[str], value: Any, field: str) -> Any:
     """Return a frozen dataclass with the value of a field, or of a field of a field, replaced."""
     known = [f.name for f in fields(part)]
@@ -129,6 +148,8 @@ def _replaced(part: Any, path: list[str], value: Any, field: str) -> Any:
     if len(path) > 1:
         value = _replaced(getattr(part, path[0]), path[1:], value, field)
     elif path[0] in STAGES and isinstance(part, Chain):
+        if not isinstance(value, str):
+            raise StudyError(f"axis {field} = {value!r:.60}: give names, among {', '.join(STAGES[path[0]])}")
         value = STAGES[path[0]].create(value)
     try:
         return replace(part, **{path[0]: value})

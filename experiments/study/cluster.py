@@ -2,6 +2,7 @@
 
 import logging
 import signal
+import sys
 from collections.abc import Iterator
 from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager
@@ -12,9 +13,9 @@ from threadpoolctl import threadpool_limits
 
 from experiments.errors import StudyError
 from experiments.study.shard import Shard, run_shard
-from experiments.study.store import require_versions, versions
 from experiments.study.study import Study
 from experiments.study.study_file import study_from_text
+from experiments.study.versions import require_versions, versions
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -63,7 +64,8 @@ def cluster_pool(study: Study, scheduler: str | None, workers: int) -> Iterator[
         If Dask is not installed, or the scheduler cannot be reached.
     """
     try:
-        from distributed import Client, LocalCluster
+        from distributed import CancelledError, Client, KilledWorker, LocalCluster
+        from distributed.comm.core import CommClosedError
     except ImportError as error:
         raise StudyError(
             "studies on workers need Dask: install the extra, as in uv sync --extra cluster, or pip install 'idbench[cluster]'"
@@ -80,7 +82,24 @@ def cluster_pool(study: Study, scheduler: str | None, workers: int) -> Iterator[
             client = stack.enter_context(Client(address, timeout=PATIENCE))
         except (OSError, ValueError, TimeoutError) as error:
             raise StudyError(f"cannot reach the scheduler {scheduler}: {error}") from error
-        yield ClusterPool(study, client)
+        _require_workers(client)
+        try:
+            yield ClusterPool(study, client)
+        except (CancelledError, KilledWorker, CommClosedError) as error:
+            what = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+            raise StudyError(f"the workers are lost ({what}): what is finished is kept, go on with --resume") from error
+
+
+def _require_workers(client: "Client") -> None:
+    """Wait for a first worker, and raise StudyError if the workers are not as this process is."""
+    if not client.nthreads():
+        sys.stderr.write("idbench: the scheduler has no workers yet; waiting for the first\n")
+        client.wait_for_workers(1)
+    try:
+        for worker, theirs in client.run(versions).items():
+            require_versions(theirs, f"worker {worker}")
+    except (ModuleNotFoundError, AttributeError) as error:
+        raise StudyError(f"the workers have no idbench, or another version of it: {error}") from error
 
 
 @contextmanager

@@ -95,7 +95,7 @@ def run_missing(store: Store, pool: LocalPool, shard: int, watch: Watch) -> None
         if not pending:
             return
         finished, _ = wait(pending, timeout=POLL, return_when=FIRST_COMPLETED)
-        for future in finished:
+        for future in sorted(finished, key=lambda future: future.exception() is not None):  # what is good is kept first
             runs = pending.pop(future)
             store.write(runs, future.result())
             done += len(runs)

@@ -6,11 +6,12 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
+from matplotlib.axes import Axes as Panel
 from matplotlib.figure import Figure
 
 from experiments.recording.style import FORMS
 from experiments.study.answer import value
+from experiments.study.axis import Axis
 from experiments.study.statistics import SIGMAS, Cell
 from identify import Array
 
@@ -23,7 +24,7 @@ WIDE = 8.0
 mpl.rcParams.update({"svg.hashsalt": "idbench", "svg.fonttype": "none", "font.size": 8, "axes.grid": True, "grid.alpha": 0.3})
 
 
-def error_figure(cells: Sequence[Cell], axis: str) -> str:
+def error_figure(cells: Sequence[Cell], axis: Axis) -> str:
     """Return spread and bias of every parameter against an axis, a curve a model."""
     figure, panels = _panels(cells[0].parameters)
     for p, (name, panel) in enumerate(panels.items()):
@@ -36,10 +37,10 @@ def error_figure(cells: Sequence[Cell], axis: str) -> str:
             panel.plot(np.array(x)[sure], bias[sure], "o", color=color, ms=3)
         panel.set_yscale("log")
         panel.set_title(name)
-    return _finished(figure, panels, axis, "error [%]")
+    return _finished(figure, panels, axis.field, "error [%]")
 
 
-def coverage_figure(cells: Sequence[Cell], axis: str) -> str:
+def coverage_figure(cells: Sequence[Cell], axis: Axis) -> str:
     """Return the share of truths within two sigma against an axis: corrected, and the paper's."""
     figure, panels = _panels(cells[0].parameters)
     for p, (name, panel) in enumerate(panels.items()):
@@ -53,11 +54,13 @@ def coverage_figure(cells: Sequence[Cell], axis: str) -> str:
             panel.plot(x, paper, color=color, ls=":", label=f"{model}: paper's", lw=wide)
         panel.set_ylim(top=103)
         panel.set_title(name)
-    return _finished(figure, panels, axis, f"truth within {SIGMAS:g} sigma [%]")
+    return _finished(figure, panels, axis.field, f"truth within {SIGMAS:g} sigma [%]")
 
 
 def cost_figure(seconds: dict[str, float], runs: int) -> str:
     """Return how long a run takes, in simulation and in each method."""
+    if not seconds:
+        return ""
     figure = Figure(figsize=(7, 0.6 + 0.3 * len(seconds)), layout="constrained")
     panel: Any = figure.subplots()
     values = [1e3 * s / max(runs, 1) for s in seconds.values()]
@@ -65,12 +68,12 @@ def cost_figure(seconds: dict[str, float], runs: int) -> str:
     panel.bar_label(bars, [f" {v:.3g} ms" for v in values])
     panel.set_xscale("log")
     panel.set_xlim(right=4 * max(values))
-    panel.set_xlabel("processor time of a run [ms]")
+    panel.set_xlabel("time of a run on one thread [ms]")
     panel.invert_yaxis()
     return _svg(figure)
 
 
-def _panels(parameters: Sequence[str]) -> tuple[Figure, dict[str, Axes]]:
+def _panels(parameters: Sequence[str]) -> tuple[Figure, dict[str, Panel]]:
     columns = 4
     rows = -(-len(parameters) // columns)
     figure = Figure(figsize=(11, 2.2 * rows + 0.5), layout="constrained")
@@ -87,20 +90,21 @@ def _models(cells: Sequence[Cell]) -> dict[str, list[Cell]]:
     return groups
 
 
-def _places(panel: Axes, group: Sequence[Cell], axis: str) -> Array:
+def _places(panel: Panel, group: Sequence[Cell], axis: Axis) -> Array:
     """Return where the cells lie on an axis, logarithmic if its values are far apart, counted if they are words."""
-    values = [cell.settings[axis] for cell in group]
-    if not all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in values):
-        panel.set_xticks(range(len(values)), [value(v) for v in values], rotation=20)
-        return np.arange(len(values), dtype=np.float64)
-    numbers = np.array(values, dtype=np.float64)
+    values = [cell.settings[axis.field] for cell in group]
+    if not axis.numeric:
+        words = [axis.label(v) for v in axis.points]
+        panel.set_xticks(range(len(words)), [value(word) for word in words], rotation=20)
+        return np.array([words.index(v) for v in values], dtype=np.float64)
+    numbers = np.array(axis.points, dtype=np.float64)
     positive = numbers[numbers > 0]
     if len(positive) and positive.max() > WIDE * positive.min():
         if len(positive) == len(numbers):
             panel.set_xscale("log")
         else:
             panel.set_xscale("symlog", linthresh=float(positive.min()))
-    return numbers
+    return np.array(values, dtype=np.float64)
 
 
 def _width(cells: Sequence[Cell], model: str) -> float:
@@ -112,7 +116,7 @@ def _color(model: str) -> tuple[float, ...]:
     return tuple(c / 255 for c in FORMS.get(model, OTHER))
 
 
-def _finished(figure: Figure, panels: dict[str, Axes], axis: str, y: str) -> str:
+def _finished(figure: Figure, panels: dict[str, Panel], axis: str, y: str) -> str:
     handles, labels = next(iter(panels.values())).get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=6, frameon=False)
     figure.supylabel(y, fontsize=9)

@@ -5,21 +5,24 @@ from math import isfinite
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.text import Text
 
 from experiments.recording.study import record_study
 from experiments.results import results_folder, write_summary
 from experiments.study.answer import answer, method, percent, short, value
 from experiments.study.report import report
+from experiments.study.shard_file import arrays
 from experiments.study.statistics import Cell, cells
-from experiments.study.store import Store, versions
+from experiments.study.store import Store
+from experiments.study.versions import versions
 from experiments.tables import new_table
 
 
 def write_results(page: Console, store: Store) -> list[Cell]:
     """Write summary.json, report.html and recording.rrd into the folder of a study, and print its answer."""
     study, seconds = store.study, store.seconds()
-    found = cells(store.columns(), study.varied, study.parameters)
+    found = cells(arrays(store.table()), study.varied, study.parameters)
     with results_folder(store.folder) as folder:
         (folder / "report.html").write_text(report(study, found, seconds, store.folder), encoding="utf-8")
         record_study(folder / "recording.rrd", study, found, store.folder)
@@ -30,16 +33,18 @@ def write_results(page: Console, store: Store) -> list[Cell]:
 
 def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:
     axes = [short(field) for field in store.study.varied]
-    grid = new_table(store.study.question, [*axes[1:], "identified by", "runs", "failed", "typical error", "within 2 sigma"])
+    grid = new_table(
+        escape(store.study.question), [*axes[1:], "identified by", "runs", "failed", "typical error", "within 2 sigma"]
+    )
     for cell in found:
         settings = [value(x) for x in cell.settings.values()]
-        numbers = f"{cell.runs}", f"{cell.failures.total() or ''}"
+        numbers = f"{cell.runs}", f"{cell.failed or ''}"
         judged = (percent(cell.typical), f"{100 * cell.coverage(cell.sigma).mean():.0f} %") if cell.runs else ("", "")
-        grid.add_row(*settings, method(cell, found), *numbers, *judged)
+        grid.add_row(*map(escape, settings), escape(method(cell, found)), *numbers, *judged)
     grid.columns[0].header = axes[0]
     page.print(grid)
     page.print(Text(answer(found)))
-    page.print(f"\nwritten to {store.folder}: open {store.folder / 'report.html'}", soft_wrap=True)
+    page.print(Text(f"\nwritten to {store.folder}: open {store.folder / 'report.html'}"), soft_wrap=True)
 
 
 def _summary(store: Store, found: Sequence[Cell], seconds: dict[str, float]) -> dict[str, Any]:
@@ -59,7 +64,7 @@ def _summary(store: Store, found: Sequence[Cell], seconds: dict[str, float]) -> 
 def _cell(cell: Cell) -> dict[str, Any]:
     chain, estimator, model = cell.names
     said: dict[str, Any] = {"settings": dict(cell.settings), "chain": chain, "estimator": estimator, "model": model}
-    said |= {"runs": cell.runs, "failures": dict(cell.failures)}
+    said |= {"runs": cell.runs, "failures": {reason: len(runs) for reason, runs in cell.failures.items()}}
     if cell.runs:
         numbers = {
             "truth": cell.truth.mean(axis=0),

@@ -44,18 +44,20 @@ def run_shard(study: Study, runs: range, *, threads: int = 1, progress: Progress
     progress : callable, optional
         Hears the share of the simulation that is done.
     """
-    shard, scenarios = Shard(), {run: study.scenario_of(run) for run in runs}
+    shard, scenarios, done = Shard(), {run: study.scenario_of(run) for run in runs}, 0
     for together in _groups(study, scenarios, shard):
         start = time.perf_counter()
         try:
-            simulated = _simulate(scenarios, together, threads, progress)
+            simulated = _simulate(scenarios, together, threads, _part(progress, done, len(together), len(runs)))
+            truth = scara_truth(simulated.robots[0])
         except BenchError as error:
             _fail(shard, study, scenarios, list(together), str(error))
             continue
         shard.seconds["simulation"] += time.perf_counter() - start
+        done += len(together)
         for method in study.methods:
             start = time.perf_counter()
-            shard.rows += _identify(study, method, simulated, list(together))
+            shard.rows += _identify(study, method, simulated, list(together), truth)
             shard.seconds[f"{method.chain_name} {method.estimator_name}"] += time.perf_counter() - start
     shard.rows.sort(key=lambda row: row["run"])
     return shard
@@ -85,10 +87,16 @@ def _simulate(
     return simulate(first, seeds, motions=motions, threads=threads, progress=progress, throw=False)
 
 
-def _identify(study: Study, method: Method, simulated: Run, runs: Sequence[int]) -> Iterator[dict[str, Any]]:
+def _part(progress: Progress | None, done: int, part: int, runs: int) -> Progress | None:
+    """Return what hears the share of `part` runs, and tells the share of all."""
+    return None if progress is None else lambda share: progress((done + share * part) / runs)
+
+
+def _identify(
+    study: Study, method: Method, simulated: Run, runs: Sequence[int], truth: Mapping[str, float]
+) -> Iterator[dict[str, Any]]:
     """Yield a row for every run and model."""
     basis = BASES[simulated.scenario.robot]()
-    truth = scara_truth(simulated.robots[0])
     try:
         found = identify_each(simulated.log, basis, study.created_models, method.chain, method.estimator, throw=False)
     except IdentificationError as error:

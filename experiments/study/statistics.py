@@ -1,6 +1,6 @@
 """What the runs of a study say, with confidence."""
 
-from collections import Counter
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,6 +22,9 @@ LEAST = 1e-16
 """Relative error that counts as none: logarithms of 0 would say too much of rounding."""
 
 
+NUMBER = re.compile(r"\d[\d.,e+-]*")
+
+
 @dataclass(frozen=True, eq=False)
 class Cell:
     """The runs of one combination of settings, identified by one model.
@@ -38,8 +41,9 @@ class Cell:
         Numbers of the runs that gave an estimate.
     X, sigma, paper_sigma, truth : Array, shape (runs, p)
         Of those runs.
-    failures : Counter of str
-        Reasons of the others.
+    failures : mapping of str to int array
+        Reasons of the others, as the first of them has it, and the runs that failed so: reasons that differ in numbers alone
+        are one.
     """
 
     settings: Mapping[str, Any]
@@ -50,17 +54,22 @@ class Cell:
     sigma: Array
     paper_sigma: Array
     truth: Array
-    failures: Counter[str]
+    failures: Mapping[str, np.typing.NDArray[np.int64]]
 
     @property
     def runs(self) -> int:
         """Number of runs that gave an estimate."""
         return len(self.run)
 
+    @property
+    def failed(self) -> int:
+        """Number of runs that did not."""
+        return sum(len(runs) for runs in self.failures.values())
+
     @cached_property
     def error(self) -> Array:
-        """(X - truth) / |truth|, shape (runs, p); absolute where the truth is 0."""
-        return (self.X - self.truth) / np.where(self.truth == 0, 1.0, np.abs(self.truth))
+        """(X - truth) / |truth|, shape (runs, p); NaN where the truth is 0."""
+        return (self.X - self.truth) / np.where(self.truth == 0, np.nan, np.abs(self.truth))
 
     @property
     def bias(self) -> Array:
@@ -86,21 +95,28 @@ class Cell:
     @property
     def typical(self) -> float:
         """Geometric mean over the parameters of their rmse: one figure that no parameter's unit or size decides."""
-        return float(np.exp(np.mean(np.log(np.maximum(self.rmse, LEAST)))))
+        return float(np.exp(np.mean(np.log(np.maximum(self.rmse[self.relative], LEAST)))))
+
+    @property
+    def relative(self) -> np.typing.NDArray[np.bool_]:
+        """Parameters whose truth is not 0, so that they have a relative error, shape (p,)."""
+        return (self.truth != 0).all(axis=0)
 
     def coverage(self, sigma: Array) -> Array:
-        """Return the share of truths within SIGMAS `sigma` of the estimate, shape (p,)."""
-        return np.mean(np.abs(self.X - self.truth) <= SIGMAS * sigma, axis=0)
+        """Return the share of truths within SIGMAS `sigma` of the estimate, of the runs that have one, shape (p,)."""
+        inside, known = np.abs(self.X - self.truth) <= SIGMAS * sigma, np.isfinite(sigma).sum(axis=0)
+        return np.where(known > 0, inside.sum(axis=0) / np.maximum(known, 1), np.nan)
 
     def coverage_interval(self, sigma: Array) -> Array:
         """Return the confidence interval of the coverage (Wilson), shape (p, 2)."""
-        inside = np.rint(self.coverage(sigma) * self.runs).astype(int)
-        found = [stats.binomtest(int(k), self.runs).proportion_ci(CONFIDENCE, "wilson") for k in inside]
-        return np.array([(i.low, i.high) for i in found])
+        inside, known = np.abs(self.X - self.truth) <= SIGMAS * sigma, np.isfinite(sigma).sum(axis=0)
+        pairs = zip(inside.sum(axis=0).tolist(), known.tolist(), strict=True)
+        found = [stats.binomtest(k, n).proportion_ci(CONFIDENCE, "wilson") if n else None for k, n in pairs]
+        return np.array([(i.low, i.high) if i else (np.nan, np.nan) for i in found])
 
     def losses(self) -> dict[int, float]:
         """Return, of each run, the mean over the parameters of log |relative error|."""
-        logs = np.log(np.maximum(np.abs(self.error), LEAST)).mean(axis=1)
+        logs = np.log(np.maximum(np.abs(self.error[:, self.relative]), LEAST)).mean(axis=1)
         return dict(zip(self.run.tolist(), logs.tolist(), strict=True))
 
 
@@ -159,8 +175,16 @@ def _cell(
         sigma=of(".sigma"),
         paper_sigma=of(".paper_sigma"),
         truth=of(".truth"),
-        failures=Counter(rows["failure"][index[failed]]),
+        failures=_grouped(rows["failure"][index[failed]], rows["run"][index[failed]]),
     )
+
+
+def _grouped(reasons: np.typing.NDArray[Any], runs: np.typing.NDArray[np.int64]) -> dict[str, np.typing.NDArray[np.int64]]:
+    """Return the runs of every reason."""
+    kinds: dict[str, tuple[str, list[int]]] = {}
+    for reason, run in zip(reasons, runs.tolist(), strict=True):
+        kinds.setdefault(NUMBER.sub("#", reason), (reason, []))[1].append(run)
+    return {reason: np.array(members, dtype=np.int64) for reason, members in kinds.values()}
 
 
 def differences(group: Sequence[Cell]) -> list[Difference]:

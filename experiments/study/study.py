@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -45,6 +45,15 @@ class Method:
     estimator: AbstractEstimator
     settings: tuple[Setting, ...]
 
+    @property
+    def names(self) -> tuple[str, str]:
+        """Of chain and estimator."""
+        return self.chain_name, self.estimator_name
+
+    def fits(self, settings: Mapping[str, Any]) -> bool:
+        """Return whether this method has the values of the axes, where they are told."""
+        return all(settings.get(s.axis.field, s.label) == s.label for s in self.settings)
+
 
 @final
 @settings
@@ -85,13 +94,7 @@ class Study:
         if methods > MOST_METHODS:
             raise StudyError(f"{methods:,} combinations of identification settings are more than {MOST_METHODS:,}")
         _ = self.methods, self.created_models
-        base = next(self._points())  # the whole grid is looked at when it is known not to be endless
-        if base.scenario.robot not in BASES:
-            raise StudyError(f"no basis for robot {base.scenario.robot!r}; known: {', '.join(BASES)}")
-        if self.motion == "drawn":
-            _random(base.scenario)
-        if self.motion == "drawn" and base.scenario.start:
-            raise StudyError("motion = 'drawn' has no way to the start: leave out start, or motion = 'shared'")
+        self._require(next(self._points()))  # the whole grid is looked at when it is known not to be endless
 
     @property
     def size(self) -> int:
@@ -100,13 +103,25 @@ class Study:
 
     @cached_property
     def points(self) -> tuple[Point, ...]:
-        """The grid of simulations; raise ScenarioError if a combination makes no sense."""
-        return tuple(self._points())
+        """The grid of simulations; raise ScenarioError or StudyError if a combination makes no sense."""
+        found = tuple(self._points())
+        for point in found:
+            self._require(point)
+        return found
+
+    def _require(self, point: Point) -> None:
+        """Raise StudyError if the runs of a combination cannot be made."""
+        if point.scenario.robot not in BASES:
+            raise StudyError(f"no basis for robot {point.scenario.robot!r}; known: {', '.join(BASES)}")
+        if self.motion == "drawn":
+            _random(point.scenario)
+        if self.motion == "drawn" and point.scenario.start:
+            raise StudyError("motion = 'drawn' has no way to the start: leave out start, or motion = 'shared'")
 
     def _points(self) -> Iterator[Point]:
         for combination in _combinations([axis for axis in self.axes if not axis.identification]):
             content = json.loads(json.dumps(self.scenario))
-            for setting in combination:
+            for setting in _whole_first(combination):
                 setting.into(content)
             yield Point(from_dict(content), combination)
 
@@ -119,7 +134,7 @@ class Study:
         combinations = list(_combinations([axis for axis in self.axes if axis.identification]))
         for name, way, combination in product(self.chains, self.estimators, combinations):
             chain, estimator = CHAINS.create(name), ESTIMATORS.create(way)
-            for setting in combination:
+            for setting in _whole_first(combination):
                 chain, estimator = setting.chain(chain), setting.estimator(estimator)
             yield Method(name, way, chain, estimator, combination)
 
@@ -180,6 +195,11 @@ class Study:
         plain = {key: getattr(self, key) for key in ("name", "question", "seeds", "seed", "motion")}
         lists = {key: list(getattr(self, key)) for key in ("models", "chains", "estimators")}
         return {**plain, **lists, "axes": axes, "scenario": self.scenario}
+
+
+def _whole_first(combination: tuple[Setting, ...]) -> list[Setting]:
+    """Return settings such that a part that is replaced whole does not undo a setting of that part."""
+    return sorted(combination, key=lambda setting: setting.axis.field.count("."))
 
 
 def _random(scenario: Scenario) -> RandomMoves:

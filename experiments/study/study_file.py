@@ -39,7 +39,7 @@ def load_study(name: str) -> Study:
 def read_toml(path: Path) -> dict[str, Any]:
     """Return the document of a study."""
     try:
-        return tomllib.loads(path.read_text())
+        return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise StudyError(f"cannot read study {path}: {error.strerror}") from error
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
@@ -51,6 +51,8 @@ def study_from(content: dict[str, Any], what: str) -> Study:
     made = dict(content)
     try:
         made["scenario"] = _scenario(made.get("scenario"), made.pop("settings", {}))
+        if not isinstance(made.get("axes", []), (list, tuple)):
+            raise StudyError("axes must be tables: write [[axes]], with a field and values, for each")
         made["axes"] = tuple(made.get("axes", ()))
         study: Study = make(Study, made, "")
     except ScenarioError as error:

@@ -1,6 +1,7 @@
 """A study of a second: 2 combinations of 9 runs, each identified 2 times."""
 
 import tomllib
+from contextlib import nullcontext
 
 import pytest
 
@@ -56,12 +57,8 @@ def file(tmp_path):
 def run(study, folder, shard=64, threads=2, pool=None):
     """Run a study in this process; return its store."""
     store = Store.new(study, folder)
-    store.begin()
-    if pool:
-        run_missing(store, pool, shard, lambda done: None)
-    else:
-        with local_pool(study, threads) as local:
-            run_missing(store, local, shard, lambda done: None)
+    with store.held(), nullcontext(pool) if pool else local_pool(study, threads) as place:
+        run_missing(store, place, shard, lambda done: None)
     return store
 
 

@@ -76,7 +76,7 @@ def test_the_recording_holds_every_error(done, undisturbed):
 
 
 def test_a_run_is_made_again_bit_for_bit(done, tmp_path, capfd):
-    assert main(["run", "--from", str(done), "--index", "13", "--out", str(tmp_path / "again")]) == 0
+    assert main(["run", "--from", str(done), "--index", "13", "--method", "1", "--out", str(tmp_path / "again")]) == 0
     assert "run 13 of" in capfd.readouterr().out.splitlines()[0]
     summary = json.loads((tmp_path / "again" / "summary.json").read_text())
     row = next(r for r in Store.open(done).rows_of(13) if r["model"] == "power" and r["chain.operator.cutoff"] == 5.0)
@@ -129,7 +129,11 @@ def test_wrong_calls(done, file, tmp_path, complaint):
     assert "there is no study in" in complaint("study", "--resume", str(tmp_path))
     assert "leave out --seeds" in complaint("study", "--resume", str(done), "--seeds", "3")
     assert "--threads 0 must be at least 1" in complaint("study", str(file), "--threads", "0", *out)
-    assert "leave out --workers" in complaint("study", str(file), "--workers", "2", "--scheduler", "tcp://a:1", *out)
+    assert "--workers, --threads name several places" in complaint("study", str(file), "--workers", "2", "--threads", "2", *out)
+    assert "--scheduler, --workers name several places" in complaint(
+        "study", str(file), "--workers", "2", "--scheduler", "tcp://a:1", *out
+    )
+    assert "--method 2 does not exist" in complaint("run", "--from", str(done), "--index", "1", "--method", "2")
     assert "run 18 does not exist" in complaint("run", "--from", str(done), "--index", "18")
     assert "name a scenario, or a run of a study" in complaint("run", "ideal", "--index", "1")
     assert "--from DIR --index N" in complaint("run")
@@ -167,7 +171,9 @@ def test_a_full_disk_is_one_line_and_keeps_what_there_is(file, tmp_path, complai
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Store, "write", write)
-    assert "No space left on device; make room and go on" in complaint("study", str(file), "--out", str(out), "--threads", "1")
+    assert "No space left on device; make room and go on with --resume" in complaint(
+        "study", str(file), "--out", str(out), "--threads", "1"
+    )
     assert [path.name for path in Store.open(out).shards()] == ["runs-0000000000-0000000008.parquet"]
 
 
@@ -176,3 +182,40 @@ def test_an_error_in_a_shard_is_not_taken_for_a_result(file, tmp_path, monkeypat
     monkeypatch.setattr(engine, "run_shard", lambda *args, **kwargs: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         main(["study", str(file), "--out", str(tmp_path / "out")])
+
+
+ODD = """
+name = "odd"
+question = "Is [/b] [red]fine?"
+scenario = "ideal"
+seeds = 2
+models = ["power"]
+
+[settings.trajectory]
+kind = "random"
+moves = 3
+durations = [0.9, 0.9]
+rest = 0.6
+"""
+
+
+@pytest.mark.parametrize(
+    ("axis", "failed"),
+    [
+        ('field = "torque.noise"\nvalues = [0.1, [0.1, 0.01]]', 0),
+        ('field = "friction"\nvalues = [{kind = "coulomb"}, {kind = "stribeck"}]', 0),
+        ('field = "origin"\nvalues = ["[/b]", "one"]', 0),
+        ('field = "timing.jitter"\nvalues = [0.02, 0.03]', 4),
+        ('field = "fs"\nvalues = [9.0, 100.0]', 2),
+        ('field = "chain.mask.threshold"\nvalues = [0.1, 50.0]', 0),
+        ('field = "friction.coulomb"\nvalues = [0.0, 1.0]', 0),
+    ],
+)
+def test_odd_studies_end_in_a_report(tmp_path, axis, failed, capfd):
+    """Values of several kinds, words that look like markup, runs that all fail, no sigma, a truth of 0."""
+    (tmp_path / "odd.toml").write_text(f"{ODD}\n[[axes]]\n{axis}\n")
+    assert main(["study", str(tmp_path / "odd.toml"), "--out", str(tmp_path / "out")]) == 0
+    assert "Is [/b] [red]fine?" in capfd.readouterr().out
+    cells = json.loads((tmp_path / "out" / "summary.json").read_text())["cells"]
+    assert sum(sum(cell["failures"].values()) for cell in cells) == failed
+    assert sum(cell["runs"] for cell in cells) + failed == 4

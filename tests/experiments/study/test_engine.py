@@ -1,14 +1,16 @@
 """Running a study: the same bits however it is cut, and runs that fail by themselves."""
 
 import pytest
+from distributed import LocalCluster
 
 from experiments.errors import StudyError
 from experiments.study import cluster
 from experiments.study.again import compare_again
 from experiments.study.cluster import cluster_pool, compute
 from experiments.study.shard import run_shard
-from experiments.study.store import Store, versions
+from experiments.study.store import Store
 from experiments.study.study_file import study_from
+from experiments.study.versions import versions
 
 
 @pytest.mark.parametrize(("shard", "threads"), [(1, 2), (7, 1), (7, 2), (64, 1)])
@@ -67,10 +69,37 @@ def test_a_worker_with_another_version_is_refused(small):
         compute(small.text, 0, 2, versions() | {"mujoco": "1.0"})
 
 
-def test_and_its_complaint_reaches_the_process_that_asks(small, tmp_path, run_study, monkeypatch):
-    monkeypatch.setattr(cluster, "versions", lambda: versions() | {"idbench": "0.0"})
-    with cluster_pool(small, None, 1) as pool, pytest.raises(StudyError, match=r"has idbench 0\.0"):
-        run_study(small, tmp_path / "out", pool=pool)
+def test_workers_with_another_version_are_refused_before_anything_is_run(small, monkeypatch):
+    monkeypatch.setattr(cluster, "versions", lambda: {"idbench": "0.0"})
+    with pytest.raises(StudyError, match=r"worker tcp.* has idbench 0\.0 \(here "), cluster_pool(small, None, 1):
+        pass
+
+
+def test_and_those_that_come_later_complain_to_the_process_that_asks(small, tmp_path, run_study, monkeypatch):
+    with cluster_pool(small, None, 1) as pool:
+        monkeypatch.setattr(cluster, "versions", lambda: versions() | {"idbench": "0.0"})
+        with pytest.raises(StudyError, match=r"has idbench 0\.0"):
+            run_study(small, tmp_path / "out", pool=pool)
+
+
+def test_a_cluster_that_goes_is_told_in_one_line(small, tmp_path, run_study):
+    """The scheduler is closed while the study runs."""
+
+    class Closing:
+        width, partial = 2, staticmethod(lambda: 0.0)
+
+        def submit(self, runs):
+            future = pool.submit(runs)
+            cluster.close()
+            return future
+
+    with LocalCluster(n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as cluster:
+        address = cluster.scheduler_address
+        with (
+            pytest.raises(StudyError, match=r"the workers are lost .* go on with --resume"),
+            cluster_pool(small, address, 1) as pool,
+        ):
+            run_study(small, tmp_path / "out", 64, pool=Closing())
 
 
 def test_motion_can_be_shared(content):

@@ -30,8 +30,8 @@ def finished(folder):
 @pytest.mark.parametrize("shards", [0, 1, 4])
 def test_a_kill_loses_no_finished_shard(small, tmp_path, undisturbed, shards):
     """SIGKILL as soon as so many shards are there; what was there stays as it was."""
-    store = Store.new(small, tmp_path)
-    store.begin()
+    with Store.new(small, tmp_path).held():
+        pass
     with subprocess.Popen([sys.executable, "-c", CODE, str(tmp_path)]) as process:
         limit = time.monotonic() + 60
         while len(finished(tmp_path)) < shards or (not shards and time.monotonic() < limit - 58):
@@ -42,7 +42,7 @@ def test_a_kill_loses_no_finished_shard(small, tmp_path, undisturbed, shards):
     kept = finished(tmp_path)
     assert shards <= len(kept) < 10
     resumed = Store.open(tmp_path)
-    with local_pool(small, 2) as pool:
+    with local_pool(small, 2) as pool, resumed.held():
         run_missing(resumed, pool, 64, lambda done: None)
     assert kept.items() <= finished(tmp_path).items()
     assert resumed.table().equals(undisturbed)
@@ -51,8 +51,7 @@ def test_a_kill_loses_no_finished_shard(small, tmp_path, undisturbed, shards):
 def test_a_killed_worker_costs_only_time(small, tmp_path, undisturbed):
     """One of two workers is killed while shards are computed; it is replaced, and its shard is done again."""
     store, killed = Store.new(small, tmp_path), []
-    store.begin()
-    with cluster_pool(small, None, 2) as pool:
+    with cluster_pool(small, None, 2) as pool, store.held():
 
         def watch(done):
             if done and not killed:

@@ -1,6 +1,6 @@
 """Statistics against known distributions and against SciPy by another way."""
 
-from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def cell(error, model="explicit", sigma=None, failures=(), runs=None, settings=N
         sigma=known,
         paper_sigma=known / 2,
         truth=np.tile(TRUTH, (len(error), 1)),
-        failures=Counter(failures),
+        failures={reason: np.arange(number) for reason, number in failures},
     )
 
 
@@ -112,7 +112,7 @@ def test_failures_are_counted_and_never_in_the_figures():
     columns = {name: np.array(column, dtype=object) for name, column in rows.items()}
     (found,) = cells(columns, ["fs"], ("a",))
     assert found.runs == 2
-    assert found.failures == {"left its range": 1}
+    assert {reason: runs.tolist() for reason, runs in found.failures.items()} == {"left its range": [1]}
     assert found.rmse == pytest.approx([0.1])
     assert "1 of 3 identifications failed" in answer([found])
 
@@ -128,4 +128,50 @@ def test_the_answer_names_the_better_model_and_both_sigmas(rng):
 
 
 def test_an_answer_without_estimates():
-    assert answer([cell(np.zeros((0, 2)), failures=["why"])]).startswith("No run gave an estimate. 1 of 1")
+    assert answer([cell(np.zeros((0, 2)), failures=[("why", 1)])]).startswith("No run gave an estimate. 1 of 1")
+
+
+def test_reasons_that_differ_in_numbers_alone_are_one():
+    rows = {name: np.array([1.0] * 3) for name in ("a", "a.sigma", "a.paper_sigma", "a.truth")}
+    reasons = ["left its range at 1.2 s (seed 5)", "left its range at 13 s (seed 71)", "no torque"]
+    words = {name: np.array([name] * 3, dtype=object) for name in ("chain", "estimator", "model")}
+    rows |= words | {"run": np.array([4, 7, 9]), "fs": np.ones(3), "failure": np.array(reasons, dtype=object)}
+    (found,) = cells(rows, ["fs"], ("a",))
+    assert {reason: runs.tolist() for reason, runs in found.failures.items()} == {reasons[0]: [4, 7], "no torque": [9]}
+    assert found.failed == 3
+
+
+def test_the_best_is_what_the_test_says_is_best(rng):
+    """One wild run in thirty makes the rms of the better model the larger one."""
+    error = rng.normal(0, 0.01, (30, 2))
+    wild = error.copy()
+    wild[0] = 10.0
+    said = answer([cell(wild), cell(3 * error, "power")])
+    assert said.startswith("Best in 1 of 1 combinations: explicit, surely so")
+
+
+def test_the_only_model_with_estimates_is_not_called_better(rng):
+    error = rng.normal(0, 0.01, (30, 2))
+    settings = [{"fs": 1.0}, {"fs": 2.0}]
+    group = [cell(error, settings=settings[0]), cell(error, "power", settings=settings[0]), cell(error, settings=settings[1])]
+    assert "(in 1 nothing else gave an estimate)" in answer(group)
+
+
+def test_what_has_no_sigma_is_neither_inside_nor_outside(rng):
+    sigma = np.full((40, 2), 10.0)
+    sigma[:30, 0] = np.nan
+    sigma[:, 1] = np.nan
+    found = cell(rng.normal(0, 1, (40, 2)), sigma=sigma)
+    assert found.coverage(found.sigma)[0] == 1
+    assert found.coverage_interval(found.sigma)[0, 0] == pytest.approx(
+        stats.binomtest(10, 10).proportion_ci(method="wilson").low
+    )
+    assert np.isnan(found.coverage(found.sigma)[1])
+    assert np.isnan(found.coverage_interval(found.sigma)[1]).all()
+
+
+def test_a_truth_of_zero_has_no_relative_error():
+    found = replace(cell([[0.1, 0.3], [0.1, -0.3]]), truth=np.array([[2.0, 0.0]] * 2))
+    assert np.isnan(found.rmse[1])
+    assert found.typical == pytest.approx(0.1)
+    assert list(found.losses().values()) == pytest.approx([np.log(0.1)] * 2)

@@ -4,7 +4,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from experiments.errors import ResultsError, StudyError
-from experiments.study import store as module
+from experiments.study import versions as module
 from experiments.study.shard import Shard, run_shard
 from experiments.study.store import Store
 
@@ -13,9 +13,9 @@ from experiments.study.store import Store
 def begun(small, tmp_path):
     """A study with its runs 3 to 5 and 9 to 17."""
     store = Store.new(small, tmp_path / "out")
-    store.begin()
-    for runs in (range(3, 6), range(9, 18)):
-        store.write(runs, run_shard(small, runs))
+    with store.held():
+        for runs in (range(3, 6), range(9, 18)):
+            store.write(runs, run_shard(small, runs))
     return store
 
 
@@ -72,8 +72,54 @@ def test_a_damaged_shard_is_named(begun):
 
 
 def test_two_processes_do_not_share_a_folder(begun):
-    with begun.locked(), pytest.raises(StudyError, match="another process is running the study"), begun.locked():
+    with begun.held(), pytest.raises(StudyError, match="another process is running the study"), begun.held():
         pass
+
+
+def test_a_study_that_came_into_the_folder_meanwhile_is_noticed(small, tmp_path):
+    """Both have looked, and found it empty; one begins."""
+    one, other = Store.new(small, tmp_path / "out"), Store.new(small.with_seeds(3), tmp_path / "out")
+    with one.held():
+        pass
+    with pytest.raises(StudyError, match="holds another study"), other.held():
+        pass
+
+
+def test_what_a_killed_process_left_half_written_goes(begun):
+    half = begun.folder / "shards" / ".runs-0000000000-0000000002.parquet.123"
+    half.write_bytes(b"half")
+    with begun.held():
+        assert not half.exists()
+
+
+def test_a_folder_that_cannot_be_written_is_told(small, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ResultsError, match="cannot write to"), Store.new(small, tmp_path / "file" / "out").held():
+        pass
+
+
+def test_shards_of_the_same_runs_and_of_other_names_are_refused(begun):
+    shards = begun.folder / "shards"
+    copy = shards / "runs-0000000003-0000000005 (copy).parquet"
+    copy.write_bytes(begun.shards()[0].read_bytes())
+    with pytest.raises(StudyError, match="is not the name of a shard: remove it"):
+        Store.open(begun.folder)
+    copy.rename(shards / "runs-0000000004-0000000006.parquet")
+    with pytest.raises(StudyError, match="hold the same runs: remove one"):
+        Store.open(begun.folder)
+    (shards / "runs-0000000004-0000000006.parquet").rename(shards / "runs-0000000006-0000000009.parquet")
+    with pytest.raises(StudyError, match="has 12 rows, its name and the study say 16"):
+        Store.open(begun.folder)
+
+
+def test_a_shard_with_damaged_pages_is_named(begun):
+    """The footer, which is looked at first, is whole."""
+    path = begun.shards()[0]
+    data = bytearray(path.read_bytes())
+    data[4:400] = bytes(396)
+    path.write_bytes(bytes(data))
+    with pytest.raises(StudyError, match=r"is damaged .*remove it"):
+        Store.open(begun.folder).table()
 
 
 def test_a_full_disk_keeps_the_finished_shards(begun, small, monkeypatch):
@@ -82,14 +128,14 @@ def test_a_full_disk_keeps_the_finished_shards(begun, small, monkeypatch):
 
     shard = run_shard(small, range(3))
     monkeypatch.setattr(pq, "write_table", full)
-    with pytest.raises(ResultsError, match=r"No space left on device; make room and go on: .* --resume"):
+    with pytest.raises(ResultsError, match=r"No space left on device; make room and go on with --resume"):
         begun.write(range(3), shard)
     assert len(list((begun.folder / "shards").iterdir())) == 2
 
 
 def test_every_shard_has_the_same_columns_even_if_all_its_runs_failed(small, tmp_path):
     store = Store.new(small, tmp_path / "out")
-    store.begin()
+    (store.folder / "shards").mkdir(parents=True)
     common = {"seed": 1, "encoder.lines": 2048, "chain.operator.cutoff": 4.0, "chain": "a", "estimator": "b", "model": "c"}
     store.write(range(1), Shard([{"run": 0, **common, "failure": "why"}]))
     store.write(range(1, 3), run_shard(small, range(1, 3)))

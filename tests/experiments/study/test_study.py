@@ -50,6 +50,37 @@ def test_a_part_of_another_kind_replaces_the_base_scenarios(content):
     assert study_from(content, "study").points[0].scenario.drive == AveragedDrive(bandwidth=500.0)
 
 
+def test_a_part_that_is_chosen_does_not_undo_what_is_set_in_it(content):
+    """Whatever the order of the axes."""
+    cutoff, stage = (
+        {"field": "chain.operator.cutoff", "values": [2.0, 4.5]},
+        {"field": "chain.operator", "values": ["fir", "iir"]},
+    )
+    for order in ([cutoff, stage], [stage, cutoff]):
+        methods = study_from(content | {"axes": order}, "study").methods
+        assert sorted((type(m.chain.operator).__name__, m.chain.operator.cutoff) for m in methods) == [
+            ("FirLowPass", 2.0),
+            ("FirLowPass", 4.5),
+            ("IirLowPass", 2.0),
+            ("IirLowPass", 4.5),
+        ]
+
+
+def test_values_are_numbers_or_words_but_not_both(content):
+    noise = study_from(axes(content, field="torque.noise", values=[0.1, [0.1, 0.01]]), "study").axes[0]
+    assert not noise.numeric
+    assert [noise.label(x) for x in noise.points] == ["0.1", "[0.1, 0.01]"]
+    assert Axis(field="x", values=[True, False]).numeric is False
+
+
+def test_every_combination_is_looked_at(content):
+    quintic = {"kind": "quintic", "waypoints": [[0.0, 0.0], [1.0, 1.0]], "durations": [1.0], "rest": 0.5}
+    random = content["settings"]["trajectory"]
+    study = study_from(axes(content, {"field": "trajectory", "values": [random, quintic]}), "study")
+    with pytest.raises(StudyError, match="needs a trajectory of kind random"):
+        _ = study.points
+
+
 def test_a_range_is_even(content):
     linear = Axis(field="fs", lowest=50.0, highest=200.0, count=4)
     log = Axis(field="fs", lowest=1.0, highest=1000.0, count=4, spacing="log")
@@ -109,6 +140,14 @@ def test_every_study_that_ships_can_be_run(name):
         ({"axes": [{"field": "fs", "lowest": 5.0, "highest": 1.0, "count": 3}]}, "lowest must be below highest"),
         ({"axes": [{"field": "fs", "lowest": 0.0, "highest": 1.0, "count": 3, "spacing": "log"}]}, "above 0"),
         ({"axes": [{"field": "fs", "lowest": 1.0, "highest": 2.0, "count": 10**9}]}, "count between 2 and"),
+        ({"axes": [{"field": "fs", "values": [100, 100.0]}]}, "a value stands twice"),
+        ({"axes": [{"field": "fs", "lowest": 100.0, "highest": 100.0001, "count": 5}]}, "a value stands twice"),
+        (
+            {"axes": [{"field": "fs", "values": [50.0], "also": ["chain.trim"]}]},
+            "mixes settings of simulation and identification",
+        ),
+        ({"axes": 3}, r"write \[\[axes\]\]"),
+        ({"axes": [{"field": "chain.operator", "values": [{"kind": "fir"}]}]}, "give names, among fir"),
         ({"axes": [{"field": "seed", "values": [1, 2]}]}, "an axis varies seed"),
         ({"axes": [{"field": "fs", "values": [50.0]}, {"field": "fs", "values": [60.0]}]}, "two axes vary fs"),
         ({"axes": [{"field": "chain.operatr.cutoff", "values": [1.0]}]}, r"no such setting \(did you mean 'operator'\?\)"),
