@@ -73,7 +73,7 @@ def cluster_pool(study: Study, scheduler: str | None, workers: int) -> Iterator[
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong we say ourselves, in one line
     with ExitStack() as stack:
         if scheduler is None:
-            options = {"host": "127.0.0.1", "dashboard_address": None, "silence_logs": logging.CRITICAL}
+            options = {"host": "127.0.0.1", "dashboard_address": "127.0.0.1:0", "silence_logs": logging.CRITICAL}
             with _deaf():
                 address = stack.enter_context(LocalCluster(n_workers=workers, threads_per_worker=1, **options))
         else:

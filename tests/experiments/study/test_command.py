@@ -142,7 +142,7 @@ def test_wrong_calls(done, file, tmp_path, complaint):
 
 def test_a_scheduler_may_be_anywhere(file, tmp_path, undisturbed):
     """Its workers have no part in the folder: rows travel."""
-    with LocalCluster(n_workers=1, threads_per_worker=2, host="127.0.0.1", dashboard_address=None) as cluster:
+    with LocalCluster(n_workers=1, threads_per_worker=2, host="127.0.0.1", dashboard_address="127.0.0.1:0") as cluster:
         scheduler = cluster.scheduler_address
         assert main(["study", str(file), "--scheduler", scheduler, "--out", str(tmp_path / "out")]) == 0
     assert Store.open(tmp_path / "out").table().equals(undisturbed)

@@ -93,7 +93,7 @@ def test_a_cluster_that_goes_is_told_in_one_line(small, tmp_path, run_study):
             cluster.close()
             return future
 
-    with LocalCluster(n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as cluster:
+    with LocalCluster(n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0") as cluster:
         address = cluster.scheduler_address
         with (
             pytest.raises(StudyError, match=r"the workers are lost .* go on with --resume"),
