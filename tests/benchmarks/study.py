@@ -2,8 +2,8 @@
 
     uv run --extra cluster python tests/benchmarks/study.py [RUNS] [MOVES]
 
-Averaged drive, 16-bit encoders, PD loop at 100 Hz, every run with a motion of its own. Both take the same threads, and take
-turns, shard by shard of the bare steps, so that the ratio holds when the machine's speed drifts. Then 256 runs on two worker
+Averaged drive, 14- and 16-bit encoders, PD loop at 100 Hz, every run with a motion of its own. Both take the same threads; half
+of the bare steps come before the study and half after, so that the ratio holds when the machine's speed drifts. Then 256 runs on two worker
 processes. Peak memory is that of this process.
 """
 
@@ -60,8 +60,7 @@ def timed(runs: int, workers: int, report: bool) -> tuple[float, float]:
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
         store = Store.new(described, Path(folder) / "out")
-        with cluster_pool(described, None, workers) if workers else local_pool(described, THREADS) as pool:
-            store.begin()
+        with cluster_pool(described, None, workers) if workers else local_pool(described, THREADS) as pool, store.held():
             run_missing(store, pool, SHARD, lambda done: None)
         took = time.perf_counter() - start
         if report:
