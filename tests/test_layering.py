@@ -23,7 +23,7 @@ ALLOWED_IN = {
     "experiments/study/study.py": {"pydantic"},
     "experiments/study/store.py": {"pyarrow", "tomli_w"},
     "experiments/study/engine.py": {"threadpoolctl"},
-    "experiments/study/cluster.py": {"threadpoolctl", "distributed"},
+    "experiments/study/cluster.py": {"threadpoolctl", "dask", "distributed"},
     "experiments/study/statistics.py": {"scipy"},
     "experiments/study/figures.py": {"matplotlib"},
     "experiments/study/report.py": {"jinja2", "tomli_w"},

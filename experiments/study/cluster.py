@@ -24,6 +24,14 @@ PATIENCE = 10.0
 """How long [s] a scheduler may take to answer."""
 
 
+QUIET = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "5s",
+    "distributed.admin.system-monitor.interval": "10s",
+}
+"""What Dask's workers on this machine leave: each look at their own threads stops the simulation for a moment, 6 % in all."""
+
+
 class ClusterPool:
     """Shards on the workers of a Dask cluster, each on one thread; a lost worker's shards go to others.
 
@@ -64,6 +72,7 @@ def cluster_pool(study: Study, scheduler: str | None, workers: int) -> Iterator[
         If Dask is not installed, or the scheduler cannot be reached.
     """
     try:
+        import dask
         from distributed import CancelledError, Client, KilledWorker, LocalCluster
         from distributed.comm.core import CommClosedError
     except ImportError as error:
@@ -74,8 +83,10 @@ def cluster_pool(study: Study, scheduler: str | None, workers: int) -> Iterator[
     with ExitStack() as stack:
         if scheduler is None:
             options = {"host": "127.0.0.1", "dashboard_address": "127.0.0.1:0", "silence_logs": logging.CRITICAL}
-            with _deaf():
-                address = stack.enter_context(LocalCluster(n_workers=workers, threads_per_worker=1, **options))
+            with _deaf(), dask.config.set(QUIET):
+                address = stack.enter_context(
+                    LocalCluster(n_workers=workers, threads_per_worker=1, memory_limit=None, **options)
+                )
         else:
             address = scheduler
         try:
@@ -96,7 +107,7 @@ def _require_workers(client: "Client") -> None:
         sys.stderr.write("idbench: the scheduler has no workers yet; waiting for the first\n")
         client.wait_for_workers(1)
     try:
-        for worker, theirs in client.run(versions).items():
+        for worker, theirs in client.run(ready).items():
             require_versions(theirs, f"worker {worker}")
     except (ModuleNotFoundError, AttributeError) as error:
         raise StudyError(f"the workers have no idbench, or another version of it: {error}") from error
@@ -110,6 +121,11 @@ def _deaf() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def ready() -> dict[str, str]:
+    """Return the versions of a worker, which has loaded all that it needs when it answers."""
+    return versions()
 
 
 def compute(text: str, first: int, stop: int, theirs: dict[str, str]) -> Shard:
