@@ -21,6 +21,7 @@ ALLOWED_IN = {
     "identify/log_file.py": {"pyarrow"},
     "sim/scenario_file.py": {"tomli_w"},
     "experiments/study/study.py": {"pydantic"},
+    "experiments/study/shard_file.py": {"pyarrow"},
     "experiments/study/store.py": {"pyarrow", "tomli_w"},
     "experiments/study/engine.py": {"threadpoolctl"},
     "experiments/study/cluster.py": {"threadpoolctl", "dask", "distributed"},

@@ -70,7 +70,7 @@ def test_a_worker_with_another_version_is_refused(small):
 
 
 def test_workers_with_another_version_are_refused_before_anything_is_run(small, monkeypatch):
-    monkeypatch.setattr(cluster, "versions", lambda: {"idbench": "0.0"})
+    monkeypatch.setattr(cluster, "ready", lambda: {"idbench": "0.0"})
     with pytest.raises(StudyError, match=r"worker tcp.* has idbench 0\.0 \(here "), cluster_pool(small, None, 1):
         pass
 
