@@ -26,6 +26,7 @@ ALLOWED_IN = {
     "experiments/study/engine.py": {"threadpoolctl"},
     "experiments/study/cluster.py": {"threadpoolctl", "dask", "distributed"},
     "experiments/study/statistics.py": {"scipy"},
+    "experiments/study/comparison.py": {"scipy"},
     "experiments/study/figures.py": {"matplotlib"},
     "experiments/study/report.py": {"jinja2", "tomli_w"},
 }

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from experiments.study.statistics import Cell, differences
+from experiments.study.comparison import differences
+from experiments.study.statistics import Cell
 
 SURE = 0.01
 """Probability below which two ways of identification count as different."""

@@ -12,8 +12,9 @@ from jinja2 import Environment
 
 from experiments.study.answer import answer, grouped, method, percent, short, value, where
 from experiments.study.axis import Axis
+from experiments.study.comparison import differences
 from experiments.study.figures import cost_figure, coverage_figure, error_figure
-from experiments.study.statistics import Cell, differences
+from experiments.study.statistics import Cell
 from experiments.study.study import Study
 from experiments.study.versions import versions
 from experiments.tables import percent as signed

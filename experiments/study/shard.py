@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from experiments.identified import BASES
-from experiments.study.study import Method, Study
+from experiments.study.method import Method
+from experiments.study.study import Study
 from identify import Estimate, IdentificationError, Status, identify_each
 from sim.engine import Progress, simulate
 from sim.errors import BenchError

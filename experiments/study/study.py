@@ -2,10 +2,9 @@
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product
 from math import prod
 from typing import Annotated, Any, Literal, final
 
@@ -15,7 +14,8 @@ from pydantic import Field
 from experiments.errors import StudyError
 from experiments.identified import BASES
 from experiments.study.axis import Axis, Setting
-from identify import CHAINS, ESTIMATORS, MODELS, AbstractEstimator, AbstractModel, Chain
+from experiments.study.method import Method, combinations, methods_of, whole_first
+from identify import MODELS, AbstractModel
 from sim.scenario import Scenario
 from sim.scenario_file import from_dict
 from sim.settings import Seed, Whole, settings
@@ -33,26 +33,6 @@ class Point:
 
     scenario: Scenario
     settings: tuple[Setting, ...]
-
-
-@dataclass(frozen=True)
-class Method:
-    """One combination of chain, estimator and their settings; all models of a study are identified with it."""
-
-    chain_name: str
-    estimator_name: str
-    chain: Chain
-    estimator: AbstractEstimator
-    settings: tuple[Setting, ...]
-
-    @property
-    def names(self) -> tuple[str, str]:
-        """Of chain and estimator."""
-        return self.chain_name, self.estimator_name
-
-    def fits(self, settings: Mapping[str, Any]) -> bool:
-        """Return whether this method has the values of the axes, where they are told."""
-        return all(settings.get(s.axis.field, s.label) == s.label for s in self.settings)
 
 
 @final
@@ -119,24 +99,16 @@ class Study:
             raise StudyError("motion = 'drawn' has no way to the start: leave out start, or motion = 'shared'")
 
     def _points(self) -> Iterator[Point]:
-        for combination in _combinations([axis for axis in self.axes if not axis.identification]):
+        for combination in combinations([axis for axis in self.axes if not axis.identification]):
             content = json.loads(json.dumps(self.scenario))
-            for setting in _whole_first(combination):
+            for setting in whole_first(combination):
                 setting.into(content)
             yield Point(from_dict(content), combination)
 
     @cached_property
     def methods(self) -> tuple[Method, ...]:
         """The grid of identifications."""
-        return tuple(self._methods())
-
-    def _methods(self) -> Iterator[Method]:
-        combinations = list(_combinations([axis for axis in self.axes if axis.identification]))
-        for name, way, combination in product(self.chains, self.estimators, combinations):
-            chain, estimator = CHAINS.create(name), ESTIMATORS.create(way)
-            for setting in _whole_first(combination):
-                chain, estimator = setting.chain(chain), setting.estimator(estimator)
-            yield Method(name, way, chain, estimator, combination)
+        return tuple(methods_of(self.chains, self.estimators, [axis for axis in self.axes if axis.identification]))
 
     @cached_property
     def created_models(self) -> dict[str, AbstractModel]:
@@ -197,18 +169,8 @@ class Study:
         return {**plain, **lists, "axes": axes, "scenario": self.scenario}
 
 
-def _whole_first(combination: tuple[Setting, ...]) -> list[Setting]:
-    """Return settings such that a part that is replaced whole does not undo a setting of that part."""
-    return sorted(combination, key=lambda setting: setting.axis.field.count("."))
-
-
 def _random(scenario: Scenario) -> RandomMoves:
     """Return the trajectory of a scenario whose motion can be drawn."""
     if not isinstance(scenario.trajectory, RandomMoves):
         raise StudyError("motion = 'drawn' needs a trajectory of kind random: write one, or motion = 'shared'")
     return scenario.trajectory
-
-
-def _combinations(axes: list[Axis]) -> Iterator[tuple[Setting, ...]]:
-    """Yield every combination of the axes' values, the last axis fastest."""
-    return product(*([Setting(axis, value) for value in axis.points] for axis in axes))

@@ -7,7 +7,8 @@ import pytest
 from scipy import stats
 
 from experiments.study.answer import answer
-from experiments.study.statistics import Cell, cells, differences
+from experiments.study.comparison import differences
+from experiments.study.statistics import Cell, cells
 
 TRUTH = np.array([2.0, -0.5])
 

@@ -1,0 +1,48 @@
+"""How the runs of a study are identified: chain, estimator, and their settings."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+from experiments.study.axis import Axis, Setting
+from identify import CHAINS, ESTIMATORS, AbstractEstimator, Chain
+
+
+@dataclass(frozen=True)
+class Method:
+    """One combination of chain, estimator and their settings; all models of a study are identified with it."""
+
+    chain_name: str
+    estimator_name: str
+    chain: Chain
+    estimator: AbstractEstimator
+    settings: tuple[Setting, ...]
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Of chain and estimator."""
+        return self.chain_name, self.estimator_name
+
+    def fits(self, settings: Mapping[str, Any]) -> bool:
+        """Return whether this method has the values of the axes, where they are told."""
+        return all(settings.get(s.axis.field, s.label) == s.label for s in self.settings)
+
+
+def methods_of(chains: Sequence[str], estimators: Sequence[str], axes: Sequence[Axis]) -> Iterator[Method]:
+    """Yield every combination of chains, estimators and the values of axes."""
+    for name, way, combination in product(chains, estimators, list(combinations(axes))):
+        chain, estimator = CHAINS.create(name), ESTIMATORS.create(way)
+        for setting in whole_first(combination):
+            chain, estimator = setting.chain(chain), setting.estimator(estimator)
+        yield Method(name, way, chain, estimator, combination)
+
+
+def combinations(axes: Sequence[Axis]) -> Iterator[tuple[Setting, ...]]:
+    """Yield every combination of the axes' values, the last axis fastest."""
+    return product(*([Setting(axis, value) for value in axis.points] for axis in axes))
+
+
+def whole_first(combination: tuple[Setting, ...]) -> list[Setting]:
+    """Return settings such that a part that is replaced whole does not undo a setting of that part."""
+    return sorted(combination, key=lambda setting: setting.axis.field.count("."))
