@@ -49,8 +49,11 @@ def write_whole(path: Path, text: str) -> None:
     try:
         number, beside = tempfile.mkstemp(prefix=".idbench-", dir=path.parent)
         try:
-            with os.fdopen(number, "w") as file:
+            with os.fdopen(number, "w", encoding="utf-8") as file:
                 file.write(text)
+            umask = os.umask(0)
+            os.umask(umask)
+            Path(beside).chmod(0o666 & ~umask)  # temporary files are the owner's alone
             Path(beside).replace(path)
         finally:
             Path(beside).unlink(missing_ok=True)

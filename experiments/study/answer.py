@@ -1,6 +1,7 @@
 """The answer of a study, in two sentences, computed from its cells."""
 
 from collections.abc import Sequence
+from math import comb
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,11 @@ def _who(cells: Sequence[Cell]) -> str:
     )
     if len(cells) == len(groups):
         return f"With the {best[0].names[2]} model {span}."
+    if 2 * 0.5 ** max(cell.runs for cell in cells) * comb(len(groups[0]), 2) >= SURE:
+        least = [method(cell, cells) for cell in best]
+        winner = max(dict.fromkeys(least), key=least.count)
+        share = f"{least.count(winner)} of {len(groups)} combinations"
+        return f"Least error in {share}: {winner} (too few runs for a test); {span}."
     names = [_not_worse(group, cell, cells) for group, cell in zip(groups, best, strict=True)]
     winners = max(dict.fromkeys(names), key=names.count)
     tie = f", with no sure difference between them (p >= {SURE:g})" if len(winners) > 1 else f", surely so (p < {SURE:g})"
@@ -69,11 +75,12 @@ def _sigmas(cells: Sequence[Cell]) -> str:
         ours, theirs = (100 * np.array([c.coverage(getattr(c, which)) for c in mine]) for which in ("sigma", "paper_sigma"))
         if not np.isfinite(ours).any():
             continue
-        spans = f"{np.nanmean(ours):.0f} % ({np.nanmin(ours):.0f} to {np.nanmax(ours):.0f} %)", f"{np.nanmean(theirs):.0f} %"
-        shares.append(f"{spans[0]} of cases{f' in chain {chain}' if len(chains) > 1 else ''}, two of the paper's in {spans[1]}")
+        span = f"single parameters {np.nanmin(ours):.0f} to {np.nanmax(ours):.0f} %"
+        told = f" with chain {chain}" if len(chains) > 1 else ""
+        shares.append(f"{np.nanmean(ours):.0f} %{told} ({span}; the paper's sigma {np.nanmean(theirs):.0f} %)")
     if not shares:
         return "There is no corrected sigma."
-    return f"Two corrected sigma hold the truth in {'; '.join(shares)} (lowest to highest of single parameters; 95 % is right)."
+    return f"Two corrected sigma hold the truth in {' and '.join(shares)} of cases, where 95 % is right."
 
 
 def failures(cells: Sequence[Cell]) -> str:

@@ -30,7 +30,7 @@ def error_figure(cells: Sequence[Cell], axis: Axis) -> str:
     for p, (name, panel) in enumerate(panels.items()):
         for model, group in _models(cells).items():
             x, color, wide = _places(panel, group, axis), _color(model), _width(cells, model)
-            panel.plot(x, [100 * c.deviation[p] for c in group], color=color, label=f"{model}: spread", lw=wide)
+            panel.plot(x, [100 * c.deviation[p] for c in group], color=color, label=f"{model}: spread", lw=wide, marker=".")
             bias = np.array([100 * abs(c.bias[p]) for c in group])
             panel.plot(x, bias, color=color, ls=":", label=f"{model}: |bias|", lw=wide)
             sure = np.array([abs(c.bias[p]) > c.bias_margin[p] for c in group])
@@ -44,15 +44,17 @@ def coverage_figure(cells: Sequence[Cell], axis: Axis) -> str:
     """Return the share of truths within two sigma against an axis: corrected, and the paper's."""
     figure, panels = _panels(cells[0].parameters)
     for p, (name, panel) in enumerate(panels.items()):
-        panel.axhline(95.4, color="black", lw=0.7)
+        panel.axhline(95.4, color="black", lw=1.0, ls="--")
         for model, group in _models(cells).items():
             x, color, wide = _places(panel, group, axis), _color(model), _width(cells, model)
             low, high = (np.array([100 * c.coverage_interval(c.sigma)[p, i] for c in group]) for i in (0, 1))
-            panel.plot(x, [100 * c.coverage(c.sigma)[p] for c in group], color=color, label=f"{model}: corrected", lw=wide)
-            panel.fill_between(x, low, high, color=color, alpha=0.15, lw=0)
+            panel.plot(
+                x, [100 * c.coverage(c.sigma)[p] for c in group], color=color, label=f"{model}: corrected", lw=wide, marker="."
+            )
+            panel.fill_between(x, low, high, color=color, alpha=0.08, lw=0)
             paper = [100 * c.coverage(c.paper_sigma)[p] for c in group]
             panel.plot(x, paper, color=color, ls=":", label=f"{model}: paper's", lw=wide)
-        panel.set_ylim(top=103)
+        panel.set_ylim(-3, 103)
         panel.set_title(name)
     return _finished(figure, panels, axis.field, f"truth within {SIGMAS:g} sigma [%]")
 

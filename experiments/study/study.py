@@ -46,7 +46,7 @@ class Study:
     """What it is to answer."""
     scenario: dict[str, Any]
     """The scenario: name of one that ships, path of a file (TOML), or a table."""
-    axes: Annotated[tuple[Axis, ...], Field(min_length=1)]
+    axes: tuple[Axis, ...]
     """What varies: the grid is every combination."""
     seeds: Annotated[Whole, Field(ge=2)] = 32
     """Independent runs of every combination."""
@@ -62,6 +62,8 @@ class Study:
     """Names of estimators."""
 
     def __post_init__(self) -> None:
+        if not self.axes:
+            raise StudyError("axes is empty: write [[axes]], with a field and values")
         every = [field for axis in self.axes for field in axis.all_fields]
         if twice := {field for field in every if every.count(field) > 1}:
             raise StudyError(f"two axes vary {', '.join(sorted(twice))}")

@@ -10,7 +10,7 @@ from experiments.errors import StudyError
 from experiments.study.study import Study
 from sim.errors import ScenarioError
 from sim.scenario_file import from_dict, load, to_dict
-from sim.settings import make
+from sim.settings import fields_of, make
 
 FOLDER = Path(__file__).parent.parent / "studies"
 
@@ -48,11 +48,21 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 def study_from(content: dict[str, Any], what: str) -> Study:
     """Make a study from the keys of a TOML document, its scenario written out in full; raise StudyError."""
-    made = dict(content)
+    made, known = dict(content), [*fields_of(Study), "settings"]
     try:
+        for key in made:
+            if key not in known:
+                near = get_close_matches(key, known, 1)
+                hint = f" (did you mean {near[0]!r}?)" if near else ""
+                raise StudyError(f"unknown key {key!r}{hint}; known: {', '.join(known)}")
+        if "scenario" not in made:
+            raise StudyError("key 'scenario' is missing: the name of a scenario, a file (TOML), or a table")
         made["scenario"] = _scenario(made.get("scenario"), made.pop("settings", {}))
         if not isinstance(made.get("axes", []), (list, tuple)):
             raise StudyError("axes must be tables: write [[axes]], with a field and values, for each")
+        for axis in made.get("axes", ()):
+            if isinstance(axis, dict) and not isinstance(axis.get("values", []), (list, tuple)):
+                raise StudyError(f"axis {axis.get('field')}: values = {axis['values']!r:.60} must be a list, [ ... ]")
         made["axes"] = tuple(made.get("axes", ()))
         study: Study = make(Study, made, "")
     except ScenarioError as error:

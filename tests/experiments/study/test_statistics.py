@@ -125,6 +125,8 @@ def test_the_answer_names_the_better_model_and_both_sigmas(rng):
     said = answer([group[0], worse[0], group[1], worse[1]])
     assert said.startswith("Best in 2 of 2 combinations: explicit, surely so (p < 0.01)")
     assert said.count(". ") == 1  # two sentences
+    few = [cell(error[:4], "explicit"), cell(3 * error[:4], "power")]
+    assert answer(few).startswith("Least error in 1 of 1 combinations: explicit (too few runs for a test)")
     assert "Two corrected sigma hold the truth in" in said
 
 

@@ -1,6 +1,8 @@
 """What a study makes of its file: runs, seeds, methods; and what it refuses."""
 
 import itertools
+import re
+import tomllib
 
 import numpy as np
 import pytest
@@ -128,7 +130,9 @@ def test_every_study_that_ships_can_be_run(name):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"axes": []}, "axes"),
+        ({"axes": []}, "axes is empty"),
+        ({"axes": [{"field": "fs", "values": 50.0}]}, r"axis fs: values = 50.0 must be a list"),
+        ({"setings": {}}, r"unknown key 'setings' \(did you mean 'settings'\?\)"),
         ({"axes": [{"field": "encoder.lines"}]}, "axis encoder.lines is empty: give values"),
         ({"axes": [{"field": "encoder.lines", "values": []}]}, "is empty"),
         ({"axes": [{"field": "encoder.line", "values": [1]}]}, r"unknown key 'encoder.line' \(did you mean 'lines'\?\)"),
@@ -181,3 +185,16 @@ def test_a_combination_that_makes_no_sense_is_refused(content):
 def test_there_is_no_run_beyond_the_last(small):
     with pytest.raises(StudyError, match="run 18 does not exist: the study 'small' has runs 0 to 17"):
         small.scenario_of(18)
+
+
+def test_a_missing_scenario_is_said_to_be_missing(content):
+    del content["scenario"]
+    with pytest.raises(StudyError, match="key 'scenario' is missing"):
+        study_from(content, "study")
+
+
+def test_the_example_of_the_docs_is_a_study(root):
+    (example,) = re.findall(r"```toml\n(.*?)```", (root / "docs" / "studies.md").read_text(), re.DOTALL)
+    study = study_from(tomllib.loads(example), "study")
+    assert study.size == 3 * 3 * 64
+    assert len(study.methods) == 2
