@@ -14,7 +14,6 @@ from experiments.app import app
 from experiments.errors import StudyError
 from experiments.interruption import importing
 from experiments.page import new_page, show
-from experiments.study_progress import watching
 
 if TYPE_CHECKING:
     from experiments.study.store import Store
@@ -58,6 +57,7 @@ def study(  # noqa: PLR0913, PLR0917  # the options of a command
     os.environ.setdefault("RUST_LOG", "off")  # what goes wrong in rerun we say ourselves, in one line
     with importing():
         from experiments.study.engine import run_missing
+        from experiments.study.progress import watching
         from experiments.study.results import write_results
     page = new_page()
     if study is None and resume is None:

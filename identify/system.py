@@ -171,7 +171,6 @@ class System:
             group=np.concatenate([s.group for s in systems]),
             parameters=first.parameters,
             carriers=tuple(carrier for s in systems for carrier in s.carriers),
-            levels=first.levels,
         )
 
     def weighted(self, weight: Array) -> Self:

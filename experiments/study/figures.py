@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from experiments.recording.style import FORMS
 from experiments.study.answer import value
 from experiments.study.axis import Axis
-from experiments.study.statistics import SIGMAS, Cell
+from experiments.study.statistics import RIGHT, SIGMAS, Cell
 from identify import Array
 
 OTHER = [90, 90, 90]
@@ -44,7 +44,7 @@ def coverage_figure(cells: Sequence[Cell], axis: Axis) -> str:
     """Return the share of truths within two sigma against an axis: corrected, and the paper's."""
     figure, panels = _panels(cells[0].parameters)
     for p, (name, panel) in enumerate(panels.items()):
-        panel.axhline(95.4, color="black", lw=1.0, ls="--")
+        panel.axhline(100 * RIGHT, color="black", lw=1.0, ls="--")
         for model, group in _models(cells).items():
             x, color, wide = _places(panel, group, axis), _color(model), _width(cells, model)
             low, high = (np.array([100 * c.coverage_interval(c.sigma)[p, i] for c in group]) for i in (0, 1))

@@ -15,11 +15,13 @@ CONFIDENCE = 0.95
 """Of every interval."""
 
 SIGMAS = 2.0
-"""Coverage is the share of truths inside this many sigma of the estimate; 95.4 % if sigma is right and errors are normal."""
+"""Coverage is the share of truths inside this many sigma of the estimate."""
+
+RIGHT = float(2 * stats.norm.cdf(SIGMAS) - 1)
+"""Coverage if sigma is right and errors are normal."""
 
 LEAST = 1e-16
 """Relative error that counts as none: logarithms of 0 would say too much of rounding."""
-
 
 NUMBER = re.compile(r"\d[\d.,e+-]*")
 
@@ -103,15 +105,19 @@ class Cell:
 
     def coverage(self, sigma: Array) -> Array:
         """Return the share of truths within SIGMAS `sigma` of the estimate, of the runs that have one, shape (p,)."""
-        inside, known = np.abs(self.X - self.truth) <= SIGMAS * sigma, np.isfinite(sigma).sum(axis=0)
-        return np.where(known > 0, inside.sum(axis=0) / np.maximum(known, 1), np.nan)
+        inside, known = self._inside(sigma)
+        return np.where(known > 0, inside / np.maximum(known, 1), np.nan)
 
     def coverage_interval(self, sigma: Array) -> Array:
         """Return the confidence interval of the coverage (Wilson), shape (p, 2)."""
-        inside, known = np.abs(self.X - self.truth) <= SIGMAS * sigma, np.isfinite(sigma).sum(axis=0)
-        pairs = zip(inside.sum(axis=0).tolist(), known.tolist(), strict=True)
+        pairs = zip(*(counts.tolist() for counts in self._inside(sigma)), strict=True)
         found = [stats.binomtest(k, n).proportion_ci(CONFIDENCE, "wilson") if n else None for k, n in pairs]
         return np.array([(i.low, i.high) if i else (np.nan, np.nan) for i in found])
+
+    def _inside(self, sigma: Array) -> tuple[np.typing.NDArray[np.int64], np.typing.NDArray[np.int64]]:
+        """Return how many truths lie within SIGMAS `sigma`, and how many have a sigma, shape (p,) each."""
+        inside = np.abs(self.X - self.truth) <= SIGMAS * sigma
+        return inside.sum(axis=0), np.isfinite(sigma).sum(axis=0)
 
     def losses(self) -> dict[int, float]:
         """Return, of each run, the mean over the parameters of log |relative error|."""

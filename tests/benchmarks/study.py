@@ -40,7 +40,7 @@ def study(runs: int) -> Study:
 
 
 def bare(described: Study, runs: int) -> float:
-    """Return how long bare steps of as many simulations take [s], in batches of a shard for each thread."""
+    """Return how long bare steps of as many simulations take [s]."""
     scenario = described.scenario_of(0)
     model = copy(scenario.real_robot.model)
     model.opt.timestep, model.opt.integrator = 0.001, mujoco.mjtIntegrator.mjINT_RK4
@@ -69,7 +69,7 @@ def timed(runs: int, workers: int, report: bool) -> tuple[float, float]:
             print(f"  report, recording and summary: {time.perf_counter() - start - took - up:.1f} s more")
         seconds = store.seconds()
         print(f"  start {up:.1f} s, not in the ratio below")
-        print(f"  {', '.join(f'{what} {s:.1f} s' for what, s in seconds.items())} of processor time")
+        print(f"  {', '.join(f'{what} {s:.1f} s' for what, s in seconds.items())} of the threads' time")
     return took, before + bare(described, runs - runs // 2)
 
 
