@@ -14,10 +14,11 @@ import experiments.log_commands
 import experiments.run_commands
 import experiments.study_commands  # noqa: F401  # all register their commands
 from experiments.app import app
+from experiments.audience import Watched, Watching
 from experiments.errors import ExperimentError
 from experiments.interruption import INTERRUPTED, importing, terminating
-from experiments.page import new_page, show
-from experiments.results import results_folder, write_summary, write_whole
+from experiments.page import new_page, show, shown
+from experiments.results import results_folder, tell_of, write_recording, write_summary, write_whole
 from experiments.search import Search
 from identify import IdentificationError
 from identify.log_file import write_log
@@ -34,7 +35,13 @@ File = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
 
 
 @app.command(name="table1")
-def table1(out: Path = Path("runs/table1"), chain: str = "both", seed: Seed = None, scenario: Name = None) -> None:
+def table1(
+    out: Path = Path("runs/table1"),
+    chain: str = "both",
+    seed: Seed = None,
+    scenario: Name = None,
+    watching: Watched = Watching(),  # noqa: B008  # frozen
+) -> None:
     """Reproduce the paper's simulation comparison (Table 1) and record it.
 
     Args:
@@ -42,25 +49,28 @@ def table1(out: Path = Path("runs/table1"), chain: str = "both", seed: Seed = No
         chain: Signal processing: both, or the name of one chain (paper, idbench, ...).
         seed: Search another trajectory from this seed instead of taking the one that ships.
         scenario: Name of a scenario, or a file (TOML), as `idbench search` writes it, instead of the one that ships.
+        watching: How it is watched.
     """
-    os.environ.setdefault("RUST_LOG", "off")  # what goes wrong in rerun we say ourselves, in one line
     with importing():
-        from experiments.recording.table1 import record_table1
         from experiments.report import print_table1
         from experiments.table1 import SCENARIO, Table1
 
     if seed is not None and scenario is not None:
         raise ExperimentError(f"--seed {seed} and --scenario {scenario} name two trajectories: give one")
     chains = ("paper", "idbench") if chain == "both" else (chain,)
-    page = new_page()
-    with results_folder(out) as folder:
-        table = Table1(load(scenario or SCENARIO) if seed is None else _search(seed), chains)
-        print_table1(page, table)
-        page.print(f"written to {out}; see it: uv run idbench view {out}", soft_wrap=True)
-        write_log(table.log, folder / "log.parquet")
-        record_table1(folder / "recording.rrd", table)
-        write_summary(folder / "summary.json", table.summary())
-    show(page)
+    page, lost = new_page(), ""
+    with watching.audience() as audience, shown(page):
+        with results_folder(out) as folder:
+            table = Table1(load(scenario or SCENARIO) if seed is None else _search(seed), chains)
+            print_table1(page, table)
+            write_log(table.log, folder / "log.parquet")
+            write_summary(folder / "summary.json", table.summary())
+            if watching.rerun:
+                from experiments.recording.table1 import record_table1
+
+                lost = write_recording(folder, record_table1(table, audience))
+        tell_of(lost, out)
+        page.print(f"written to {out}{watching.hint(out)}", soft_wrap=True)
 
 
 @app.command(name="search")
@@ -90,15 +100,25 @@ def list_plugins() -> None:
 
 
 @app.command(name="view")
-def view(folder: tyro.conf.Positional[Path]) -> None:
-    """Open the recording of a results folder in the rerun viewer.
+def view(folder: tyro.conf.Positional[Path], tab: str = "overview", save: File = None) -> None:
+    """Open the recording of a results folder, with all its layers, in the rerun viewer.
 
     Args:
         folder: Results folder, or a recording (.rrd).
+        tab: What is in front: overview, friction, drive, filters, excitation or parameters.
+        save: Write the recording and its layers to one file (.rrd) instead, to be taken elsewhere.
     """
-    from experiments.viewer import view as open_viewer
+    with importing():
+        from experiments.viewer import save as save_as
+        from experiments.viewer import view as open_viewer
 
-    open_viewer(folder)
+    if save is None:
+        open_viewer(folder, tab)
+        return
+    page = new_page()
+    save_as(folder, tab, save)
+    page.print(f"written to {save}", soft_wrap=True)
+    show(page)
 
 
 def _search(seed: int) -> Scenario:

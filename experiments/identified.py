@@ -76,6 +76,11 @@ class Identified:
         return chain if self.trim is None else replace(chain, trim=self.trim)
 
     @property
+    def label(self) -> str:
+        """What tells this identification from others of the same log."""
+        return f"{self.chain}-{self.estimator}"
+
+    @property
     def solver(self) -> AbstractEstimator:
         """The estimator."""
         return self.method[1] if self.method else ESTIMATORS.create(self.estimator)

@@ -1,21 +1,26 @@
 """Commands that work on logs."""
 
-import os
+import json
 import shlex
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 import tyro
+from rich.console import Console
 
 from experiments.app import app
+from experiments.audience import Audience, Watched, Watching
 from experiments.errors import ExperimentError
 from experiments.interruption import importing
-from experiments.page import new_page, show
-from experiments.results import results_folder, write_summary
+from experiments.page import new_page, show, shown
+from experiments.results import results_folder, tell_of, write_recording, write_summary
 from identify import MODELS, Basis, Chain, MotionLog, TimeError, TorqueChannel
 from identify.log_file import read_columns, read_log, write_log
+
+if TYPE_CHECKING:
+    from experiments.identified import Identified
 
 Meaning = Literal["held", "instantaneous", "averaged"]
 File = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
@@ -33,11 +38,12 @@ def identify(  # noqa: PLR0913, PLR0917  # the options of a command
     model: str = "all",
     estimator: str = "WLS",
     out: File = None,
+    watching: Watched = Watching(),  # noqa: B008  # frozen
 ) -> None:
     """Identify a log: CSV or Parquet with the columns t, q1, q2, ..., tau1, tau2, ... in SI units.
 
     Args:
-        log: The file; its times uniform to 1 %.
+        log: The file; its times uniform to 1 %. Or the folder of a run, whose recording gets a layer of this identification.
         robot: Name of the robot.
         torque: What a torque sample means: held from its sample on for a period (a controller's command), the torque at an
             instant (a measurement), or the mean over a period. Asked for unless the file says it.
@@ -46,28 +52,71 @@ def identify(  # noqa: PLR0913, PLR0917  # the options of a command
         model: all, explicit, implicit or power.
         estimator: OLS, WLS, ...
         out: Folder for summary.json, recording.rrd and log.parquet.
+        watching: How it is watched.
     """
-    os.environ.setdefault("RUST_LOG", "off")  # what goes wrong in rerun we say ourselves, in one line
     with importing():
         from experiments.identified import Identified
         from experiments.tables import print_identified
 
     page, models = new_page(), tuple(MODELS) if model == "all" else (model,)
     named = Identified((), robot, models=models, chain=chain, estimator=estimator)  # complains of names first
-    known, said = _read(log, torque, torque_delay, named.basis, named.processing)
-    found = replace(named, logs=(known,))
-    print_identified(page, found, str(log))
-    if said:
-        page.print(said)
-    if out is not None:
-        from experiments.recording.identified import record_log
+    known, said = _read(_file(log), torque, torque_delay, named.basis, named.processing)
+    found = replace(named, logs=(known,), truth=_truth(log, named))
+    with watching.audience() as audience, shown(page):
+        print_identified(page, found, str(log))
+        if said:
+            page.print(said)
+        if out is not None:
+            _write_results(page, out, log.name, found, watching, audience)
+        elif log.is_dir() and watching.rerun:
+            from experiments.recording.identified import add_layer
 
-        with results_folder(out) as folder:
-            write_log(known, folder / "log.parquet")
-            record_log(folder / "recording.rrd", found)
-            write_summary(folder / "summary.json", {"experiment": "identify", "log": log.name, **found.summary()})
-        page.print(f"written to {out}; see it: uv run idbench view {out}", soft_wrap=True)
-    show(page)
+            with results_folder(log) as folder:
+                lost = write_recording(folder, add_layer(log, found, audience))
+            tell_of(lost, log)
+            page.print(f"added to the recording in {log}{watching.hint(log)}", soft_wrap=True)
+        elif audience:
+            from experiments.recording.identified import record_log
+
+            for _, stream in record_log(found, audience):
+                stream.close()
+
+
+def _write_results(
+    page: Console, out: Path, name: str, found: "Identified", watching: Watching, audience: Audience | None
+) -> None:
+    lost = ""
+    with results_folder(out) as folder:
+        write_log(found.logs[0], folder / "log.parquet")
+        write_summary(folder / "summary.json", {"experiment": "identify", "log": name, **found.summary()})
+        if watching.rerun:
+            from experiments.recording.identified import record_log
+
+            lost = write_recording(folder, record_log(found, audience))
+    tell_of(lost, out)
+    page.print(f"written to {out}{watching.hint(out)}", soft_wrap=True)
+
+
+def _file(log: Path) -> Path:
+    """Return the log of a results folder, or the log itself."""
+    if not log.is_dir():
+        return log
+    if not (log / "log.parquet").is_file():
+        raise ExperimentError(f"there is no log.parquet in {log}: name a log, or the folder of a run")
+    return log / "log.parquet"
+
+
+def _truth(log: Path, named: "Identified") -> dict[str, float] | None:
+    """Return the true parameters that the summary of a results folder states, None without one."""
+    path = log / "summary.json"
+    if not path.is_file():
+        return None
+    try:
+        said = json.loads(path.read_text())
+        names, values = said["parameters"], said["truth"]
+    except (ValueError, KeyError, TypeError, OSError) as error:
+        raise ExperimentError(f"{path} is no summary of a run ({error}): name the log itself, {log / 'log.parquet'}") from error
+    return dict(zip(names, values, strict=True)) if values is not None and tuple(names) == named.basis.parameters else None
 
 
 @app.command(name="resample")

@@ -1,11 +1,13 @@
 """What a command prints: kept until everything has gone well, whatever the terminal does."""
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from io import StringIO
 
 from rich.console import Console
 
-from experiments.errors import ExperimentError
+from experiments.errors import ExperimentError, ResultsError
 
 WIDTH = 120
 """Characters that the widest table needs."""
@@ -15,6 +17,17 @@ def new_page() -> Console:
     """Return a console that keeps what is printed: it is shown when everything has gone well, whatever the terminal does."""
     terminal = Console()
     return Console(file=StringIO(), width=max(terminal.width, WIDTH), force_terminal=terminal.is_terminal, highlight=False)
+
+
+@contextmanager
+def shown(page: Console) -> Iterator[None]:
+    """Print what the page holds at the end of the block, also if results cannot be written: it is worth keeping."""
+    try:
+        yield
+    except ResultsError:
+        show(page)
+        raise
+    show(page)
 
 
 def show(page: Console) -> None:

@@ -4,15 +4,18 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from experiments.errors import ResultsError
 from identify import Estimate
+
+if TYPE_CHECKING:
+    from experiments.recording.stream import Stream
 
 
 @contextmanager
@@ -42,6 +45,24 @@ def results_folder(out: Path) -> Iterator[Path]:
         ) from error
     finally:
         shutil.rmtree(hidden, ignore_errors=True)
+
+
+def write_recording(folder: Path, streams: "Sequence[tuple[str, Stream]]") -> str:
+    """Write the files of a recording; if that fails write none, and return why: the other results are worth keeping."""
+    try:
+        for name, stream in streams:
+            stream.write(folder / name)
+    except ResultsError as error:
+        for name, _ in streams:
+            (folder / name).unlink(missing_ok=True)
+        return str(error)
+    return ""
+
+
+def tell_of(lost: str, out: Path) -> None:
+    """Raise ResultsError if a recording was lost."""
+    if lost:
+        raise ResultsError(f"{lost}; the other results are in {out}")
 
 
 def write_whole(path: Path, text: str) -> None:

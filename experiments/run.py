@@ -11,6 +11,7 @@ from sim.run import Run
 from sim.scara import scara_truth
 from sim.scenario import Scenario
 from sim.scenario_file import to_dict
+from sim.watch import Watch
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +28,8 @@ class ScenarioRun:
         Both with settings of their own, instead of those that have the names.
     progress : callable, optional
         Hears how much of the simulation is done.
+    watch : Watch, optional
+        Hears what happens in it.
     """
 
     scenario: Scenario
@@ -34,6 +37,7 @@ class ScenarioRun:
     estimator: str = "WLS"
     method: tuple[Chain, AbstractEstimator] | None = None
     progress: Progress | None = None
+    watch: Watch | None = None
 
     def __post_init__(self) -> None:
         # What is wrong with names, or a robot that is no SCARA, is told before the simulation.
@@ -43,7 +47,7 @@ class ScenarioRun:
     @cached_property
     def run(self) -> Run:
         """The simulation."""
-        return simulate(self.scenario, progress=self.progress)
+        return simulate(self.scenario, progress=self.progress, watch=self.watch)
 
     @cached_property
     def identified(self) -> Identified:

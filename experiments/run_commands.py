@@ -1,6 +1,5 @@
 """Commands that simulate."""
 
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,15 +9,18 @@ from rich.console import Console
 from rich.text import Text
 
 from experiments.app import app
+from experiments.audience import Audience, Watched, Watching, Window
 from experiments.errors import ExperimentError
 from experiments.interruption import importing
-from experiments.page import new_page, show
-from experiments.results import results_folder, write_summary, write_whole
+from experiments.page import new_page, show, shown
+from experiments.results import results_folder, tell_of, write_recording, write_summary, write_whole
 from identify.log_file import write_log
 from sim.engine import Progress
+from sim.scenario import Scenario
 from sim.scenario_file import load, names, to_toml
 
 if TYPE_CHECKING:
+    from experiments.recording.identified import RunRecording
     from experiments.run import ScenarioRun
 
 File = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
@@ -28,7 +30,7 @@ Index = Annotated[int | None, tyro.conf.arg(metavar="N")]
 
 
 @app.command(name="run")
-def run(  # the options of a command
+def run(  # noqa: PLR0913, PLR0917  # the options of a command
     scenario: tyro.conf.Positional[Name] = None,
     out: File = None,
     chain: str = "idbench",
@@ -36,6 +38,8 @@ def run(  # the options of a command
     study: From = None,
     index: Index = None,
     method: Index = None,
+    inner: Window = None,
+    watching: Watched = Watching(),  # noqa: B008  # frozen
 ) -> None:
     """Simulate a scenario in closed loop, identify it with all models, and record it.
 
@@ -47,10 +51,10 @@ def run(  # the options of a command
         out: Folder for summary.json, recording.rrd, log.parquet and scenario.toml; runs/<name of the scenario> by default.
         chain: Signal processing.
         estimator: OLS, WLS, ...
+        inner: From when to when [s] the signals inside the loop are recorded at the full rate of the drive, such as 10 10.5.
+        watching: How it is watched.
     """
-    os.environ.setdefault("RUST_LOG", "off")  # what goes wrong in rerun we say ourselves, in one line
     with importing():
-        from experiments.recording.identified import record_run
         from experiments.run import ScenarioRun
         from experiments.tables import print_identified
 
@@ -60,17 +64,28 @@ def run(  # the options of a command
         if scenario is None
         else ScenarioRun(load(_alone(scenario, study, index)), chain, estimator)
     )
-    described = made.scenario
+    if inner is not None and not (watching.rerun and 0 <= inner[0] < inner[1]):
+        raise ExperimentError(f"--inner {inner[0]:g} {inner[1]:g} must be two times [s], in order, and needs a recording")
+    described, lost = made.scenario, ""
     folder_name = out or Path("runs") / described.name
-    with results_folder(folder_name) as folder:
-        ran = replace(made, progress=watch(f"simulating {described.name}"))
-        print_identified(page, ran.identified, f"Scenario {described.name}")
-        page.print(f"written to {folder_name}; see it: uv run idbench view {folder_name}", soft_wrap=True)
-        write_log(ran.run.alone(), folder / "log.parquet")
-        (folder / "scenario.toml").write_text(to_toml(described))
-        record_run(folder / "recording.rrd", ran)
-        write_summary(folder / "summary.json", ran.summary())
-    show(page)
+    with watching.audience() as audience, shown(page):
+        with results_folder(folder_name) as folder:
+            recording = _recording(described, audience, inner) if watching.rerun else None
+            ran = replace(made, progress=watch(f"simulating {described.name}"), watch=recording.watch if recording else None)
+            print_identified(page, ran.identified, f"Scenario {described.name}")
+            write_log(ran.run.alone(), folder / "log.parquet")
+            (folder / "scenario.toml").write_text(to_toml(described))
+            write_summary(folder / "summary.json", ran.summary())
+            if recording:
+                lost = write_recording(folder, recording.finish(ran))
+        tell_of(lost, folder_name)
+        page.print(f"written to {folder_name}{watching.hint(folder_name)}", soft_wrap=True)
+
+
+def _recording(scenario: Scenario, audience: Audience | None, window: tuple[float, float] | None = None) -> "RunRecording":
+    from experiments.recording.identified import RunRecording
+
+    return RunRecording(scenario, audience, window)
 
 
 def _alone(scenario: str, study: Path | None, index: int | None) -> str:
@@ -107,29 +122,39 @@ def _again(page: Console, folder: Path | None, index: int | None, method: int | 
 
 
 @app.command(name="table2")
-def table2(out: Path = Path("runs/table2"), scenario: str = "table2") -> None:
+def table2(
+    out: Path = Path("runs/table2"),
+    scenario: str = "table2",
+    inner: Window = None,
+    watching: Watched = Watching(),  # noqa: B008  # frozen
+) -> None:
     """Repeat the paper's experiment (Table 2) on the virtual robot, and attribute its errors; takes two minutes.
 
     Args:
         out: Folder for summary.json, recording.rrd and the logs of the realizations.
         scenario: Name of a scenario, or a file (TOML).
+        inner: From when to when [s] the signals inside the loop are recorded at the full rate of the drive, such as 10 10.5.
+        watching: How it is watched.
     """
-    os.environ.setdefault("RUST_LOG", "off")  # what goes wrong in rerun we say ourselves, in one line
     with importing():
-        from experiments.recording.table2 import record_table2
         from experiments.table2 import Table2
         from experiments.tables import print_table2
 
-    page, described = new_page(), load(scenario)
-    with results_folder(out) as folder:
-        table = Table2(described, watch("simulating"))
-        print_table2(page, table)
-        page.print(f"written to {out}; see it: uv run idbench view {out}", soft_wrap=True)
-        for i in range(len(table.run.seeds)):
-            write_log(table.run.alone(i), folder / f"log{i}.parquet")
-        record_table2(folder / "recording.rrd", table)
-        write_summary(folder / "summary.json", table.summary())
-    show(page)
+    page, described, lost = new_page(), load(scenario), ""
+    with watching.audience() as audience, shown(page):
+        with results_folder(out) as folder:
+            recording = _recording(described, audience, inner) if watching.rerun else None
+            table = Table2(described, watch("simulating"), recording.watch if recording else None)
+            print_table2(page, table)
+            for i in range(len(table.run.seeds)):
+                write_log(table.run.alone(i), folder / f"log{i}.parquet")
+            write_summary(folder / "summary.json", table.summary())
+            if recording:
+                from experiments.recording.table2 import finish_table2
+
+                lost = write_recording(folder, finish_table2(recording, table))
+        tell_of(lost, out)
+        page.print(f"written to {out}{watching.hint(out)}", soft_wrap=True)
 
 
 @app.command(name="scenario")

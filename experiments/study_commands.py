@@ -4,6 +4,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from functools import partial
 from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,11 +12,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from experiments.app import app
+from experiments.audience import Audience, Watched, Watching
 from experiments.errors import StudyError
 from experiments.interruption import importing
-from experiments.page import new_page, show
+from experiments.page import new_page, show, shown
 
 if TYPE_CHECKING:
+    from experiments.recording.study import StudyRecording
     from experiments.study.store import Store
 
 MANY = 100_000
@@ -40,6 +43,7 @@ def study(  # noqa: PLR0913, PLR0917  # the options of a command
     workers: Number = None,
     scheduler: Url = None,
     yes: bool = False,
+    watching: Watched = Watching(),  # noqa: B008  # frozen
 ) -> None:
     """Run a study: a scenario over a grid and many seeds, identified by every method; without a name, list those that ship.
 
@@ -53,11 +57,11 @@ def study(  # noqa: PLR0913, PLR0917  # the options of a command
         workers: Processes of this machine to run on instead (needs the extra `cluster`).
         scheduler: Address of a Dask scheduler to run on instead, as tcp://host:8786 (needs the extra `cluster`).
         yes: Run more than a hundred thousand runs.
+        watching: How it is watched; runs show as they are finished.
     """
-    os.environ.setdefault("RUST_LOG", "off")  # what goes wrong in rerun we say ourselves, in one line
     with importing():
         from experiments.study.engine import run_missing
-        from experiments.study.progress import watching
+        from experiments.study.progress import watching as counting
         from experiments.study.results import write_results
     page = new_page()
     if study is None and resume is None:
@@ -73,12 +77,35 @@ def study(  # noqa: PLR0913, PLR0917  # the options of a command
     store = _resumed(resume, study, out, seeds) if resume else _begun(str(study), out, seeds, yes)
     width = workers or threads or os.cpu_count() or 1
     runs = shard or min(LARGEST_SHARD, ceil(store.study.size / (2 * width)))
-    with _pool(store, scheduler, workers, threads, width) as pool, store.held(), _kept(store):
+    pooled = _pool(store, scheduler, workers, threads, width)
+    with watching.audience() as audience, shown(page), pooled as pool, store.held(), _kept(store):
+        recording = _recording(store, audience) if watching.rerun else None
+        hear = partial(_show, store, recording) if recording and audience else None
         if pool is not None:
-            with watching(store.study, sum(len(r) for r in store.missing(runs))) as watch:
-                run_missing(store, pool, runs, watch)
-        write_results(page, store)
-    show(page)
+            with counting(store.study, sum(len(r) for r in store.missing(runs))) as watch:
+                run_missing(store, pool, runs, watch, hear)
+        if recording and not audience:
+            _show(store, recording)
+        write_results(page, store, recording)
+
+
+def _recording(store: "Store", audience: Audience | None) -> "StudyRecording":
+    """Return the recording of a study, with the runs that are finished already if somebody watches."""
+    from experiments.recording.study import StudyRecording
+
+    recording = StudyRecording(store.study, store.folder, audience)
+    if audience and store.shards():
+        _show(store, recording)
+    return recording
+
+
+def _show(store: "Store", recording: "StudyRecording", runs: range | None = None) -> None:
+    """Send runs to a recording, those of a shard or all that are finished."""
+    from experiments.study.shard_file import arrays
+    from experiments.study.statistics import cells
+
+    table = store.table() if runs is None else store.part(runs)
+    recording.add(cells(arrays(table), store.study.varied, store.study.parameters))
 
 
 def _begun(name: str, out: Path | None, seeds: int | None, yes: bool) -> "Store":

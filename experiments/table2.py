@@ -20,6 +20,7 @@ from sim.run import Run
 from sim.scara import scara_truth
 from sim.scenario import Scenario
 from sim.scenario_file import to_dict
+from sim.watch import Watch
 
 SCENARIO = "table2"
 """The scenario that ships."""
@@ -82,10 +83,13 @@ class Table2:
         The robot and its motion; realization k has seed + k.
     progress : callable, optional
         Hears how much of the simulation is done.
+    watch : Watch, optional
+        Hears what happens in the first realization.
     """
 
     scenario: Scenario
     progress: Progress | None = None
+    watch: Watch | None = None
 
     def __post_init__(self) -> None:
         scara_truth(self.scenario.real_robot)
@@ -101,7 +105,8 @@ class Table2:
     def run(self) -> Run:
         """As many realizations as the power model needs."""
         first = self.scenario.seed
-        return simulate(self.scenario, range(first, first + max(REALIZATIONS.values())), progress=self.progress)
+        seeds = range(first, first + max(REALIZATIONS.values()))
+        return simulate(self.scenario, seeds, progress=self.progress, watch=self.watch)
 
     @cached_property
     def truth(self) -> dict[str, float]:

@@ -1,14 +1,15 @@
 """Opening a recording in the rerun viewer."""
 
-import os
 import subprocess
-import sys
+import tempfile
 from pathlib import Path
 
-from experiments.errors import ResultsError
+from experiments.audience import LOOPBACK, require_display, viewer_binary
+from experiments.errors import ExperimentError, ResultsError
+from experiments.recording.folder import BASE, files, merge
 
 
-def view(folder: Path) -> None:
+def view(folder: Path, tab: str = "overview") -> None:
     """Open the recording of a results folder, or a recording itself; return when the viewer is closed.
 
     Raises
@@ -16,19 +17,42 @@ def view(folder: Path) -> None:
     ResultsError
         If there is no recording, no display, or the viewer fails.
     """
-    path = folder / "recording.rrd" if folder.is_dir() else folder
-    if path.suffix != ".rrd" or not path.is_file():
-        raise ResultsError(f"there is no recording {path}: name a results folder, such as runs/table1, or a .rrd file")
-    if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        raise ResultsError(
-            f"there is no display here: copy {path} to a machine with one, or serve it to a browser with "
-            f"`uv run rerun --serve-web --bind 127.0.0.1 {path}`"
-        )
-    import rerun_cli  # the viewer's binary lies beside its package
-
-    binary = Path(str(rerun_cli.__file__)).parent / "rerun"
+    paths = _paths(folder)
     try:
-        code = subprocess.run([binary, path, "--bind", "127.0.0.1"], check=False).returncode
+        require_display()
+    except ExperimentError:
+        raise ResultsError(
+            f"there is no display here: serve it to a browser with `uv run rerun --serve-web --bind {LOOPBACK} "
+            f"{' '.join(map(str, paths))}`, or write it to one file with --save FILE and copy that to a machine with a display"
+        ) from None
+    with tempfile.TemporaryDirectory(prefix="idbench-") as hidden:
+        one = paths
+        if folder.is_dir():
+            one = [Path(hidden) / BASE]
+            merge(paths, tab, one[0])
+        _open(one)
+
+
+def save(folder: Path, tab: str, out: Path) -> None:
+    """Write the recording of a results folder and its layers as one file; raise ResultsError if that fails."""
+    if out.suffix != ".rrd":
+        raise ResultsError(f"--save {out} must end with .rrd")
+    merge(_paths(folder), tab, out)
+
+
+def _paths(folder: Path) -> list[Path]:
+    """Return the files of a recording, in the order in which a viewer should open them."""
+    paths = files(folder) if folder.is_dir() else [folder]
+    if not paths or any(path.suffix != ".rrd" or not path.is_file() for path in paths):
+        missing = folder / BASE if folder.is_dir() else folder
+        raise ResultsError(f"there is no recording {missing}: name a results folder, such as runs/table1, or a .rrd file")
+    return paths
+
+
+def _open(paths: list[Path]) -> None:
+    binary = viewer_binary()
+    try:
+        code = subprocess.run([binary, *paths, "--bind", LOOPBACK], check=False).returncode
     except OSError as error:
         raise ResultsError(f"cannot start the rerun viewer {binary}: {error.strerror}") from error
     if code:

@@ -21,6 +21,13 @@ from identify.chain import CHAINS as CHAINS
 from identify.chain import Chain as Chain
 from identify.chain import idbench_chain as idbench_chain
 from identify.chain import paper_chain as paper_chain
+from identify.diagnosis import Instants as Instants
+from identify.diagnosis import binned as binned
+from identify.diagnosis import cutoffs as cutoffs
+from identify.diagnosis import filtered as filtered
+from identify.diagnosis import instants as instants
+from identify.diagnosis import measured_state as measured_state
+from identify.diagnosis import spectrum as spectrum
 from identify.differentiators import DIFFERENTIATORS as DIFFERENTIATORS
 from identify.differentiators import AbstractDifferentiator as AbstractDifferentiator
 from identify.differentiators import CentralDifference as CentralDifference
@@ -61,6 +68,8 @@ from identify.prefilters import PREFILTERS as PREFILTERS
 from identify.prefilters import AbstractPrefilter as AbstractPrefilter
 from identify.prefilters import ButterworthPrefilter as ButterworthPrefilter
 from identify.prefilters import NoPrefilter as NoPrefilter
+from identify.running import Running as Running
+from identify.running import running_estimate as running_estimate
 from identify.state import State as State
 from identify.system import Status as Status
 from identify.system import System as System

@@ -66,6 +66,14 @@ class Balance:
             np.multiply(sum(parts[1:], start=parts[0]), self.weight[..., address[0], :], out=both[..., n + i, :])
         return both
 
+    def predicted(self, X: Array) -> Array:
+        """Return (c + s e) X at every sample, without weights, shape (..., row, time)."""
+        total = np.zeros(self.y.shape)
+        for columns in (self.c, self._rates()):
+            for (row, parameter), column in columns.items():
+                total[..., row, :] += column * X[..., self.parameters.index(parameter), None]
+        return total
+
     def _rates(self) -> Columns:
         """Return s e, differentiated in one go."""
         if not self.e:

@@ -12,6 +12,7 @@ from identify.arrays import Array, require_not_negative
 from identify.basis import Basis
 from identify.differentiators import AbstractDifferentiator, CentralDifference
 from identify.errors import LogError, SettingError
+from identify.grid import Grid
 from identify.masks import AbstractMask, NoMask, ReversalMask
 from identify.models import AbstractModel
 from identify.motion_log import MotionLog, TorqueChannel
@@ -81,9 +82,12 @@ class Chain:
         if log.n != basis.n:
             hint = "; its axes are (time, joint), is it transposed?" if log.samples == basis.n else ""
             raise LogError(f"the log has {log.n} joints, the basis {basis.n}{hint}")
-        grid = self.operator.grid(log.samples, log.fs, self._margin(log))
-        signals = self.signals(log)
+        grid, signals = self.rows(log), self.signals(log)
         return [self.operator.system(model.balance(basis, signals), grid) for model in models]
+
+    def rows(self, log: MotionLog) -> Grid:
+        """Return where the rows of `log` lie; raise LogError if it leaves none."""
+        return self.operator.grid(log.samples, log.fs, self._margin(log))
 
     def signals(self, log: MotionLog) -> Signals:
         """Return what the models see of `log`: prefiltered, differentiated, aligned, weighted."""

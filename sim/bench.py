@@ -20,6 +20,7 @@ from sim.robot import Robot
 from sim.run import Run
 from sim.scenario import Scenario
 from sim.trajectories import Reference
+from sim.watch import Step, Watcher
 
 BLOCK = 1e-3
 """Time [s] over which the motion of the rotors may be foretold, for their back-EMF and ripple: with a jerk of 1000 rad/s^3 they
@@ -37,9 +38,10 @@ class Bench:
         seeds: tuple[int, ...],
         vary: Mapping[str, npt.ArrayLike],
         threads: int,
+        watcher: Watcher | None = None,
     ) -> None:
         fs, n, nsim, samples = scenario.fs, robot.n, len(seeds), len(planned.q)
-        self._scenario, self._planned, self._seeds = scenario, planned, seeds
+        self._scenario, self._planned, self._seeds, self._watcher = scenario, planned, seeds, watcher
         self._h = scenario.drive.step_length(fs, scenario.physics.step)
         self._clock = clock = Clock(round(1 / fs / self._h), self._h, scenario.timing.delay)
         self._plant = Plant(robot, nsim, scenario.physics, self._h, vary, threads)
@@ -86,6 +88,8 @@ class Bench:
         if sample is not None and sample < len(self._q):
             self._q[sample], self._speeds[sample], self._currents[sample] = q, qd, self._sensor.value
             self._stop_those_out_of_range(sample)
+            if self._watcher and self._watcher.due(self._final(step)):
+                self.tell(step)
         self._history.put(step, q, qd)
         steps = self._listen(step)
         t = self._middles(steps)
@@ -98,11 +102,30 @@ class Bench:
         tau = electric * constant + self._ripple.cogging.at(mid_q)
         if self._failures:
             tau[:, list(self._failures)] = 0.0
+        if self._watcher:
+            self._watcher.take(Step(step, steps, tau, self._drive.trace))
         self._plant.step(tau + self._friction.torque(mid_qd[0]), steps)
         current = step // self._clock.per_sample
         if current < len(self._tau):
             self._tau[current] += tau.mean(axis=0) * steps
         return steps
+
+    def _final(self, step: int) -> int:
+        """Return how many samples nothing can change any more at the beginning of physics step `step`."""
+        clock, samples = self._clock, len(self._q)
+        return min(samples, step // clock.per_sample, max(0, (step - clock.late - 1) // clock.per_sample + 1))
+
+    def tell(self, step: int) -> None:
+        """Hand on to the watcher what is final at the beginning of physics step `step`, of the first simulation."""
+        if self._watcher:
+            channels = {
+                "measured": self._measured,
+                "q": self._q,
+                "qd": self._speeds,
+                "tau": self._tau,
+                "command": self._commands,
+            }
+            self._watcher.tell(self._final(step), self._planned, channels, self._drive)
 
     def _middles(self, steps: int) -> Array:
         """Return the middle of each of the steps to come [s], shape (steps, 1, 1), or of all of them for steady parts."""

@@ -12,12 +12,13 @@ from sim.run import Run
 from sim.scenario import Scenario
 from sim.trajectories import Reference
 from sim.trajectories.approach import approach
+from sim.watch import Watch, Watcher
 
 Progress = Callable[[float], None]
 """Hears the share of a run that is done."""
 
 
-def simulate(
+def simulate(  # noqa: PLR0913  # all but two by their names
     scenario: Scenario,
     seeds: Sequence[int] = (),
     *,
@@ -25,6 +26,7 @@ def simulate(
     vary: Mapping[str, npt.ArrayLike] | None = None,
     threads: int = 0,
     progress: Progress | None = None,
+    watch: Watch | None = None,
     throw: bool = True,
 ) -> Run:
     """Run a scenario in closed loop.
@@ -43,6 +45,8 @@ def simulate(
         Native threads; 0 for all processors. No bit depends on it.
     progress : callable, optional
         Hears the share of the run that is done, about a hundred times.
+    watch : Watch, optional
+        Hears what the first simulation does, while it runs. No bit depends on it.
     throw : bool
         Raise if a simulation fails while it runs; otherwise `Run.failures` tells why, and the others go on.
 
@@ -56,13 +60,16 @@ def simulate(
     seeds = tuple(seeds) or (scenario.seed,)
     robot = scenario.real_robot
     planned, skipped = _joined([_planned(scenario, robot, motion) for motion in motions or (None,)])
-    bench = Bench(scenario, robot, planned, seeds, vary or {}, threads)
+    h = scenario.drive.step_length(scenario.fs, scenario.physics.step)
+    watcher = Watcher(watch, scenario.fs, h, skipped) if watch else None
+    bench = Bench(scenario, robot, planned, seeds, vary or {}, threads, watcher)
     step, told = 0, -1
     while step < bench.steps:
         step += bench.advance(step)
         if progress and 100 * step // bench.steps > told:
             told = 100 * step // bench.steps
             progress(step / bench.steps)
+    bench.tell(bench.steps)
     run = bench.run(skipped)
     if throw and run.failures:
         raise ScenarioError(next(iter(run.failures.values())))

@@ -5,13 +5,14 @@ from typing import Literal
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 from mujoco import mjtStage
 from mujoco.batch import Batch
 
 from sim.motors import Array
 from sim.robot import Robot
 
-Kind = Literal["sphere", "capsule", "ellipsoid", "cylinder", "box"]
+Kind = Literal["sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh"]
 
 _KINDS: dict[int, Kind] = {
     int(mujoco.mjtGeom.mjGEOM_SPHERE): "sphere",
@@ -19,7 +20,11 @@ _KINDS: dict[int, Kind] = {
     int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): "ellipsoid",
     int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder",
     int(mujoco.mjtGeom.mjGEOM_BOX): "box",
+    int(mujoco.mjtGeom.mjGEOM_MESH): "mesh",
 }
+
+HIDDEN = 3
+"""Geoms of this group and higher are not drawn, as in MuJoCo's own viewer: they are there for collisions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +36,7 @@ class Shape:
     name, body : str
         Its name and the body that carries it.
     kind : str
-        Sphere, capsule, ellipsoid, cylinder or box; capsules and cylinders along z, all centred.
+        Sphere, capsule, ellipsoid, cylinder, box or mesh; capsules and cylinders along z, all but meshes centred.
     size : Array, shape (3,)
         MuJoCo's sizes [m]: radius; radius and half length; half lengths.
     position : Array, shape (3,)
@@ -40,6 +45,8 @@ class Shape:
         Orientation in the body's frame, x y z w.
     rgba : Array, shape (4,)
         Colour, 0 to 1.
+    vertices, faces : Array, shape (vertex, 3) [m] and (face, 3)
+        Of a mesh, in its own frame; empty otherwise.
     """
 
     name: str
@@ -49,6 +56,8 @@ class Shape:
     position: Array
     quaternion: Array
     rgba: Array
+    vertices: Array
+    faces: npt.NDArray[np.int32]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,16 +80,33 @@ class Motion:
 
 
 def shapes(robot: Robot) -> list[Shape]:
-    """Return the visible shapes of the robot; planes and meshes are left out."""
+    """Return the visible shapes of the robot; planes and height fields are left out."""
     model, found = robot.model, []
     for g in range(model.ngeom):
-        kind, geom = _KINDS.get(int(model.geom_type[g])), model.geom(g)
-        if kind is None or geom.rgba[3] == 0:
+        kind, geom, rgba = _KINDS.get(int(model.geom_type[g])), model.geom(g), _color(model, g)
+        if kind is None or rgba[3] == 0 or model.geom_group[g] >= HIDDEN:
             continue
-        body = model.body(int(model.geom_bodyid[g])).name
+        body = body_name(model, int(model.geom_bodyid[g]))
         name = geom.name or f"geom{g}"
-        found.append(Shape(name, body, kind, geom.size.copy(), geom.pos.copy(), _xyzw(geom.quat), geom.rgba.astype(float)))
+        mesh = _mesh(model, int(model.geom_dataid[g])) if kind == "mesh" else (np.empty((0, 3)), np.empty((0, 3), np.int32))
+        found.append(Shape(name, body, kind, geom.size.copy(), geom.pos.copy(), _xyzw(geom.quat), rgba, *mesh))
     return found
+
+
+def body_name(model: mujoco.MjModel, b: int) -> str:
+    """Return the name of a body, or its number where it has none."""
+    return model.body(b).name or f"body{b}"
+
+
+def _color(model: mujoco.MjModel, g: int) -> Array:
+    material = int(model.geom_matid[g])
+    return (model.geom_rgba[g] if material < 0 else model.mat_rgba[material]).astype(np.float64)
+
+
+def _mesh(model: mujoco.MjModel, m: int) -> tuple[Array, npt.NDArray[np.int32]]:
+    first, face = int(model.mesh_vertadr[m]), int(model.mesh_faceadr[m])
+    vertices = model.mesh_vert[first : first + int(model.mesh_vertnum[m])].astype(np.float64)
+    return vertices, model.mesh_face[face : face + int(model.mesh_facenum[m])].copy()
 
 
 def motion(robot: Robot, q: Array) -> Motion:
@@ -89,11 +115,11 @@ def motion(robot: Robot, q: Array) -> Motion:
     xpos, xquat, site_xpos = states.bind("xpos"), states.bind("xquat"), states.bind("site_xpos")
     states.bind("qpos")[:] = q
     states.forward(stage=mjtStage.mjSTAGE_POS.value)
-    bodies = {model.body(b).name: b for b in range(1, model.nbody)}
+    bodies = {body_name(model, b): b for b in range(1, model.nbody)}
     return Motion(
         {name: xpos[:, b].copy() for name, b in bodies.items()},
         {name: _xyzw(xquat[:, b]) for name, b in bodies.items()},
-        {model.site(s).name: site_xpos[:, s].copy() for s in range(model.nsite)},
+        {model.site(s).name or f"site{s}": site_xpos[:, s].copy() for s in range(model.nsite)},
     )
 
 

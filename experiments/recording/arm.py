@@ -1,45 +1,90 @@
-"""The arm in 3D."""
+"""The arm in 3D: as it is, as it was planned to be, and as its encoders see it."""
 
-from collections.abc import Sequence
+from typing import Literal
 
+import numpy as np
 import rerun as rr
 
+from experiments.recording.stream import Stream, Times
+from experiments.recording.style import MEASURED, PLANNED, Color
 from identify import Array
 from sim.robot import Robot
 from sim.scene import Shape, motion, shapes
 
+ROLES: dict[str, Color | None] = {"true": None, "measured": MEASURED, "planned": PLANNED}
+"""Arms that may be shown, and the colour of those that are drawn as wires around the first."""
 
-def send_arm(recording: rr.RecordingStream, robot: Robot, q: Array, times: Sequence[rr.TimeColumn]) -> None:
-    """Send the robot's shapes, their motion along `q` [rad], shape (time, joint), and the paths of its sites."""
-    recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    for shape in shapes(robot):
-        path = f"world/{shape.body}/{shape.name}"
-        recording.log(path, _solid(shape), static=True)
-        recording.log(path, _pose(shape), static=True)
-    moving = motion(robot, q)
-    for body, position in moving.positions.items():
-        poses = rr.Transform3D.columns(translation=position, quaternion=moving.quaternions[body])
-        recording.send_columns(f"world/{body}", times, poses)
-    for site, position in moving.sites.items():
-        strip = rr.LineStrips3D([position], radii=[0.0015], colors=[[190, 190, 190]])
-        recording.log(f"world/path_of_{site}", strip, static=True)
+
+class Arm:
+    """The arms of a recording.
+
+    Parameters
+    ----------
+    stream : Stream
+        Where they go.
+    robot : Robot
+        What they look like.
+    roles : tuple of str
+        Those of ROLES that are shown; the first is drawn solid.
+    """
+
+    def __init__(self, stream: Stream, robot: Robot, roles: tuple[str, ...]) -> None:
+        self._stream, self._robot = stream, robot
+        two = motion(robot, np.stack([np.zeros(robot.n), np.full(robot.n, 0.1)]))
+        pose = {body: np.concatenate([x, two.quaternions[body]], axis=1) for body, x in two.positions.items()}
+        self._moving = {body for body, (at, moved) in pose.items() if not np.array_equal(at, moved)}
+        stream.keep("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+        for body in pose.keys() - self._moving:
+            where = rr.Transform3D(translation=two.positions[body][0], quaternion=rr.Quaternion(xyzw=two.quaternions[body][0]))
+            stream.keep(f"world/{roles[0]}/{body}", where)
+        for role in roles:
+            for shape in shapes(robot):
+                if role == roles[0] or shape.body in self._moving:
+                    path = f"world/{role}/{shape.body}/{shape.name}"
+                    stream.keep(path, _drawn(shape, None if role == roles[0] else ROLES[role]), _pose(shape))
+
+    def move(self, role: str, times: Times, q: Array) -> None:
+        """Send where an arm is at the positions `q` [rad], shape (time, joint)."""
+        moving = motion(self._robot, q)
+        for body in self._moving:
+            columns = rr.Transform3D.columns(translation=moving.positions[body], quaternion=moving.quaternions[body])
+            self._stream.send(f"world/{role}/{body}", times, columns)
+
+    def trace(self, q: Array) -> None:
+        """Draw the way of every site along `q` [rad], shape (time, joint)."""
+        for site, position in motion(self._robot, q).sites.items():
+            self._stream.keep(f"world/path_of_{site}", rr.LineStrips3D([position], radii=[0.0015], colors=[[190, 190, 190]]))
+
+
+Fill = Literal["solid", "majorwireframe"]
 
 
 def _pose(shape: Shape) -> rr.Transform3D:
     return rr.Transform3D(translation=shape.position, quaternion=rr.Quaternion(xyzw=shape.quaternion))
 
 
-def _solid(shape: Shape) -> rr.AsComponents:
-    rgba, size = [shape.rgba], shape.size
+def _drawn(shape: Shape, wire: Color | None) -> rr.AsComponents:
+    """Return a shape: solid in its own colour, or as wires of the colour `wire`."""
+    color, size = [shape.rgba if wire is None else wire], shape.size
+    fill: Fill = "solid" if wire is None else "majorwireframe"
     match shape.kind:
         case "box":
-            return rr.Boxes3D(half_sizes=[size], colors=rgba, fill_mode="solid")
+            return rr.Boxes3D(half_sizes=[size], colors=color, fill_mode=fill)
         case "cylinder":
-            return rr.Cylinders3D(lengths=[2 * size[1]], radii=[size[0]], colors=rgba, fill_mode="solid")
+            return rr.Cylinders3D(lengths=[2 * size[1]], radii=[size[0]], colors=color, fill_mode=fill)
         case "capsule":  # rerun's starts at the origin, MuJoCo's is centred there
             centre = [[0.0, 0.0, -size[1]]]
-            return rr.Capsules3D(lengths=[2 * size[1]], radii=[size[0]], translations=centre, colors=rgba, fill_mode="solid")
+            return rr.Capsules3D(lengths=[2 * size[1]], radii=[size[0]], translations=centre, colors=color, fill_mode=fill)
         case "sphere":
-            return rr.Ellipsoids3D(half_sizes=[[size[0]] * 3], colors=rgba, fill_mode="solid")
+            return rr.Ellipsoids3D(half_sizes=[[size[0]] * 3], colors=color, fill_mode=fill)
         case "ellipsoid":
-            return rr.Ellipsoids3D(half_sizes=[size], colors=rgba, fill_mode="solid")
+            return rr.Ellipsoids3D(half_sizes=[size], colors=color, fill_mode=fill)
+        case "mesh":
+            return _mesh(shape, wire)
+
+
+def _mesh(shape: Shape, wire: Color | None) -> rr.AsComponents:
+    if wire is None:
+        return rr.Mesh3D(vertex_positions=shape.vertices, triangle_indices=shape.faces, albedo_factor=shape.rgba)
+    low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)  # every edge of a mesh would hide the arm
+    return rr.Boxes3D(half_sizes=[(high - low) / 2], centers=[(high + low) / 2], colors=[wire], fill_mode="majorwireframe")

@@ -1,87 +1,100 @@
-"""The recording of a run or a log: motion, what was measured and what was true, predictions, residuals, parameters."""
+"""The recordings of a run and of a log: a base, a layer inside the loop, and a layer for each identification."""
 
-from collections.abc import Mapping
+import hashlib
+from collections.abc import Sequence
 from pathlib import Path
 
-import rerun as rr
-import rerun.blueprint as rrb
-
+from experiments.audience import Audience
+from experiments.errors import ResultsError
 from experiments.identified import Identified
-from experiments.recording.arm import send_arm
-from experiments.recording.parts import UNITS, layout, plot, send_bars, send_joints, send_model
-from experiments.recording.stream import recording_file, time_columns
-from experiments.recording.style import FORMS
+from experiments.recording.base import Base
+from experiments.recording.folder import BASE, INNER, files, known, layer_file, rearrange
+from experiments.recording.layer import Layer
+from experiments.recording.report import about
+from experiments.recording.stream import Stream
 from experiments.run import ScenarioRun
-from identify import Array, Estimate
+from identify import measured_state
 from sim.robot import Robot
+from sim.run import Run
+from sim.scenario import Scenario
+from sim.scenario_file import to_toml
+from sim.watch import Watch
+
+ROLES = ("true", "planned", "measured")
 
 
-def record_run(path: Path, ran: ScenarioRun) -> None:
-    """Write the recording of a simulated scenario; raise ResultsError if it cannot be written."""
-    run = ran.run
-    signals = {
-        "joint/q": run.q[0],
-        "joint/error": run.reference.q - run.q[0],
-        "joint/tau": run.log.tau[0],
-        "joint/disturbance": run.tau[0] - run.command[0],
-    }
-    _record(path, ran.scenario.name, ran.identified, run.robots[0], run.q[0], signals)
+class RunRecording:
+    """The recording of a scenario, which grows while it is simulated.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is simulated.
+    audience : Audience, optional
+        Who watches.
+    window : tuple of float, optional
+        From when to when signals inside the loop are shown at their full rate [s].
+    """
+
+    def __init__(self, scenario: Scenario, audience: Audience | None = None, window: tuple[float, float] | None = None) -> None:
+        self._audience, written = audience, to_toml(scenario)
+        self.base = Base(recording_id(scenario.name, written.encode()), scenario.real_robot, scenario.fs, ROLES, audience)
+        self.base.stream.describe(scenario=written, seed=str(scenario.seed), fs_hz=f"{scenario.fs:g}")
+        self.watch = Watch(self.base.stretch, audience.every if audience else float("inf"), window)
+
+    def end(self, run: Run) -> list[tuple[str, Stream]]:
+        """Add what only the end of a simulation tells; return the streams by the name of their file."""
+        self.base.end(run.alone(), run.q[0])
+        return [(BASE, self.base.stream), *([(INNER, self.base.inner)] if self.base.inner else [])]
+
+    def finish(self, ran: ScenarioRun) -> list[tuple[str, Stream]]:
+        """Add what only the end tells, and the identification; return the streams by the name of their file."""
+        streams = self.end(ran.run)
+        self.base.finish(about(ran.scenario.name, ran.scenario.origin))
+        there = set().union(*(stream.paths for _, stream in streams))
+        return [*streams, layer(self.base.stream.name, ran.identified, ran.run.robots[0].joints, there, self._audience)]
 
 
-def record_log(path: Path, found: Identified) -> None:
-    """Write the recording of an identified log; raise ResultsError if it cannot be written."""
-    log = found.logs[0]
-    _record(path, "log", found, Robot.load(found.robot), log.q, {"joint/q": log.q, "joint/tau": log.tau})
+def record_log(found: Identified, audience: Audience | None = None) -> list[tuple[str, Stream]]:
+    """Return the streams of an identified log's recording, by the name of their file."""
+    log, robot = found.logs[0], Robot.load(found.robot)
+    base = Base(recording_id("log", log.q.tobytes() + log.tau.tobytes()), robot, log.fs, ("measured",), audience)
+    channel = log.torque
+    base.stream.describe(fs_hz=f"{log.fs:g}", torque=channel.meaning, torque_delay_s=f"{channel.delay:g}")
+    base.replay(log, {}, measured_state(log, found.processing).qd.T)
+    base.end(log, log.q)
+    base.finish(about("log", ""))
+    return [(BASE, base.stream), layer(base.stream.name, found, robot.joints, base.stream.paths, audience)]
 
 
-def _record(path: Path, name: str, found: Identified, robot: Robot, q: Array, signals: Mapping[str, Array]) -> None:
-    log = found.logs[0]
-    with recording_file(path, name, _blueprint(found, list(signals))) as recording:
-        times = time_columns(log.t, log.fs)
-        send_arm(recording, robot, q, times)
-        send_joints(recording, times, signals)
-        for form, estimate in found.estimates.items():
-            send_model(recording, found.chain, form, estimate, FORMS[form], log.fs)
-            errors = (
-                estimate.error_percent(list(found.truth.values()))
-                if found.truth is not None
-                else estimate.relative_sigma_percent
-            )
-            send_bars(recording, f"error/{form}", errors, form)
-        recording.log("report", rr.TextDocument(_markdown(found), media_type="text/markdown"), static=True)
+def add_layer(folder: Path, found: Identified, audience: Audience | None = None) -> list[tuple[str, Stream]]:
+    """Return the stream of an identification's layer for the recording in a results folder, by the name of its file.
+
+    Layers that are there already are written anew, to show the new one beside them.
+
+    Raises
+    ------
+    ResultsError
+        If there is no recording, or it cannot be read or written.
+    """
+    others = [path for path in files(folder) if path.name != layer_file(found.label)]
+    if not (folder / BASE).is_file():
+        raise ResultsError(f"there is no {BASE} in {folder} to add a layer to: give --out for a recording of its own")
+    name, there = known(others)
+    made = layer(name, found, Robot.load(found.robot).joints, there, audience)
+    rearrange(others, made[1])
+    return [made]
 
 
-def _judged(found: Identified, estimate: Estimate) -> Array:
-    """Return the errors [%] where the truth is known, %sigma where it is not."""
-    return estimate.relative_sigma_percent if found.truth is None else estimate.error_percent(list(found.truth.values()))
+def layer(
+    name: str, found: Identified, joints: Sequence[str], there: set[str], audience: Audience | None = None
+) -> tuple[str, Stream]:
+    """Return the stream of an identification's layer, and the name of its file."""
+    made = Layer(name, found, joints, there, audience)
+    made.send()
+    return layer_file(found.label), made.stream
 
 
-def _blueprint(found: Identified, signals: list[str]) -> rrb.Blueprint:
-    units = {"joint/q": "q [rad]", "joint/error": "tracking error [rad]", "joint/tau": "tau in the log [N m]"}
-    units["joint/disturbance"] = "true minus commanded torque, mean of each sample [N m]"
-    shown = [form for form in UNITS if form in found.estimates]
-    bars = f"{'sigma' if found.truth is None else 'error'} [%] of parameters 1 to {len(found.basis.parameters)}"
-    columns = [
-        rrb.Vertical(*(plot(f"/{path}", units[path]) for path in signals), rrb.BarChartView(origin="/error", name=bars)),
-        rrb.Vertical(*(plot(f"/identify/{found.chain}/{f}/signal", f"{f} [{UNITS[f]}]") for f in shown)),
-        rrb.Vertical(*(plot(f"/identify/{found.chain}/{f}/residual", f"{f} residual [{UNITS[f]}]") for f in shown)),
-    ]
-    return layout("parameters", [5, 4], columns, [7, 6, 5, 5])
-
-
-def _markdown(found: Identified) -> str:
-    """Return estimates, with error or sigma, as a markdown table."""
-    forms = list(found.estimates)
-    what = "sigma" if found.truth is None else "error"
-    lines = [f"Estimate and {what}, chain **{found.chain}**, {found.estimator}\n"]
-    lines += [f"| | true | {' | '.join(forms)} |", "|---|---:|" + "---:|" * len(forms)]
-    for i, name in enumerate(found.basis.parameters):
-        true = "" if found.truth is None else f"{list(found.truth.values())[i]:g}"
-        cells = []
-        for form in forms:
-            estimate = found.estimates[form]
-            aside = f"{estimate.sigma[i]:.2g}" if found.truth is None else f"{_judged(found, estimate)[i]:+.2g} %"
-            cells.append(f"{estimate.X[i]:.4g} ({aside})")
-        lines.append(f"| {i + 1} {name} | {true} | {' | '.join(cells)} |")
-    conds = " | ".join(f"{e.condition_number:.1f}" for e in found.estimates.values())
-    return "\n".join([*lines, f"| Cond(W) | | {conds} |"])
+def recording_id(name: str, content: bytes) -> str:
+    """Return a name and what tells its content from others: recordings of one id are shown as one."""
+    return f"{name}-{hashlib.sha256(content).hexdigest()[:10]}"

@@ -1,53 +1,137 @@
-"""Writing arrays to a rerun recording: columns, not rows."""
+"""Writing arrays to a rerun recording: columns, not rows; to a file, a viewer, or both at once."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+from rerun.chunk import Chunk, RrdReader
 
+from experiments.audience import Audience
 from experiments.errors import ResultsError
+from experiments.recording.style import STATES, Color
 from identify import Array
 
+APPLICATION = "idbench"
 NANOSECONDS = 1_000_000_000
 
+Times = Sequence[rr.TimeColumn]
 
-@contextmanager
-def recording_file(path: Path, name: str, blueprint: rrb.Blueprint) -> Iterator[rr.RecordingStream]:
-    """Give a recording that goes to `path`, with its blueprint inside; it is complete when the block ends."""
-    recording = rr.RecordingStream("idbench", recording_id=name)
-    try:
-        recording.save(path, default_blueprint=blueprint)
-        recording.set_log_time_enabled(False)
-        yield recording
-        recording.flush()
-    except RuntimeError as error:  # rerun's writer gives no other reason
-        raise ResultsError(f"cannot write the recording {path.name}: is there space left? ({error})") from error
-    finally:
-        recording.disconnect()
+
+class Stream:
+    """A recording, or a layer of one.
+
+    What goes to the file is kept in memory until it is written whole: a viewer that has gone, or a full disk, then costs
+    nothing but itself. Chunks are made once and sent to both.
+
+    Parameters
+    ----------
+    name : str
+        Recording id: layers of the same name belong to one recording.
+    audience : Audience, optional
+        Who watches.
+    layer : bool
+        Whether it adds to a recording that is there already.
+    """
+
+    def __init__(self, name: str, audience: Audience | None = None, *, layer: bool = False) -> None:
+        self.name, self.paths, self._audience = name, set[str](), audience
+        self._file = rr.RecordingStream(APPLICATION, recording_id=name, send_properties=not layer)
+        self._file.set_log_time_enabled(False)
+        self._bytes = rr.binary_stream(self._file)
+        self._live = self._connected(audience, layer) if audience and audience.watching else None
+
+    def _connected(self, audience: Audience, layer: bool) -> rr.RecordingStream:
+        live = rr.RecordingStream(APPLICATION, recording_id=self.name, send_properties=not layer)
+        live.set_log_time_enabled(False)
+        live.set_sinks(rr.GrpcSink(audience.url))
+        return live
+
+    def send(self, path: str, times: Times, columns: Iterable[rr.ComponentColumn]) -> None:
+        """Send columns of an entity."""
+        self.paths.add(path)
+        chunk = Chunk.from_columns(path, times, columns)
+        rr.send_chunks(chunk, recording=self._file)
+        if self._live:
+            rr.send_chunks(chunk, recording=self._live)
+
+    def keep(self, path: str, *things: rr.AsComponents) -> None:
+        """Send what holds at all times."""
+        self.paths.add(path)
+        for thing in things:
+            self._file.log(path, thing, static=True)
+            if self._live:
+                self._live.log(path, thing, static=True)
+
+    def style(self, path: str, names: Sequence[str], colors: Sequence[Color], width: float = 1.5) -> None:
+        """Announce an entity of curves."""
+        self.keep(path, rr.SeriesLines(names=names, colors=colors, widths=[width] * len(names)))
+
+    def curves(self, path: str, times: Times, values: Array) -> None:
+        """Send values of shape (time, curve) or (time,)."""
+        count = values.shape[1] if values.ndim > 1 else 1
+        scalars = rr.Scalars.columns(scalars=np.ascontiguousarray(values).ravel())
+        self.send(path, times, scalars.partition([count] * len(values)))
+
+    def states(self, path: str, times: Times, states: Sequence[str]) -> None:
+        """Send states, each from its time until the next."""
+        self.send(path, times, rr.StateChange.columns(state=states))
+
+    def lanes(self, path: str) -> None:
+        """Announce an entity of states."""
+        nothing = [" "] * len(STATES)  # words would be cut off where a state is short: the view's title tells the colours
+        self.keep(path, rr.StateConfiguration(values=list(STATES), labels=nothing, colors=list(STATES.values())))
+
+    def copy(self, reader: RrdReader) -> None:
+        """Send what another file of the recording holds."""
+        for entry in reader.recordings():
+            rr.send_chunks(reader.stream(store=entry), recording=self._file)
+
+    def describe(self, **properties: str) -> None:
+        """Send properties of the whole recording."""
+        for recording in filter(None, (self._file, self._live)):
+            recording.send_property("run", rr.AnyValues(drop_untyped_nones=True, **properties))
+
+    def arrange(self, blueprint: rrb.Blueprint) -> None:
+        """Send a layout: that which the file opens with; to be called once, as every layout takes its room in the file."""
+        self._file.send_blueprint(blueprint, make_active=False, make_default=True)
+        self.show(blueprint)
+
+    def show(self, blueprint: rrb.Blueprint) -> None:
+        """Send a layout to who watches."""
+        if self._live:
+            self._live.send_blueprint(blueprint, make_active=True, make_default=True)
+
+    def breathe(self, seconds: float) -> None:
+        """Let the viewer catch up, at the pace that it asked for; `seconds` is where the recording has come to."""
+        if self._live and self._audience:
+            if self._audience.reached(self._live, seconds):
+                return
+            self._live.disconnect()
+            self._live = None
+
+    def write(self, path: Path) -> None:
+        """End the recording and write it to a file, whole; raise ResultsError if it cannot be written."""
+        self.close()
+        try:
+            path.write_bytes(self._bytes.read() or b"")
+        except OSError as error:
+            raise ResultsError(f"cannot write the recording {path.name}: {error.strerror}") from error
+
+    def close(self) -> None:
+        """Let the viewer have what is still on its way."""
+        if self._live and self._audience:
+            self._audience.reached(self._live, None)
+            self._live.disconnect()
+            self._live = None
 
 
 def time_columns(t: Array, fs: float) -> list[rr.TimeColumn]:
     """Return the timelines sim_time (exact to 1 ns) and sample of the instants `t` [s]."""
-    nanoseconds = np.rint(t * NANOSECONDS).astype(np.int64)
-    return [
-        rr.TimeColumn("sim_time", duration=nanoseconds.astype("timedelta64[ns]")),
-        rr.TimeColumn("sample", sequence=np.rint(t * fs).astype(np.int64)),
-    ]
+    return [seconds(t), rr.TimeColumn("sample", sequence=np.rint(t * fs).astype(np.int64))]
 
 
-def send_curves(
-    recording: rr.RecordingStream,
-    path: str,
-    times: Sequence[rr.TimeColumn],
-    values: Array,
-    names: Sequence[str],
-    colors: Sequence[Sequence[int]],
-    widths: Sequence[float],
-) -> None:
-    """Send `values`, shape (time, curve), as one entity with a curve each."""
-    recording.log(path, rr.SeriesLines(names=names, colors=colors, widths=widths), static=True)
-    scalars = rr.Scalars.columns(scalars=np.ascontiguousarray(values).ravel())
-    recording.send_columns(path, times, scalars.partition([values.shape[1]] * len(values)))
+def seconds(t: Array) -> rr.TimeColumn:
+    """Return the timeline sim_time alone, exact to 1 ns, for what lies between samples."""
+    return rr.TimeColumn("sim_time", duration=np.rint(t * NANOSECONDS).astype(np.int64).astype("timedelta64[ns]"))

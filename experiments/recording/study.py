@@ -7,8 +7,10 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from experiments.recording.stream import recording_file
-from experiments.recording.style import FORMS, MEASURED
+from experiments.audience import Audience
+from experiments.recording.folder import BASE
+from experiments.recording.stream import Stream
+from experiments.recording.style import FORMS, GREY
 from experiments.study.answer import answer, where
 from experiments.study.report import command, worst_runs
 from experiments.study.statistics import Cell
@@ -18,31 +20,56 @@ EDGES = np.arange(-6.25, 6.3, 0.5)
 """Bins of errors in sigma; what lies beyond counts in the outermost."""
 
 
-def record_study(path: Path, study: Study, cells: Sequence[Cell], folder: Path) -> None:
-    """Record the errors of every run over its number, and their distribution in units of sigma."""
-    solved = [cell for cell in cells if cell.runs]
-    with recording_file(path, f"study-{study.name}", _blueprint(study)) as recording:
-        recording.log("/report", rr.TextDocument(_text(study, cells, folder), media_type=rr.MediaType.MARKDOWN), static=True)
+class StudyRecording:
+    """The recording of a study: points while it runs, the rest when it has ended.
+
+    Parameters
+    ----------
+    study : Study
+        What is run.
+    folder : Path
+        Where it is kept.
+    audience : Audience, optional
+        Who watches.
+    """
+
+    def __init__(self, study: Study, folder: Path, audience: Audience | None = None) -> None:
+        self._study, self._folder = study, folder
+        self.stream = Stream(f"study-{study.name}-{study.fingerprint[:10]}", audience)
         for model in study.models:
             size = 2.0 * (len(study.models) - study.models.index(model))
-            _errors(recording, model, [cell for cell in solved if cell.names[2] == model], size)
+            for name in study.parameters:
+                points = rr.SeriesPoints(names=model, colors=FORMS.get(model, GREY), marker_sizes=size)
+                self.stream.keep(f"error/{name}/{model}", points)
+        self.stream.arrange(_blueprint(study))
+
+    def add(self, cells: Sequence[Cell]) -> None:
+        """Send the errors of runs, each a point."""
+        for cell in cells:
+            order, errors = np.argsort(cell.run, kind="stable"), 100 * cell.error
+            for p, name in enumerate(cell.parameters if cell.runs else ()):
+                columns = rr.Scalars.columns(scalars=errors[order, p])
+                self.stream.send(f"error/{name}/{cell.names[2]}", [rr.TimeColumn("run", sequence=cell.run[order])], columns)
+        self.stream.breathe(0.0)
+
+    def finish(self, cells: Sequence[Cell]) -> list[tuple[str, Stream]]:
+        """Send the answer, and the distributions of the errors; return the stream by the name of its file."""
+        text = rr.TextDocument(_text(self._study, cells, self._folder), media_type=rr.MediaType.MARKDOWN)
+        self.stream.keep("report", text)
+        for model in self._study.models:
+            if mine := [cell for cell in cells if cell.runs and cell.names[2] == model]:
+                _sigmas(self.stream, model, mine)
+        self.stream.arrange(_blueprint(self._study, finished=True))
+        return [(BASE, self.stream)]
 
 
-def _errors(recording: rr.RecordingStream, model: str, cells: Sequence[Cell], size: float) -> None:
-    """Send a point a run and parameter, and the histogram of all errors over their corrected sigma."""
-    if not cells:
-        return
-    run = np.concatenate([cell.run for cell in cells])
-    error = 100 * np.concatenate([cell.error for cell in cells])
-    order, color = np.argsort(run, kind="stable"), FORMS.get(model, MEASURED)
-    for p, name in enumerate(cells[0].parameters):
-        at = f"/error/{name}/{model}"
-        recording.log(at, rr.SeriesPoints(names=model, colors=color, marker_sizes=size), static=True)
-        recording.send_columns(at, [rr.TimeColumn("run", sequence=run[order])], rr.Scalars.columns(scalars=error[order, p]))
+def _sigmas(stream: Stream, model: str, cells: Sequence[Cell]) -> None:
+    """Send the histogram of all errors over their corrected sigma."""
     z = np.concatenate([((c.X - c.truth)[c.sigma > 0] / c.sigma[c.sigma > 0]) for c in cells])
+    color = FORMS.get(model, GREY)
     counts, _ = np.histogram(np.clip(z, EDGES[0], EDGES[-1]), EDGES)
     bars = rr.BarChart(counts / max(counts.sum(), 1), abscissa=(EDGES[:-1] + EDGES[1:]) / 2, widths=np.diff(EDGES), color=color)
-    recording.log(f"/sigmas/{model}", bars, static=True)
+    stream.keep(f"sigmas/{model}", bars)
 
 
 def _text(study: Study, cells: Sequence[Cell], folder: Path) -> str:
@@ -53,17 +80,18 @@ def _text(study: Study, cells: Sequence[Cell], folder: Path) -> str:
     return "\n\n".join([f"# {study.question}", answer(cells), "## Worst runs", "\n".join(worst)])
 
 
-def _blueprint(study: Study) -> rrb.Blueprint:
+def _blueprint(study: Study, *, finished: bool = False) -> rrb.Blueprint:
     hidden = rrb.PlotLegend(visible=False)  # the colours are those of the histograms
     errors = [
         rrb.TimeSeriesView(origin=f"/error/{name}", name=f"error of {name} [%] over runs", plot_legend=hidden)
         for name in study.parameters
     ]
-    sigmas = [rrb.BarChartView(origin=f"/sigmas/{name}", name=f"{name}: error / corrected sigma") for name in study.models]
-    left = rrb.Vertical(
-        rrb.TextDocumentView(origin="/report", name=study.name), *sigmas, row_shares=[2.0, *[1.0] * len(sigmas)]
-    )
-    time = rrb.TimePanel(state="collapsed", timeline="run")
-    return rrb.Blueprint(
-        rrb.Horizontal(left, rrb.Grid(*errors, grid_columns=2), column_shares=[1.0, 2.0]), time, collapse_panels=True
-    )
+    sigmas = [
+        rrb.BarChartView(origin=f"/sigmas/{name}", name=f"{name}: error / corrected sigma", plot_legend=hidden)
+        for name in study.models
+    ]
+    text = rrb.TextDocumentView(origin="/report", name=study.name)
+    left = [rrb.Vertical(text, *sigmas, row_shares=[2.0, *[1.0] * len(sigmas)])] if finished else []
+    time, shares = rrb.TimePanel(state="collapsed", timeline="run"), [*[1.0] * len(left), 2.0]
+    points = rrb.Grid(*errors, grid_columns=2)
+    return rrb.Blueprint(rrb.Horizontal(*left, points, column_shares=shares), time, collapse_panels=True)

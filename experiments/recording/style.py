@@ -1,25 +1,67 @@
 """Colours and names that are the same in every view."""
 
-JOINTS = ([31, 119, 180], [255, 127, 14])
-"""Colours of the joints' curves: those of the SCARA's links."""
+from collections.abc import Sequence
 
-MEASURED = [150, 150, 150]
-"""Grey: what was measured."""
+Color = Sequence[int]
 
-FORMS = {
-    "explicit": [44, 160, 44],
-    "implicit": [148, 103, 189],
-    "power": [214, 39, 40],
-    "energy": [140, 86, 75],
+JOINTS: tuple[Color, ...] = (
+    (31, 119, 180),
+    (255, 127, 14),
+    (44, 160, 44),
+    (214, 39, 40),
+    (148, 103, 189),
+    (140, 86, 75),
+    (227, 119, 194),
+)
+"""Colours of the joints' curves; the first two are those of the SCARA's links."""
+
+GREY: Color = (150, 150, 150)
+"""What was measured, the truth, and marks."""
+
+FORMS: dict[str, Color] = {
+    "explicit": (44, 160, 44),
+    "implicit": (148, 103, 189),
+    "power": (214, 39, 40),
+    "energy": (140, 86, 75),
 }
 """Colours of the models."""
 
+PLANNED: Color = (240, 200, 60)
+MEASURED: Color = (90, 210, 220)
+"""Colours of the planned arm and of that which the encoders see; the true arm has its own."""
 
-def joint_colors(n: int) -> list[list[int]]:
+STATES: dict[str, Color] = {
+    "slides": (70, 130, 90),
+    "reversal": (200, 150, 50),
+    "stands": (150, 60, 60),
+    "saturated": (230, 60, 200),
+    "used": (70, 130, 90),
+    "partly": (200, 150, 50),
+    "masked": (150, 60, 60),
+}
+"""What a joint does, its drive at a limit, and what identification makes of the instant."""
+
+FORM_WIDTHS = {"explicit": 3.5}
+"""Widths of the curves of models, 1.5 unless it is said here: the implicit model's lie on those of the explicit one."""
+
+
+def joint_colors(n: int) -> list[Color]:
     """Return a colour for each of `n` joints."""
     return [JOINTS[j % len(JOINTS)] for j in range(n)]
 
 
-def lighter(color: list[int], times: int) -> list[int]:
-    """Return `color` moved halfway to white, that many times: one model's rows are shades of its colour."""
+def lighter(color: Color, times: int) -> list[int]:
+    """Return `color` moved halfway to white, that many times: a second identification in shades of the first."""
     return [round(255 - (255 - c) / 2**times) for c in color]
+
+
+SHADES = {"planned": 2, "measured": 1, "log": 1, "command": 1, "reference": 1}
+"""How much lighter than the joint's colour the curves of a kind are; the others have the colour itself."""
+
+WIDTHS = {"planned": 4.0, "reference": 4.0, "command": 4.0, "log": 1.0}
+"""Widths of the curves of a kind: what was wanted is a broad band behind what has come of it."""
+
+
+def kind_colors(kind: str, n: int) -> list[list[int]]:
+    """Return the colours of `n` joints' curves of a kind."""
+    return [lighter(color, SHADES.get(kind, 0)) for color in joint_colors(n)]

@@ -1,14 +1,14 @@
 """The recording of Table 2: the twin's signals, its errors by both processings, and what each imperfection does alone."""
 
-from pathlib import Path
-
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from experiments.recording.arm import send_arm
-from experiments.recording.parts import layout, plot, send_bars, send_joints
-from experiments.recording.stream import recording_file, time_columns
+from experiments.recording.identified import RunRecording
+from experiments.recording.layouts import Shelf, arm, bars, column, plot, side_by_side, tabs
+from experiments.recording.report import about
+from experiments.recording.stream import Stream
+from experiments.recording.style import FORMS
 from experiments.table2 import PAPER, Table2
 from identify import Array
 
@@ -19,40 +19,43 @@ ROWS = 5
 """Charts of imperfections in a column."""
 
 
-def record_table2(path: Path, table: Table2) -> None:
-    """Write the recording of `table` to `path`; raise ResultsError if it cannot be written."""
-    run = table.run
-    with recording_file(path, table.scenario.name, _blueprint(table)) as recording:
-        times = time_columns(run.log.t, run.log.fs)
-        send_arm(recording, run.robots[0], run.q[0], times)
-        disturbance = run.tau[0] - run.command[0]
-        send_joints(recording, times, {"joint/tau": run.log.tau[0], "joint/disturbance": disturbance})
-        for name, found in table.found.items():
-            for form, one in found.items():
-                errors = one.estimates[form].error_percent(list(table.truth.values()))
-                send_bars(recording, f"processing/{name}/{form}", _decades(errors), form)
-        for k, alone in enumerate(table.attribution.values()):
-            for form, error in alone.items():
-                send_bars(recording, f"attribution/{k}/{form}", _decades(error), form)
-        recording.log("report", rr.TextDocument(_markdown(table), media_type="text/markdown"), static=True)
+def finish_table2(recording: RunRecording, table: Table2) -> list[tuple[str, Stream]]:
+    """Add what only the end tells to a recording of the first realization; return its streams by the name of their file."""
+    run, stream = table.run, recording.base.stream
+    streams = recording.end(run)
+    truth = list(table.truth.values())
+    for name, found in table.found.items():
+        for form, one in found.items():
+            _send(stream, f"processing/{name}/{form}", one.estimates[form].error_percent(truth), form)
+    for k, alone in enumerate(table.attribution.values()):
+        for form, error in alone.items():
+            _send(stream, f"attribution/{k}/{form}", error, form)
+    stream.keep("table2", rr.TextDocument(_markdown(table), media_type=rr.MediaType.MARKDOWN))
+    stream.keep("about", rr.TextDocument(about(table.scenario.name, table.scenario.origin), media_type=rr.MediaType.MARKDOWN))
+    known = set().union(*(s.paths for _, s in streams))
+    stream.arrange(tabs(known, first=("table 2", _front(Shelf(known), table))))
+    return streams
 
 
-def _decades(error_percent: Array) -> Array:
-    """Return how many decades an error is above FLOOR, with its sign."""
-    return np.sign(error_percent) * np.log10(1 + np.abs(error_percent) / FLOOR)
+def _send(stream: Stream, path: str, error_percent: Array, form: str) -> None:
+    """Send bars of how many decades errors are above FLOOR, with their sign; those of the models stand side by side."""
+    heights = np.sign(error_percent) * np.log10(1 + np.abs(error_percent) / FLOOR)
+    place, slots = list(FORMS).index(form), len(FORMS) + 1
+    x = 1 + np.arange(len(heights)) + (place - (len(FORMS) - 1) / 2) / slots
+    stream.keep(path, rr.BarChart(heights, abscissa=x, widths=np.full(len(x), 1 / slots), color=FORMS[form]))
 
 
-def _blueprint(table: Table2) -> rrb.Blueprint:
+def _front(shelf: Shelf, table: Table2) -> rrb.Container | rrb.View | None:
     names = list(table.attribution)
-    hidden = rrb.PlotLegend(visible=False)
-    charts = [rrb.BarChartView(origin=f"/attribution/{k}", name=name, plot_legend=hidden) for k, name in enumerate(names)]
-    columns = [rrb.Vertical(*charts[k : k + ROWS]) for k in range(0, len(charts), ROWS)]
-    signals = rrb.Vertical(
-        plot("/joint/tau", "tau in the log [N m]"),
-        plot("/joint/disturbance", "true minus commanded torque [N m]"),
-        *(rrb.BarChartView(origin=f"/processing/{name}", name=f"processed as {name}") for name in table.found),
+    charts = [bars(shelf, name, f"attribution/{k}/*") for k, name in enumerate(names)]
+    columns = [column(*charts[k : k + ROWS]) for k in range(0, len(charts), ROWS)]
+    signals = column(
+        plot(shelf, "torque in the log [N m]", "torque/log"),
+        plot(shelf, "torque, true - commanded [N m]", "torque/disturbance"),
+        *(bars(shelf, f"processed as {name}", f"processing/{name}/*") for name in table.found),
     )
-    return layout("Table 2", [3, 5], [signals, *columns], [6, 4, *([4] * len(columns))])
+    left = column(arm(shelf), rrb.TextDocumentView(origin="/table2", name="Table 2"), shares=[3, 5])
+    return side_by_side("table 2", left, signals, *columns, shares=[6, 4, *([4] * len(columns))])
 
 
 def _markdown(table: Table2) -> str:

@@ -74,7 +74,9 @@ def local_pool(study: Study, threads: int) -> Iterator[LocalPool]:
         pool.close()
 
 
-def run_missing(store: Store, pool: LocalPool, shard: int, watch: Watch) -> None:
+def run_missing(
+    store: Store, pool: LocalPool, shard: int, watch: Watch, finished_shard: Callable[[range], None] | None = None
+) -> None:
     """Run what a study lacks; what is finished when this is interrupted is kept.
 
     Parameters
@@ -87,6 +89,8 @@ def run_missing(store: Store, pool: LocalPool, shard: int, watch: Watch) -> None
         Most runs of a shard.
     watch : callable
         Hears how many runs of this call are done.
+    finished_shard : callable, optional
+        Hears the runs of every shard when it is kept.
     """
     todo, pending, done = store.missing(shard), dict[Future[Shard], range](), 0
     while True:
@@ -99,4 +103,6 @@ def run_missing(store: Store, pool: LocalPool, shard: int, watch: Watch) -> None
             runs = pending.pop(future)
             store.write(runs, future.result())
             done += len(runs)
+            if finished_shard:
+                finished_shard(runs)
         watch(done + pool.partial())

@@ -2,14 +2,13 @@
 
 from collections.abc import Sequence
 from math import isfinite
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.markup import escape
 from rich.text import Text
 
-from experiments.recording.study import record_study
-from experiments.results import results_folder, write_summary
+from experiments.results import results_folder, tell_of, write_recording, write_summary
 from experiments.study.answer import answer, method, percent, short, value
 from experiments.study.report import report
 from experiments.study.shard_file import arrays
@@ -18,16 +17,20 @@ from experiments.study.store import Store
 from experiments.study.versions import versions
 from experiments.tables import new_table
 
+if TYPE_CHECKING:
+    from experiments.recording.study import StudyRecording
 
-def write_results(page: Console, store: Store) -> list[Cell]:
-    """Write summary.json, report.html and recording.rrd into the folder of a study, and print its answer."""
+
+def write_results(page: Console, store: Store, recording: "StudyRecording | None") -> list[Cell]:
+    """Write summary.json, report.html and the recording into the folder of a study, and print its answer."""
     study, seconds = store.study, store.seconds()
     found = cells(arrays(store.table()), study.varied, study.parameters)
     with results_folder(store.folder) as folder:
         (folder / "report.html").write_text(report(study, found, seconds, store.folder), encoding="utf-8")
-        record_study(folder / "recording.rrd", study, found, store.folder)
         write_summary(folder / "summary.json", _summary(store, found, seconds))
+        lost = write_recording(folder, recording.finish(found)) if recording else ""
     _print(page, store, found)
+    tell_of(lost, store.folder)
     return found
 
 

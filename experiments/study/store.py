@@ -113,6 +113,10 @@ class Store:
         """Write a finished shard, whole or not at all."""
         write_shard(self.folder / "shards", self.study, runs, shard)
 
+    def part(self, runs: range) -> pa.Table:
+        """Return the rows of the finished shard of `runs`."""
+        return pa.concat_tables([read_shard(path) for path in self.shards() if runs_of(path) == runs])
+
     def table(self) -> pa.Table:
         """Return the rows of all finished shards, by run, method and model."""
         return pa.concat_tables([read_shard(path) for path in self.shards()])

@@ -4,7 +4,8 @@ from typing import final
 
 import numpy as np
 
-from sim.drives.base import AbstractAmplifier, AbstractDrive, every
+from sim.drives.base import AbstractAmplifier, AbstractDrive, Trace, every
+from sim.drives.electric import Electric
 from sim.errors import ScenarioError
 from sim.motors import Array, Motors
 from sim.robot import Robot
@@ -81,7 +82,16 @@ class _Amplifier(AbstractAmplifier):
             t, i1, charge = np.zeros(1), i0, np.zeros(1)
         away, rest = i1 - target, dt - t
         self._i = target + away * np.exp(-self._w * rest)
-        return (self._K * ((charge + target * rest - away * (np.expm1(-self._w * rest) / self._w)) / dt))[None]
+        current = (charge + target * rest - away * (np.expm1(-self._w * rest) / self._w)) / dt
+        self.trace = demand, limited, current, i0, self._i, e, saturated
+        return (self._K * current)[None]
+
+    def electric(self, trace: Trace, dt: Array) -> Electric:
+        demand, reference, current, i0, i1, e, saturated = trace
+        R, L, K, V, most = (x[0] for x in (self._R, self._L, self._K, self._V, self._I))
+        voltage = R * current + L * (i1 - i0) / dt + e
+        limited = np.maximum(saturated, np.abs(demand) > most * K)
+        return Electric(reference, current, voltage, voltage / V, limited)
 
     def _release(self, v: Array, target: Array, e: Array) -> Array:
         """Return how long [s] the loop asks for more than the voltage `v`, which is all there is."""

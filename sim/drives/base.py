@@ -4,12 +4,18 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
+from sim.drives.electric import Electric
 from sim.motors import Array
 from sim.robot import Robot
+
+Trace = tuple[Array, ...]
 
 
 class AbstractAmplifier(ABC):
     """A drive at work; what it remembers is of shape (nsim, joint)."""
+
+    trace: Trace = ()
+    """What the last call of `step` did, raw, (steps or 1, nsim, joint) or (nsim, joint) each; empty without currents."""
 
     @abstractmethod
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
@@ -29,6 +35,18 @@ class AbstractAmplifier(ABC):
         -------
         Array, shape (steps or 1, nsim, joint)
             The mean torque in every step, or in all of them.
+        """
+
+    @abstractmethod
+    def electric(self, trace: Trace, dt: Array) -> Electric:
+        """Return currents and voltages of the first simulation from its traces.
+
+        Parameters
+        ----------
+        trace : tuple of Array, shape (step, joint)
+            As this drive left them; not empty.
+        dt : Array, shape (step, 1)
+            How long each step was [s].
         """
 
 

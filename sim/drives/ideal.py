@@ -4,7 +4,8 @@ from typing import final
 
 import numpy as np
 
-from sim.drives.base import AbstractAmplifier, AbstractDrive
+from sim.drives.base import AbstractAmplifier, AbstractDrive, Trace
+from sim.drives.electric import Electric
 from sim.motors import Array
 from sim.robot import Robot
 from sim.settings import settings
@@ -34,3 +35,7 @@ class _Amplifier(AbstractAmplifier):
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
         del speed, steps
         return demand[None]
+
+    def electric(self, trace: Trace, dt: Array) -> Electric:
+        del trace
+        return Electric(*np.zeros((5, *dt.shape)))

@@ -6,7 +6,8 @@ import numpy as np
 from pydantic import Field
 
 from sim.drives.averaged import limits
-from sim.drives.base import AbstractAmplifier, AbstractDrive, every
+from sim.drives.base import AbstractAmplifier, AbstractDrive, Trace, every
+from sim.drives.electric import Electric
 from sim.drives.pwm import Modulation, Modulator
 from sim.drives.winding import Winding, pass_period
 from sim.errors import ScenarioError
@@ -105,13 +106,24 @@ class SwitchedAmplifier(AbstractAmplifier):
         """Advance by PWM periods; return the mean torque in each."""
         wanted = np.minimum(np.maximum(demand / self._K, -self._I), self._I)
         e = self._K * speed
-        charge = np.empty((steps, *demand.shape))
+        charge, before, after, index = np.empty((4, steps, *demand.shape))
         for k in range(steps):
-            m = self._index(wanted, self._known * e[k])
-            self.i, charge[k], electrical = pass_period(self.i, m, e[k], self._winding, self._modulator)
+            index[k], before[k] = self._index(wanted, self._known * e[k]), self.i
+            self.i, charge[k], electrical = pass_period(self.i, index[k], e[k], self._winding, self._modulator)
             self.electrical += electrical
+            after[k] = self.i
+        self.trace = wanted, charge, before, after, e, index
         self.mechanical += (e * charge).sum(axis=0)
         return charge * (self._K / self._h)
+
+    def electric(self, trace: Trace, dt: Array) -> Electric:
+        """Return currents and voltages of PWM periods."""
+        reference, charge, before, after, e, index = trace
+        V, R, L = (x[0] for x in self._winding)
+        voltage = (R * charge + L * (after - before)) / dt + e
+        most = self._most[0] / V * (1 - 1e-9)  # as an index is rounded
+        limited = (np.abs(reference) >= self._I[0]) | (np.abs(index) >= most)
+        return Electric(reference, charge / dt, voltage, index, limited.astype(np.float64))
 
     @property
     def copper(self) -> Array:

@@ -1,0 +1,79 @@
+"""The recording of a results folder: a base and its layers, each a file of its own."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rerun.chunk import RrdReader
+
+from experiments.errors import ResultsError
+from experiments.recording.layouts import LAYOUTS, tabs
+from experiments.recording.stream import Stream
+
+BASE = "recording.rrd"
+INNER = "recording.inner.rrd"
+
+
+def layer_file(label: str) -> str:
+    """Return the name of the file of an identification's layer."""
+    return f"recording.{label}.rrd"
+
+
+def files(folder: Path) -> list[Path]:
+    """Return the recording of a folder: its layers, newest first, and then the base.
+
+    A viewer lays out what it opens first, and the newest layer knows of all the others.
+    """
+    layers = sorted(folder.glob("recording.*.rrd"), key=lambda path: (path.name != INNER, path.stat().st_mtime), reverse=True)
+    base = folder / BASE
+    return [*layers, base] if base.is_file() else layers
+
+
+def known(paths: Sequence[Path]) -> tuple[str, set[str]]:
+    """Return the recording id and the entities of files of one recording.
+
+    Raises
+    ------
+    ResultsError
+        If one cannot be read, or they are of different recordings.
+    """
+    ids, entities = set[str](), set[str]()
+    for path in paths:
+        try:
+            reader = RrdReader(path)
+            ids |= {entry.recording_id for entry in reader.recordings()}
+            columns = reader.store().schema().component_columns()
+        except (RuntimeError, ValueError, OSError) as error:
+            raise ResultsError(f"cannot read the recording {path}: {' '.join(str(error).split())}") from error
+        entities |= {column.entity_path.strip("/") for column in columns}
+    if len(ids) != 1:
+        raise ResultsError(f"{', '.join(map(str, paths))} hold {len(ids)} recordings, not one: record the run anew")
+    return ids.pop(), entities
+
+
+def merge(paths: Sequence[Path], tab: str, out: Path) -> None:
+    """Write files of one recording as one file that opens with the layout `tab`.
+
+    Raises
+    ------
+    ResultsError
+        If a file cannot be read or written, or there is no such layout.
+    """
+    if tab not in LAYOUTS:
+        raise ResultsError(f"unknown tab {tab!r}; known: {', '.join(LAYOUTS)}")
+    name, entities = known(paths)
+    stream = Stream(name)
+    for path in reversed(paths):
+        stream.copy(RrdReader(path))
+    stream.arrange(tabs(entities, tab))
+    stream.write(out)
+
+
+def rearrange(paths: Sequence[Path], fresh: Stream) -> None:
+    """Write layers anew so that they, too, lay out what `fresh` adds to their recording."""
+    name, entities = known(paths)
+    for path in paths:
+        if path.name not in (BASE, INNER):
+            stream = Stream(name, layer=True)
+            stream.copy(RrdReader(path))
+            stream.arrange(tabs(entities | fresh.paths))
+            stream.write(path)

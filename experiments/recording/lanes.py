@@ -1,0 +1,60 @@
+"""Lanes of states: what a joint does, what its drive does, and what identification makes of the instant."""
+
+import numpy as np
+import numpy.typing as npt
+
+from experiments.recording.stream import Stream, time_columns
+from identify import Array
+
+STILL = 1e-3
+"""Speed [rad/s] up to which a joint is said to stand: a 16-bit encoder shows one step of it in a tenth of a second."""
+
+SLOW = 0.1
+"""Speed [rad/s] up to which its friction is in doubt: where masks of reversals begin."""
+
+
+class Lanes:
+    """Lanes that grow; only changes are sent.
+
+    Parameters
+    ----------
+    stream : Stream
+        Where they go.
+    fs : float
+        Sampling frequency [Hz].
+    """
+
+    def __init__(self, stream: Stream, fs: float) -> None:
+        self._stream, self._fs, self._last = stream, fs, dict[str, str]()
+
+    def send(self, path: str, t: Array, states: npt.NDArray[np.str_]) -> None:
+        """Send the states of a lane at the instants `t` [s]."""
+        if path not in self._last:
+            self._stream.lanes(path)
+        now = np.concatenate([[self._last.get(path, "")], states])
+        self._last[path] = str(now[-1])
+        changed = np.flatnonzero(now[1:] != now[:-1])
+        if len(changed):
+            self._stream.states(path, time_columns(t[changed], self._fs), now[1 + changed].tolist())
+
+
+def joint_states(qd: Array, limited: Array | None) -> npt.NDArray[np.str_]:
+    """Return what a joint does: it slides, turns or stands, or its drive is at a limit, whatever it does.
+
+    Parameters
+    ----------
+    qd : Array, shape (time,)
+        Velocity [rad/s].
+    limited : Array, shape (time,), optional
+        Share of each sample for which the drive was at its limit of current or voltage.
+    """
+    speed = np.abs(qd)
+    turns = np.zeros(len(qd), dtype=bool)
+    turns[1:] = np.signbit(qd[1:]) != np.signbit(qd[:-1])  # a fast joint turns between two samples
+    states = np.where(speed <= STILL, "stands", np.where(turns | (speed <= SLOW), "reversal", "slides"))
+    return states if limited is None else np.where(limited > 0, "saturated", states)
+
+
+def mask_states(weight: Array) -> npt.NDArray[np.str_]:
+    """Return whether an instant is used, from its weight, shape (time,)."""
+    return np.where(weight == 0, "masked", np.where(weight < 1, "partly", "used"))

@@ -1,0 +1,203 @@
+"""The layer of an identification: what its models make of a recorded motion, and what they leave over."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import rerun as rr
+
+from experiments.audience import Audience
+from experiments.identified import Identified
+from experiments.recording.lanes import Lanes, mask_states
+from experiments.recording.layouts import tabs
+from experiments.recording.report import estimates_table, judged, short_table
+from experiments.recording.stream import Stream, seconds, time_columns
+from experiments.recording.style import FORM_WIDTHS, FORMS, GREY, JOINTS, Color, kind_colors, lighter
+from identify import (
+    MODELS,
+    Array,
+    Estimate,
+    Instants,
+    binned,
+    cutoffs,
+    filtered,
+    instants,
+    measured_state,
+    running_estimate,
+    spectrum,
+)
+
+EVERY = 0.5
+"""Time between the instants of running estimates [s]."""
+
+BINS = {"over_velocity": 41, "over_position": 240}
+"""Bins of residuals: over position fine enough for a motor of many slots."""
+
+RESOLUTION = 0.5
+"""Distance of the frequencies of a spectrum [Hz]."""
+
+WIDEST = 0.5
+"""Share of the last estimate up to which the sigma of an earlier one is worth showing."""
+
+FLOOR = 1e-5
+"""Amplitude density [N m/sqrt(Hz)], or [W/sqrt(Hz)], that a spectrum shows as 0 dB."""
+
+
+class Layer:
+    """What the identification of one log adds to its recording.
+
+    Parameters
+    ----------
+    name : str
+        Recording id of the motion.
+    found : Identified
+        The identification of one log.
+    joints : sequence of str
+        Names of the joints.
+    known : set of str
+        Entities that the recording has already.
+    audience : Audience, optional
+        Who watches.
+    """
+
+    def __init__(
+        self, name: str, found: Identified, joints: Sequence[str], known: set[str], audience: Audience | None = None
+    ) -> None:
+        self.stream, self._found, self._joints, self._known = Stream(name, audience, layer=True), found, joints, known
+        self._log, self._chain, self._at = found.logs[0], found.processing, f"identify/{found.label}"
+        methods = {path.strip("/").split("/")[1] for path in known if path.strip("/").startswith("identify/")}
+        self._shade = len(methods - {found.label})
+        self._highest = 0.0
+
+    def send(self) -> None:
+        """Send everything."""
+        self._motion()
+        for form, estimate in self._found.estimates.items():
+            at, color = f"{self._at}/{form}", self._color(form)
+            self._rows(at, form, estimate, color)
+            self._columns(at, form, estimate)
+            self._running(at, form, estimate, color)
+            self._left_over(at, form, estimate, color)
+            self._judge(form, estimate)
+        self._truth()
+        for name, cutoff in cutoffs(self._chain, self._log.fs).items():
+            mark = rr.BarChart([1.1 * self._highest], abscissa=[cutoff], widths=[RESOLUTION / 3], color=GREY)
+            self.stream.keep(f"{self._at}/cutoff/{name}", mark)
+        for name, text in (("report", estimates_table(self._found)), ("estimates", short_table(self._found))):
+            self.stream.keep(f"{self._at}/{name}", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+        self.stream.arrange(tabs(self._known | self.stream.paths))
+        self.stream.breathe(0.0)
+
+    def _color(self, form: str) -> list[int]:
+        return lighter(FORMS.get(form, GREY), self._shade)
+
+    def _names(self, form: str, system_rows: int) -> Sequence[str]:
+        """Return what the kinds of row of a model are called: after their joint, or after the model."""
+        return self._joints if system_rows == len(self._joints) and form != "power" else [form] * system_rows
+
+    def _curve(self, path: str, times: Sequence[rr.TimeColumn], values: Array, name: str, color: Color, width: float) -> None:
+        self.stream.style(path, [name], [color], width)
+        self.stream.curves(path, times, values)
+
+    def _motion(self) -> None:
+        """Send the motion as it was measured, and as the rows see it, and which instants are masked."""
+        log, rows = self._log, self._chain.rows(self._log)
+        raw, seen, inner = measured_state(log, self._chain), filtered(log, self._chain), slice(rows.first, -rows.first or None)
+        for name, values in seen.items():
+            kinds = {"filtered": (np.arange(log.samples)[rows.samples], values)}
+            if name != "q":  # that is in the base
+                kinds["measured"] = np.arange(log.samples)[inner], getattr(raw, name)[:, inner]
+            for kind, (samples, curves) in kinds.items():
+                path, colors = f"{self._at}/{name}/{kind}", kind_colors(kind, len(self._joints))
+                self.stream.style(path, [f"{kind} {joint}" for joint in self._joints], colors)
+                self.stream.curves(path, time_columns(samples / log.fs, log.fs), curves.T)
+        lanes, weight = Lanes(self.stream, log.fs), self._chain.signals(log).weight
+        for joint, of_joint in zip(self._joints, weight, strict=True):
+            lanes.send(f"{self._at}/mask/{joint}", log.t, mask_states(of_joint))
+
+    def _rows(self, at: str, form: str, estimate: Estimate, color: Color) -> None:
+        """Send what was measured, what is predicted, and the residual, an entity for each kind of row."""
+        system, label = estimate.system, self._found.label if self._shade else ""
+        groups = np.unique(system.group)
+        for group, row in zip(groups, self._names(form, len(groups)), strict=True):
+            rows = (system.group == group) & system.valid
+            times, named = [seconds(system.time[rows])], f"{form} {label}".strip()
+            self._curve(f"{at}/measured/{row}", times, system.Y[rows], "measured", GREY, 6.0)
+            width = FORM_WIDTHS.get(form, 1.5)
+            self._curve(f"{at}/predicted/{row}", times, estimate.predicted[rows], named, color, width)
+            self._curve(f"{at}/residual/{row}", times, estimate.residual[rows], named, color, width)
+
+    def _columns(self, at: str, form: str, estimate: Estimate) -> None:
+        """Send the columns of W, scaled to unit length, and its singular values."""
+        system = estimate.system
+        length = np.linalg.norm(system.W, axis=0)
+        W, groups = system.W / np.where(length > 0, length, 1.0), np.unique(system.group)
+        if form != "implicit":  # whose W is the explicit one's, but for the differences
+            for group, row in zip(groups, self._names(form, len(groups)), strict=True):
+                rows = (system.group == group) & system.valid
+                used = np.flatnonzero(np.abs(W[rows]).max(axis=0) > 0)
+                path, colors = f"{at}/columns/{row}", [JOINTS[p % len(JOINTS)] for p in used]
+                self.stream.style(path, [estimate.parameters[p] for p in used], colors)
+                self.stream.curves(path, [seconds(system.time[rows])], W[rows][:, used])
+        values = np.linalg.svd(system.R_W, compute_uv=False)
+        self._bars(f"{at}/singular_values", np.log10(values / values[-1]), form)
+
+    def _running(self, at: str, form: str, estimate: Estimate, color: Color) -> None:
+        """Send the estimate as it comes about, with its variance, once that is small enough to be worth a look."""
+        if estimate.solved is None:
+            return
+        log = self._log
+        t = np.append(np.arange(EVERY, log.t[-1], EVERY), log.t[-1] + self._chain.halo(log.fs, log.torque))
+        running = running_estimate(estimate, t, self._chain.halo(log.fs, log.torque))
+        t = np.minimum(t, log.t[-1])
+        for p, name in enumerate(estimate.parameters):
+            known = np.isfinite(running.X[:, p]) & (running.sigma[:, p] < WIDEST * np.abs(running.X[-1, p]))
+            path, variance = f"{at}/estimate/{name}", running.sigma[known, p] ** 2
+            self.stream.keep(path, rr.Measurements.from_fields(names=[form], colors=[color], widths=[2.0]))
+            columns = rr.Measurements.columns(values=running.X[known, p], variances=variance)
+            self.stream.send(path, [seconds(t[known])], columns)
+
+    def _left_over(self, at: str, form: str, estimate: Estimate, color: Color) -> None:
+        """Send the residual before the operator: over velocity and position, and its spectrum."""
+        log = self._log
+        left = instants(log, self._found.basis, MODELS.create(form), self._chain, estimate.X)
+        names = self._names(form, len(left.residual))
+        if names is self._joints:
+            self._over(at, form, left)
+        for row, residual, weight in zip(names, left.residual, left.weight, strict=True):
+            f, density = spectrum(np.where(weight > 0, residual, 0.0), log.fs, RESOLUTION)
+            height = np.maximum(20 * np.log10(np.maximum(density, 1e-300) / FLOOR), 0.0)
+            path = f"{self._at}/{form}/spectrum/{row}"
+            self.stream.keep(path, rr.BarChart(height, abscissa=f, widths=np.full(len(f), f[1]), color=color))
+            self._highest = max(self._highest, height.max())
+
+    def _over(self, at: str, form: str, left: Instants) -> None:
+        state, last = measured_state(self._log, self._chain), left.first + left.residual.shape[-1]
+        for kind, x in (("over_velocity", state.qd), ("over_position", state.q)):
+            for joint, of_joint, residual, weight in zip(self._joints, x, left.residual, left.weight, strict=True):
+                seen = of_joint[left.first : last]
+                edges = np.linspace(seen.min(), seen.max(), BINS[kind] + 1)
+                mean = np.nan_to_num(binned(seen, residual, weight, edges))
+                middle, widths = (edges[1:] + edges[:-1]) / 2, np.full(BINS[kind], edges[1] - edges[0])
+                chart = rr.BarChart(mean, abscissa=middle, widths=widths, color=self._color(form))
+                self.stream.keep(f"{at}/{kind}/{joint}", chart)
+
+    def _judge(self, form: str, estimate: Estimate) -> None:
+        """Send the error of every parameter, where the truth is known, or its sigma."""
+        kind = "relative_sigma" if self._found.truth is None else "error"
+        values = judged(self._found, estimate)
+        self._bars(f"{self._at}/{form}/{kind}", np.nan_to_num(values), form)
+
+    def _bars(self, path: str, values: Array, form: str) -> None:
+        """Send bars at 1, 2, ...; those of the models stand side by side."""
+        forms = list(self._found.estimates)
+        place, slots = forms.index(form), len(forms) + 1
+        x = 1 + np.arange(len(values)) + (place - (len(forms) - 1) / 2) / slots
+        chart = rr.BarChart(values, abscissa=x, widths=np.full(len(x), 1 / slots), color=self._color(form))
+        self.stream.keep(path, chart)
+
+    def _truth(self) -> None:
+        """Send the true parameters as lines from the beginning to the end."""
+        ends: Mapping[str, float] = self._found.truth or {}
+        for name, value in ends.items():
+            times = time_columns(self._log.t[[0, -1]], self._log.fs)
+            self._curve(f"truth/{name}", times, np.array([value, value]), "true", GREY, 3.0)

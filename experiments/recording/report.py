@@ -1,0 +1,56 @@
+"""Texts in recordings."""
+
+from collections.abc import Iterator
+
+from experiments.identified import Identified
+from identify import Array, Estimate
+
+
+def judged(found: Identified, estimate: Estimate) -> Array:
+    """Return the errors [%] where the truth is known, %sigma where it is not."""
+    return estimate.relative_sigma_percent if found.truth is None else estimate.error_percent(list(found.truth.values()))
+
+
+def estimates_table(found: Identified) -> str:
+    """Return estimates, with error or sigma, as a markdown table."""
+    forms = list(found.estimates)
+    what = "sigma" if found.truth is None else "error"
+    lines = [f"Estimate and {what}, chain **{found.chain}**, {found.estimator}\n"]
+    lines += [f"| | true | {' | '.join(forms)} |", "|---|---:|" + "---:|" * len(forms)]
+    for i, name in enumerate(found.basis.parameters):
+        true = "" if found.truth is None else f"{list(found.truth.values())[i]:g}"
+        lines.append(f"| {i + 1} {name} | {true} | {' | '.join(_cells(found, i))} |")
+    conds = " | ".join(f"{e.condition_number:.1f}" for e in found.estimates.values())
+    return "\n".join([*lines, f"| Cond(W) | | {conds} |"])
+
+
+def short_table(found: Identified) -> str:
+    """Return the estimates of the models alone, beside the truth if it is known, as a markdown table."""
+    known = found.truth is not None
+    lines = [
+        f"Chain **{found.chain}**, {found.estimator}\n",
+        f"|{' | true' if known else ''} | {' | '.join(found.estimates)} |",
+    ]
+    lines.append("|---|" + "---:|" * (len(found.estimates) + known))
+    for i, name in enumerate(found.basis.parameters):
+        true = f" {list(found.truth.values())[i]:g} |" if found.truth is not None else ""
+        lines.append(f"| {name} |{true} {' | '.join(f'{e.X[i]:.4g}' for e in found.estimates.values())} |")
+    return "\n".join(lines)
+
+
+def _cells(found: Identified, i: int) -> Iterator[str]:
+    for estimate in found.estimates.values():
+        aside = f"{estimate.corrected_sigma[i]:.2g}" if found.truth is None else f"{judged(found, estimate)[i]:+.2g} %"
+        yield f"{estimate.X[i]:.4g} ({aside})"
+
+
+def about(name: str, origin: str) -> str:
+    """Return what a recording shows, and where what is."""
+    return "\n".join(
+        [
+            f"# {name}\n",
+            f"{origin}\n" if origin else "",
+            "The arm is solid where it is, yellow wires where it was planned to be, blue wires where its encoders see it.\n",
+            "Planned, asked for or logged: broad and light. True: in the joint's own colour.",
+        ]
+    )
