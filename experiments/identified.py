@@ -48,6 +48,8 @@ class Identified:
         Both with settings of their own, instead of those that have the names.
     trim : float, optional
         Time at either end of a log that makes no rows [s]; by default what the chain needs.
+    name : str
+        What to call it beside others of the same log; by default chain and estimator.
     """
 
     logs: tuple[MotionLog, ...]
@@ -58,6 +60,7 @@ class Identified:
     estimator: str = "WLS"
     method: tuple[Chain, AbstractEstimator] | None = None
     trim: float | None = None
+    name: str = ""
 
     def __post_init__(self) -> None:
         if self.robot not in BASES:
@@ -78,7 +81,7 @@ class Identified:
     @property
     def label(self) -> str:
         """What tells this identification from others of the same log."""
-        return f"{self.chain}-{self.estimator}"
+        return self.name or f"{self.chain}-{self.estimator}"
 
     @property
     def solver(self) -> AbstractEstimator:

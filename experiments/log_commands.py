@@ -1,6 +1,7 @@
 """Commands that work on logs."""
 
 import json
+import re
 import shlex
 from dataclasses import replace
 from pathlib import Path
@@ -38,6 +39,7 @@ def identify(  # noqa: PLR0913, PLR0917  # the options of a command
     model: str = "all",
     estimator: str = "WLS",
     out: File = None,
+    label: str = "",
     watching: Watched = Watching(),  # noqa: B008  # frozen
 ) -> None:
     """Identify a log: CSV or Parquet with the columns t, q1, q2, ..., tau1, tau2, ... in SI units.
@@ -52,6 +54,7 @@ def identify(  # noqa: PLR0913, PLR0917  # the options of a command
         model: all, explicit, implicit or power.
         estimator: OLS, WLS, ...
         out: Folder for summary.json, recording.rrd and log.parquet.
+        label: What to call this identification in a recording; by default chain and estimator. One of that name is replaced.
         watching: How it is watched.
     """
     with importing():
@@ -59,7 +62,9 @@ def identify(  # noqa: PLR0913, PLR0917  # the options of a command
         from experiments.tables import print_identified
 
     page, models = new_page(), tuple(MODELS) if model == "all" else (model,)
-    named = Identified((), robot, models=models, chain=chain, estimator=estimator)  # complains of names first
+    if label and not re.fullmatch(r"[\w.-]+", label):
+        raise ExperimentError(f"--label {label!r} must be of letters, digits, dot, hyphen and underscore")
+    named = Identified((), robot, models=models, chain=chain, estimator=estimator, name=label)  # complains of names first
     known, said = _read(_file(log), torque, torque_delay, named.basis, named.processing)
     found = replace(named, logs=(known,), truth=_truth(log, named))
     with watching.audience() as audience, shown(page):

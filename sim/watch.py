@@ -182,7 +182,7 @@ class _Rows:
     def inside(self, window: tuple[float, float], h: float, before: float) -> Inner | None:
         """Return what lies in the window [s], None if nothing does."""
         t = self.start * h - before
-        within = (t >= window[0]) & (t < window[1])
+        within = (t > window[0] - h / 2) & (t < window[1] - h / 2)  # half a step aside, where rounding decides nothing
         if not within.any():
             return None
         return Inner(t[within], Electric(*(x[within] for x in self.electric)), self.tau[within])

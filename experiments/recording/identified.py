@@ -40,6 +40,8 @@ class RunRecording:
         self._audience, written = audience, to_toml(scenario)
         self.base = Base(recording_id(scenario.name, written.encode()), scenario.real_robot, scenario.fs, ROLES, audience)
         self.base.stream.describe(scenario=written, seed=str(scenario.seed), fs_hz=f"{scenario.fs:g}")
+        if audience:  # so that the view holds the whole motion from the beginning
+            self.base.foretell(scenario.trajectory.sample(scenario.real_robot, scenario.fs).q)
         self.watch = Watch(self.base.stretch, audience.every if audience else float("inf"), window)
 
     def end(self, run: Run) -> list[tuple[str, Stream]]:

@@ -36,7 +36,7 @@ RESOLUTION = 0.5
 """Distance of the frequencies of a spectrum [Hz]."""
 
 WIDEST = 0.5
-"""Share of the last estimate up to which the sigma of an earlier one is worth showing."""
+"""A running estimate is shown once its sigma has been below this share of the last one, and in the second half anyway."""
 
 FLOOR = 1e-5
 """Amplitude density [N m/sqrt(Hz)], or [W/sqrt(Hz)], that a spectrum shows as 0 dB."""
@@ -122,7 +122,7 @@ class Layer:
             rows = (system.group == group) & system.valid
             times, named = [seconds(system.time[rows])], f"{form} {label}".strip()
             self._curve(f"{at}/measured/{row}", times, system.Y[rows], "measured", GREY, 6.0)
-            width = FORM_WIDTHS.get(form, 1.5)
+            width = FORM_WIDTHS.get(form, 1.5) / (1 + self._shade)  # so that what lies below shows
             self._curve(f"{at}/predicted/{row}", times, estimate.predicted[rows], named, color, width)
             self._curve(f"{at}/residual/{row}", times, estimate.residual[rows], named, color, width)
 
@@ -150,7 +150,8 @@ class Layer:
         running = running_estimate(estimate, t, self._chain.halo(log.fs, log.torque))
         t = np.minimum(t, log.t[-1])
         for p, name in enumerate(estimate.parameters):
-            known = np.isfinite(running.X[:, p]) & (running.sigma[:, p] < WIDEST * np.abs(running.X[-1, p]))
+            settled = np.logical_or.accumulate(running.sigma[:, p] < WIDEST * np.abs(running.X[-1, p]))
+            known = np.isfinite(running.X[:, p]) & (settled | (t > t[-1] / 2))
             path, variance = f"{at}/estimate/{name}", running.sigma[known, p] ** 2
             self.stream.keep(path, rr.Measurements.from_fields(names=[form], colors=[color], widths=[2.0]))
             columns = rr.Measurements.columns(values=running.X[known, p], variances=variance)

@@ -8,6 +8,9 @@ import rerun.blueprint as rrb
 PARAMETER_UNITS = {"Fv": "N m s/rad", "Fs": "N m", "ZZ": "kg m²", "LM": "kg m²"}
 """Units of parameters, by how their names begin."""
 
+MOST = 3
+"""Entities in a view up to which a legend has room; the colours are the same everywhere."""
+
 JOINT_STATES = "green slides, amber turns, red stands, pink saturated"
 MASK_STATES = "green used, amber in part, red masked"
 
@@ -57,7 +60,7 @@ def plot(shelf: Shelf, name: str, *patterns: str, legend: bool = True) -> Part:
         name=name,
         contents=_contents(found),
         axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop, visible=legend),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop, visible=legend and len(found) <= MOST),
     )
 
 
@@ -130,7 +133,7 @@ def overview(shelf: Shelf) -> Part:
         lanes(shelf, JOINT_STATES, "state/*"),
     )
     left = column(arm(shelf), text(shelf, "identify/*/estimates") or text(shelf, "about"), shares=[5, 4])
-    return side_by_side("overview", left, motion, column(*fits), column(*_residuals(shelf, rows)), shares=[7, 6, 5, 5])
+    return side_by_side("overview", left, motion, column(*fits), column(*_residuals(shelf, rows)), shares=[7, 7, 5, 5])
 
 
 def friction(shelf: Shelf) -> Part:
@@ -149,10 +152,11 @@ def friction(shelf: Shelf) -> Part:
         *_residuals(shelf, joints),
         lanes(shelf, JOINT_STATES, "state/*"),
         lanes(shelf, MASK_STATES, "identify/*/mask/*"),
+        shares=[1.0, *[1.0] * len(joints), _height(shelf, "state/*"), _height(shelf, "identify/*/mask/*")],
     )
     names = [name for name in shelf.last("identify/*/*/estimate/*") if name.startswith("F")]
     estimates = column(*(_estimate(shelf, name) for name in names))
-    return side_by_side("friction", column(*over_velocity), column(*over_position), time, estimates, shares=[5, 5, 5, 4])
+    return side_by_side("friction", column(*over_velocity), column(*over_position), time, estimates, shares=[5, 5, 6, 4])
 
 
 def drive(shelf: Shelf) -> Part:
@@ -198,26 +202,31 @@ def filters(shelf: Shelf) -> Part:
 def excitation(shelf: Shelf) -> Part:
     """Return the columns of W, and how well they tell the parameters apart."""
     rows = shelf.last("identify/*/*/columns/*")
-    W = [plot(shelf, f"columns of W, {row}, to unit length", *shelf.by_method(f"identify/*/*/columns/{row}")) for row in rows]
-    values = [
-        bars(shelf, f"singular values of W, decades above the least, {method}", f"identify/{method}/*/singular_values")
-        for method in shelf.methods
-    ]
-    return grid("excitation", [*W, *values], 2) if rows else None
+    W = [plot(shelf, f"columns of W, {row}, to unit length", *shelf.of(f"identify/*/*/columns/{row}")[:1]) for row in rows]
+    values = column(
+        *(
+            bars(shelf, f"singular values of W, decades above the least, {method}", f"identify/{method}/*/singular_values")
+            for method in shelf.methods
+        )
+    )
+    return grid("excitation", [*W, values], 2) if rows else None
 
 
 def parameters(shelf: Shelf) -> Part:
     """Return how every estimate comes about, with its sigma, and the truth."""
     views = [_estimate(shelf, name) for name in shelf.last("identify/*/*/estimate/*")]
-    left = column(
-        text(shelf, "identify/*/report"),
-        *(
-            bars(shelf, f"{what} [%] of each parameter, {method}", f"identify/{method}/*/{kind}")
-            for method in shelf.methods
-            for what, kind in (("error", "error"), ("sigma", "relative_sigma"))
-        ),
-    )
+    judged = [
+        bars(shelf, f"{what} [%] of each parameter, {method}", f"identify/{method}/*/{kind}")
+        for method in shelf.methods
+        for what, kind in (("error", "error"), ("sigma", "relative_sigma"))
+    ]
+    left = column(text(shelf, "identify/*/report"), *judged, shares=[3.0, *[2.0] * len(judged)])
     return side_by_side("parameters", left, grid("estimates", views, 2), shares=[2, 3]) if views else None
+
+
+def _height(shelf: Shelf, pattern: str) -> float:
+    """Return how much room lanes need, in that of a plot."""
+    return 0.45 + 0.28 * len(shelf.of(pattern))
 
 
 def _residuals(shelf: Shelf, rows: Sequence[str]) -> list[Part]:

@@ -1,0 +1,94 @@
+"""Recordings on disk: layers laid over each other, one file of them all."""
+
+import shutil
+
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+from experiments.cli import main
+from experiments.errors import ResultsError
+from experiments.recording.folder import files, known, merge
+
+
+@pytest.fixture
+def copied(recorded, tmp_path):
+    """Return a results folder that may be changed."""
+    folder = shutil.copytree(recorded.folder, tmp_path / "run")
+    from identify.log_file import write_log
+
+    write_log(recorded.ran.run.alone(), folder / "log.parquet")
+    from experiments.results import write_summary
+
+    write_summary(folder / "summary.json", recorded.ran.summary())
+    return folder
+
+
+def test_identify_adds_a_layer_to_a_run_and_replaces_one_of_the_same_name(copied, reading, capsys, recorded):
+    before = (copied / "recording.rrd").read_bytes()
+    for estimator in ("OLS", "WLS"):
+        assert main(["identify", str(copied), "--estimator", estimator, "--label", "second"]) == 0
+    assert "added to the recording" in capsys.readouterr().out
+    assert (copied / "recording.rrd").read_bytes() == before
+    assert len(files(copied)) == 4
+    name, there = known(files(copied))
+    assert name == recorded.streams[0][1].name
+    assert {"identify/second/power/residual/power", "identify/idbench-WLS/power/residual/power"} <= there
+    _, mine = reading.column(copied / "recording.second.rrd", "identify/second/power/residual/power")
+    theirs = recorded.column("identify/idbench-WLS/power/residual/power", file="recording.idbench-WLS.rrd")[1]
+    np.testing.assert_array_equal(mine, theirs)
+
+
+def test_a_layer_knows_the_truth_of_its_run(copied, reading):
+    assert main(["identify", str(copied), "--label", "second"]) == 0
+    ns, value = reading.column(copied / "recording.second.rrd", "truth/ZZR1")
+    assert (value == 3.5).all()
+    assert ns[0] == 0
+
+
+def test_every_layer_lays_out_the_others_too(copied):
+    assert main(["identify", str(copied), "--label", "second"]) == 0
+    shown = {path.name: str(RrdReader(path).store(store=RrdReader(path).blueprints()[0]).summary()) for path in layers(copied)}
+    assert set(shown) == {"recording.idbench-WLS.rrd", "recording.second.rrd"}
+    sizes = {name: len(text.splitlines()) for name, text in shown.items()}
+    assert len(set(sizes.values())) == 1  # the same views in both
+
+
+def layers(folder):
+    return [path for path in files(folder) if path.name not in ("recording.rrd", "recording.inner.rrd")]
+
+
+def test_one_file_holds_everything(copied, reading):
+    one = copied / "one.rrd"
+    assert main(["view", str(copied), "--tab", "friction", "--save", str(one)]) == 0
+    assert reading.entities(one) == known(files(copied))[1]
+    for path, file in (("q/true", "recording.rrd"), ("inner/voltage", "recording.inner.rrd")):
+        for mine, theirs in zip(reading.column(one, path), reading.column(copied / file, path), strict=True):
+            np.testing.assert_array_equal(mine, theirs)
+    assert len(RrdReader(one).recordings()) == len(RrdReader(one).blueprints()) == 1
+    reading.verify(one)
+
+
+def test_what_is_wrong_is_told(copied, tmp_path, complaint):
+    assert "unknown tab 'frictoin'; known: overview, friction" in complaint(
+        "view", str(copied), "--tab", "frictoin", "--save", str(tmp_path / "x.rrd")
+    )
+    assert "must end with .rrd" in complaint("view", str(copied), "--save", str(tmp_path / "x.png"))
+    assert "--label 'a/b' must be of letters" in complaint("identify", str(copied), "--label", "a/b")
+    (copied / "recording.rrd").write_bytes(b"nonsense")
+    assert "cannot read the recording" in complaint("identify", str(copied), "--label", "second")
+    (copied / "recording.rrd").unlink()
+    assert "there is no recording.rrd in" in complaint("identify", str(copied), "--label", "second")
+    (copied / "summary.json").write_text("{")
+    assert "is no summary of a run" in complaint("identify", str(copied))
+    (copied / "log.parquet").unlink()
+    assert "there is no log.parquet in" in complaint("identify", str(copied))
+
+
+def test_files_of_two_recordings_are_not_mixed(copied, table1, tmp_path):
+    from experiments.recording.table1 import record_table1
+
+    name, stream = record_table1(table1)[0]
+    stream.write(tmp_path / name)
+    with pytest.raises(ResultsError, match="hold 2 recordings"):
+        merge([copied / "recording.rrd", tmp_path / name], "overview", tmp_path / "x.rrd")

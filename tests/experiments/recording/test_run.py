@@ -1,0 +1,181 @@
+"""The recording of a run is read back and compared with the arrays that went in."""
+
+import itertools
+
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+from experiments.audience import Audience
+from experiments.recording.identified import RunRecording
+from identify import measured_state
+from sim.scenario_file import from_dict
+from sim.scene import motion, shapes
+
+TICK = 10_000_000
+"""[ns] between samples."""
+
+
+def expected(run):
+    reference, log = run.reference, run.alone()
+    return {
+        "q/planned": reference.q,
+        "q/true": run.q[0],
+        "q/measured": log.q,
+        "qd/planned": reference.qd,
+        "qd/true": run.qd[0],
+        "qdd/planned": reference.qdd,
+        "error/tracking": reference.q - run.q[0],
+        "error/encoder": log.q - run.q[0],
+        "torque/command": run.command[0],
+        "torque/true": run.tau[0],
+        "torque/disturbance": run.tau[0] - run.command[0],
+        "torque/log": log.tau,
+    }
+
+
+def test_every_signal_and_every_time_is_exact(recorded):
+    run = recorded.ran.run
+    for path, values in expected(run).items():
+        ns, found = recorded.column(path)
+        np.testing.assert_array_equal(ns, np.arange(len(values)) * TICK, err_msg=path)
+        np.testing.assert_array_equal(found, values, err_msg=path)
+
+
+def test_samples_are_numbered(recorded, reading):
+    number, _ = reading.column(recorded.folder / "recording.rrd", "q/true", timeline="sample")
+    np.testing.assert_array_equal(number, np.arange(recorded.ran.run.log.samples))
+
+
+def test_the_true_acceleration_is_the_mean_between_samples(recorded):
+    run = recorded.ran.run
+    ns, found = recorded.column("qdd/true")
+    np.testing.assert_array_equal(ns, np.arange(run.log.samples - 1) * TICK + TICK // 2)
+    np.testing.assert_array_equal(found, np.diff(run.qd[0], axis=0) * run.log.fs)
+
+
+@pytest.mark.parametrize("role", ["true", "planned", "measured"])
+def test_the_arms_move_as_mujoco_moves_them(recorded, role):
+    run = recorded.ran.run
+    q = {"true": run.q[0], "planned": run.reference.q, "measured": run.log.q[0]}[role]
+    moving = motion(run.robots[0], q)
+    for body in ("link1", "link2"):
+        _, position = recorded.column(f"world/{role}/{body}", "Transform3D:translation")
+        _, quaternion = recorded.column(f"world/{role}/{body}", "Transform3D:quaternion")
+        np.testing.assert_allclose(position, moving.positions[body], atol=1e-6)  # rerun keeps 32 bits of a pose
+        np.testing.assert_allclose(quaternion, moving.quaternions[body], atol=1e-6)
+
+
+def test_every_shape_is_drawn_once_solid_and_twice_as_wires(recorded, reading):
+    there, robot = reading.entities(recorded.folder / "recording.rrd"), recorded.ran.run.robots[0]
+    for shape in shapes(robot):
+        assert f"world/true/{shape.body}/{shape.name}" in there
+        wires = {f"world/{role}/{shape.body}/{shape.name}" in there for role in ("planned", "measured")}
+        assert wires == {shape.body != "base"}  # what no joint moves cannot be elsewhere
+
+
+def test_states_are_those_of_the_velocity(recorded):
+    """Played back, each lane says at every sample what the true velocity does."""
+    qd = recorded.ran.run.qd[0]
+    for j in range(2):
+        ns, states = recorded.column(f"state/joint{j + 1}", "StateChange:state")
+        at = np.searchsorted(ns, np.arange(len(qd)) * TICK, side="right") - 1
+        played, speed = np.array(states)[at], np.abs(qd[:, j])
+        assert set(played) == {"stands", "reversal", "slides"}
+        assert (speed[played == "slides"] > 0.1).all()
+        assert (speed[played == "stands"] <= 1e-3).all()
+        assert (np.diff(at) <= 1).all()
+        assert all(a != b for a, b in itertools.pairwise(states))
+
+
+def test_the_drive_is_recorded_at_the_samples_and_inside_the_loop_at_its_own_rate(recorded, reading):
+    """The window is that which was asked for, PWM period by PWM period; means over samples are means of the periods."""
+    ns, current = recorded.column("inner/current", file="recording.inner.rrd")
+    np.testing.assert_array_equal(ns, 4_000_000_000 + np.arange(100) * 1_000_000)
+    _, mean = recorded.column("drive/current")
+    np.testing.assert_allclose(mean[400:410], current.reshape(10, 10, 2).mean(axis=1), rtol=1e-12)
+    assert not {path for path in reading.entities(recorded.folder / "recording.rrd") if path.startswith("inner")}
+
+
+def test_measured_predicted_and_residual_are_those_of_the_estimate(recorded):
+    for form, rows in {"explicit": ("joint1", "joint2"), "implicit": ("joint1", "joint2"), "power": ("power",)}.items():
+        estimate = recorded.ran.identified.estimates[form]
+        parts = {"measured": estimate.system.Y, "predicted": estimate.predicted, "residual": estimate.residual}
+        for group, row in enumerate(rows):
+            mine = (estimate.system.group == group) & estimate.system.valid
+            for kind, values in parts.items():
+                ns, found = layer(recorded, f"{form}/{kind}/{row}")
+                np.testing.assert_array_equal(found[:, 0], values[mine])
+                np.testing.assert_allclose(ns, estimate.system.time[mine] * 1e9, atol=1)
+
+
+def layer(recorded, path, component="Scalars:scalars"):
+    return recorded.column(f"identify/idbench-WLS/{path}", component, "recording.idbench-WLS.rrd")
+
+
+def test_running_estimates_end_at_the_estimate_with_its_sigma(recorded):
+    for form, estimate in recorded.ran.identified.estimates.items():
+        for p, name in enumerate(estimate.parameters):
+            _, X = layer(recorded, f"{form}/estimate/{name}", "Measurements:values")
+            _, variance = layer(recorded, f"{form}/estimate/{name}", "Measurements:variances")
+            # The factor takes in rows in another order than the estimate did: rounding, times the condition of W squared.
+            np.testing.assert_allclose(X[-1], estimate.X[p], rtol=1e-8)
+            np.testing.assert_allclose(variance[-1] ** 0.5, estimate.corrected_sigma[p], rtol=1e-6)
+
+
+def test_velocities_are_shown_as_measured_and_as_the_rows_see_them(recorded):
+    found, log = recorded.ran.identified, recorded.ran.run.alone()
+    rows = found.processing.rows(log)
+    ns, measured = layer(recorded, "qd/measured")
+    np.testing.assert_array_equal(measured, measured_state(log, found.processing).qd.T[ns // TICK])
+    ns, seen = layer(recorded, "qd/filtered")
+    np.testing.assert_array_equal(ns // TICK, np.arange(log.samples)[rows.samples])
+    true = recorded.ran.run.qd[0][rows.samples]
+    assert np.abs(seen - true).max() < 0.2 * np.abs(true).max()  # moves of 1.3 s pass a filter of 5 Hz, but for their edges
+
+
+def test_the_parameter_table_and_the_bars_tell_the_errors(recorded):
+    found = recorded.ran.identified
+    store = RrdReader(recorded.folder / "recording.idbench-WLS.rrd").store()
+    (text,) = [c for c in store.stream().filter(content="identify/idbench-WLS/report").to_chunks() if c.is_static]
+    table = text.to_record_batch().column("TextDocument:text").to_pylist()[0][0]
+    for name, truth in found.truth.items():
+        assert f"{name} | {truth:g} |" in table
+
+
+def test_a_recording_is_a_base_and_layers_of_one_id_each_with_one_layout(recorded, reading):
+    ids = set()
+    for name, layouts in (("recording.rrd", 1), ("recording.inner.rrd", 0), ("recording.idbench-WLS.rrd", 1)):
+        reader = RrdReader(recorded.folder / name)
+        ids |= {(e.application_id, e.recording_id) for e in reader.recordings()}
+        assert len(reader.blueprints()) == layouts
+        reading.verify(recorded.folder / name)
+    ((application, recording),) = ids
+    assert application == "idbench"
+    assert recording.startswith("short-")
+
+
+def test_watching_changes_no_bit_of_the_run_nor_of_the_recording(recorded, reading, tmp_path):
+    """Sent in stretches of half a second, what is read back is the same."""
+    audience = Audience("rerun+http://127.0.0.1:9/proxy")
+    audience.watching = False  # it has gone, but stretches are as short as if it were there
+    again = reading.Recorded(tmp_path, audience)
+    assert sum(c.num_rows > 0 for c in chunks(again, "q/true")) > 5
+    for name in ("q", "qd", "tau", "command"):
+        np.testing.assert_array_equal(getattr(again.ran.run, name), getattr(recorded.ran.run, name))
+    assert reading.entities(tmp_path / "recording.rrd") == reading.entities(recorded.folder / "recording.rrd")
+    for path in (*expected(recorded.ran.run), "qdd/true", "drive/voltage", "drive/duty"):
+        for mine, theirs in zip(again.column(path), recorded.column(path), strict=True):
+            np.testing.assert_array_equal(mine, theirs, err_msg=path)
+    assert again.column("state/joint1", "StateChange:state")[1] == recorded.column("state/joint1", "StateChange:state")[1]
+
+
+def chunks(recorded, entity):
+    stream = RrdReader(recorded.folder / "recording.rrd").stream()
+    return stream.filter(content=entity, has_timeline="sim_time").to_chunks()
+
+
+def test_the_same_scenario_has_the_same_id_and_another_seed_another(recorded, reading):
+    ids = [RunRecording(from_dict(reading.SCENARIO | {"seed": seed})).base.stream.name for seed in (0, 0, 1)]
+    assert ids[0] == ids[1] == recorded.streams[0][1].name
+    assert ids[2] != ids[0]

@@ -1,0 +1,50 @@
+"""The recording of Table 1: a base, and a layer for each chain."""
+
+import numpy as np
+import pytest
+import rerun as rr
+from rerun.chunk import RrdReader
+
+from experiments.errors import ResultsError
+from experiments.recording.table1 import record_table1
+from experiments.results import write_recording
+
+
+@pytest.fixture(scope="module")
+def folder(table1, tmp_path_factory):
+    rr.set_strict_mode(True)
+    folder = tmp_path_factory.mktemp("recording")
+    assert not write_recording(folder, record_table1(table1))
+    return folder
+
+
+@pytest.mark.parametrize("path", ["q/measured", "qd/planned", "torque/log"])
+def test_signals_and_times_are_exact(folder, reading, path, table1):
+    expected = {"q/measured": table1.log.q, "qd/planned": table1.reference.qd, "torque/log": table1.log.tau}[path]
+    ns, values = reading.column(folder / "recording.rrd", path)
+    np.testing.assert_array_equal(ns, np.arange(4600) * 10_000_000)
+    np.testing.assert_array_equal(values, expected)
+
+
+@pytest.mark.parametrize("chain", ["paper", "idbench"])
+def test_every_chain_is_a_layer_with_the_estimates_of_the_table(folder, reading, chain, table1):
+    file, at = folder / f"recording.{chain}-OLS.rrd", f"identify/{chain}-OLS"
+    for form in ("explicit", "implicit", "power"):
+        estimate = table1.estimates[chain][form]
+        for group in np.unique(estimate.system.group):
+            row = "power" if form == "power" else f"joint{group + 1}"
+            _, residual = reading.column(file, f"{at}/{form}/residual/{row}")
+            np.testing.assert_array_equal(residual[:, 0], estimate.residual[estimate.system.group == group])
+    reading.verify(file)
+
+
+def test_layers_belong_to_the_base(folder):
+    files = sorted(folder.iterdir())
+    assert [path.name for path in files] == ["recording.idbench-OLS.rrd", "recording.paper-OLS.rrd", "recording.rrd"]
+    assert len({RrdReader(path).recordings()[0].recording_id for path in files}) == 1
+
+
+def test_a_path_that_cannot_be_written_is_told(tmp_path, table1):
+    ((name, stream), *_) = record_table1(table1)
+    with pytest.raises(ResultsError, match="cannot write the recording"):
+        stream.write(tmp_path / "nowhere" / name)

@@ -1,0 +1,106 @@
+"""Watching a run: what is handed on, and that nothing changes by it."""
+
+import numpy as np
+import pytest
+
+from sim.engine import simulate
+from sim.scenario_file import from_dict
+from sim.watch import Watch
+
+MOTION = {"kind": "random", "moves": 2, "rest": 0.3}
+
+
+def scenario(**settings):
+    return from_dict({"name": "short", "trajectory": MOTION, **settings})
+
+
+SWITCHED = {"kind": "switched", "pwm": 1000.0, "bandwidth": 150.0, "dead_time": 0.0, "duty_resolution": 0.0}
+
+DRIVES = {
+    "ideal": {"drive": {"kind": "ideal"}},
+    "averaged": {"drive": {"kind": "averaged"}},
+    "late": {"drive": {"kind": "averaged"}, "timing": {"delay": 0.0123}},
+    "approach": {"drive": {"kind": "averaged"}, "start": [0.5, 0.5]},
+    "switched": {"drive": SWITCHED, "ripple": {"cogging": 1.0}},
+}
+
+
+@pytest.mark.parametrize("every", [0.05, 0.37, np.inf])
+@pytest.mark.parametrize("name", DRIVES)
+def test_stretches_are_the_run_and_change_no_bit_of_it(name, every):
+    described, heard = scenario(**DRIVES[name]), []
+    alone, watched = simulate(described, [3, 4]), simulate(described, [3, 4], watch=Watch(heard.append, every))
+    for part in ("q", "qd", "tau", "command"):
+        np.testing.assert_array_equal(getattr(watched, part), getattr(alone, part))
+        joined = np.concatenate([getattr(stretch, part) for stretch in heard])
+        np.testing.assert_array_equal(joined, alone.__dict__[part][0])
+    np.testing.assert_array_equal(np.concatenate([s.measured for s in heard]), alone.log.q[0])
+    np.testing.assert_array_equal(np.concatenate([s.reference.q for s in heard]), alone.reference.q)
+    assert [s.first for s in heard] == [0, *np.cumsum([len(s.q) for s in heard])[:-1]]
+    if np.isfinite(every):
+        assert len(heard) > 3
+        assert {len(s.q) for s in heard[:-1]} == {round(every * 100)}
+    else:
+        assert len(heard) == 1
+
+
+def test_it_is_heard_while_the_run_goes_on():
+    times = []
+    progress, heard = times.append, lambda stretch: times.append(f"samples from {stretch.first}")
+    simulate(scenario(), watch=Watch(heard, 0.5), progress=progress)
+    assert times.index("samples from 50") < next(k for k, t in enumerate(times) if isinstance(t, float) and t > 0.9)
+
+
+@pytest.mark.parametrize("name", ["averaged", "late", "approach"])
+def test_the_mean_current_is_the_mean_torque_over_the_torque_constant(name):
+    """Without ripple: what the motor's torque was is told by the run, what its current was by the drive."""
+    heard = []
+    run = simulate(scenario(**DRIVES[name]), watch=Watch(heard.append))
+    K = run.robots[0].motors.K
+    np.testing.assert_allclose(heard[0].electric.current * K, run.tau[0], rtol=1e-12, atol=1e-12 * np.abs(run.tau).max())
+
+
+def test_the_mean_voltage_of_a_chopper_without_dead_time_is_its_duty_times_the_bus():
+    """The voltage is computed from current and speed, the duty is what the loop asked for: two routes."""
+    heard = []
+    run = simulate(scenario(drive=SWITCHED), watch=Watch(heard.append, np.inf, (0.0, 10.0)))
+    inner, V = heard[0].inner, run.robots[0].motors.V
+    np.testing.assert_allclose(inner.electric.voltage, inner.electric.duty * V, atol=1e-9 * V.max())
+    np.testing.assert_allclose(inner.t, np.arange(len(inner.t)) / 1000, atol=1e-12)
+    np.testing.assert_allclose(inner.tau, inner.electric.current * run.robots[0].motors.K, rtol=1e-12, atol=1e-12)
+
+
+def test_the_averaged_drive_holds_its_voltage_equation_from_sample_to_sample():
+    """R i + L di/dt + K qd = v in the mean; at rest under no load all are zero."""
+    heard = []
+    run = simulate(scenario(**DRIVES["averaged"]), watch=Watch(heard.append))
+    electric, m = heard[0].electric, run.robots[0].motors
+    slow = np.gradient(electric.current, 0.01, axis=0)  # coarse: inductance makes less than a hundredth of the voltage
+    mean_speed = np.diff(run.q[0], axis=0) / 0.01
+    told = (m.R * electric.current + m.L * slow)[:-1] + m.K * mean_speed
+    assert np.abs(electric.voltage[:-1] - told).max() < 0.02 * np.abs(told).max()
+
+
+def test_limits_are_told_where_more_is_asked_than_there_is():
+    free, heard = simulate(scenario(drive={"kind": "averaged"})), []
+    K = free.robots[0].motors.K
+    most = 0.9 * np.abs(free.command[0]).max(axis=0) / K
+    run = simulate(scenario(drive={"kind": "averaged", "current_limit": most.tolist()}), watch=Watch(heard.append))
+    limited = heard[0].electric.limited > 0
+    np.testing.assert_array_equal(limited, np.abs(run.command[0]) > most * K)
+    assert limited.any()
+    assert not limited.all()
+
+
+def test_a_drive_without_currents_tells_none():
+    heard = []
+    simulate(scenario(), watch=Watch(heard.append, 0.5, (0.0, 1.0)))
+    assert all(stretch.electric is None and stretch.inner is None for stretch in heard)
+
+
+def test_the_window_is_on_the_time_of_the_log():
+    """Also when the arm is brought to its start before the log begins."""
+    heard = []
+    simulate(scenario(drive=SWITCHED, start=[0.5, 0.5]), watch=Watch(heard.append, 0.1, (0.25, 0.45)))
+    t = np.concatenate([s.inner.t for s in heard if s.inner])
+    np.testing.assert_allclose(t, 0.25 + np.arange(200) / 1000, atol=1e-9)
