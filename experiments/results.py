@@ -117,3 +117,6 @@ def _move(hidden: Path, out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     for path in paths:
         path.replace(out / path.name)
+    if any(path.name == "summary.json" for path in paths):  # recordings of earlier results are none of these
+        for old in {*out.glob("recording*.rrd")} - {out / path.name for path in paths}:
+            old.unlink()

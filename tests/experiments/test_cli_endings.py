@@ -75,16 +75,18 @@ def test_termination_leaves_nothing_half_written(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("size", [20_000, 300_000])
-def test_a_full_disk_is_one_line(tmp_path, size):
-    """Too small for the log, and for the recording alone: no file may grow beyond `size` bytes."""
+@pytest.mark.parametrize(("size", "kept"), [(20_000, []), (300_000, ["log.parquet", "summary.json"])])
+def test_a_full_disk_is_one_line_and_what_has_room_is_kept(tmp_path, size, kept):
+    """Too small for the log, and for the recording alone: no file may grow beyond `size` bytes. What was found is printed."""
     code = f"import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size}))\n"
     code += "from experiments.cli import main; sys.exit(main(['table1', '--out', 'results']))"
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1
     assert done.stderr.startswith("idbench: cannot write")
-    assert not list(tmp_path.iterdir())
+    assert "explicit model" in done.stdout
+    assert sorted(path.name for path in tmp_path.glob("results/*")) == kept
+    assert not list(tmp_path.glob(".idbench-*"))
 
 
 def test_a_failure_half_way_leaves_earlier_results_whole(out, monkeypatch, capfd, complaint):

@@ -32,7 +32,13 @@ def test_every_scenario_that_ships_runs(name, tmp_path, capsys):
     assert main(["run", str(shortened(name, tmp_path)), "--out", str(out)]) == 0
     printed = capsys.readouterr().out
     assert all(word in printed for word in ("ZZR1", "Cond(W)", "tau2 explained", "torque: held"))
-    assert sorted(x.name for x in out.iterdir()) == ["log.parquet", "recording.rrd", "scenario.toml", "summary.json"]
+    assert sorted(x.name for x in out.iterdir()) == [
+        "log.parquet",
+        "recording.idbench-WLS.rrd",
+        "recording.rrd",
+        "scenario.toml",
+        "summary.json",
+    ]
     summary = json.loads((out / "summary.json").read_text())
     assert list(summary["models"]) == ["explicit", "implicit", "power"]
     assert summary["scenario"]["name"] == name
@@ -68,7 +74,12 @@ def test_a_csv_is_identified_with_what_its_torque_means(csv, capsys, truth, tmp_
     assert summary["models"]["explicit"]["relative_error_percent"] is None
     np.testing.assert_allclose(summary["models"]["power"]["estimate"], truth, rtol=1e-3)
     assert min(summary["models"]["power"]["explained_share"]) > 0.999
-    assert sorted(x.name for x in out.iterdir()) == ["log.parquet", "recording.rrd", "summary.json"]
+    assert sorted(x.name for x in out.iterdir()) == [
+        "log.parquet",
+        "recording.idbench-WLS.rrd",
+        "recording.rrd",
+        "summary.json",
+    ]
     assert read_log(out / "log.parquet").torque.meaning == "held"
 
 

@@ -1,0 +1,123 @@
+"""Who watches: what is asked for, what is missing, and who goes away."""
+
+import socket
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from experiments.audience import Audience, Watching
+from experiments.errors import ExperimentError
+
+NOBODY = "rerun+http://127.0.0.1:{port}/proxy"
+
+
+@pytest.fixture
+def taken():
+    """Give a port that somebody listens at."""
+    with socket.socket() as server:
+        server.bind(("127.0.0.1", 0))
+        server.listen()
+        yield server.getsockname()[1]
+
+
+@pytest.fixture
+def free():
+    """Return a port that nobody listens at."""
+    with socket.socket() as server:
+        server.bind(("127.0.0.1", 0))
+        return server.getsockname()[1]
+
+
+@pytest.mark.parametrize(
+    "url", ["127.0.0.1:9876", "http://127.0.0.1:9876/proxy", "rerun+http://:9876", "rerun+http://a:b", "x"]
+)
+def test_an_address_that_is_none_is_told(complaint, out, url):
+    assert f"--connect {url} is no address of a viewer" in complaint("run", "ideal", "--connect", url, "--out", str(out))
+    assert not out.exists()
+
+
+def test_a_viewer_that_does_not_answer_is_told_before_anything_is_simulated(complaint, out, free):
+    url = NOBODY.format(port=free)
+    assert f"no viewer answers at {url}" in complaint("run", "ideal", "--connect", url, "--out", str(out))
+
+
+@pytest.mark.parametrize("command", [["run", "ideal"], ["table1"], ["table2"], ["study", "delay"]])
+def test_a_port_that_is_taken_is_told(complaint, tmp_path, monkeypatch, taken, command):
+    monkeypatch.chdir(tmp_path)
+    assert f"port {taken} cannot be used" in complaint(*command, "--serve", "--port", str(taken))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems always have a display")
+def test_a_missing_display_is_told(complaint, out, monkeypatch):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    assert "there is no display here: use --serve" in complaint("run", "ideal", "--live", "--out", str(out))
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--live", "--serve"], "--live and --serve name several viewers"),
+        (["--pace", "1"], "--pace 1 needs somebody who watches"),
+        (["--serve", "--pace", "0"], "--pace 0 must be above 0"),
+        (["--serve", "--pace", "nan"], "--pace nan must be above 0"),
+        (["--serve", "--no-rerun"], "--serve and --no-rerun contradict"),
+        (["--serve", "--port", "99999"], "port 99999 cannot be used"),
+        (["--inner", "3", "2"], "--inner 3 2 must be two times"),
+        (["--inner", "1", "2", "--no-rerun"], "needs a recording"),
+    ],
+)
+def test_options_that_make_no_sense_are_told(complaint, out, options, said):
+    assert said in complaint("run", "ideal", "--out", str(out), *options)
+    assert not out.exists()
+
+
+def test_without_rerun_it_is_not_even_loaded(tmp_path):
+    code = "import sys; from experiments.cli import main\n"
+    code += "code = main(['run', 'ideal', '--no-rerun', '--out', 'run'])\n"
+    code += "sys.exit(code or [name for name in sys.modules if name.startswith('rerun')] != [])"
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["log.parquet", "scenario.toml", "summary.json"]
+    assert "view" not in done.stdout
+
+
+@pytest.mark.parametrize(("pace", "every"), [(None, 1.0), (1.0, 0.1), (5.0, 0.5), (0.2, 0.1), (100.0, 1.0)])
+def test_stretches_are_a_tenth_of_a_second_as_it_passes(pace, every):
+    assert Audience("", pace).every == pytest.approx(every)
+
+
+def test_a_viewer_that_goes_away_costs_nothing_but_itself(tmp_path, reading):
+    """Somebody answers when it is asked whether a viewer is there, and has gone when the run begins."""
+    with socket.socket() as server:
+        server.bind(("127.0.0.1", 0))
+        server.listen()
+        url = NOBODY.format(port=server.getsockname()[1])
+
+        def answer_once():
+            server.accept()[0].close()
+            server.close()
+
+        threading.Thread(target=answer_once, daemon=True).start()
+        words = ["run", "ideal", "--connect", url, "--out", "run"]
+        code = f"import sys; from experiments.cli import main; sys.exit(main({words}))"
+        done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    assert done.stderr.splitlines() == [f"idbench: the viewer at {url} has gone; the work goes on without it"]
+    assert "written to run" in done.stdout
+    reading.verify(tmp_path / "run" / "recording.rrd")
+
+
+def test_no_viewer_is_nobody():
+    with Watching().audience() as audience:
+        assert audience is None
+
+
+def test_errors_name_the_way_out():
+    with (
+        pytest.raises(ExperimentError, match="uv run rerun --bind"),
+        Watching(connect=NOBODY.format(port=1)).audience(),
+    ):
+        pass

@@ -1,0 +1,111 @@
+"""A viewer without a window receives a run while it goes on."""
+
+import os
+import re
+import socket
+import subprocess
+import sys
+import time
+import warnings
+from pathlib import Path
+
+import pytest
+import rerun_cli
+
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")  # its interface is declared unstable; our pin holds it
+    from rerun.experimental import ViewerClient
+
+DRIVERS = Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d")
+
+pytestmark = pytest.mark.skipif(
+    not any(folder.glob("*.json") for folder in DRIVERS if folder.is_dir()),
+    reason="the viewer needs a Vulkan driver, as in Debian's mesa-vulkan-drivers",
+)
+
+PACE = 4.0
+"""46 s of simulated time last longer than it takes to look twice."""
+
+
+@pytest.fixture
+def viewer(tmp_path):
+    """Give a viewer without a window: its client, and its process."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    binary = Path(rerun_cli.__file__).parent / "rerun"
+    command = [binary, "--headless", "--bind", "127.0.0.1", "--port", f"{port}", "--window-size", "800x600"]
+    quiet, environment = subprocess.DEVNULL, os.environ | {"WGPU_BACKEND": "vulkan", "XDG_RUNTIME_DIR": str(tmp_path)}
+    process = subprocess.Popen([*command, "--hide-welcome-screen"], stdout=quiet, stderr=quiet, env=environment)
+    try:
+        yield connected(f"rerun+http://127.0.0.1:{port}/proxy", process), process
+    finally:
+        process.terminate()
+        process.wait(10)
+
+
+def connected(url, process):
+    end = time.monotonic() + 60
+    while time.monotonic() < end and process.poll() is None:
+        try:
+            client = ViewerClient.connect(url)
+            client.get_state()
+        except Exception:  # whatever it is that is not ready yet
+            time.sleep(0.2)
+        else:
+            return client
+    pytest.fail("the viewer does not start")
+
+
+def reached(client):
+    """Return how much simulated time the viewer has [s]."""
+    ends = [t.end for r in client.get_state().recordings for t in r.timelines if t.name == "sim_time" and t.end is not None]
+    return max(ends, default=0) / 1e9
+
+
+def until(condition, process=None):
+    end = time.monotonic() + 60
+    while time.monotonic() < end and not condition() and (process is None or process.poll() is None):
+        time.sleep(0.2)
+    return condition()
+
+
+def run(client, out, *options):
+    code = f"import sys; from experiments.cli import main; sys.exit(main({['run', 'saturation', *options]!r}))"
+    words = [sys.executable, "-c", code.replace("URL", client.url).replace("OUT", str(out))]
+    return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def test_the_arm_moves_in_the_viewer_before_the_run_has_ended(viewer, tmp_path):
+    client, out = viewer[0], tmp_path / "run"
+    with run(client, out, "--connect", "URL", "--out", "OUT", "--pace", f"{PACE}") as process:
+        assert until(lambda: reached(client) > 4, process)  # it rests for 3 s
+        arm = picture(client)
+        assert until(lambda: reached(client) > 12, process)
+        assert picture(client) != arm
+        assert process.poll() is None
+        assert process.wait(60) == 0
+    assert until(lambda: reached(client) > 45.9)
+    shown = {view.name for view in client.get_state().views}
+    assert {"arm", "joint1 [N m]", "residual power [W]", "ZZR1 [kg m²]"} <= shown  # the identification has come, too
+    complaints = [e.message for e in client.get_logs() if e.level in ("WARN", "ERROR")]
+    assert not [text for text in complaints if not re.search("rasterizer|screenshot|Docker", text)]
+    assert not [report.summary for view in client.get_state().views for report in view.reports]
+
+
+def picture(client):
+    (arm,) = [view for view in client.get_state().views if view.name == "arm"]
+    return client.take_screenshot(arm.view_id)
+
+
+def test_a_viewer_closed_while_the_run_goes_on_is_told_once(viewer, tmp_path, reading):
+    (client, window), out = viewer, tmp_path / "run"
+    with run(client, out, "--connect", "URL", "--out", "OUT", "--pace", f"{PACE}") as process:
+        assert until(lambda: reached(client) > 1, process)
+        window.terminate()
+        printed, said = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert len(said.splitlines()) == 1
+    assert "has gone; the work goes on without it" in said
+    assert "written to" in printed
+    reading.verify(out / "recording.rrd")
