@@ -75,7 +75,7 @@ class Watching:
         elif self.live:
             yield Audience(_spawned(), self.pace)
         elif self.serve:
-            with _served(self.port) as url:
+            with served(self.port) as url:
                 yield Audience(url, self.pace)
                 _until_interrupted()
         else:
@@ -189,7 +189,7 @@ def _start(options: list[str], port: int) -> "subprocess.Popen[bytes]":
 
 
 @contextmanager
-def _served(web: int) -> Iterator[str]:
+def served(web: int) -> Iterator[str]:
     """Serve the web viewer; give where it listens for data."""
     for port in (web, web + 1):
         _require_free(port)

@@ -100,12 +100,12 @@ def list_plugins() -> None:
 
 
 @app.command(name="view")
-def view(folder: tyro.conf.Positional[Path], tab: str = "overview", save: File = None) -> None:
+def view(folder: tyro.conf.Positional[Path], tab: str = "", save: File = None) -> None:
     """Open the recording of a results folder, with all its layers, in the rerun viewer.
 
     Args:
         folder: Results folder, or a recording (.rrd).
-        tab: What is in front: overview, friction, drive, filters, excitation or parameters.
+        tab: What is in front: overview, friction, drive, filters, excitation or parameters; by default the first that it has.
         save: Write the recording and its layers to one file (.rrd) instead, to be taken elsewhere.
     """
     with importing():

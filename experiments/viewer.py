@@ -9,7 +9,7 @@ from experiments.errors import ExperimentError, ResultsError
 from experiments.recording.folder import BASE, files, merge
 
 
-def view(folder: Path, tab: str = "overview") -> None:
+def view(folder: Path, tab: str = "") -> None:
     """Open the recording of a results folder, or a recording itself; return when the viewer is closed.
 
     Raises

@@ -111,16 +111,37 @@ def _mesh(model: mujoco.MjModel, m: int) -> tuple[Array, npt.NDArray[np.int32]]:
 
 def motion(robot: Robot, q: Array) -> Motion:
     """Return where the bodies and sites are at the positions `q` [rad], shape (time, joint)."""
-    states, model = Batch(robot.model, len(q)), robot.model
-    xpos, xquat, site_xpos = states.bind("xpos"), states.bind("xquat"), states.bind("site_xpos")
-    states.bind("qpos")[:] = q
-    states.forward(stage=mjtStage.mjSTAGE_POS.value)
-    bodies = {body_name(model, b): b for b in range(1, model.nbody)}
-    return Motion(
-        {name: xpos[:, b].copy() for name, b in bodies.items()},
-        {name: _xyzw(xquat[:, b]) for name, b in bodies.items()},
-        {model.site(s).name or f"site{s}": site_xpos[:, s].copy() for s in range(model.nsite)},
-    )
+    return Mover(robot).at(q)
+
+
+class Mover:
+    """Moves the bodies of a robot; for the next motion of as many instants it is ready.
+
+    Parameters
+    ----------
+    robot : Robot
+        What is moved.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self._model, self._size = robot.model, -1
+        self._states: Batch | None = None
+        self._bodies = {body_name(robot.model, b): b for b in range(1, robot.model.nbody)}
+        self._sites = {robot.model.site(s).name or f"site{s}": s for s in range(robot.model.nsite)}
+
+    def at(self, q: Array) -> Motion:
+        """Return where the bodies and sites are at the positions `q` [rad], shape (time, joint)."""
+        if self._states is None or len(q) != self._size:
+            self._states, self._size = Batch(self._model, len(q)), len(q)
+            names = ("qpos", "xpos", "xquat", "site_xpos")
+            self._qpos, self._xpos, self._xquat, self._site_xpos = (self._states.bind(name) for name in names)
+        self._qpos[:] = q
+        self._states.forward(stage=mjtStage.mjSTAGE_POS.value)
+        return Motion(
+            {name: self._xpos[:, b].copy() for name, b in self._bodies.items()},
+            {name: _xyzw(self._xquat[:, b]) for name, b in self._bodies.items()},
+            {name: self._site_xpos[:, s].copy() for name, s in self._sites.items()},
+        )
 
 
 def _xyzw(wxyz: Array) -> Array:

@@ -1,6 +1,9 @@
 """What many tests start from."""
 
+import os
 from pathlib import Path
+
+os.environ.setdefault("RUST_LOG", "off")  # as on the command line: read when rerun is loaded, which tests do first
 
 import numpy as np
 import pytest

@@ -20,6 +20,7 @@ ALLOWED = {
 ALLOWED_IN = {
     "identify/log_file.py": {"pyarrow"},
     "sim/scenario_file.py": {"tomli_w"},
+    "experiments/recording/columns.py": {"pyarrow"},
     "experiments/study/study.py": {"pydantic"},
     "experiments/study/shard_file.py": {"pyarrow"},
     "experiments/study/store.py": {"pyarrow", "tomli_w"},

@@ -1,15 +1,17 @@
 """The arm in 3D: as it is, as it was planned to be, and as its encoders see it."""
 
+from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
 import rerun as rr
 
-from experiments.recording.stream import Stream, Times
+from experiments.recording.columns import Times, poses
+from experiments.recording.stream import Stream
 from experiments.recording.style import MEASURED, PLANNED, Color
 from identify import Array
 from sim.robot import Robot
-from sim.scene import Shape, motion, shapes
+from sim.scene import Mover, Shape, motion, shapes
 
 ROLES: dict[str, Color | None] = {"true": None, "measured": MEASURED, "planned": PLANNED}
 """Arms that may be shown, and the colour of those that are drawn as wires around the first."""
@@ -29,7 +31,7 @@ class Arm:
     """
 
     def __init__(self, stream: Stream, robot: Robot, roles: tuple[str, ...]) -> None:
-        self._stream, self._robot = stream, robot
+        self._stream, self._robot, self._mover = stream, robot, Mover(robot)
         two = motion(robot, np.stack([np.zeros(robot.n), np.full(robot.n, 0.1)]))
         pose = {body: np.concatenate([x, two.quaternions[body]], axis=1) for body, x in two.positions.items()}
         self._moving = {body for body, (at, moved) in pose.items() if not np.array_equal(at, moved)}
@@ -43,12 +45,14 @@ class Arm:
                     path = f"world/{role}/{shape.body}/{shape.name}"
                     stream.keep(path, _drawn(shape, None if role == roles[0] else ROLES[role]), _pose(shape))
 
-    def move(self, role: str, times: Times, q: Array) -> None:
-        """Send where an arm is at the positions `q` [rad], shape (time, joint)."""
-        moving = motion(self._robot, q)
-        for body in self._moving:
-            columns = rr.Transform3D.columns(translation=moving.positions[body], quaternion=moving.quaternions[body])
-            self._stream.send(f"world/{role}/{body}", times, columns)
+    def move(self, times: Times, where: Mapping[str, Array]) -> None:
+        """Send where arms are, by their role, at positions [rad] of shape (time, joint)."""
+        moving = self._mover.at(np.concatenate(list(where.values())))
+        for k, (role, q) in enumerate(where.items()):
+            part = slice(k * len(q), (k + 1) * len(q))
+            for body in self._moving:
+                at, turned = moving.positions[body][part], moving.quaternions[body][part]
+                self._stream.send(f"world/{role}/{body}", times, poses(at, turned))
 
     def trace(self, q: Array) -> None:
         """Draw the way of every site along `q` [rad], shape (time, joint)."""

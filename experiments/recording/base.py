@@ -7,9 +7,10 @@ import rerun as rr
 
 from experiments.audience import Audience
 from experiments.recording.arm import Arm
+from experiments.recording.columns import Times, seconds, time_columns
 from experiments.recording.lanes import Lanes, joint_states
 from experiments.recording.layouts import tabs
-from experiments.recording.stream import Stream, seconds, time_columns
+from experiments.recording.stream import Stream
 from experiments.recording.style import WIDTHS, kind_colors
 from identify import Array, MotionLog
 from sim.robot import Robot
@@ -52,7 +53,7 @@ class Base:
             signals |= {f"drive/{name}": getattr(stretch.electric, name) for name in ELECTRIC}
         self._accelerate(t, stretch.qd)
         if stretch.inner is not None:
-            self._inside(stretch.inner)
+            self.inside(stretch.inner)
         poses = {"true": stretch.q, "planned": stretch.reference.q, "measured": stretch.measured}
         limited = stretch.electric.limited if stretch.electric else None
         self.add(stretch.first, signals, {role: poses[role] for role in self._roles}, stretch.qd, limited)
@@ -78,8 +79,7 @@ class Base:
         fresh = not signals.keys() <= self.stream.paths
         for path, values in signals.items():
             self._curves(self.stream, path, times, values)
-        for role, q in poses.items():
-            self._arm.move(role, times[:1], q)
+        self._arm.move(times[:1], poses)
         for j, joint in enumerate(self._robot.joints):
             self._lanes.send(f"state/{joint}", t, joint_states(qd[:, j], None if limited is None else limited[:, j]))
         if fresh and self._audience:
@@ -109,7 +109,7 @@ class Base:
         self.stream.keep("about", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
         self.stream.arrange(tabs(self.stream.paths | (self.inner.paths if self.inner else set())))
 
-    def _curves(self, stream: Stream, path: str, times: list[rr.TimeColumn], values: Array) -> None:
+    def _curves(self, stream: Stream, path: str, times: Times, values: Array) -> None:
         if path not in stream.paths:
             kind, n = path.rsplit("/", 1)[-1], self._robot.n
             stream.style(path, [f"{kind} {joint}" for joint in self._robot.joints], kind_colors(kind, n), WIDTHS.get(kind, 1.5))
@@ -123,7 +123,7 @@ class Base:
             middle = [seconds((t[1:] + t[:-1]) / 2)]
             self._curves(self.stream, "qdd/true", middle, np.diff(qd, axis=0) * self._fs)
 
-    def _inside(self, inner: Inner) -> None:
+    def inside(self, inner: Inner) -> None:
         """Send signals inside the loop, in a layer of their own."""
         if self.inner is None:
             self.inner = Stream(self.stream.name, self._audience, layer=True)

@@ -6,7 +6,7 @@ from pathlib import Path
 from rerun.chunk import RrdReader
 
 from experiments.errors import ResultsError
-from experiments.recording.layouts import LAYOUTS, tabs
+from experiments.recording.layouts import tabs
 from experiments.recording.stream import Stream
 
 BASE = "recording.rrd"
@@ -56,15 +56,13 @@ def merge(paths: Sequence[Path], tab: str, out: Path) -> None:
     Raises
     ------
     ResultsError
-        If a file cannot be read or written, or there is no such layout.
+        If a file cannot be read or written, or the recording has no such layout.
     """
-    if tab not in LAYOUTS:
-        raise ResultsError(f"unknown tab {tab!r}; known: {', '.join(LAYOUTS)}")
     name, entities = known(paths)
-    stream = Stream(name)
+    layout, stream = tabs(entities, tab), Stream(name)
     for path in reversed(paths):
         stream.copy(RrdReader(path))
-    stream.arrange(tabs(entities, tab))
+    stream.arrange(layout)
     stream.write(out)
 
 

@@ -3,7 +3,8 @@
 import numpy as np
 import numpy.typing as npt
 
-from experiments.recording.stream import Stream, time_columns
+from experiments.recording.columns import time_columns
+from experiments.recording.stream import Stream
 from identify import Array
 
 STILL = 1e-3

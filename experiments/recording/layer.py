@@ -7,10 +7,11 @@ import rerun as rr
 
 from experiments.audience import Audience
 from experiments.identified import Identified
+from experiments.recording.columns import Times, seconds, time_columns
 from experiments.recording.lanes import Lanes, mask_states
 from experiments.recording.layouts import tabs
 from experiments.recording.report import estimates_table, judged, short_table
-from experiments.recording.stream import Stream, seconds, time_columns
+from experiments.recording.stream import Stream
 from experiments.recording.style import FORM_WIDTHS, FORMS, GREY, JOINTS, Color, kind_colors, lighter
 from identify import (
     MODELS,
@@ -94,7 +95,7 @@ class Layer:
         """Return what the kinds of row of a model are called: after their joint, or after the model."""
         return self._joints if system_rows == len(self._joints) and form != "power" else [form] * system_rows
 
-    def _curve(self, path: str, times: Sequence[rr.TimeColumn], values: Array, name: str, color: Color, width: float) -> None:
+    def _curve(self, path: str, times: Times, values: Array, name: str, color: Color, width: float) -> None:
         self.stream.style(path, [name], [color], width)
         self.stream.curves(path, times, values)
 

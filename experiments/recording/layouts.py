@@ -1,119 +1,21 @@
 """Layouts: what is looked at together, one a purpose, made of the views for which a recording has something to show."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from collections.abc import Set as AbstractSet
 
 import rerun.blueprint as rrb
 
+from experiments.errors import ResultsError
+from experiments.recording.views import Part, Shelf, arm, bars, column, grid, lanes, plot, side_by_side, text
+
 PARAMETER_UNITS = {"Fv": "N m s/rad", "Fs": "N m", "ZZ": "kg m²", "LM": "kg m²"}
 """Units of parameters, by how their names begin."""
 
-MOST = 3
-"""Entities in a view up to which a legend has room; the colours are the same everywhere."""
+CHARTS = 5
+"""Charts of imperfections in a column."""
 
 JOINT_STATES = "green slides, amber turns, red stands, pink saturated"
 MASK_STATES = "green used, amber in part, red masked"
-
-Part = rrb.Container | rrb.View | None
-
-
-class Shelf:
-    """The entities of a recording, by what they are.
-
-    Parameters
-    ----------
-    paths : set of str
-        All entities.
-    """
-
-    def __init__(self, paths: AbstractSet[str]) -> None:
-        self.paths = sorted(path.strip("/") for path in paths)
-
-    def of(self, *patterns: str) -> list[str]:
-        """Return the entities that match one of the patterns, in which * stands for one part of a path."""
-        return [path for pattern in patterns for path in self.paths if _matches(path.split("/"), pattern.split("/"))]
-
-    def by_method(self, pattern: str) -> list[str]:
-        """Return, of the entities that match, the first of every method: what other models show is the same."""
-        return list({path.split("/")[1]: path for path in reversed(self.of(pattern))}.values())
-
-    @property
-    def methods(self) -> list[str]:
-        """Identifications, as they are called."""
-        return list(dict.fromkeys(path.split("/")[1] for path in self.of("identify/*/report")))
-
-    def last(self, pattern: str) -> list[str]:
-        """Return what the last parts of the matching entities are, each once."""
-        return list(dict.fromkeys(path.rsplit("/", 1)[-1] for path in self.of(pattern)))
-
-
-def _matches(path: Sequence[str], pattern: Sequence[str]) -> bool:
-    return len(path) == len(pattern) and all(p in ("*", part) for part, p in zip(path, pattern, strict=True))
-
-
-def plot(shelf: Shelf, name: str, *patterns: str, legend: bool = True) -> Part:
-    """Return a view of curves over time, its time axis that of all others; none if there is nothing to show."""
-    found = shelf.of(*patterns)
-    if not found:
-        return None
-    return rrb.TimeSeriesView(
-        name=name,
-        contents=_contents(found),
-        axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop, visible=legend and len(found) <= MOST),
-    )
-
-
-def lanes(shelf: Shelf, name: str, *patterns: str) -> Part:
-    """Return a view of states over time, if there are any."""
-    found = shelf.of(*patterns)
-    return rrb.StateTimelineView(name=name, contents=_contents(found)) if found else None
-
-
-def bars(shelf: Shelf, name: str, *patterns: str) -> Part:
-    """Return a view of bars, if there are any."""
-    found = shelf.of(*patterns)
-    hidden = rrb.PlotLegend(visible=False)  # it would be paths; the colours are those of the models
-    return rrb.BarChartView(name=name, contents=_contents(found), plot_legend=hidden) if found else None
-
-
-def text(shelf: Shelf, *patterns: str) -> Part:
-    """Return the texts, one behind the other, if there are any."""
-    found = [rrb.TextDocumentView(origin=f"/{path}", name=_title(path)) for path in shelf.of(*patterns)]
-    return rrb.Tabs(*found, active_tab=len(found) - 1) if len(found) > 1 else next(iter(found), None)
-
-
-def _title(path: str) -> str:
-    return path.split("/")[1] if path.startswith("identify/") else path
-
-
-def arm(shelf: Shelf) -> Part:
-    """Return the arm, if it is drawn."""
-    return rrb.Spatial3DView(origin="/world", name="arm") if "world" in shelf.paths else None
-
-
-def _contents(paths: Iterable[str]) -> list[str]:
-    return [f"+ /{path}" for path in paths]
-
-
-def column(*parts: Part, shares: Sequence[float] | None = None) -> Part:
-    """Return the parts that there are, one above the other; none if there are none."""
-    there = [(part, share) for part, share in zip(parts, shares or [1.0] * len(parts), strict=True) if part is not None]
-    return rrb.Vertical(*(p for p, _ in there), row_shares=[s for _, s in there]) if there else None
-
-
-def side_by_side(name: str, *parts: Part, shares: Sequence[float]) -> Part:
-    """Return the parts that there are, side by side, under a name; none if there are none."""
-    there = [(part, share) for part, share in zip(parts, shares, strict=True) if part is not None]
-    if not there:
-        return None
-    return rrb.Horizontal(*(p for p, _ in there), column_shares=[s for _, s in there], name=name)
-
-
-def grid(name: str, parts: Sequence[Part], columns: int) -> Part:
-    """Return the parts that there are in a grid."""
-    there = [part for part in parts if part is not None]
-    return rrb.Grid(*there, grid_columns=columns, name=name) if there else None
 
 
 def overview(shelf: Shelf) -> Part:
@@ -246,7 +148,31 @@ def _estimate(shelf: Shelf, name: str) -> Part:
     return plot(shelf, name + unit, f"identify/*/*/estimate/{name}", f"truth/{name}", legend=False)
 
 
+def table2(shelf: Shelf) -> Part:
+    """Return Table 2: the twin's errors by both processings, and what each imperfection does alone."""
+    charts = [bars(shelf, name[3:].replace("_", " "), f"attribution/{name}/*") for name in shelf.parents("attribution/*/*")]
+    columns = [column(*charts[k : k + CHARTS]) for k in range(0, len(charts), CHARTS)]
+    signals = column(
+        plot(shelf, "torque in the log [N m]", "torque/log"),
+        plot(shelf, "torque, true - commanded [N m]", "torque/disturbance"),
+        *(bars(shelf, f"processed as {name}", f"processing/{name}/*") for name in shelf.parents("processing/*/*")),
+    )
+    left = column(arm(shelf), text(shelf, "table2"), shares=[3, 5])
+    return side_by_side("table2", left, signals, *columns, shares=[6, 4, *([4] * len(columns))]) if charts else None
+
+
+def study(shelf: Shelf) -> Part:
+    """Return a study: the error of every run, its distribution in units of sigma, and the answer."""
+    names = shelf.parents("runs/*/*")
+    points = grid("errors", [plot(shelf, f"error of {n} [%] over runs", f"runs/{n}/*", legend=False) for n in names], 2)
+    sigmas = [bars(shelf, f"{model}: error / corrected sigma", f"sigmas/{model}") for model in shelf.last("sigmas/*")]
+    answer = column(text(shelf, "answer"), *sigmas, shares=[2.0, *[1.0] * len(sigmas)])
+    return side_by_side("study", answer, points, shares=[1, 2]) if names else None
+
+
 LAYOUTS: dict[str, Callable[[Shelf], Part]] = {
+    "study": study,
+    "table2": table2,
     "overview": overview,
     "friction": friction,
     "drive": drive,
@@ -254,13 +180,21 @@ LAYOUTS: dict[str, Callable[[Shelf], Part]] = {
     "excitation": excitation,
     "parameters": parameters,
 }
-"""Layouts by what they are for; the first is what a recording opens with."""
+"""Layouts by what they are for; a recording opens with the first for which it has something to show."""
 
 
-def tabs(paths: AbstractSet[str], active: str = "", first: tuple[str, Part] = ("", None)) -> rrb.Blueprint:
-    """Return all layouts for which a recording with these entities has something to show, in tabs; `active` is in front."""
+def tabs(paths: AbstractSet[str], active: str = "") -> rrb.Blueprint:
+    """Return all layouts for which a recording with these entities has something to show, in tabs; `active` is in front.
+
+    Raises
+    ------
+    ResultsError
+        If `active` is none of them.
+    """
     shelf = Shelf(paths)
-    made = {name: part for name, part in [first, *((n, make(shelf)) for n, make in LAYOUTS.items())] if part is not None}
-    time = rrb.TimePanel(state="collapsed", timeline="sim_time")
-    number = list(made).index(active) if active in made else 0
+    made = {name: part for name, make in LAYOUTS.items() if (part := make(shelf)) is not None}
+    time = rrb.TimePanel(state="collapsed", timeline="run" if "study" in made else "sim_time")
+    if active and active not in made:
+        raise ResultsError(f"this recording has no tab {active!r}; it has {', '.join(made)}")
+    number = list(made).index(active) if active else 0
     return rrb.Blueprint(rrb.Tabs(*made.values(), active_tab=number), time, collapse_panels=True)

@@ -3,20 +3,17 @@
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import Chunk, RrdReader
 
 from experiments.audience import Audience
 from experiments.errors import ResultsError
+from experiments.recording.columns import Times, scalars
 from experiments.recording.style import STATES, Color
 from identify import Array
 
 APPLICATION = "idbench"
-NANOSECONDS = 1_000_000_000
-
-Times = Sequence[rr.TimeColumn]
 
 
 class Stream:
@@ -70,9 +67,7 @@ class Stream:
 
     def curves(self, path: str, times: Times, values: Array) -> None:
         """Send values of shape (time, curve) or (time,)."""
-        count = values.shape[1] if values.ndim > 1 else 1
-        scalars = rr.Scalars.columns(scalars=np.ascontiguousarray(values).ravel())
-        self.send(path, times, scalars.partition([count] * len(values)))
+        self.send(path, times, scalars(values))
 
     def states(self, path: str, times: Times, states: Sequence[str]) -> None:
         """Send states, each from its time until the next."""
@@ -125,13 +120,3 @@ class Stream:
             self._audience.reached(self._live, None)
             self._live.disconnect()
             self._live = None
-
-
-def time_columns(t: Array, fs: float) -> list[rr.TimeColumn]:
-    """Return the timelines sim_time (exact to 1 ns) and sample of the instants `t` [s]."""
-    return [seconds(t), rr.TimeColumn("sample", sequence=np.rint(t * fs).astype(np.int64))]
-
-
-def seconds(t: Array) -> rr.TimeColumn:
-    """Return the timeline sim_time alone, exact to 1 ns, for what lies between samples."""
-    return rr.TimeColumn("sim_time", duration=np.rint(t * NANOSECONDS).astype(np.int64).astype("timedelta64[ns]"))

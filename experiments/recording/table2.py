@@ -1,11 +1,12 @@
 """The recording of Table 2: the twin's signals, its errors by both processings, and what each imperfection does alone."""
 
+import re
+
 import numpy as np
 import rerun as rr
-import rerun.blueprint as rrb
 
 from experiments.recording.identified import RunRecording
-from experiments.recording.layouts import Shelf, arm, bars, column, plot, side_by_side, tabs
+from experiments.recording.layouts import tabs
 from experiments.recording.report import about
 from experiments.recording.stream import Stream
 from experiments.recording.style import FORMS
@@ -14,9 +15,6 @@ from identify import Array
 
 FLOOR = 0.01
 """Error [%] at which the bars begin; every unit of their height is a decade more."""
-
-ROWS = 5
-"""Charts of imperfections in a column."""
 
 
 def finish_table2(recording: RunRecording, table: Table2) -> list[tuple[str, Stream]]:
@@ -27,13 +25,14 @@ def finish_table2(recording: RunRecording, table: Table2) -> list[tuple[str, Str
     for name, found in table.found.items():
         for form, one in found.items():
             _send(stream, f"processing/{name}/{form}", one.estimates[form].error_percent(truth), form)
-    for k, alone in enumerate(table.attribution.values()):
+    for k, (name, alone) in enumerate(table.attribution.items()):
+        part = f"{k:02}_" + re.sub(r"[^\w.-]+", "_", name)  # entities are shown in the order of their names
         for form, error in alone.items():
-            _send(stream, f"attribution/{k}/{form}", error, form)
+            _send(stream, f"attribution/{part}/{form}", error, form)
     stream.keep("table2", rr.TextDocument(_markdown(table), media_type=rr.MediaType.MARKDOWN))
     stream.keep("about", rr.TextDocument(about(table.scenario.name, table.scenario.origin), media_type=rr.MediaType.MARKDOWN))
     known = set().union(*(s.paths for _, s in streams))
-    stream.arrange(tabs(known, first=("table 2", _front(Shelf(known), table))))
+    stream.arrange(tabs(known))
     return streams
 
 
@@ -43,19 +42,6 @@ def _send(stream: Stream, path: str, error_percent: Array, form: str) -> None:
     place, slots = list(FORMS).index(form), len(FORMS) + 1
     x = 1 + np.arange(len(heights)) + (place - (len(FORMS) - 1) / 2) / slots
     stream.keep(path, rr.BarChart(heights, abscissa=x, widths=np.full(len(x), 1 / slots), color=FORMS[form]))
-
-
-def _front(shelf: Shelf, table: Table2) -> rrb.Container | rrb.View | None:
-    names = list(table.attribution)
-    charts = [bars(shelf, name, f"attribution/{k}/*") for k, name in enumerate(names)]
-    columns = [column(*charts[k : k + ROWS]) for k in range(0, len(charts), ROWS)]
-    signals = column(
-        plot(shelf, "torque in the log [N m]", "torque/log"),
-        plot(shelf, "torque, true - commanded [N m]", "torque/disturbance"),
-        *(bars(shelf, f"processed as {name}", f"processing/{name}/*") for name in table.found),
-    )
-    left = column(arm(shelf), rrb.TextDocumentView(origin="/table2", name="Table 2"), shares=[3, 5])
-    return side_by_side("table 2", left, signals, *columns, shares=[6, 4, *([4] * len(columns))])
 
 
 def _markdown(table: Table2) -> str:

@@ -70,7 +70,7 @@ def test_one_file_holds_everything(copied, reading):
 
 
 def test_what_is_wrong_is_told(copied, tmp_path, complaint):
-    assert "unknown tab 'frictoin'; known: overview, friction" in complaint(
+    assert "no tab 'frictoin'; it has overview, friction, drive, filters, excitation, parameters" in complaint(
         "view", str(copied), "--tab", "frictoin", "--save", str(tmp_path / "x.rrd")
     )
     assert "must end with .rrd" in complaint("view", str(copied), "--save", str(tmp_path / "x.png"))
@@ -91,4 +91,4 @@ def test_files_of_two_recordings_are_not_mixed(copied, table1, tmp_path):
     name, stream = record_table1(table1)[0]
     stream.write(tmp_path / name)
     with pytest.raises(ResultsError, match="hold 2 recordings"):
-        merge([copied / "recording.rrd", tmp_path / name], "overview", tmp_path / "x.rrd")
+        merge([copied / "recording.rrd", tmp_path / name], "", tmp_path / "x.rrd")

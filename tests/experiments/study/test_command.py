@@ -68,7 +68,7 @@ def test_the_recording_holds_every_error(done, undisturbed):
         [rerun_cli.__path__[0] + "/rerun", "rrd", "verify", str(path)], capture_output=True, text=True, check=False
     )
     assert verified.returncode == 0, verified.stderr
-    chunks = RrdReader(path).stream().filter(content="/error/Fv2/power", has_timeline="run").to_chunks()
+    chunks = RrdReader(path).stream().filter(content="/runs/Fv2/power", has_timeline="run").to_chunks()
     batches = [chunk.to_record_batch() for chunk in chunks]
     values = np.concatenate([np.ravel(batch.column("Scalars:scalars").to_pylist()) for batch in batches])
     expected = [100 * (r["Fv2"] - 0.01) / 0.01 for r in undisturbed.to_pylist() if r["model"] == "power"]

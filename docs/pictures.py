@@ -1,0 +1,141 @@
+"""Make the pictures of recordings in these pages, from scenarios that ship.
+
+    uv run python docs/pictures.py [NAME ...]
+
+Every picture is a recording opened in rerun's own viewer, without a window; on a machine without a graphics card that needs a
+software Vulkan driver, such as Debian's mesa-vulkan-drivers. Names are those of PICTURES; all by default.
+"""
+
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from experiments.cli import main as idbench
+
+warnings.filterwarnings("ignore")  # the viewer's client is declared unstable; our pin holds it
+
+DOCS = Path(__file__).parent
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture: what is run, and what is looked at.
+
+    Parameters
+    ----------
+    commands : tuple of str
+        Of idbench; OUT is where results go.
+    tab : str
+        What is in front.
+    at : float
+        Where on the time of the recording it is looked at, as a share.
+    """
+
+    commands: tuple[str, ...]
+    tab: str = ""
+    at: float = 0.3
+
+
+DELAY = ("run delay --out OUT", "identify OUT --torque held --torque-delay 0 --label untold")
+COGGING = ("run ripple --out OUT --inner 10 10.02",)
+GAIN = ("run gain --out OUT",)
+
+PICTURES = {
+    "recording-overview": Picture(("run quantization --out OUT",)),
+    "recording-filters": Picture(("run quantization --out OUT",), "filters"),
+    "recording-excitation": Picture(("run quantization --out OUT",), "excitation"),
+    "recording-delay": Picture(DELAY),
+    "recording-delay-parameters": Picture(DELAY, "parameters"),
+    "recording-cogging": Picture(COGGING, "friction"),
+    "recording-drive": Picture(COGGING, "drive"),
+    "recording-gain": Picture(GAIN),
+    "recording-gain-parameters": Picture(GAIN, "parameters"),
+    "recording-saturation": Picture(("run saturation --out OUT",), "parameters"),
+    "table1": Picture(("table1 --out OUT",), "", 0.6),
+    "table2": Picture(("table2 --out OUT",), "", 0.6),
+}
+
+
+def make(names: list[str]) -> None:
+    """Run what is to be seen, each once, and take the pictures."""
+    with tempfile.TemporaryDirectory(prefix="idbench-") as folder:
+        done: dict[tuple[str, ...], Path] = {}
+        for name in names:
+            picture = PICTURES[name]
+            if picture.commands not in done:
+                out = done[picture.commands] = Path(folder) / f"run{len(done)}"
+                for command in picture.commands:
+                    if idbench(command.replace("OUT", str(out)).split()):
+                        sys.exit(f"{command} failed")
+            with viewer(Path(folder)) as client:  # one a picture: a viewer keeps the layout that it opens first
+                take(client, done[picture.commands], picture, DOCS / f"{name}.png")
+
+
+def take(client, out: Path, picture: Picture, path: Path) -> None:  # type: ignore[no-untyped-def]
+    """Open a recording and write what is seen, once it has stopped changing."""
+    one = out / f"{path.stem}.rrd"
+    if idbench(["view", str(out), "--tab", picture.tab, "--save", str(one)]):
+        sys.exit(f"{one} cannot be written")
+    client.open([str(one)])
+    while (state := client.get_state()).loading or not state.recordings:
+        time.sleep(0.2)
+    (shown,) = state.recordings
+    client.set_location(shown.location)
+    (timeline,) = [t for t in shown.timelines if t.name == "sim_time"]
+    now = np.timedelta64(timeline.start + int(picture.at * (timeline.end - timeline.start)), "ns")
+    client.set_time("sim_time", duration=now, play_state="paused")
+    start, last, image = time.monotonic(), b"", client.take_screenshot(max_size=1600)
+    while time.monotonic() - start < 15 and (image != last or time.monotonic() - start < 4):
+        time.sleep(0.5)  # axes fit themselves over some frames, and notices fade; some views never rest
+        last, image = image, client.take_screenshot(max_size=1600)
+    Image.open(BytesIO(image)).convert("RGB").quantize(128).save(path, optimize=True)
+    complaints = [f"{view.name}: {report.summary}" for view in client.get_state().views for report in view.reports]
+    print(f"{path.name}: {', '.join(complaints) or 'no complaints'}")
+
+
+@contextmanager
+def viewer(folder: Path) -> Iterator[object]:
+    """Give a viewer without a window."""
+    import rerun_cli
+    from rerun.experimental import ViewerClient
+
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    command = [Path(rerun_cli.__file__).parent / "rerun", "--headless", "--bind", "127.0.0.1", "--port", f"{port}"]
+    quiet, environment = subprocess.DEVNULL, os.environ | {"WGPU_BACKEND": "vulkan", "XDG_RUNTIME_DIR": str(folder)}
+    options = ["--window-size", "1600x900", "--hide-welcome-screen"]
+    process = subprocess.Popen([*command, *options], stdout=quiet, stderr=quiet, env=environment)
+    try:
+        for _ in range(200):
+            time.sleep(0.2)
+            try:
+                client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
+                client.get_state()
+            except Exception:  # whatever it is that is not ready yet
+                continue
+            yield client
+            return
+        sys.exit("the viewer does not start: is there a Vulkan driver, such as mesa-vulkan-drivers?")
+    finally:
+        process.terminate()
+        process.wait(10)
+
+
+if __name__ == "__main__":
+    unknown = [name for name in sys.argv[1:] if name not in PICTURES]
+    if unknown:
+        sys.exit(f"no picture {unknown[0]!r}; known: {', '.join(PICTURES)}")
+    make(sys.argv[1:] or list(PICTURES))

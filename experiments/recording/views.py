@@ -1,0 +1,114 @@
+"""Views that layouts are made of: of the entities that a recording has, none where it has none."""
+
+from collections.abc import Iterable, Sequence
+from collections.abc import Set as AbstractSet
+
+import rerun.blueprint as rrb
+
+MOST = 3
+"""Entities in a view up to which a legend has room; the colours are the same everywhere."""
+
+Part = rrb.Container | rrb.View | None
+
+
+class Shelf:
+    """The entities of a recording, by what they are.
+
+    Parameters
+    ----------
+    paths : set of str
+        All entities.
+    """
+
+    def __init__(self, paths: AbstractSet[str]) -> None:
+        self.paths = sorted(path.strip("/") for path in paths)
+
+    def of(self, *patterns: str) -> list[str]:
+        """Return the entities that match one of the patterns, in which * stands for one part of a path."""
+        return [path for pattern in patterns for path in self.paths if _matches(path.split("/"), pattern.split("/"))]
+
+    def by_method(self, pattern: str) -> list[str]:
+        """Return, of the entities that match, the first of every method: what other models show is the same."""
+        return list({path.split("/")[1]: path for path in reversed(self.of(pattern))}.values())
+
+    def parents(self, pattern: str) -> list[str]:
+        """Return what the parts before the last of the matching entities are, each once."""
+        return list(dict.fromkeys(path.split("/")[-2] for path in self.of(pattern)))
+
+    @property
+    def methods(self) -> list[str]:
+        """Identifications, as they are called."""
+        return list(dict.fromkeys(path.split("/")[1] for path in self.of("identify/*/report")))
+
+    def last(self, pattern: str) -> list[str]:
+        """Return what the last parts of the matching entities are, each once."""
+        return list(dict.fromkeys(path.rsplit("/", 1)[-1] for path in self.of(pattern)))
+
+
+def _matches(path: Sequence[str], pattern: Sequence[str]) -> bool:
+    return len(path) == len(pattern) and all(p in ("*", part) for part, p in zip(path, pattern, strict=True))
+
+
+def plot(shelf: Shelf, name: str, *patterns: str, legend: bool = True) -> Part:
+    """Return a view of curves over time, its time axis that of all others; none if there is nothing to show."""
+    found = shelf.of(*patterns)
+    if not found:
+        return None
+    return rrb.TimeSeriesView(
+        name=name,
+        contents=_contents(found),
+        axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop, visible=legend and len(found) <= MOST),
+    )
+
+
+def lanes(shelf: Shelf, name: str, *patterns: str) -> Part:
+    """Return a view of states over time, if there are any."""
+    found = shelf.of(*patterns)
+    return rrb.StateTimelineView(name=name, contents=_contents(found)) if found else None
+
+
+def bars(shelf: Shelf, name: str, *patterns: str) -> Part:
+    """Return a view of bars, if there are any."""
+    found = shelf.of(*patterns)
+    hidden = rrb.PlotLegend(visible=False)  # it would be paths; the colours are those of the models
+    return rrb.BarChartView(name=name, contents=_contents(found), plot_legend=hidden) if found else None
+
+
+def text(shelf: Shelf, *patterns: str) -> Part:
+    """Return the texts, one behind the other, if there are any."""
+    found = [rrb.TextDocumentView(origin=f"/{path}", name=_title(path)) for path in shelf.of(*patterns)]
+    return rrb.Tabs(*found, active_tab=len(found) - 1) if len(found) > 1 else next(iter(found), None)
+
+
+def _title(path: str) -> str:
+    return path.split("/")[1] if path.startswith("identify/") else path
+
+
+def arm(shelf: Shelf) -> Part:
+    """Return the arm, if it is drawn."""
+    return rrb.Spatial3DView(origin="/world", name="arm") if "world" in shelf.paths else None
+
+
+def _contents(paths: Iterable[str]) -> list[str]:
+    return [f"+ /{path}" for path in paths]
+
+
+def column(*parts: Part, shares: Sequence[float] | None = None) -> Part:
+    """Return the parts that there are, one above the other; none if there are none."""
+    there = [(part, share) for part, share in zip(parts, shares or [1.0] * len(parts), strict=True) if part is not None]
+    return rrb.Vertical(*(p for p, _ in there), row_shares=[s for _, s in there]) if there else None
+
+
+def side_by_side(name: str, *parts: Part, shares: Sequence[float]) -> Part:
+    """Return the parts that there are, side by side, under a name; none if there are none."""
+    there = [(part, share) for part, share in zip(parts, shares, strict=True) if part is not None]
+    if not there:
+        return None
+    return rrb.Horizontal(*(p for p, _ in there), column_shares=[s for _, s in there], name=name)
+
+
+def grid(name: str, parts: Sequence[Part], columns: int) -> Part:
+    """Return the parts that there are in a grid."""
+    there = [part for part in parts if part is not None]
+    return rrb.Grid(*there, grid_columns=columns, name=name) if there else None

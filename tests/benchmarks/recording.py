@@ -1,0 +1,127 @@
+"""What a recording costs: 40 s at 100 Hz with everything, 1 s inside the loop at 10 kHz, and being watched.
+
+    uv run python tests/benchmarks/recording.py
+
+Watched runs send to a rerun server on this machine; each is timed between two that nobody watches, and the ratio of the medians
+is printed, of the simulation and of the whole: simulate, identify, record, write.
+"""
+
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import rerun as rr
+
+from experiments.audience import Audience, served
+from experiments.recording.base import Base
+from experiments.recording.identified import RunRecording
+from experiments.results import write_recording
+from experiments.run import ScenarioRun
+from identify import MotionLog
+from sim.engine import simulate
+from sim.scenario import Scenario
+from sim.scenario_file import from_dict, load
+from sim.watch import Inner, Stretch, Watch
+
+TIMES = 7
+"""Repetitions."""
+
+
+def timed(work: Callable[[], object]) -> float:
+    """Return how long something takes [s]."""
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+def forty_seconds(folder: Path) -> None:
+    """Record 40 s of a closed loop with an averaged drive, simulated and identified beforehand."""
+    whole, heard = ScenarioRun(load("saturation")), list[Stretch]()
+    run = simulate(whole.scenario, watch=Watch(heard.append))
+    part = cut(run.alone(), 4000)
+    seconds = []
+    for _ in range(TIMES):
+        ran = replace(whole)
+        vars(ran)["run"] = replace(run, log=MotionLog(100.0, part.q[None], part.tau[None], part.torque))
+        _ = [estimate.corrected_sigma for estimate in ran.identified.estimates.values()]
+        recording = RunRecording(whole.scenario)
+        seconds.append(timed(partial(record, recording, ran, heard[0], folder)))
+    size = sum(path.stat().st_size for path in folder.glob("*.rrd"))
+    print(f"40 s at 100 Hz, everything: {statistics.median(seconds):.3f} s, {size / 1e6:.2f} MB")
+
+
+def cut(log: MotionLog, samples: int) -> MotionLog:
+    """Return the first samples of a log."""
+    return MotionLog(log.fs, log.q[:samples], log.tau[:samples], log.torque)
+
+
+def record(recording: RunRecording, ran: ScenarioRun, heard: Stretch, folder: Path) -> None:
+    """Send the first 4000 samples of a run, and its identification, and write them."""
+    names = ("measured", "q", "qd", "tau", "command")
+    parts = {name: getattr(heard, name)[:4000] for name in names}
+    reference = replace(heard.reference, **{x: getattr(heard.reference, x)[:4000] for x in ("q", "qd", "qdd")})
+    electric = heard.electric and type(heard.electric)(*(x[:4000] for x in heard.electric))
+    recording.base.stretch(replace(heard, reference=reference, electric=electric, **parts))
+    write_recording(folder, recording.finish(ran))
+
+
+def inside(folder: Path) -> None:
+    """Record 1 s inside the loop of a chopper at 10 kHz."""
+    motion = {"kind": "random", "moves": 1, "rest": 0.2}
+    chopper = {"kind": "switched", "pwm": 10000.0, "bandwidth": 1000.0}
+    described, heard = from_dict({"name": "inside", "trajectory": motion, "drive": chopper}), list[Stretch]()
+    simulate(described, watch=Watch(heard.append, window=(0.2, 1.2)))
+    seconds = []
+    for _ in range(TIMES):
+        base = RunRecording(described).base
+        seconds.append(timed(partial(send_inner, base, heard[0].inner, folder / "inner.rrd")))
+    steps, size = len(heard[0].inner.t), (folder / "inner.rrd").stat().st_size
+    print(f"1 s inside the loop, {steps} steps: {statistics.median(seconds):.3f} s, {size / 1e6:.2f} MB")
+
+
+def send_inner(base: Base, inner: Inner, path: Path) -> None:
+    """Send signals inside the loop and write them."""
+    base.inside(inner)
+    base.inner.write(path)
+
+
+def watched(name: str, times: int) -> None:
+    """Compare runs that are watched with runs that nobody watches, alternating."""
+    described, seconds = load(name), {"simulated": ([], []), "all": ([], [])}
+    with served(9321) as url, tempfile.TemporaryDirectory() as folder:
+        for _ in range(times):
+            for k, audience in enumerate((None, Audience(url))):
+                simulated, everything = once(described, audience, Path(folder))
+                seconds["simulated"][k].append(simulated)
+                seconds["all"][k].append(everything)
+    for what, (alone, seen) in seconds.items():
+        ratio = statistics.median(seen) / statistics.median(alone)
+        print(f"{name}, {what}: {statistics.median(alone):.2f} s alone, watched {ratio:.3f} times that")
+
+
+def once(described: Scenario, audience: Audience | None, folder: Path) -> tuple[float, float]:
+    """Return how long a run takes [s]: until it is simulated, and until it is written."""
+    start = time.perf_counter()
+    recording = RunRecording(described, audience)
+    ran = ScenarioRun(described, watch=recording.watch)
+    _ = ran.run
+    simulated = time.perf_counter() - start
+    write_recording(folder, recording.finish(ran))
+    return simulated, time.perf_counter() - start
+
+
+def main() -> None:
+    """Print all."""
+    rr.set_strict_mode(True)
+    with tempfile.TemporaryDirectory() as folder:
+        forty_seconds(Path(folder))
+        inside(Path(folder))
+    watched("saturation", TIMES)
+
+
+if __name__ == "__main__":
+    main()
