@@ -100,7 +100,7 @@ def take(client, out: Path, picture: Picture, path: Path) -> None:  # type: igno
     while time.monotonic() - start < 15 and (image != last or time.monotonic() - start < 4):
         time.sleep(0.5)  # axes fit themselves over some frames, and notices fade; some views never rest
         last, image = image, client.take_screenshot(max_size=1600)
-    Image.open(BytesIO(image)).convert("RGB").quantize(128).save(path, optimize=True)
+    Image.open(BytesIO(image)).convert("RGB").quantize(256, kmeans=1).save(path, optimize=True)
     complaints = [f"{view.name}: {report.summary}" for view in client.get_state().views for report in view.reports]
     print(f"{path.name}: {', '.join(complaints) or 'no complaints'}")
 

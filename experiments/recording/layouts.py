@@ -11,7 +11,7 @@ from experiments.recording.views import Part, Shelf, arm, bars, column, grid, la
 PARAMETER_UNITS = {"Fv": "N m s/rad", "Fs": "N m", "ZZ": "kg m²", "LM": "kg m²"}
 """Units of parameters, by how their names begin."""
 
-CHARTS = 5
+CHARTS = 7
 """Charts of imperfections in a column."""
 
 JOINT_STATES = "green slides, amber turns, red stands, pink saturated"
@@ -158,7 +158,7 @@ def table2(shelf: Shelf) -> Part:
         *(bars(shelf, f"processed as {name}", f"processing/{name}/*") for name in shelf.parents("processing/*/*")),
     )
     left = column(arm(shelf), text(shelf, "table2"), shares=[3, 5])
-    return side_by_side("table2", left, signals, *columns, shares=[6, 4, *([4] * len(columns))]) if charts else None
+    return side_by_side("table2", left, signals, *columns, shares=[6, 5, *([6] * len(columns))]) if charts else None
 
 
 def study(shelf: Shelf) -> Part:
