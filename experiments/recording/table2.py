@@ -26,7 +26,9 @@ def finish_table2(recording: RunRecording, table: Table2) -> list[tuple[str, Str
         for form, one in found.items():
             _send(stream, f"processing/{name}/{form}", one.estimates[form].error_percent(truth), form)
     for k, (name, alone) in enumerate(table.attribution.items()):
-        part = f"{k:02}_" + re.sub(r"[^\w.-]+", "_", name.replace("%", "percent"))  # entities are shown in the order of their names
+        part = f"{k:02}_" + re.sub(
+            r"[^\w.-]+", "_", name.replace("%", "percent")
+        )  # entities are shown in the order of their names
         for form, error in alone.items():
             _send(stream, f"attribution/{part}/{form}", error, form)
     stream.keep("table2", rr.TextDocument(_markdown(table), media_type=rr.MediaType.MARKDOWN))
