@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 import rerun as rr
 
-from experiments.recording.columns import Times, poses
+from experiments.recording.columns import Times, part, poses
 from experiments.recording.stream import Stream
 from experiments.recording.style import MEASURED, PLANNED, Color
 from identify import Array
@@ -38,26 +38,28 @@ class Arm:
         stream.keep("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
         for body in pose.keys() - self._moving:
             where = rr.Transform3D(translation=two.positions[body][0], quaternion=rr.Quaternion(xyzw=two.quaternions[body][0]))
-            stream.keep(f"world/{roles[0]}/{body}", where)
+            stream.keep(f"world/{roles[0]}/{part(body)}", where)
         for role in roles:
             for shape in shapes(robot):
                 if role == roles[0] or shape.body in self._moving:
-                    path = f"world/{role}/{shape.body}/{shape.name}"
+                    path = f"world/{role}/{part(shape.body)}/{part(shape.name)}"
                     stream.keep(path, _drawn(shape, None if role == roles[0] else ROLES[role]), _pose(shape))
 
     def move(self, times: Times, where: Mapping[str, Array]) -> None:
         """Send where arms are, by their role, at positions [rad] of shape (time, joint)."""
         moving = self._mover.at(np.concatenate(list(where.values())))
         for k, (role, q) in enumerate(where.items()):
-            part = slice(k * len(q), (k + 1) * len(q))
+            mine = slice(k * len(q), (k + 1) * len(q))
             for body in self._moving:
-                at, turned = moving.positions[body][part], moving.quaternions[body][part]
-                self._stream.send(f"world/{role}/{body}", times, poses(at, turned))
+                at, turned = moving.positions[body][mine], moving.quaternions[body][mine]
+                self._stream.send(f"world/{role}/{part(body)}", times, poses(at, turned))
 
     def trace(self, q: Array) -> None:
         """Draw the way of every site along `q` [rad], shape (time, joint)."""
         for site, position in motion(self._robot, q).sites.items():
-            self._stream.keep(f"world/path_of_{site}", rr.LineStrips3D([position], radii=[0.0015], colors=[[190, 190, 190]]))
+            self._stream.keep(
+                f"world/path_of_{part(site)}", rr.LineStrips3D([position], radii=[0.0015], colors=[[190, 190, 190]])
+            )
 
 
 Fill = Literal["solid", "majorwireframe"]

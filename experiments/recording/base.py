@@ -7,7 +7,7 @@ import rerun as rr
 
 from experiments.audience import Audience
 from experiments.recording.arm import Arm
-from experiments.recording.columns import Times, seconds, time_columns
+from experiments.recording.columns import Times, part, seconds, time_columns
 from experiments.recording.lanes import Lanes, joint_states
 from experiments.recording.layouts import tabs
 from experiments.recording.stream import Stream
@@ -40,7 +40,7 @@ class Base:
     def __init__(self, name: str, robot: Robot, fs: float, roles: tuple[str, ...], audience: Audience | None = None) -> None:
         self.stream, self._audience = Stream(name, audience), audience
         self.inner: Stream | None = None
-        self._robot, self._fs, self._roles = robot, fs, roles
+        self._joints, self._fs, self._roles = [part(joint) for joint in robot.joints], fs, roles
         self._arm, self._lanes = Arm(self.stream, robot, roles), Lanes(self.stream, fs)
         self._before = np.empty(0), np.empty((0, robot.n))
         if audience:
@@ -80,7 +80,7 @@ class Base:
         for path, values in signals.items():
             self._curves(self.stream, path, times, values)
         self._arm.move(times[:1], poses)
-        for j, joint in enumerate(self._robot.joints):
+        for j, joint in enumerate(self._joints):
             self._lanes.send(f"state/{joint}", t, joint_states(qd[:, j], None if limited is None else limited[:, j]))
         if fresh and self._audience:
             self.stream.show(tabs(self.stream.paths))
@@ -111,8 +111,9 @@ class Base:
 
     def _curves(self, stream: Stream, path: str, times: Times, values: Array) -> None:
         if path not in stream.paths:
-            kind, n = path.rsplit("/", 1)[-1], self._robot.n
-            stream.style(path, [f"{kind} {joint}" for joint in self._robot.joints], kind_colors(kind, n), WIDTHS.get(kind, 1.5))
+            kind, colors = path.rsplit("/", 1)[-1], len(self._joints)
+            names = [f"{kind} {joint}" for joint in self._joints]
+            stream.style(path, names, kind_colors(kind, colors), WIDTHS.get(kind, 1.5))
         stream.curves(path, times, values)
 
     def _accelerate(self, t: Array, qd: Array) -> None:

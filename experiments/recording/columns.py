@@ -1,5 +1,6 @@
 """Columns of a recording, made straight from arrays: a run that is watched sends twenty of them a second of its time."""
 
+import re
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
@@ -11,6 +12,11 @@ import rerun as rr
 from identify import Array
 
 NANOSECONDS = 1_000_000_000
+
+
+def part(name: str) -> str:
+    """Return a name as part of an entity's path, in which slashes, spaces and the like mean something."""
+    return re.sub(r"[^\w.-]+", "_", name)
 
 
 class TimeColumn:

@@ -7,7 +7,7 @@ import rerun as rr
 
 from experiments.audience import Audience
 from experiments.identified import Identified
-from experiments.recording.columns import Times, seconds, time_columns
+from experiments.recording.columns import Times, part, seconds, time_columns
 from experiments.recording.lanes import Lanes, mask_states
 from experiments.recording.layouts import tabs
 from experiments.recording.report import estimates_table, judged, short_table
@@ -63,7 +63,8 @@ class Layer:
     def __init__(
         self, name: str, found: Identified, joints: Sequence[str], known: set[str], audience: Audience | None = None
     ) -> None:
-        self.stream, self._found, self._joints, self._known = Stream(name, audience, layer=True), found, joints, known
+        self.stream, self._found, self._known = Stream(name, audience, layer=True), found, known
+        self._joints = [part(joint) for joint in joints]
         self._log, self._chain, self._at = found.logs[0], found.processing, f"identify/{found.label}"
         methods = {path.strip("/").split("/")[1] for path in known if path.strip("/").startswith("identify/")}
         self._shade = len(methods - {found.label})

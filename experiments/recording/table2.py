@@ -1,10 +1,9 @@
 """The recording of Table 2: the twin's signals, its errors by both processings, and what each imperfection does alone."""
 
-import re
-
 import numpy as np
 import rerun as rr
 
+from experiments.recording.columns import part
 from experiments.recording.identified import RunRecording
 from experiments.recording.layouts import tabs
 from experiments.recording.report import about
@@ -26,11 +25,10 @@ def finish_table2(recording: RunRecording, table: Table2) -> list[tuple[str, Str
         for form, one in found.items():
             _send(stream, f"processing/{name}/{form}", one.estimates[form].error_percent(truth), form)
     for k, (name, alone) in enumerate(table.attribution.items()):
-        part = f"{k:02}_" + re.sub(
-            r"[^\w.-]+", "_", name.replace("%", "percent")
-        )  # entities are shown in the order of their names
+        # Entities are shown in the order of their names.
+        at = f"attribution/{k:02}_{part(name.replace('%', 'percent'))}"
         for form, error in alone.items():
-            _send(stream, f"attribution/{part}/{form}", error, form)
+            _send(stream, f"{at}/{form}", error, form)
     stream.keep("table2", rr.TextDocument(_markdown(table), media_type=rr.MediaType.MARKDOWN))
     stream.keep("about", rr.TextDocument(about(table.scenario.name, table.scenario.origin), media_type=rr.MediaType.MARKDOWN))
     known = set().union(*(s.paths for _, s in streams))
