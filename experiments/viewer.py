@@ -4,9 +4,9 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from experiments.audience import LOOPBACK, require_display, viewer_binary
 from experiments.errors import ExperimentError, ResultsError
 from experiments.recording.folder import BASE, files, merge
+from experiments.viewers import LOOPBACK, require_display, viewer_binary
 
 
 def view(folder: Path, tab: str = "") -> None:

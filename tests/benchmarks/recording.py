@@ -16,11 +16,12 @@ from pathlib import Path
 
 import rerun as rr
 
-from experiments.audience import Audience, served
+from experiments.audience import Audience
 from experiments.recording.base import Base
 from experiments.recording.identified import RunRecording
 from experiments.results import write_recording
 from experiments.run import ScenarioRun
+from experiments.viewers import served
 from identify import MotionLog
 from sim.engine import simulate
 from sim.scenario import Scenario
