@@ -1,6 +1,7 @@
 """Who watches a run while it goes on: a viewer on this machine, in a browser, or elsewhere."""
 
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,10 +12,18 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from experiments.errors import ExperimentError
-from experiments.viewers import PATIENCE, answers, reachable, served, spawned
+from experiments.viewers import answers, reachable, served, spawned
 
 if TYPE_CHECKING:
     import rerun as rr
+
+GOODBYE = 10.0
+"""How long a viewer may take to take what is still on its way to it, at the end [s]."""
+
+DEAF = 6
+"""How often in a row a viewer may fail to take what is sent within half a second."""
+
+LEAVING = "idbench-leaving"
 
 Url = Annotated[str | None, tyro.conf.arg(metavar="URL")]
 Times = Annotated[float | None, tyro.conf.arg(metavar="FLOAT")]
@@ -46,6 +55,8 @@ class Watching:
             raise ExperimentError(f"--pace {self.pace:g} must be above 0: 1.0 is real time")
         if self.pace is not None and not ways:
             raise ExperimentError(f"--pace {self.pace:g} needs somebody who watches: add --live, --serve or --connect URL")
+        if not 0 < self.port < 65535:
+            raise ExperimentError(f"--port {self.port} must be between 1 and 65534; data go through the port after it")
         if ways and not self.rerun:
             raise ExperimentError(f"{ways[0]} and --no-rerun contradict each other: give one")
 
@@ -91,6 +102,7 @@ class Audience:
 
     def __init__(self, url: str, pace: float | None = None) -> None:
         self.url, self.pace, self.watching, self._start = url, pace, True, time.perf_counter()
+        self._deaf = 0
 
     @property
     def every(self) -> float:
@@ -103,15 +115,32 @@ class Audience:
 
     def reached(self, recording: "rr.RecordingStream", seconds: float | None) -> bool:
         """Hand on what was sent; wait until `seconds` of simulated time are due; return whether the viewer still watches."""
+        if not self.watching:
+            return False
         try:
-            recording.flush(timeout_sec=0.5 if seconds is not None else PATIENCE)
+            recording.flush(timeout_sec=0.5 if seconds is not None else GOODBYE)
+            self._deaf = 0
         except RuntimeError:  # rerun tells a slow viewer and one that has gone apart in words alone
-            self.watching = answers(self.url)
+            self._deaf += 1
+            gone = not answers(self.url)
+            self.watching = not gone and self._deaf < DEAF and seconds is not None
             if not self.watching:
-                sys.stderr.write(f"idbench: the viewer at {self.url} has gone; the work goes on without it\n")
+                why = "has gone" if gone else "takes nothing"
+                sys.stderr.write(f"idbench: the viewer at {self.url} {why}; the work goes on without it\n")
         if self.watching and self.pace and seconds is not None:
             time.sleep(max(0.0, self._start + seconds / self.pace - time.perf_counter()))
         return self.watching
+
+    def leave(self, recording: "rr.RecordingStream") -> None:
+        """Take leave of the viewer; one that hangs is left behind, with the thread that waits for it."""
+        thread = threading.Thread(target=recording.disconnect, name=LEAVING, daemon=True)
+        thread.start()
+        thread.join(GOODBYE)
+
+
+def left_behind() -> bool:
+    """Return whether something still waits for a viewer that hangs, which would keep the process from ending."""
+    return any(thread.name == LEAVING for thread in threading.enumerate())
 
 
 def _until_interrupted() -> None:

@@ -1,5 +1,6 @@
 """The entry point of the command line: everything slow to load is loaded here, guarded."""
 
+import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -19,4 +20,7 @@ def entry() -> NoReturn:
     """Run the command line and end the process; an interruption after the work is done changes nothing."""
     code = main()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if "experiments.audience" in sys.modules and sys.modules["experiments.audience"].left_behind():
+        sys.stdout.flush()
+        os._exit(code)
     sys.exit(code)

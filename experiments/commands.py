@@ -105,7 +105,7 @@ def view(folder: tyro.conf.Positional[Path], tab: str = "", save: File = None) -
 
     Args:
         folder: Results folder, or a recording (.rrd).
-        tab: What is in front: overview, friction, drive, filters, excitation or parameters; by default the first that it has.
+        tab: What is in front: overview, friction, drive, filters, excitation, parameters, study or table2, as far as it has it.
         save: Write the recording and its layers to one file (.rrd) instead, to be taken elsewhere.
     """
     with importing():

@@ -62,8 +62,8 @@ def identify(  # noqa: PLR0913, PLR0917  # the options of a command
         from experiments.tables import print_identified
 
     page, models = new_page(), tuple(MODELS) if model == "all" else (model,)
-    if label and not re.fullmatch(r"[\w.-]+", label):
-        raise ExperimentError(f"--label {label!r} must be of letters, digits, dot, hyphen and underscore")
+    if label and (not re.fullmatch(r"[A-Za-z0-9][\w.-]*", label) or label == "inner"):
+        raise ExperimentError(f"--label {label!r} must be of letters, digits, dots, hyphens and underscores, and not 'inner'")
     named = Identified((), robot, models=models, chain=chain, estimator=estimator, name=label)  # complains of names first
     known, said = _read(_file(log), torque, torque_delay, named.basis, named.processing)
     found = replace(named, logs=(known,), truth=_truth(log, named))
@@ -119,9 +119,10 @@ def _truth(log: Path, named: "Identified") -> dict[str, float] | None:
     try:
         said = json.loads(path.read_text())
         names, values = said["parameters"], said["truth"]
+        known = None if values is None else dict(zip(names, map(float, values), strict=True))
     except (ValueError, KeyError, TypeError, OSError) as error:
         raise ExperimentError(f"{path} is no summary of a run ({error}): name the log itself, {log / 'log.parquet'}") from error
-    return dict(zip(names, values, strict=True)) if values is not None and tuple(names) == named.basis.parameters else None
+    return known if tuple(names) == named.basis.parameters else None
 
 
 @app.command(name="resample")

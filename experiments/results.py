@@ -56,6 +56,9 @@ def write_recording(folder: Path, streams: "Sequence[tuple[str, Stream]]") -> st
         for name, _ in streams:
             (folder / name).unlink(missing_ok=True)
         return str(error)
+    finally:
+        for _, stream in streams:  # when everything is written: a viewer may hang
+            stream.close()
     return ""
 
 
@@ -118,5 +121,5 @@ def _move(hidden: Path, out: Path) -> None:
     for path in paths:
         path.replace(out / path.name)
     if any(path.name == "summary.json" for path in paths):  # recordings of earlier results are none of these
-        for old in {*out.glob("recording*.rrd")} - {out / path.name for path in paths}:
+        for old in {*out.glob("recording.rrd"), *out.glob("recording.*.rrd")} - {out / path.name for path in paths}:
             old.unlink()

@@ -53,8 +53,8 @@ class ScenarioRun:
     def identified(self) -> Identified:
         """What the models make of its log."""
         truth = scara_truth(self.run.robots[0])
-        log = (self.run.alone(),)
-        return Identified(log, truth=truth, chain=self.chain, estimator=self.estimator, method=self.method)
+        log, name = (self.run.alone(),), f"{self.chain}-{self.estimator}-study" if self.method else ""
+        return Identified(log, truth=truth, chain=self.chain, estimator=self.estimator, method=self.method, name=name)
 
     def summary(self) -> dict[str, Any]:
         """Return summary.json."""

@@ -64,10 +64,11 @@ def run(  # noqa: PLR0913, PLR0917  # the options of a command
         if scenario is None
         else ScenarioRun(load(_alone(scenario, study, index)), chain, estimator)
     )
-    if inner is not None and not (watching.rerun and 0 <= inner[0] < inner[1]):
-        raise ExperimentError(f"--inner {inner[0]:g} {inner[1]:g} must be two times [s], in order, and needs a recording")
+    _require_window(inner, watching)
     described, lost = made.scenario, ""
     folder_name = out or Path("runs") / described.name
+    if (folder_name / "study.toml").exists():
+        raise ExperimentError(f"{folder_name} holds a study: choose another --out")
     with watching.audience() as audience, shown(page):
         with results_folder(folder_name) as folder:
             recording = _recording(described, audience, inner) if watching.rerun else None
@@ -79,7 +80,22 @@ def run(  # noqa: PLR0913, PLR0917  # the options of a command
             if recording:
                 lost = write_recording(folder, recording.finish(ran))
         tell_of(lost, folder_name)
+        _doubt_window(page, inner, recording)
         page.print(f"written to {folder_name}{watching.hint(folder_name)}", soft_wrap=True)
+
+
+def _require_window(inner: tuple[float, float] | None, watching: Watching) -> None:
+    if inner is not None and not (watching.rerun and 0 <= inner[0] < inner[1]):
+        raise ExperimentError(f"--inner {inner[0]:g} {inner[1]:g} must be two times [s], in order, and needs a recording")
+
+
+def _doubt_window(page: Console, inner: tuple[float, float] | None, recording: "RunRecording | None") -> None:
+    if inner is not None and recording is not None and recording.base.inner is None:
+        page.print(
+            f"doubtful: nothing lies inside the loop from {inner[0]:g} to {inner[1]:g} s: the drive has no currents, "
+            "or the run is shorter",
+            soft_wrap=True,
+        )
 
 
 def _recording(scenario: Scenario, audience: Audience | None, window: tuple[float, float] | None = None) -> "RunRecording":
@@ -140,6 +156,7 @@ def table2(
         from experiments.table2 import Table2
         from experiments.tables import print_table2
 
+    _require_window(inner, watching)
     page, described, lost = new_page(), load(scenario), ""
     with watching.audience() as audience, shown(page):
         with results_folder(out) as folder:
@@ -154,6 +171,7 @@ def table2(
 
                 lost = write_recording(folder, finish_table2(recording, table))
         tell_of(lost, out)
+        _doubt_window(page, inner, recording)
         page.print(f"written to {out}{watching.hint(out)}", soft_wrap=True)
 
 

@@ -63,6 +63,8 @@ def study(  # noqa: PLR0913, PLR0917  # the options of a command
         from experiments.study.engine import run_missing
         from experiments.study.progress import watching as counting
         from experiments.study.results import write_results
+    if watching.pace is not None:
+        raise StudyError(f"--pace {watching.pace:g}: a study has no one time that could pass; leave it out")
     page = new_page()
     if study is None and resume is None:
         from experiments.study.study_file import load_study, names

@@ -27,7 +27,7 @@ def view(folder: Path, tab: str = "") -> None:
         ) from None
     with tempfile.TemporaryDirectory(prefix="idbench-") as hidden:
         one = paths
-        if folder.is_dir():
+        if folder.is_dir() or tab:
             one = [Path(hidden) / BASE]
             merge(paths, tab, one[0])
         _open(one)
@@ -37,6 +37,8 @@ def save(folder: Path, tab: str, out: Path) -> None:
     """Write the recording of a results folder and its layers as one file; raise ResultsError if that fails."""
     if out.suffix != ".rrd":
         raise ResultsError(f"--save {out} must end with .rrd")
+    if out.name.startswith("recording.") and out.absolute().parent == folder.absolute():
+        raise ResultsError(f"--save {out} would be a part of the recording itself: choose another name")
     merge(_paths(folder), tab, out)
 
 

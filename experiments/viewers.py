@@ -20,12 +20,12 @@ PATIENCE = 20.0
 
 def address(url: str) -> tuple[str, int]:
     """Return host and port of a viewer; raise ExperimentError if `url` is no address of one."""
-    parts = urlsplit(url)
     try:
-        host, port = parts.hostname, parts.port
+        parts = urlsplit(url)
+        scheme, host, port = parts.scheme, parts.hostname, parts.port
     except ValueError:
-        host, port = None, None
-    if parts.scheme not in ("rerun", "rerun+http", "rerun+https") or not host or port is None:
+        scheme, host, port = "", None, None
+    if scheme not in ("rerun", "rerun+http", "rerun+https") or not host or port is None:
         raise ExperimentError(f"--connect {url} is no address of a viewer: it looks like rerun+http://127.0.0.1:9876/proxy")
     return host, port
 
@@ -35,7 +35,7 @@ def answers(url: str) -> bool:
     try:
         with closing(socket.create_connection(address(url), 2.0)):
             return True
-    except OSError:
+    except (OSError, UnicodeError):  # a host whose name cannot be one
         return False
 
 
@@ -79,12 +79,20 @@ def _start(options: list[str], port: int) -> "subprocess.Popen[bytes]":
     except OSError as error:
         raise ExperimentError(f"cannot start the rerun viewer {binary}: {error.strerror}") from error
     end = time.perf_counter() + PATIENCE
-    while not answers(f"rerun+http://{LOOPBACK}:{port}/proxy"):
-        if viewer.poll() is not None or time.perf_counter() > end:
-            viewer.terminate()
-            raise ExperimentError("the rerun viewer does not start: use --serve and a browser, or leave --live out")
-        time.sleep(0.05)
+    try:
+        while not answers(f"rerun+http://{LOOPBACK}:{port}/proxy"):
+            if viewer.poll() is not None or time.perf_counter() > end:
+                raise ExperimentError("the rerun viewer does not start: use --serve and a browser, or leave --live out")
+            time.sleep(0.05)
+    except BaseException:  # also Ctrl-C: nothing that was begun stays behind
+        _stop(viewer)
+        raise
     return viewer
+
+
+def _stop(viewer: "subprocess.Popen[bytes]") -> None:
+    viewer.terminate()
+    viewer.wait()
 
 
 @contextmanager
@@ -94,12 +102,11 @@ def served(web: int) -> Iterator[str]:
         _require_free(port)
     server = _start(["--serve-web", "--port", f"{web + 1}", "--web-viewer-port", f"{web}"], web + 1)
     url = f"rerun+http://{LOOPBACK}:{web + 1}/proxy"
-    sys.stderr.write(f"idbench: watch it at http://{LOOPBACK}:{web}/?url={quote(url, safe='')}\n")
     try:
+        sys.stderr.write(f"idbench: watch it at http://{LOOPBACK}:{web}/?url={quote(url, safe='')}\n")
         yield url
     finally:
-        server.terminate()
-        server.wait()
+        _stop(server)
 
 
 def _require_free(port: int) -> None:

@@ -161,14 +161,17 @@ class _Rows:
 
     @classmethod
     def of(cls, taken: Sequence[Step], drive: AbstractAmplifier, h: float) -> "_Rows":
-        """Return the steps of a drive, unrolled: a trace that has several rows says what each of its steps did."""
-        count = np.array([max(len(x) for x in s.trace if x.ndim == 3) if s.trace[-1].ndim == 3 else 1 for s in taken])
+        """Return the steps of a drive, unrolled: a trace, or a torque, that has several rows says what each step did."""
         steps = np.array([s.steps for s in taken])
+        rows = np.array([max([len(x) for x in s.trace if x.ndim == 3], default=1) for s in taken])
+        count = np.array([max(n, len(s.tau)) for n, s in zip(rows, taken, strict=True)])
         length = np.repeat(steps // count, count)
         within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
         start = np.repeat([s.step for s in taken], count) + within * length
-        traces = (_unrolled(x, count) for x in zip(*(s.trace for s in taken), strict=True))
-        electric = drive.electric(tuple(traces), (length * h)[:, None])
+        traces = (_unrolled(x, rows) for x in zip(*(s.trace for s in taken), strict=True))
+        whole = drive.electric(tuple(traces), (np.repeat(steps / rows, rows) * h)[:, None])
+        again = np.repeat(count // rows, rows)  # a mean over several steps holds for each of them
+        electric = Electric(*(np.repeat(x, again, axis=0) for x in whole))
         return cls(start, length.astype(np.float64), electric, _unrolled([s.tau for s in taken], count))
 
     def means(self, first: int, final: int, per_sample: int) -> Electric:

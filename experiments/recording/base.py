@@ -16,6 +16,9 @@ from identify import Array, MotionLog
 from sim.robot import Robot
 from sim.watch import Inner, Stretch
 
+LOGGED = {"q/measured", "torque/log"}
+"""What a robot would log: numbered by samples, too, which takes room."""
+
 ELECTRIC = ("reference", "current", "voltage", "duty")
 """Signals of a drive."""
 
@@ -40,9 +43,10 @@ class Base:
     def __init__(self, name: str, robot: Robot, fs: float, roles: tuple[str, ...], audience: Audience | None = None) -> None:
         self.stream, self._audience = Stream(name, audience), audience
         self.inner: Stream | None = None
+        self._shown = 0
         self._joints, self._fs, self._roles = [part(joint) for joint in robot.joints], fs, roles
         self._arm, self._lanes = Arm(self.stream, robot, roles), Lanes(self.stream, fs)
-        self._before = np.empty(0), np.empty((0, robot.n))
+        self._before, self._turning = (np.empty(0), np.empty((0, robot.n))), np.zeros(robot.n)
         if audience:
             audience.begin()
 
@@ -76,14 +80,16 @@ class Base:
         """
         t = (first + np.arange(len(qd))) / self._fs
         times = time_columns(t, self._fs)
-        fresh = not signals.keys() <= self.stream.paths
         for path, values in signals.items():
-            self._curves(self.stream, path, times, values)
+            self._curves(self.stream, path, times if path in LOGGED else times[:1], values)
         self._arm.move(times[:1], poses)
         for j, joint in enumerate(self._joints):
-            self._lanes.send(f"state/{joint}", t, joint_states(qd[:, j], None if limited is None else limited[:, j]))
-        if fresh and self._audience:
-            self.stream.show(tabs(self.stream.paths))
+            states = joint_states(qd[:, j], None if limited is None else limited[:, j], self._turning[j])
+            self._lanes.send(f"state/{joint}", t, states)
+        self._turning = qd[-1]
+        if self._shown != len(self._paths):
+            self._shown = len(self._paths)
+            self.stream.show(tabs(self._paths))
         self.stream.breathe(float(t[-1]))
 
     def replay(self, log: MotionLog, signals: Mapping[str, Array], qd: Array) -> None:
@@ -107,7 +113,11 @@ class Base:
     def finish(self, text: str) -> None:
         """Send a text about it all, and the layout."""
         self.stream.keep("about", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
-        self.stream.arrange(tabs(self.stream.paths | (self.inner.paths if self.inner else set())))
+        self.stream.arrange(tabs(self._paths))
+
+    @property
+    def _paths(self) -> set[str]:
+        return self.stream.paths | (self.inner.paths if self.inner else set())
 
     def _curves(self, stream: Stream, path: str, times: Times, values: Array) -> None:
         if path not in stream.paths:

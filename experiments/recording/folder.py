@@ -1,5 +1,6 @@
 """The recording of a results folder: a base and its layers, each a file of its own."""
 
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -39,9 +40,11 @@ def known(paths: Sequence[Path]) -> tuple[str, set[str]]:
     ids, entities = set[str](), set[str]()
     for path in paths:
         try:
-            reader = RrdReader(path)
-            ids |= {entry.recording_id for entry in reader.recordings()}
-            columns = reader.store().schema().component_columns()
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # what is wrong we say ourselves, in one line
+                reader = RrdReader(path)
+                ids |= {entry.recording_id for entry in reader.recordings()}
+                columns = reader.store().schema().component_columns()
         except (RuntimeError, ValueError, OSError) as error:
             raise ResultsError(f"cannot read the recording {path}: {' '.join(str(error).split())}") from error
         entities |= {column.entity_path.strip("/") for column in columns}
@@ -66,12 +69,13 @@ def merge(paths: Sequence[Path], tab: str, out: Path) -> None:
     stream.write(out)
 
 
-def rearrange(paths: Sequence[Path], fresh: Stream) -> None:
-    """Write layers anew so that they, too, lay out what `fresh` adds to their recording."""
-    name, entities = known(paths)
+def rearranged(paths: Sequence[Path], fresh: Stream) -> list[tuple[str, Stream]]:
+    """Return layers anew, by the name of their file, so that they, too, lay out what `fresh` adds to their recording."""
+    (name, entities), streams = known(paths), []
     for path in paths:
         if path.name not in (BASE, INNER):
             stream = Stream(name, layer=True)
             stream.copy(RrdReader(path))
             stream.arrange(tabs(entities | fresh.paths))
-            stream.write(path)
+            streams.append((path.name, stream))
+    return streams

@@ -4,11 +4,13 @@ import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 
+from rerun.chunk import RrdReader
+
 from experiments.audience import Audience
 from experiments.errors import ResultsError
 from experiments.identified import Identified
 from experiments.recording.base import Base
-from experiments.recording.folder import BASE, INNER, files, known, layer_file, rearrange
+from experiments.recording.folder import BASE, INNER, files, known, layer_file, rearranged
 from experiments.recording.layer import Layer
 from experiments.recording.report import about
 from experiments.recording.stream import Stream
@@ -21,6 +23,9 @@ from sim.scenario_file import to_toml
 from sim.watch import Watch
 
 ROLES = ("true", "planned", "measured")
+
+UNWATCHED = 10.0
+"""Length of the stretches of a run that nobody watches [s]: what is not recorded yet takes memory."""
 
 
 class RunRecording:
@@ -42,7 +47,7 @@ class RunRecording:
         self.base.stream.describe(scenario=written, seed=str(scenario.seed), fs_hz=f"{scenario.fs:g}")
         if audience:  # so that the view holds the whole motion from the beginning
             self.base.foretell(scenario.trajectory.sample(scenario.real_robot, scenario.fs).q)
-        self.watch = Watch(self.base.stretch, audience.every if audience else float("inf"), window)
+        self.watch = Watch(self.base.stretch, audience.every if audience else UNWATCHED, window)
 
     def end(self, run: Run) -> list[tuple[str, Stream]]:
         """Add what only the end of a simulation tells; return the streams by the name of their file."""
@@ -52,7 +57,7 @@ class RunRecording:
     def finish(self, ran: ScenarioRun) -> list[tuple[str, Stream]]:
         """Add what only the end tells, and the identification; return the streams by the name of their file."""
         streams = self.end(ran.run)
-        self.base.finish(about(ran.scenario.name, ran.scenario.origin))
+        self.base.finish(about(ran.scenario.name, ran.scenario.origin, ROLES))
         there = set().union(*(stream.paths for _, stream in streams))
         return [*streams, layer(self.base.stream.name, ran.identified, ran.run.robots[0].joints, there, self._audience)]
 
@@ -65,14 +70,14 @@ def record_log(found: Identified, audience: Audience | None = None) -> list[tupl
     base.stream.describe(fs_hz=f"{log.fs:g}", torque=channel.meaning, torque_delay_s=f"{channel.delay:g}")
     base.replay(log, {}, measured_state(log, found.processing).qd.T)
     base.end(log, log.q)
-    base.finish(about("log", ""))
+    base.finish(about("log", "", ("measured",)))
     return [(BASE, base.stream), layer(base.stream.name, found, robot.joints, base.stream.paths, audience)]
 
 
 def add_layer(folder: Path, found: Identified, audience: Audience | None = None) -> list[tuple[str, Stream]]:
-    """Return the stream of an identification's layer for the recording in a results folder, by the name of its file.
+    """Return the streams of the layers of the recording in a results folder, that of an identification first.
 
-    Layers that are there already are written anew, to show the new one beside them.
+    The layers that are there already come anew with it, to lay out the new one beside them.
 
     Raises
     ------
@@ -83,9 +88,18 @@ def add_layer(folder: Path, found: Identified, audience: Audience | None = None)
     if not (folder / BASE).is_file():
         raise ResultsError(f"there is no {BASE} in {folder} to add a layer to: give --out for a recording of its own")
     name, there = known(others)
+    if audience:
+        show(name, others, audience)
     made = layer(name, found, Robot.load(found.robot).joints, there, audience)
-    rearrange(others, made[1])
-    return [made]
+    return [made, *rearranged(others, made[1])]
+
+
+def show(name: str, paths: Sequence[Path], audience: Audience) -> None:
+    """Send the files of a recording to who watches."""
+    stream = Stream(name, audience)
+    for path in reversed(paths):
+        stream.copy(RrdReader(path))
+    stream.close()
 
 
 def layer(

@@ -39,7 +39,7 @@ class Lanes:
             self._stream.states(path, time_columns(t[changed], self._fs), now[1 + changed].tolist())
 
 
-def joint_states(qd: Array, limited: Array | None) -> npt.NDArray[np.str_]:
+def joint_states(qd: Array, limited: Array | None, before: float) -> npt.NDArray[np.str_]:
     """Return what a joint does: it slides, turns or stands, or its drive is at a limit, whatever it does.
 
     Parameters
@@ -48,10 +48,11 @@ def joint_states(qd: Array, limited: Array | None) -> npt.NDArray[np.str_]:
         Velocity [rad/s].
     limited : Array, shape (time,), optional
         Share of each sample for which the drive was at its limit of current or voltage.
+    before : float
+        Velocity one sample before, or 0.
     """
     speed = np.abs(qd)
-    turns = np.zeros(len(qd), dtype=bool)
-    turns[1:] = np.signbit(qd[1:]) != np.signbit(qd[:-1])  # a fast joint turns between two samples
+    turns = np.concatenate([[before], qd[:-1]]) * qd < 0  # a fast joint turns between two samples
     states = np.where(speed <= STILL, "stands", np.where(turns | (speed <= SLOW), "reversal", "slides"))
     return states if limited is None else np.where(limited > 0, "saturated", states)
 

@@ -167,7 +167,9 @@ class Layer:
         if names is self._joints:
             self._over(at, form, left)
         for row, residual, weight in zip(names, left.residual, left.weight, strict=True):
-            f, density = spectrum(np.where(weight > 0, residual, 0.0), log.fs, RESOLUTION)
+            used = weight > 0
+            f, density = spectrum(np.where(used, residual, 0.0), log.fs, RESOLUTION)
+            density = density / np.sqrt(max(used.mean(), 1e-12))  # as if what is masked were like the rest
             height = np.maximum(20 * np.log10(np.maximum(density, 1e-300) / FLOOR), 0.0)
             path = f"{self._at}/{form}/spectrum/{row}"
             self.stream.keep(path, rr.BarChart(height, abscissa=f, widths=np.full(len(f), f[1]), color=color))
@@ -178,25 +180,29 @@ class Layer:
         for kind, x in (("over_velocity", state.qd), ("over_position", state.q)):
             for joint, of_joint, residual, weight in zip(self._joints, x, left.residual, left.weight, strict=True):
                 seen = of_joint[left.first : last]
-                edges = np.linspace(seen.min(), seen.max(), BINS[kind] + 1)
-                mean = np.nan_to_num(binned(seen, residual, weight, edges))
-                middle, widths = (edges[1:] + edges[:-1]) / 2, np.full(BINS[kind], edges[1] - edges[0])
-                chart = rr.BarChart(mean, abscissa=middle, widths=widths, color=self._color(form))
-                self.stream.keep(f"{at}/{kind}/{joint}", chart)
+                edges: Array = np.linspace(seen.min(), seen.max(), BINS[kind] + 1)
+                mean = binned(seen, residual, weight, edges)
+                self._chart(f"{at}/{kind}/{joint}", mean, (edges[1:] + edges[:-1]) / 2, float(edges[1] - edges[0]), form)
 
     def _judge(self, form: str, estimate: Estimate) -> None:
         """Send the error of every parameter, where the truth is known, or its sigma."""
         kind = "relative_sigma" if self._found.truth is None else "error"
         values = judged(self._found, estimate)
-        self._bars(f"{self._at}/{form}/{kind}", np.nan_to_num(values), form)
+        self._bars(f"{self._at}/{form}/{kind}", values, form)
 
     def _bars(self, path: str, values: Array, form: str) -> None:
         """Send bars at 1, 2, ...; those of the models stand side by side."""
         forms = list(self._found.estimates)
         place, slots = forms.index(form), len(forms) + 1
-        x = 1 + np.arange(len(values)) + (place - (len(forms) - 1) / 2) / slots
-        chart = rr.BarChart(values, abscissa=x, widths=np.full(len(x), 1 / slots), color=self._color(form))
-        self.stream.keep(path, chart)
+        x: Array = 1 + np.arange(len(values)) + (place - (len(forms) - 1) / 2) / slots
+        self._chart(path, values, x, 1 / slots, form)
+
+    def _chart(self, path: str, values: Array, x: Array, width: float, form: str) -> None:
+        """Send bars where there is something to show."""
+        known = np.isfinite(values)
+        if known.any():
+            widths = np.full(np.count_nonzero(known), width)
+            self.stream.keep(path, rr.BarChart(values[known], abscissa=x[known], widths=widths, color=self._color(form)))
 
     def _truth(self) -> None:
         """Send the true parameters as lines from the beginning to the end."""

@@ -1,6 +1,6 @@
 """Texts in recordings."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from experiments.identified import Identified
 from identify import Array, Estimate
@@ -44,13 +44,17 @@ def _cells(found: Identified, i: int) -> Iterator[str]:
         yield f"{estimate.X[i]:.4g} ({aside})"
 
 
-def about(name: str, origin: str) -> str:
-    """Return what a recording shows, and where what is."""
-    return "\n".join(
-        [
-            f"# {name}\n",
-            f"{origin}\n" if origin else "",
-            "The arm is solid where it is, yellow wires where it was planned to be, blue wires where its encoders see it.\n",
-            "Planned, asked for or logged: broad and light. True: in the joint's own colour.",
-        ]
-    )
+DRAWN = {
+    "true": "where it is",
+    "planned": "yellow wires where it was planned to be",
+    "measured": "blue wires where its encoders see it",
+}
+"""How arms are drawn; the first of a recording is solid."""
+
+
+def about(name: str, origin: str, roles: Sequence[str]) -> str:
+    """Return what a recording shows, with the arms of these roles."""
+    first = "where its encoders see it" if roles[0] == "measured" else DRAWN[roles[0]]
+    arms = ", ".join([f"The arm is solid {first}", *(DRAWN[role] for role in roles[1:])])
+    kinds = "Planned or asked for: broad and light. Measured or logged: thin and light. True: in the joint's own colour."
+    return "\n\n".join(filter(None, [f"# {name}", origin, f"{arms}.", kinds]))

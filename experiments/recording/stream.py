@@ -81,7 +81,8 @@ class Stream:
     def copy(self, reader: RrdReader) -> None:
         """Send what another file of the recording holds."""
         for entry in reader.recordings():
-            rr.send_chunks(reader.stream(store=entry), recording=self._file)
+            for recording in filter(None, (self._file, self._live)):
+                rr.send_chunks(reader.stream(store=entry), recording=recording)
 
     def describe(self, **properties: str) -> None:
         """Send properties of the whole recording."""
@@ -100,23 +101,23 @@ class Stream:
 
     def breathe(self, seconds: float) -> None:
         """Let the viewer catch up, at the pace that it asked for; `seconds` is where the recording has come to."""
-        if self._live and self._audience:
-            if self._audience.reached(self._live, seconds):
-                return
-            self._live.disconnect()
-            self._live = None
+        if self._live and self._audience and not self._audience.reached(self._live, seconds):
+            self._leave(self._audience)
 
     def write(self, path: Path) -> None:
-        """End the recording and write it to a file, whole; raise ResultsError if it cannot be written."""
-        self.close()
+        """Write the recording to a file; raise ResultsError if it cannot be written."""
         try:
             path.write_bytes(self._bytes.read() or b"")
         except OSError as error:
             raise ResultsError(f"cannot write the recording {path.name}: {error.strerror}") from error
 
     def close(self) -> None:
-        """Let the viewer have what is still on its way."""
+        """Let the viewer have what is still on its way: to be called last, as viewers may be slow, or hang."""
         if self._live and self._audience:
             self._audience.reached(self._live, None)
-            self._live.disconnect()
+            self._leave(self._audience)
+
+    def _leave(self, audience: Audience) -> None:
+        if self._live:
+            audience.leave(self._live)
             self._live = None

@@ -4,7 +4,7 @@ import numpy as np
 import rerun as rr
 
 from experiments.recording.columns import part
-from experiments.recording.identified import RunRecording
+from experiments.recording.identified import ROLES, RunRecording
 from experiments.recording.layouts import tabs
 from experiments.recording.report import about
 from experiments.recording.stream import Stream
@@ -30,7 +30,9 @@ def finish_table2(recording: RunRecording, table: Table2) -> list[tuple[str, Str
         for form, error in alone.items():
             _send(stream, f"{at}/{form}", error, form)
     stream.keep("table2", rr.TextDocument(_markdown(table), media_type=rr.MediaType.MARKDOWN))
-    stream.keep("about", rr.TextDocument(about(table.scenario.name, table.scenario.origin), media_type=rr.MediaType.MARKDOWN))
+    stream.keep(
+        "about", rr.TextDocument(about(table.scenario.name, table.scenario.origin, ROLES), media_type=rr.MediaType.MARKDOWN)
+    )
     known = set().union(*(s.paths for _, s in streams))
     stream.arrange(tabs(known))
     return streams

@@ -48,6 +48,8 @@ class Store:
             raise StudyError(
                 f"{folder} holds this study already: go on with idbench study --resume {folder}, or choose another --out"
             )
+        if (folder / "scenario.toml").exists():
+            raise StudyError(f"{folder} holds a run: choose another --out")
         if store.shards():
             raise StudyError(f"{folder} holds shards but no study.toml: choose another --out")
         return store

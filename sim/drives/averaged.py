@@ -91,7 +91,8 @@ class _Amplifier(AbstractAmplifier):
         R, L, K, V, most = (x[0] for x in (self._R, self._L, self._K, self._V, self._I))
         voltage = R * current + L * (i1 - i0) / dt + e
         limited = np.maximum(saturated, np.abs(demand) > most * K)
-        return Electric(reference, current, voltage, voltage / V, limited)
+        duty = np.where(np.isfinite(V), voltage / V, np.nan)  # a share of a bus that has no end is none
+        return Electric(reference, current, voltage, duty, limited)
 
     def _release(self, v: Array, target: Array, e: Array) -> Array:
         """Return how long [s] the loop asks for more than the voltage `v`, which is all there is."""

@@ -41,7 +41,7 @@ def timed(work: Callable[[], object]) -> float:
 
 def forty_seconds(folder: Path) -> None:
     """Record 40 s of a closed loop with an averaged drive, simulated and identified beforehand."""
-    whole, heard = ScenarioRun(load("saturation")), list[Stretch]()
+    whole, heard = ScenarioRun(load("gain")), list[Stretch]()
     run = simulate(whole.scenario, watch=Watch(heard.append))
     part = cut(run.alone(), 4000)
     seconds = []

@@ -21,6 +21,13 @@ DRIVES = {
     "averaged": {"drive": {"kind": "averaged"}},
     "late": {"drive": {"kind": "averaged"}, "timing": {"delay": 0.0123}},
     "approach": {"drive": {"kind": "averaged"}, "start": [0.5, 0.5]},
+    "fine": {"drive": {"kind": "averaged"}, "ripple": {"cogging": 1.0, "commutation": [0.02]}, "physics": {"step": 0.00025}},
+    "fine and late": {
+        "drive": {"kind": "averaged"},
+        "ripple": {"cogging": 1.0},
+        "physics": {"step": 0.00025},
+        "timing": {"delay": 0.0123},
+    },
     "switched": {"drive": SWITCHED, "ripple": {"cogging": 1.0}},
 }
 
@@ -58,6 +65,21 @@ def test_the_mean_current_is_the_mean_torque_over_the_torque_constant(name):
     run = simulate(scenario(**DRIVES[name]), watch=Watch(heard.append))
     K = run.robots[0].motors.K
     np.testing.assert_allclose(heard[0].electric.current * K, run.tau[0], rtol=1e-12, atol=1e-12 * np.abs(run.tau).max())
+
+
+def test_currents_that_hold_for_several_steps_are_told_for_each():
+    """With ripple and fine steps the motors' torque differs from step to step, and the drive's current is a mean over some."""
+    heard = []
+    run = simulate(scenario(**DRIVES["fine"]), watch=Watch(heard.append, np.inf, (0.0, 9.0)))
+    inner, K, V = heard[0].inner, run.robots[0].motors.K, run.robots[0].motors.V
+    np.testing.assert_allclose(inner.tau.reshape(-1, 40, 2).mean(axis=1), run.tau[0], rtol=1e-9, atol=1e-9)
+    per_sample = inner.electric.current.reshape(-1, 40, 2).mean(axis=1)
+    np.testing.assert_allclose(heard[0].electric.current, per_sample, rtol=1e-9, atol=1e-9)
+    assert np.abs(run.tau[0] - K * per_sample).max() > 0.1  # cogging needs no current
+    coarse = []
+    simulate(scenario(drive={"kind": "averaged"}), watch=Watch(coarse.append))
+    # Ripple apart, voltages are those of the same motion with coarse steps: back-EMF and resistance, not L times a false rate.
+    assert np.abs(heard[0].electric.voltage - coarse[0].electric.voltage).max() < 0.02 * V.max()
 
 
 def test_the_mean_voltage_of_a_chopper_without_dead_time_is_its_duty_times_the_bus():

@@ -8,6 +8,7 @@ import threading
 import pytest
 
 from experiments.audience import Audience, Watching
+from experiments.cli import main
 from experiments.errors import ExperimentError
 
 NOBODY = "rerun+http://127.0.0.1:{port}/proxy"
@@ -64,7 +65,7 @@ def test_a_missing_display_is_told(complaint, out, monkeypatch):
         (["--serve", "--pace", "0"], "--pace 0 must be above 0"),
         (["--serve", "--pace", "nan"], "--pace nan must be above 0"),
         (["--serve", "--no-rerun"], "--serve and --no-rerun contradict"),
-        (["--serve", "--port", "99999"], "port 99999 cannot be used"),
+        (["--serve", "--port", "99999"], "--port 99999 must be between"),
         (["--inner", "3", "2"], "--inner 3 2 must be two times"),
         (["--inner", "1", "2", "--no-rerun"], "needs a recording"),
     ],
@@ -108,6 +109,33 @@ def test_a_viewer_that_goes_away_costs_nothing_but_itself(tmp_path, reading):
     assert done.stderr.splitlines() == [f"idbench: the viewer at {url} has gone; the work goes on without it"]
     assert "written to run" in done.stdout
     reading.verify(tmp_path / "run" / "recording.rrd")
+
+
+def test_a_viewer_that_hangs_keeps_nothing_back(tmp_path, reading):
+    """It takes connections and never says a word; the run is written, and ends."""
+    with socket.socket() as server:
+        server.bind(("127.0.0.1", 0))
+        server.listen(64)
+        url = NOBODY.format(port=server.getsockname()[1])
+        words = ["run", "ideal", "--connect", url, "--out", "run"]
+        code = f"import sys; sys.argv = ['idbench', *{words}]; from experiments.cli import entry; entry()"
+        done = subprocess.run(
+            [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120
+        )
+    assert done.returncode == 0
+    assert done.stderr.splitlines() == [f"idbench: the viewer at {url} takes nothing; the work goes on without it"]
+    assert "written to run" in done.stdout
+    reading.verify(tmp_path / "run" / "recording.rrd")
+
+
+def test_a_host_that_cannot_be_one_does_not_answer(complaint, out):
+    url = "rerun+http://a..b:9876/proxy"
+    assert f"no viewer answers at {url}" in complaint("run", "ideal", "--connect", url, "--out", str(out))
+
+
+def test_a_window_in_which_nothing_lies_is_told(out, capsys):
+    assert main(["run", "ideal", "--inner", "1", "2", "--out", str(out)]) == 0
+    assert "doubtful: nothing lies inside the loop from 1 to 2 s" in capsys.readouterr().out
 
 
 def test_no_viewer_is_nobody():

@@ -74,11 +74,15 @@ def test_what_is_wrong_is_told(copied, tmp_path, complaint):
         "view", str(copied), "--tab", "frictoin", "--save", str(tmp_path / "x.rrd")
     )
     assert "must end with .rrd" in complaint("view", str(copied), "--save", str(tmp_path / "x.png"))
-    assert "--label 'a/b' must be of letters" in complaint("identify", str(copied), "--label", "a/b")
+    for label in ("a/b", "inner", "..", "-x"):
+        assert f"--label {label!r} must be of letters" in complaint("identify", str(copied), f"--label={label}")
+    assert "would be a part of the recording" in complaint("view", str(copied), "--save", str(copied / "recording.all.rrd"))
     (copied / "recording.rrd").write_bytes(b"nonsense")
     assert "cannot read the recording" in complaint("identify", str(copied), "--label", "second")
     (copied / "recording.rrd").unlink()
     assert "there is no recording.rrd in" in complaint("identify", str(copied), "--label", "second")
+    (copied / "summary.json").write_text('{"parameters": ["ZZR1"], "truth": [1, 2]}')
+    assert "is no summary of a run" in complaint("identify", str(copied))
     (copied / "summary.json").write_text("{")
     assert "is no summary of a run" in complaint("identify", str(copied))
     (copied / "log.parquet").unlink()
@@ -92,3 +96,23 @@ def test_files_of_two_recordings_are_not_mixed(copied, table1, tmp_path):
     stream.write(tmp_path / name)
     with pytest.raises(ResultsError, match="hold 2 recordings"):
         merge([copied / "recording.rrd", tmp_path / name], "", tmp_path / "x.rrd")
+
+
+def test_a_full_disk_leaves_the_layers_that_were_there(copied, complaint, monkeypatch):
+    before = {path.name: path.read_bytes() for path in copied.iterdir()}
+
+    def full(path, content):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("pathlib.Path.write_bytes", full)
+    assert "No space left on device" in complaint("identify", str(copied), "--label", "second")
+    assert {path.name: path.read_bytes() for path in copied.iterdir()} == before
+
+
+def test_a_run_and_a_study_of_one_name_do_not_share_a_folder(tmp_path, complaint, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for file, command, said in (("study.toml", "run", "holds a study"), ("scenario.toml", "study", "holds a run")):
+        (tmp_path / "runs" / "ripple").mkdir(parents=True, exist_ok=True)
+        (tmp_path / "runs" / "ripple" / file).write_text("")
+        assert f"runs/ripple {said}: choose another --out" in complaint(command, "ripple")
+        (tmp_path / "runs" / "ripple" / file).unlink()

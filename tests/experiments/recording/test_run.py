@@ -43,7 +43,7 @@ def test_every_signal_and_every_time_is_exact(recorded):
 
 
 def test_samples_are_numbered(recorded, reading):
-    number, _ = reading.column(recorded.folder / "recording.rrd", "q/true", timeline="sample")
+    number, _ = reading.column(recorded.folder / "recording.rrd", "q/measured", timeline="sample")
     np.testing.assert_array_equal(number, np.arange(recorded.ran.run.log.samples))
 
 
