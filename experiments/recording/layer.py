@@ -194,7 +194,7 @@ class Layer:
         """Send bars at 1, 2, ...; those of the models stand side by side."""
         forms = list(self._found.estimates)
         place, slots = forms.index(form), len(forms) + 1
-        x: Array = 1 + np.arange(len(values)) + (place - (len(forms) - 1) / 2) / slots
+        x = 1.0 + np.arange(float(len(values))) + (place - (len(forms) - 1) / 2) / slots
         self._chart(path, values, x, 1 / slots, form)
 
     def _chart(self, path: str, values: Array, x: Array, width: float, form: str) -> None:
