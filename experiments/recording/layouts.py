@@ -166,7 +166,7 @@ def study(shelf: Shelf) -> Part:
     names = shelf.parents("runs/*/*")
     points = grid("errors", [plot(shelf, f"error of {n} [%] over runs", f"runs/{n}/*", legend=False) for n in names], 2)
     sigmas = [bars(shelf, f"{model}: error / corrected sigma", f"sigmas/{model}") for model in shelf.last("sigmas/*")]
-    answer = column(text(shelf, "answer"), *sigmas, shares=[2.0, *[1.0] * len(sigmas)])
+    answer = column(text(shelf, "answer"), *sigmas, shares=[4.0, *[1.0] * len(sigmas)])
     return side_by_side("study", answer, points, shares=[1, 2]) if names else None
 
 
