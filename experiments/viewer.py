@@ -6,6 +6,7 @@ from pathlib import Path
 
 from experiments.errors import ExperimentError, ResultsError
 from experiments.recording.folder import BASE, files, merge
+from experiments.results import results_folder
 from experiments.viewers import LOOPBACK, require_display, viewer_binary
 
 
@@ -39,7 +40,9 @@ def save(folder: Path, tab: str, out: Path) -> None:
         raise ResultsError(f"--save {out} must end with .rrd")
     if out.name.startswith("recording.") and out.absolute().parent == folder.absolute():
         raise ResultsError(f"--save {out} would be a part of the recording itself: choose another name")
-    merge(_paths(folder), tab, out)
+    paths = _paths(folder)
+    with results_folder(out.parent) as hidden:
+        merge(paths, tab, hidden / out.name)
 
 
 def _paths(folder: Path) -> list[Path]:

@@ -193,9 +193,7 @@ class _Rows:
 
 def _unrolled(arrays: Sequence[Array], count: npt.NDArray[np.int64]) -> Array:
     """Return arrays of shape (steps or 1, nsim, joint) or (nsim, joint) of the first simulation as one, `count` rows each."""
-    flat = np.array([x[0] for x in arrays]) if arrays[0].ndim == 2 else None
-    if flat is not None:
-        return np.repeat(flat, count, axis=0)
-    rows = np.concatenate([x[:, 0] for x in arrays])
-    lengths = np.array([len(x) for x in arrays])
+    if arrays[0].ndim == 2:
+        return np.repeat([x[0] for x in arrays], count, axis=0)
+    rows, lengths = np.concatenate([x[:, 0] for x in arrays]), np.array([len(x) for x in arrays])
     return rows if (lengths == count).all() else np.repeat(rows, count, axis=0)

@@ -87,7 +87,7 @@ class Base:
             states = joint_states(qd[:, j], None if limited is None else limited[:, j], self._turning[j])
             self._lanes.send(f"state/{joint}", t, states)
         self._turning = qd[-1]
-        if self._shown != len(self._paths):
+        if self._audience and self._shown != len(self._paths):
             self._shown = len(self._paths)
             self.stream.show(tabs(self._paths))
         self.stream.breathe(float(t[-1]))

@@ -5,13 +5,13 @@ import numpy.typing as npt
 
 from experiments.recording.columns import time_columns
 from experiments.recording.stream import Stream
-from identify import Array
+from identify import Array, ReversalMask
 
 STILL = 1e-3
 """Speed [rad/s] up to which a joint is said to stand: a 16-bit encoder shows one step of it in a tenth of a second."""
 
-SLOW = 0.1
-"""Speed [rad/s] up to which its friction is in doubt: where masks of reversals begin."""
+SLOW = ReversalMask().threshold
+"""Speed [rad/s] up to which its friction is in doubt."""
 
 
 class Lanes:

@@ -182,7 +182,8 @@ class Layer:
                 seen = of_joint[left.first : last]
                 edges: Array = np.linspace(seen.min(), seen.max(), BINS[kind] + 1)
                 mean = binned(seen, residual, weight, edges)
-                self._chart(f"{at}/{kind}/{joint}", mean, (edges[1:] + edges[:-1]) / 2, float(edges[1] - edges[0]), form)
+                middle, width = (edges[1:] + edges[:-1]) / 2, float(edges[1] - edges[0])
+                self.stream.bars(f"{at}/{kind}/{joint}", mean, middle, width, self._color(form))
 
     def _judge(self, form: str, estimate: Estimate) -> None:
         """Send the error of every parameter, where the truth is known, or its sigma."""
@@ -191,18 +192,8 @@ class Layer:
         self._bars(f"{self._at}/{form}/{kind}", values, form)
 
     def _bars(self, path: str, values: Array, form: str) -> None:
-        """Send bars at 1, 2, ...; those of the models stand side by side."""
         forms = list(self._found.estimates)
-        place, slots = forms.index(form), len(forms) + 1
-        x = 1.0 + np.arange(float(len(values))) + (place - (len(forms) - 1) / 2) / slots
-        self._chart(path, values, x, 1 / slots, form)
-
-    def _chart(self, path: str, values: Array, x: Array, width: float, form: str) -> None:
-        """Send bars where there is something to show."""
-        known = np.isfinite(values)
-        if known.any():
-            widths = np.full(np.count_nonzero(known), width)
-            self.stream.keep(path, rr.BarChart(values[known], abscissa=x[known], widths=widths, color=self._color(form)))
+        self.stream.grouped_bars(path, values, forms.index(form), len(forms), self._color(form))
 
     def _truth(self) -> None:
         """Send the true parameters as lines from the beginning to the end."""

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import Chunk, RrdReader
@@ -77,6 +78,18 @@ class Stream:
         """Announce an entity of states."""
         nothing = [" "] * len(STATES)  # words would be cut off where a state is short: the view's title tells the colours
         self.keep(path, rr.StateConfiguration(values=list(STATES), labels=nothing, colors=list(STATES.values())))
+
+    def bars(self, path: str, values: Array, x: Array, width: float, color: Color) -> None:
+        """Send bars where there is something to show: a value that is not finite has none."""
+        known = np.isfinite(values)
+        if known.any():
+            widths = np.full(np.count_nonzero(known), width)
+            self.keep(path, rr.BarChart(values[known], abscissa=x[known], widths=widths, color=color))
+
+    def grouped_bars(self, path: str, values: Array, place: int, kinds: int, color: Color) -> None:
+        """Send bars at 1, 2, ...; those of several `kinds` stand side by side, each in its `place`, from 0."""
+        slots = kinds + 1
+        self.bars(path, values, 1.0 + np.arange(float(len(values))) + (place - (kinds - 1) / 2) / slots, 1 / slots, color)
 
     def copy(self, reader: RrdReader) -> None:
         """Send what another file of the recording holds."""

@@ -41,9 +41,7 @@ def finish_table2(recording: RunRecording, table: Table2) -> list[tuple[str, Str
 def _send(stream: Stream, path: str, error_percent: Array, form: str) -> None:
     """Send bars of how many decades errors are above FLOOR, with their sign; those of the models stand side by side."""
     heights = np.sign(error_percent) * np.log10(1 + np.abs(error_percent) / FLOOR)
-    place, slots = list(FORMS).index(form), len(FORMS) + 1
-    x = 1 + np.arange(len(heights)) + (place - (len(FORMS) - 1) / 2) / slots
-    stream.keep(path, rr.BarChart(heights, abscissa=x, widths=np.full(len(x), 1 / slots), color=FORMS[form]))
+    stream.grouped_bars(path, heights, list(FORMS).index(form), len(FORMS), FORMS[form])
 
 
 def _markdown(table: Table2) -> str:
