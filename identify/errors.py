@@ -29,3 +29,7 @@ class UnknownNameError(IdentificationError, KeyError):
 
 class PluginError(IdentificationError):
     """A plug-in of another package that cannot be loaded, or is not what its entry point promises."""
+
+
+class KinematicsError(IdentificationError):
+    """A description of a robot that makes no sense."""

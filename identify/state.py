@@ -3,10 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
 from identify.arrays import Array
+
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,4 +50,14 @@ class State:
 
     @cached_property
     def _turned(self) -> dict[int, tuple[Array, Array]]:
+        return {}
+
+    def shared(self, key: object, make: Callable[[Self], T]) -> T:
+        """Return `make(self)`, computed once for all that ask with the same `key`."""
+        if key not in self._shared:
+            self._shared[key] = make(self)
+        return self._shared[key]
+
+    @cached_property
+    def _shared(self) -> dict[object, Any]:
         return {}

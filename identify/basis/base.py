@@ -1,7 +1,7 @@
 """Column blocks: what a robot's basis is a sum of."""
 
 from abc import ABC, abstractmethod
-from typing import ClassVar, final
+from typing import ClassVar, Protocol, final, runtime_checkable
 
 from identify.arrays import Array, Columns
 from identify.state import State
@@ -45,6 +45,14 @@ class AbstractBlock(ABC):
     @abstractmethod
     def dissipation(self, state: State) -> Columns:
         """Return the columns of the dissipated power qd' Gamma_f in row 0 (Eq. 10)."""
+
+
+@runtime_checkable
+class Narrowing(Protocol):
+    """A block that can spare itself the columns that nobody asks for."""
+
+    def narrowed(self, names: frozenset[str]) -> AbstractBlock:
+        """Return the block without the work for parameters that are not in `names`."""
 
 
 class AbstractConservativeBlock(AbstractBlock):

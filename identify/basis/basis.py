@@ -1,12 +1,12 @@
 """A robot as identification sees it: a sum of column blocks."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self, final
 
 from identify.arrays import Columns
-from identify.basis.base import AbstractBlock
+from identify.basis.base import AbstractBlock, Narrowing
 from identify.errors import SettingError
 from identify.state import State
 
@@ -24,31 +24,67 @@ class Basis:
         The blocks; no two may have a parameter in common.
     order : tuple of str
         Parameters to be put first, in this order; those of the blocks that it leaves out follow as they come.
+    kept : mapping of str to str, optional
+        Parameters of the blocks that stay, and what they are called here; all, by their own names, by default.
 
     Raises
     ------
     SettingError
-        If a parameter appears twice, or `order` names one that no block has.
+        If a parameter appears twice, or `order` or `kept` name one that no block has.
     """
 
     n: int
     blocks: tuple[AbstractBlock, ...]
     order: tuple[str, ...] = ()
+    kept: Mapping[str, str] | None = None
 
     def __post_init__(self) -> None:
         names = [name for block in self.blocks for name in block.names(self.n)]
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise SettingError(f"parameters {', '.join(twice)} come from two blocks: leave one of them out")
-        if unknown := [name for name in self.order if name not in names]:
-            raise SettingError(f"the order names {', '.join(unknown)}, which no block has; there are {', '.join(names)}")
+        if unknown := [name for name in (*self.order, *(self.kept or ())) if name not in names]:
+            raise SettingError(f"there is no parameter {', '.join(unknown)} in this basis; there are {', '.join(names)}")
 
     def __add__(self, block: AbstractBlock) -> Self:
-        return replace(self, blocks=(*self.blocks, block))
+        kept = None if self.kept is None else {**self.kept, **{name: name for name in block.names(self.n)}}
+        return replace(self, blocks=(*self.blocks, block), kept=kept)
+
+    def renamed(self, kept: Mapping[str, str]) -> Self:
+        """Return the basis with these parameters alone, by new names; blocks are spared the work for others.
+
+        Parameters
+        ----------
+        kept : mapping of str to str
+            Parameters of this basis, and what they are called from now on.
+
+        Raises
+        ------
+        SettingError
+            If it names a parameter that there is not.
+        """
+        if unknown := [name for name in kept if name not in self.parameters]:
+            raise SettingError(f"there is no parameter {', '.join(unknown)}; there are {', '.join(self.parameters)}")
+        own = {new: old for old, new in self._names.items()}
+        names = frozenset(own[name] for name in kept)
+        blocks = tuple(block.narrowed(names) if isinstance(block, Narrowing) else block for block in self.blocks)
+        return replace(self, blocks=blocks, order=(), kept={own[name]: new for name, new in kept.items()})
+
+    def without(self, *names: str) -> Self:
+        """Return the basis without some of its parameters, which then count as zero."""
+        self.renamed({name: name for name in names})  # complains of those that there are not
+        return self.renamed({name: name for name in self.parameters if name not in names})
 
     @cached_property
     def _units(self) -> dict[str, str]:
         units = {n: u for block in self.blocks for n, u in zip(block.names(self.n), block.units(self.n), strict=True)}
-        return {name: units[name] for name in dict.fromkeys((*self.order, *units))}
+        return {new: units[name] for name, new in self._names.items()}
+
+    @cached_property
+    def _names(self) -> dict[str, str]:
+        """What each parameter of the blocks is called here, in the order of X."""
+        own = [name for block in self.blocks for name in block.names(self.n)]
+        kept = {name: name for name in dict.fromkeys((*self.order, *own))} if self.kept is None else self.kept
+        return {name: kept[name] for name in dict.fromkeys((*self.order, *kept)) if name in kept}
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -81,4 +117,6 @@ class Basis:
         return self._sum(lambda block: block.dissipation(state))
 
     def _sum(self, columns: Callable[[AbstractBlock], Columns]) -> Columns:
-        return {address: signal for block in self.blocks for address, signal in columns(block).items()}
+        names = self._names
+        found = (item for block in self.blocks for item in columns(block).items())
+        return {(row, names[name]): signal for (row, name), signal in found if name in names}

@@ -1,0 +1,178 @@
+"""Base parameters: the combinations of standard parameters that a motion can tell at all."""
+
+import re
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self, final
+
+import numpy as np
+from scipy import linalg
+
+from identify.arrays import Array
+from identify.basis import Basis
+from identify.errors import SettingError
+from identify.kinematics import KinematicTree
+from identify.state import State
+
+STATES_A_PARAMETER = 4
+"""Random states for each standard parameter."""
+
+SEED = 0
+"""Of the random states: any others give the same grouping, up to rounding."""
+
+DEPENDENT = 1e-6
+"""A column counts as a combination of those before it when less than this share of its length is left over.
+
+Descriptions give angles to some nine digits (1.570796325 for pi/2), so that a share of 1e-9 is theirs; a parameter that shows
+with less than a millionth of its column is none that a log could tell."""
+
+NEGLIGIBLE = 1e-8
+"""Coefficients below this share of the largest of their grouping are rounding."""
+
+SPEED, ACCELERATION = 5.0, 25.0
+"""Largest rates of the random states [rad/s, rad/s^2]: as heavy as gravity, so that no kind of column drowns."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class BaseParameters:
+    """The grouping of a basis: X_base = K X_standard, from the columns of the explicit model at random states.
+
+    A parameter whose column depends on those before it is grouped with them; one without effect has no part. So parameters stay
+    that come first in the order of the basis (W. Khalil and E. Dombre, "Modeling, Identification and Control of Robots", 2002,
+    chapter 9; numerically M. Gautier, "Numerical calculation of the base inertial parameters of robots", J. Robotic Systems 8
+    (1991) 485-506).
+
+    Parameters
+    ----------
+    standard : Basis
+        Links, armatures, frictions.
+    kept : tuple of int
+        Numbers of the parameters that stay, from 0.
+    K : Array, shape (b, p)
+        What each base parameter is made of.
+    """
+
+    standard: Basis
+    kept: tuple[int, ...]
+    K: Array
+
+    @classmethod
+    def of(cls, tree: KinematicTree, standard: Basis) -> Self:
+        """Return the grouping of a robot's standard parameters.
+
+        Raises
+        ------
+        SettingError
+            If the rank of the columns is in doubt: pivoting finds another than going from left to right.
+        """
+        W = _explicit_columns(tree, standard)
+        length = np.linalg.norm(W, axis=0)
+        seen = np.flatnonzero(length > DEPENDENT * length.max())
+        scaled = W[:, seen] / length[seen]
+        R: Array = np.linalg.qr(scaled, mode="r")  # type: ignore[assignment]  # mode "r" gives R alone
+        kept, rank = _independent(R), _rank(R)
+        if len(kept) != rank:
+            raise SettingError(
+                f"robot {tree.name!r}: {len(kept)} base parameters from left to right, {rank} with pivoting: some columns are "
+                "nearly dependent; are lengths and angles in the description accurate?"
+            )
+        K = np.zeros((rank, W.shape[1]))
+        solved = np.linalg.lstsq(R[:, kept], R, rcond=None)[0]
+        K[:, seen] = solved * length[seen] / length[seen][kept][:, None]
+        K[np.abs(solved_share(K)) < NEGLIGIBLE] = 0.0
+        K[:, seen[kept]] = np.eye(rank)
+        return cls(standard, tuple(int(k) for k in seen[kept]), K)
+
+    @property
+    def basis(self) -> Basis:
+        """The basis of the base parameters, whose columns are those of the parameters that stay."""
+        names = self.standard.parameters
+        return self.standard.renamed({names[k]: name for k, name in zip(self.kept, self.names, strict=True)})
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the base parameters: ZZ1 becomes ZZR1 where others are grouped with it."""
+        names = [self.standard.parameters[k] for k in self.kept]
+        grouped = np.count_nonzero(self.K, axis=1) > 1
+        return tuple(_regrouped(name) if more else name for name, more in zip(names, grouped, strict=True))
+
+    @property
+    def unseen(self) -> tuple[str, ...]:
+        """Standard parameters that no motion shows."""
+        return tuple(name for name, used in zip(self.standard.parameters, self.K.any(axis=0), strict=True) if not used)
+
+    def grouping(self, i: int) -> str:
+        """Return what base parameter `i` is made of, such as ZZ1 + Ia1 + 0.25 M2."""
+        first, *others = [self.kept[i], *(k for k in np.flatnonzero(self.K[i]) if k != self.kept[i])]
+        terms = [self.standard.parameters[first]]
+        for k in others:
+            c = self.K[i, k]
+            size = "" if np.isclose(abs(c), 1, rtol=1e-6) else f"{abs(c):.6g} "
+            terms.append(f"{'-' if c < 0 else '+'} {size}{self.standard.parameters[k]}")
+        return " ".join(terms)
+
+    def base(self, standard: Array) -> Array:
+        """Return the base values of standard values, shape (..., p)."""
+        return np.asarray(standard) @ self.K.T
+
+    def nearest(self, base: Array, standard: Array, scale: Array) -> Array:
+        """Return the standard values with the base values `base` that lie nearest to `standard`, in units of `scale`.
+
+        Parameters
+        ----------
+        base : Array, shape (b,)
+            What they shall give.
+        standard, scale : Array, shape (p,)
+            Where to stay near, and what counts as far.
+        """
+        K = self.K * scale
+        return np.asarray(standard) + scale * np.linalg.lstsq(K, base - self.base(standard), rcond=None)[0]
+
+
+def solved_share(K: Array) -> Array:
+    """Return coefficients as shares of the largest of their grouping."""
+    return K / np.abs(K).max(axis=1, keepdims=True)
+
+
+def _explicit_columns(tree: KinematicTree, basis: Basis) -> Array:
+    """Return the columns of the explicit model at random states, shape (states x joint, p)."""
+    q, qd, qdd = random_states(tree, STATES_A_PARAMETER * len(basis.parameters))
+    W = np.zeros((tree.n, len(basis.parameters), q.shape[-1]))
+    for (row, name), signal in basis.explicit(State(q, qd, lambda _: qdd)).items():
+        W[row, basis.parameters.index(name)] = signal
+    return np.moveaxis(W, 1, -1).reshape(-1, len(basis.parameters))
+
+
+def random_states(tree: KinematicTree, count: int) -> Array:
+    """Return random positions inside the joints' ranges, or a turn, velocities and accelerations, shape (3, joint, count)."""
+    rng = np.random.default_rng(SEED)
+    low, high = np.array([joint.range for joint in tree.joints]).T
+    zero = np.array([joint.zero for joint in tree.joints])
+    low, high = np.where(np.isfinite(low), low, zero - np.pi), np.where(np.isfinite(high), high, zero + np.pi)
+    ends = np.array([[low, high], [-SPEED * np.ones(tree.n), SPEED * np.ones(tree.n)], [-ACCELERATION * np.ones(tree.n)] * 2])
+    ends[2, 1] = ACCELERATION
+    return ends[:, 0, :, None] + rng.random((3, tree.n, count)) * (ends[:, 1] - ends[:, 0])[..., None]
+
+
+def _independent(R: Array) -> list[int]:
+    """Return the columns that depend on none before them: their part off those that stay is no rounding."""
+    kept: list[int] = []
+    Q = np.zeros((len(R), 0))
+    for k in range(R.shape[1]):
+        rest = R[:, k] - Q @ (Q.T @ R[:, k])
+        rest -= Q @ (Q.T @ rest)
+        if (size := np.linalg.norm(rest)) > DEPENDENT:
+            kept.append(k)
+            Q = np.column_stack([Q, rest / size])
+    return kept
+
+
+def _rank(R: Array) -> int:
+    diagonal = np.abs(np.diagonal(linalg.qr(R, mode="r", pivoting=True)[0]))
+    return int(np.count_nonzero(diagonal > DEPENDENT * diagonal[0]))
+
+
+def _regrouped(name: str) -> str:
+    letters, number = re.fullmatch(r"(\D+)(\d+)", name).groups()  # type: ignore[union-attr]  # names end with a number
+    return f"{letters}R{number}"

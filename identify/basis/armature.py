@@ -1,0 +1,52 @@
+"""Inertia of rotors."""
+
+from dataclasses import dataclass
+from typing import final
+
+from identify.arrays import Columns
+from identify.basis.base import AbstractConservativeBlock
+from identify.state import State
+
+
+@final
+@dataclass(frozen=True)
+class Armature(AbstractConservativeBlock):
+    """Inertia of a rotor, seen at its joint: Ia qdd, in the row of the joint alone.
+
+    Of a rotor that turns fast behind a gear; the small torques it makes when its housing turns are left out, as in MuJoCo.
+
+    Parameters
+    ----------
+    joints : tuple of int, optional
+        Joints that have one, from 0; all by default.
+    """
+
+    joints: tuple[int, ...] | None = None
+
+    def names(self, n: int) -> tuple[str, ...]:
+        """Return Ia and the number of each joint that has one."""
+        return tuple(f"Ia{j + 1}" for j in self._numbers(n))
+
+    def units(self, n: int) -> tuple[str, ...]:
+        """Return kg m^2."""
+        return ("kg m^2",) * len(self.names(n))
+
+    def explicit(self, state: State) -> Columns:
+        """Return qdd (Eq. 5, 6)."""
+        return {(j, f"Ia{j + 1}"): state.qdd[..., j, :] for j in self._numbers(state.n)}
+
+    def momentum(self, state: State) -> Columns:
+        """Return qd (Eq. 9)."""
+        return {(j, f"Ia{j + 1}"): state.qd[..., j, :] for j in self._numbers(state.n)}
+
+    def remainder(self, state: State) -> Columns:
+        """Return no columns."""
+        del state
+        return {}
+
+    def energy(self, state: State) -> Columns:
+        """Return qd^2 / 2 (Eq. 10)."""
+        return {(0, f"Ia{j + 1}"): 0.5 * state.qd[..., j, :] ** 2 for j in self._numbers(state.n)}
+
+    def _numbers(self, n: int) -> tuple[int, ...]:
+        return tuple(range(n)) if self.joints is None else self.joints

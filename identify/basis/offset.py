@@ -1,0 +1,23 @@
+"""Constant offset of a torque."""
+
+from dataclasses import dataclass
+from typing import ClassVar, final
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.basis.base import AbstractFriction
+
+
+@final
+@dataclass(frozen=True)
+class Offset(AbstractFriction):
+    """Constant torque, off: an amplifier's offset, or Coulomb friction that differs with the direction."""
+
+    symbol: ClassVar[str] = "off"
+    unit: ClassVar[str] = "N m"
+
+    def force(self, q: Array, qd: Array) -> Array:
+        """Return ones."""
+        del q
+        return np.ones_like(qd)

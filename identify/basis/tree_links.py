@@ -1,0 +1,105 @@
+"""The links of any tree of hinges and slides."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Self, final
+
+import numpy as np
+
+from identify.arrays import Columns
+from identify.basis.base import AbstractConservativeBlock
+from identify.basis.terms import Term, is_zero, minus
+from identify.basis.twists import Twists
+from identify.basis.wrench import INERTIAL, UNITS, Wrench, energy
+from identify.errors import SettingError
+from identify.kinematics import KinematicTree
+from identify.state import State
+
+
+@final
+@dataclass(frozen=True)
+class TreeLinks(AbstractConservativeBlock):
+    """Rigid links of a tree, ten parameters each: XX1 XY1 XZ1 YY1 YZ1 ZZ1 MX1 MY1 MZ1 M1, XX2, ...
+
+    The inertia matrix and the first moments are about the origin of the link's frame, in its axes. By Newton and Euler, and by
+    Lagrange for the columns of the implicit and power models: with V_j the twist of link j, T_j = V_j' P_j / 2 and
+
+        p_i = sum_j (dV_j/dqd_i)' P_j        remainder_i = sum_j -(dV_j/dq_i)' P_j + gravity
+
+    Parameters
+    ----------
+    tree : KinematicTree
+        The robot.
+    only : frozenset of str, optional
+        Parameters whose columns are computed; all by default.
+    """
+
+    tree: KinematicTree
+    only: frozenset[str] | None = None
+
+    def names(self, n: int) -> tuple[str, ...]:
+        """Return ten parameters a link that has mass; raise SettingError unless the tree has `n` joints."""
+        if n != self.tree.n:
+            raise SettingError(f"robot {self.tree.name!r} has {self.tree.n} joints, not {n}")
+        return tuple(f"{x}{j + 1}" for j in self._massive for x in INERTIAL)
+
+    def units(self, n: int) -> tuple[str, ...]:
+        """Return kg m^2, kg m and kg."""
+        return UNITS * (len(self.names(n)) // len(UNITS))
+
+    def narrowed(self, names: frozenset[str]) -> Self:
+        """Return this block without the work for other parameters."""
+        return replace(self, only=names)
+
+    def explicit(self, state: State) -> Columns:
+        """Return D (Eq. 5, 6)."""
+        at = state.shared(self.tree, self._twists)
+        force = {j: Wrench.inertial(at.velocity[j], at.acceleration[j], at.up[j]) for j in self._massive}
+        return self._columns(state, self._pairs, lambda i, j, x: force[j].along(at.unit[j][i], x))
+
+    def momentum(self, state: State) -> Columns:
+        """Return M_i(q) qd (Eq. 9)."""
+        at = state.shared(self.tree, self._twists)
+        momentum = {j: Wrench.momentum(at.velocity[j]) for j in self._massive}
+        return self._columns(state, self._pairs, lambda i, j, x: momentum[j].along(at.unit[j][i], x))
+
+    def remainder(self, state: State) -> Columns:
+        """Return R_i(q, qd) = -dT_i/dq + dU_i/dq (Eq. 8, 9)."""
+        at = state.shared(self.tree, self._twists)
+        momentum = {j: Wrench.momentum(at.velocity[j]) for j in self._massive}
+        weight = {j: Wrench.weight(at.up[j]) for j in self._massive}
+
+        def column(i: int, j: int, x: int) -> Term:
+            return minus(weight[j].along(at.unit[j][i], x), momentum[j].along(at.slope[j][i], x))
+
+        return self._columns(state, self._pairs, column)
+
+    def energy(self, state: State) -> Columns:
+        """Return h_i(q, qd) (Eq. 10)."""
+        at = state.shared(self.tree, self._twists)
+        stored = {j: energy(at.velocity[j], at.up[j], at.height[j]) for j in self._massive}
+        return self._columns(state, tuple((0, j) for j in self._massive), lambda _, j, x: stored[j][x])
+
+    def _twists(self, state: State) -> Twists:
+        return Twists(self.tree, state)
+
+    @property
+    def _massive(self) -> tuple[int, ...]:
+        return tuple(j for j, joint in enumerate(self.tree.joints) if joint.massive)
+
+    @property
+    def _pairs(self) -> tuple[tuple[int, int], ...]:
+        """(joint, link that it moves)."""
+        return tuple((i, j) for j in self._massive for i in self.tree.ancestors(j))
+
+    def _columns(
+        self, state: State, rows: tuple[tuple[int, int], ...], column: Callable[[int, int, int], Term]
+    ) -> Columns:
+        """Return the columns of (row, link) that are asked for and not zero at all times."""
+        shape, found = state.q[..., 0, :].shape, {}
+        for i, j in rows:
+            for x, letter in enumerate(INERTIAL):
+                name = f"{letter}{j + 1}"
+                if (self.only is None or name in self.only) and not is_zero(term := column(i, j, x)):
+                    found[i, name] = np.broadcast_to(term, shape)
+        return found

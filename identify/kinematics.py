@@ -1,0 +1,141 @@
+"""How the links of a robot hang together: all that identification has to know of a robot's geometry."""
+
+from dataclasses import dataclass
+from typing import Literal, final, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from identify.arrays import Array, frozen
+from identify.errors import KinematicsError
+
+Kind = Literal["hinge", "slide"]
+
+GROUND = -1
+"""Number of the parent of a joint that stands on the ground."""
+
+ROUNDING = 1e-12
+"""Entries of rotations and axes below this are rounding, and zero."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """A joint, and the link that it moves.
+
+    The frame of the link stands at `position` and `rotation` in the frame of its parent's link while the joint is at `zero`.
+
+    Parameters
+    ----------
+    name : str
+        Of the joint.
+    kind : {"hinge", "slide"}
+        What it does.
+    parent : int
+        Number of the joint whose link carries it, from 0; `GROUND` if none does.
+    position : array_like, shape (3,)
+        [m].
+    rotation : array_like, shape (3, 3)
+        Turns vectors of the link into those of its parent.
+    axis : array_like, shape (3,)
+        Direction in the frame of the link, of any length above 0.
+    anchor : array_like, shape (3,)
+        A point of a hinge's axis in the frame of the link [m].
+    zero : float
+        Position [rad or m] at which the frames are placed as said.
+    range : tuple of float
+        Lowest and highest position [rad or m]; infinite without limits.
+    armature : bool
+        Whether its drive adds an inertia of its own.
+    massive : bool
+        Whether its link has mass; False for the links between several joints of one body.
+
+    Raises
+    ------
+    KinematicsError
+        If a value is of the wrong shape or not finite, the rotation is none, or the axis has no length.
+    """
+
+    name: str
+    kind: Kind
+    parent: int
+    position: Array
+    rotation: Array
+    axis: Array
+    anchor: Array
+    zero: float = 0.0
+    range: tuple[float, float] = (-np.inf, np.inf)
+    armature: bool = True
+    massive: bool = True
+
+    def __post_init__(self) -> None:
+        if self.kind not in get_args(Kind):
+            raise KinematicsError(f"joint {self.name}: kind {self.kind!r} is none of {', '.join(get_args(Kind))}")
+        for name, shape in (("position", (3,)), ("rotation", (3, 3)), ("axis", (3,)), ("anchor", (3,))):
+            object.__setattr__(self, name, self._checked(name, getattr(self, name), shape))
+        length = np.linalg.norm(self.axis)
+        if length == 0:
+            raise KinematicsError(f"joint {self.name}: the axis has no length")
+        if not np.allclose(self.rotation @ self.rotation.T, np.eye(3), atol=1e-6) or np.linalg.det(self.rotation) < 0:
+            raise KinematicsError(f"joint {self.name}: {self.rotation.tolist()} is no rotation")
+        object.__setattr__(self, "axis", frozen(_clean(self.axis / length)))
+        object.__setattr__(self, "rotation", frozen(_clean(self.rotation)))
+
+    def _checked(self, name: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> Array:
+        array = frozen(value)
+        if array.shape != shape or not np.isfinite(array).all():
+            raise KinematicsError(f"joint {self.name}: {name} = {array.tolist()} must be finite, of shape {shape}")
+        return array
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class KinematicTree:
+    """A tree of links on the ground, a joint each, with bodies that are welded together as one link.
+
+    Parameters
+    ----------
+    name : str
+        Of the robot.
+    joints : tuple of Joint
+        In the order of a log's columns; parents come before their children.
+    gravity : array_like, shape (3,)
+        [m/s^2], in the frame of the ground.
+
+    Raises
+    ------
+    KinematicsError
+        If there is no joint, two have one name, or a parent does not come before its child.
+    """
+
+    name: str
+    joints: tuple[Joint, ...]
+    gravity: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "gravity", frozen(self.gravity))
+        names = [joint.name for joint in self.joints]
+        if not names:
+            raise KinematicsError(f"robot {self.name!r} has no joints")
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise KinematicsError(f"robot {self.name!r} has two joints of the name {', '.join(twice)}")
+        for j, joint in enumerate(self.joints):
+            if not GROUND <= joint.parent < j:
+                raise KinematicsError(f"joint {joint.name}: its parent, number {joint.parent}, does not come before it")
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return len(self.joints)
+
+    def ancestors(self, link: int) -> tuple[int, ...]:
+        """Return the joints that move a link, from the ground to its own."""
+        chain = [link]
+        while (parent := self.joints[chain[-1]].parent) != GROUND:
+            chain.append(parent)
+        return tuple(reversed(chain))
+
+
+def _clean(values: Array) -> Array:
+    near = np.abs(values - np.round(values)) < ROUNDING
+    return np.where(near, np.round(values), values) + 0.0

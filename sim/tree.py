@@ -1,0 +1,141 @@
+"""Any robot's kinematic description and its true parameters, read from its compiled model."""
+
+from collections.abc import Iterator
+
+import mujoco
+import numpy as np
+
+from identify.kinematics import GROUND, Joint, KinematicTree
+from sim.errors import RobotError
+from sim.motors import Array
+from sim.robot import Robot
+
+
+def kinematic_tree(robot: Robot) -> KinematicTree:
+    """Return the tree of a robot's links; bodies that are welded to a link belong to it.
+
+    A joint has an armature if the model gives it one.
+
+    Raises
+    ------
+    RobotError
+        If equality constraints or tendons close chains or couple joints; they are named.
+    """
+    model = robot.model
+    _require_open(robot)
+    joints: list[Joint] = []
+    last = {0: GROUND}
+    for body in range(1, model.nbody):
+        first, count = model.body_jntadr[body], model.body_jntnum[body]
+        if not count:
+            continue
+        parent, position, rotation = _placement(model, body)
+        carrier = last[parent]
+        for k in range(first, first + count):
+            at_first = k == first
+            joints.append(
+                Joint(
+                    name=robot.joints[k],
+                    kind="slide" if model.jnt_type[k] == int(mujoco.mjtJoint.mjJNT_SLIDE) else "hinge",
+                    parent=carrier,
+                    position=position if at_first else np.zeros(3),
+                    rotation=rotation if at_first else np.eye(3),
+                    axis=model.jnt_axis[k],
+                    anchor=model.jnt_pos[k],
+                    zero=float(model.qpos0[k]),
+                    range=tuple(float(x) for x in robot.ranges[k]),  # type: ignore[arg-type]  # two of them
+                    armature=bool(model.dof_armature[k] > 0),
+                    massive=k == first + count - 1,
+                )
+            )
+            carrier = k
+        last[body] = carrier
+    weightless = model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+    return KinematicTree(robot.name, tuple(joints), np.zeros(3) if weightless else model.opt.gravity)
+
+
+def standard_parameters(robot: Robot) -> dict[str, float]:
+    """Return the true standard parameters: ten a link, armature, viscous and Coulomb friction of every joint.
+
+    Inertias and first moments [kg m^2, kg m] are about the origin of the frame of the body that a joint moves, in its axes, with
+    all bodies that are welded to it; see `identify.tree_basis` for the names.
+    """
+    model = robot.model
+    found: dict[str, float] = {}
+    for j in range(robot.n):
+        body = int(model.jnt_bodyid[j])
+        if j + 1 == robot.n or model.jnt_bodyid[j + 1] != body:
+            inertia, first, mass = _inertial(model, body)
+            values = *inertia[np.triu_indices(3)], *first, mass
+            found |= {f"{x}{j + 1}": float(v) for x, v in zip(_LETTERS, values, strict=True)}
+        for letters, field in (("Ia", "dof_armature"), ("Fv", "dof_damping"), ("Fs", "dof_frictionloss")):
+            found[f"{letters}{j + 1}"] = float(getattr(model, field)[j])
+    return found
+
+
+_LETTERS = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
+
+
+def _require_open(robot: Robot) -> None:
+    """Raise RobotError if something other than the tree ties joints together."""
+    model = robot.model
+    ties = [
+        f"{mujoco.mjtEq(model.eq_type[i]).name.removeprefix('mjEQ_').lower()} {model.equality(i).name!r}"
+        for i in range(model.neq)
+        if model.eq_active0[i]
+    ]
+    ties += [f"tendon {model.tendon(i).name!r}" for i in range(model.ntendon) if _is_stiff(model, i)]
+    if ties:
+        raise RobotError(
+            f"robot {robot.name!r} is no tree of free joints: {', '.join(ties)} closes a chain or couples joints; remove it, and "
+            "the joints that it ties, from the file"
+        )
+
+
+def _is_stiff(model: mujoco.MjModel, tendon: int) -> bool:
+    return bool(model.tendon_stiffness[tendon] or model.tendon_damping[tendon] or model.tendon_frictionloss[tendon])
+
+
+def _placement(model: mujoco.MjModel, body: int) -> tuple[int, Array, Array]:
+    """Return the nearest body above `body` that has joints, or the world, and where `body` stands in its frame."""
+    position, rotation = np.array(model.body_pos[body]), _rotation(model.body_quat[body])
+    parent = int(model.body_parentid[body])
+    while parent and not model.body_jntnum[parent]:
+        turned = _rotation(model.body_quat[parent])
+        position, rotation = model.body_pos[parent] + turned @ position, turned @ rotation
+        parent = int(model.body_parentid[parent])
+    if not parent:  # bodies of the ground are placed in the world
+        return 0, position, rotation
+    return parent, position, rotation
+
+
+def _inertial(model: mujoco.MjModel, link: int) -> tuple[Array, Array, float]:
+    """Return inertia matrix and first moments about the origin of a link's frame, and its mass."""
+    inertia, first, mass = np.zeros((3, 3)), np.zeros(3), 0.0
+    for body, position, rotation in _welded(model, link):
+        m, c = float(model.body_mass[body]), position + rotation @ model.body_ipos[body]
+        axes = rotation @ _rotation(model.body_iquat[body])
+        inertia += axes @ np.diag(model.body_inertia[body]) @ axes.T + m * (c @ c * np.eye(3) - np.outer(c, c))
+        first += m * c
+        mass += m
+    return inertia, first, mass
+
+
+def _welded(model: mujoco.MjModel, link: int) -> Iterator[tuple[int, Array, Array]]:
+    """Yield the bodies of a link, and where they stand in its frame."""
+    yield link, np.zeros(3), np.eye(3)
+    for body in range(link + 1, model.nbody):
+        if model.body_weldid[body] == link:
+            position, rotation = np.array(model.body_pos[body]), _rotation(model.body_quat[body])
+            parent = int(model.body_parentid[body])
+            while parent != link:
+                turned = _rotation(model.body_quat[parent])
+                position, rotation = model.body_pos[parent] + turned @ position, turned @ rotation
+                parent = int(model.body_parentid[parent])
+            yield body, position, rotation
+
+
+def _rotation(quaternion: Array) -> Array:
+    matrix = np.zeros(9)
+    mujoco.mju_quat2Mat(matrix, quaternion)
+    return matrix.reshape(3, 3)
