@@ -1,13 +1,14 @@
 """A log identified by some models: what every experiment prints, records and writes."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from experiments.results import summarize
+from experiments.subject import Subject
 from identify import (
     CHAINS,
     ESTIMATORS,
@@ -19,13 +20,8 @@ from identify import (
     Estimate,
     ExplicitModel,
     MotionLog,
-    UnknownNameError,
     identify_each,
-    scara,
 )
-
-BASES = {"scara": scara}
-"""Bases of the robots that ship."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +32,8 @@ class Identified:
     ----------
     logs : tuple of MotionLog
         What was logged.
-    robot : str
-        Name of the robot.
+    subject : Subject
+        The robot.
     truth : mapping of str to float, optional
         The true parameters, where they are known.
     models : tuple of str
@@ -53,7 +49,7 @@ class Identified:
     """
 
     logs: tuple[MotionLog, ...]
-    robot: str = "scara"
+    subject: Subject = field(default_factory=Subject)
     truth: Mapping[str, float] | None = None
     models: tuple[str, ...] = ("explicit", "implicit", "power")
     chain: str = "idbench"
@@ -63,14 +59,12 @@ class Identified:
     name: str = ""
 
     def __post_init__(self) -> None:
-        if self.robot not in BASES:
-            raise UnknownNameError(f"no basis for robot {self.robot!r}; known: {', '.join(BASES)}")
-        _ = self.processing, ESTIMATORS.create(self.estimator), [MODELS.create(name) for name in self.models]
+        _ = self.basis, self.processing, ESTIMATORS.create(self.estimator), [MODELS.create(name) for name in self.models]
 
     @property
     def basis(self) -> Basis:
         """The robot, linear in its parameters."""
-        return BASES[self.robot]()
+        return self.subject.basis
 
     @property
     def processing(self) -> Chain:
@@ -114,7 +108,7 @@ class Identified:
         return {
             "parameters": list(self.basis.parameters),
             "truth": truth,
-            "robot": self.robot,
+            "robot": self.subject.name,
             "chain": self.chain,
             "estimator": self.estimator,
             "torque": {"meaning": channel.meaning, "delay": channel.delay, "gain": channel.gain},

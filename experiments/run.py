@@ -5,10 +5,10 @@ from functools import cached_property
 from typing import Any
 
 from experiments.identified import Identified
+from experiments.subject import Subject
 from identify import AbstractEstimator, Chain
 from sim.engine import Progress, simulate
 from sim.run import Run
-from sim.scara import scara_truth
 from sim.scenario import Scenario
 from sim.scenario_file import to_dict
 from sim.watch import Watch
@@ -41,8 +41,13 @@ class ScenarioRun:
 
     def __post_init__(self) -> None:
         # What is wrong with names, or a robot that is no SCARA, is told before the simulation.
-        Identified((), chain=self.chain, estimator=self.estimator)
-        scara_truth(self.scenario.real_robot)
+        Identified((), self.subject, chain=self.chain, estimator=self.estimator)
+        self.subject.truth(self.scenario.real_robot)
+
+    @cached_property
+    def subject(self) -> Subject:
+        """The robot."""
+        return Subject(self.scenario.robot)
 
     @cached_property
     def run(self) -> Run:
@@ -52,9 +57,9 @@ class ScenarioRun:
     @cached_property
     def identified(self) -> Identified:
         """What the models make of its log."""
-        truth = scara_truth(self.run.robots[0])
+        truth = self.subject.truth(self.run.robots[0])
         log, name = (self.run.alone(),), f"{self.chain}-{self.estimator}-study" if self.method else ""
-        return Identified(log, truth=truth, chain=self.chain, estimator=self.estimator, method=self.method, name=name)
+        return Identified(log, self.subject, truth, chain=self.chain, estimator=self.estimator, method=self.method, name=name)
 
     def summary(self) -> dict[str, Any]:
         """Return summary.json."""

@@ -14,6 +14,7 @@ import numpy as np
 from experiments.attribution import attribution
 from experiments.errors import ExperimentError
 from experiments.identified import Identified
+from experiments.subject import Subject
 from identify import CHAINS, Array, TorqueChannel
 from sim.engine import Progress, simulate
 from sim.run import Run
@@ -121,7 +122,7 @@ class Table2:
     def _identified(self, processing: str, model: str) -> Identified:
         logs = tuple(self.run.alone(i) for i in range(REALIZATIONS[model]))
         chain, estimator = PROCESSINGS[processing]
-        return Identified(logs, self.scenario.robot, self.truth, (model,), chain, estimator, trim=self.rest)
+        return Identified(logs, Subject(self.scenario.robot), self.truth, (model,), chain, estimator, trim=self.rest)
 
     @property
     def rest(self) -> float:

@@ -8,15 +8,20 @@ on Decision and Control, 1996).
 
 from identify.arrays import Array as Array
 from identify.arrays import Columns as Columns
+from identify.base_parameters import BaseParameters as BaseParameters
 from identify.basis import BLOCKS as BLOCKS
 from identify.basis import AbstractBlock as AbstractBlock
 from identify.basis import AbstractConservativeBlock as AbstractConservativeBlock
 from identify.basis import AbstractFriction as AbstractFriction
+from identify.basis import Armature as Armature
 from identify.basis import Basis as Basis
 from identify.basis import CoulombFriction as CoulombFriction
+from identify.basis import Offset as Offset
 from identify.basis import ScaraLinks as ScaraLinks
+from identify.basis import TreeLinks as TreeLinks
 from identify.basis import ViscousFriction as ViscousFriction
 from identify.basis import scara as scara
+from identify.basis import tree_basis as tree_basis
 from identify.chain import CHAINS as CHAINS
 from identify.chain import Chain as Chain
 from identify.chain import idbench_chain as idbench_chain
@@ -33,6 +38,7 @@ from identify.differentiators import AbstractDifferentiator as AbstractDifferent
 from identify.differentiators import CentralDifference as CentralDifference
 from identify.errors import ExcitationError as ExcitationError
 from identify.errors import IdentificationError as IdentificationError
+from identify.errors import KinematicsError as KinematicsError
 from identify.errors import LogError as LogError
 from identify.errors import PluginError as PluginError
 from identify.errors import SettingError as SettingError
@@ -44,6 +50,8 @@ from identify.estimators import AbstractEstimator as AbstractEstimator
 from identify.estimators import OrdinaryLeastSquares as OrdinaryLeastSquares
 from identify.estimators import Problem as Problem
 from identify.estimators import WeightedLeastSquares as WeightedLeastSquares
+from identify.kinematics import Joint as Joint
+from identify.kinematics import KinematicTree as KinematicTree
 from identify.masks import MASKS as MASKS
 from identify.masks import AbstractMask as AbstractMask
 from identify.masks import NoMask as NoMask

@@ -118,6 +118,10 @@ class MotionLog:
         """Time of every sample [s], shape (time,), from 0."""
         return np.arange(self.samples) / self.fs
 
+    def part(self, first: int, end: int) -> "MotionLog":
+        """Return the samples `first` ... `end` - 1 as a log of its own."""
+        return MotionLog(self.fs, self.q[..., first:end, :], self.tau[..., first:end, :], self.torque)
+
     @classmethod
     def at_times(cls, t: npt.ArrayLike, q: npt.ArrayLike, tau: npt.ArrayLike, torque: TorqueChannel) -> Self:
         """Make a log from samples at the times `t`, which must be uniform.

@@ -7,7 +7,7 @@ import pytest
 
 OURS = {"models", "sim", "identify", "experiments", "tests"}
 
-CONTRACT = {"identify.motion_log", "identify.plugins"}
+CONTRACT = {"identify.motion_log", "identify.plugins", "identify.kinematics"}
 """What `sim` may know of `identify`: the contract types and the plug-in tables."""
 
 ALLOWED = {

@@ -16,7 +16,6 @@ from experiments.recording.report import about
 from experiments.recording.stream import Stream
 from experiments.run import ScenarioRun
 from identify import measured_state
-from sim.robot import Robot
 from sim.run import Run
 from sim.scenario import Scenario
 from sim.scenario_file import to_toml
@@ -64,7 +63,7 @@ class RunRecording:
 
 def record_log(found: Identified, audience: Audience | None = None) -> list[tuple[str, Stream]]:
     """Return the streams of an identified log's recording, by the name of their file."""
-    log, robot = found.logs[0], Robot.load(found.robot)
+    log, robot = found.logs[0], found.subject.robot
     base = Base(recording_id("log", log.q.tobytes() + log.tau.tobytes()), robot, log.fs, ("measured",), audience)
     channel = log.torque
     base.stream.describe(fs_hz=f"{log.fs:g}", torque=channel.meaning, torque_delay_s=f"{channel.delay:g}")
@@ -90,7 +89,7 @@ def add_layer(folder: Path, found: Identified, audience: Audience | None = None)
     name, there = known(others)
     if audience:
         show(name, others, audience)
-    made = layer(name, found, Robot.load(found.robot).joints, there, audience)
+    made = layer(name, found, found.subject.robot.joints, there, audience)
     return [made, *rearranged(others, made[1])]
 
 

@@ -8,8 +8,8 @@ import rerun.blueprint as rrb
 from experiments.errors import ResultsError
 from experiments.recording.views import Part, Shelf, arm, bars, column, grid, lanes, plot, side_by_side, text
 
-PARAMETER_UNITS = {"Fv": "N m s/rad", "Fs": "N m", "ZZ": "kg m²", "LM": "kg m²"}
-"""Units of parameters, by how their names begin."""
+UNITS = {"Fv": "N m s/rad", "Fs": "N m", "off": "N m", "M": "kg", "MX": "kg m", "MY": "kg m", "MZ": "kg m", "Ia": "kg m²"}
+"""Units of parameters, by their letters; LMX, LMY and elements of inertia matrices, two of X, Y and Z, have kg m²."""
 
 CHARTS = 7
 """Charts of imperfections in a column."""
@@ -144,8 +144,9 @@ def _unit(row: str) -> str:
 
 
 def _estimate(shelf: Shelf, name: str) -> Part:
-    unit = next((f" [{unit}]" for start, unit in PARAMETER_UNITS.items() if name.startswith(start)), "")
-    return plot(shelf, name + unit, f"identify/*/*/estimate/{name}", f"truth/{name}", legend=False)
+    letters = name.rstrip("0123456789").removesuffix("R")  # of those that are grouped
+    unit = UNITS.get(letters, "kg m²" if set(letters) <= set("LMXYZ") else "")
+    return plot(shelf, f"{name} [{unit}]" if unit else name, f"identify/*/*/estimate/{name}", f"truth/{name}", legend=False)
 
 
 def table2(shelf: Shelf) -> Part:

@@ -8,14 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from experiments.identified import BASES
 from experiments.study.method import Method
 from experiments.study.study import Study
 from identify import Estimate, IdentificationError, Status, identify_each
 from sim.engine import Progress, simulate
 from sim.errors import BenchError
 from sim.run import Run
-from sim.scara import scara_truth
 from sim.scenario import Scenario
 from sim.trajectories import Reference
 
@@ -50,7 +48,7 @@ def run_shard(study: Study, runs: range, *, threads: int = 1, progress: Progress
         start = time.perf_counter()
         try:
             simulated = _simulate(scenarios, together, threads, _part(progress, done, len(together), len(runs)))
-            truth = scara_truth(simulated.robots[0])
+            truth = study.subject.truth(simulated.robots[0])
         except BenchError as error:
             _fail(shard, study, scenarios, list(together), str(error))
             continue
@@ -97,7 +95,7 @@ def _identify(
     study: Study, method: Method, simulated: Run, runs: Sequence[int], truth: Mapping[str, float]
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for every run and model."""
-    basis = BASES[simulated.scenario.robot]()
+    basis = study.subject.basis
     try:
         found = identify_each(simulated.log, basis, study.created_models, method.chain, method.estimator, throw=False)
     except IdentificationError as error:

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from experiments.errors import StudyError
-from experiments.identified import BASES
+from experiments.subject import Subject
 from experiments.study.axis import Axis, Setting
 from experiments.study.method import Method, combinations, methods_of, whole_first
 from identify import MODELS, AbstractModel
@@ -86,19 +86,23 @@ class Study:
     @cached_property
     def points(self) -> tuple[Point, ...]:
         """The grid of simulations; raise ScenarioError or StudyError if a combination makes no sense."""
-        found = tuple(self._points())
+        found, _ = tuple(self._points()), self.subject.basis
         for point in found:
             self._require(point)
         return found
 
     def _require(self, point: Point) -> None:
         """Raise StudyError if the runs of a combination cannot be made."""
-        if point.scenario.robot not in BASES:
-            raise StudyError(f"no basis for robot {point.scenario.robot!r}; known: {', '.join(BASES)}")
+        if point.scenario.robot != (first := self._first.robot):
+            raise StudyError(f"robots {first!r} and {point.scenario.robot!r} have other parameters: make a study of each")
         if self.motion == "drawn":
             _random(point.scenario)
         if self.motion == "drawn" and point.scenario.start:
             raise StudyError("motion = 'drawn' has no way to the start: leave out start, or motion = 'shared'")
+
+    @cached_property
+    def _first(self) -> Scenario:
+        return next(self._points()).scenario
 
     def _points(self) -> Iterator[Point]:
         for combination in combinations([axis for axis in self.axes if not axis.identification]):
@@ -125,7 +129,12 @@ class Study:
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the parameters that are identified."""
-        return BASES[self.points[0].scenario.robot]().parameters
+        return self.subject.basis.parameters
+
+    @cached_property
+    def subject(self) -> Subject:
+        """The robot of all its runs."""
+        return Subject(self._first.robot)
 
     def with_seeds(self, seeds: int) -> "Study":
         """Return this study with another number of independent runs."""

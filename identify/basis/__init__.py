@@ -3,13 +3,17 @@
 ``BLOCKS`` is the table of blocks that fit a robot of any number of joints, or refuse the wrong one.
 """
 
+from identify.basis.armature import Armature as Armature
 from identify.basis.base import AbstractBlock as AbstractBlock
 from identify.basis.base import AbstractConservativeBlock as AbstractConservativeBlock
 from identify.basis.base import AbstractFriction as AbstractFriction
 from identify.basis.basis import Basis as Basis
 from identify.basis.coulomb import CoulombFriction as CoulombFriction
+from identify.basis.offset import Offset as Offset
 from identify.basis.scara import ScaraLinks as ScaraLinks
 from identify.basis.scara import scara as scara
+from identify.basis.tree import tree_basis as tree_basis
+from identify.basis.tree_links import TreeLinks as TreeLinks
 from identify.basis.viscous import ViscousFriction as ViscousFriction
 from identify.plugins import PluginTable
 
@@ -20,5 +24,7 @@ BLOCKS: PluginTable[AbstractBlock] = PluginTable(
         "scara": ScaraLinks,
         "viscous": ViscousFriction,
         "coulomb": CoulombFriction,
+        "offset": Offset,
+        "armature": Armature,
     },
 )

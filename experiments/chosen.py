@@ -1,0 +1,30 @@
+"""The robot, as the command line asks for it."""
+
+from dataclasses import dataclass
+from typing import Annotated, final
+
+import tyro
+
+from experiments.subject import CLOSED_FORM, Armature, Subject
+
+Words = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME")]
+
+
+@final
+@dataclass(frozen=True)
+class Parameters:
+    """Which parameters of a robot are asked for."""
+
+    armature: Armature = "file"
+    """Which joints have the inertia of a rotor: those to which the robot's file gives one, or all."""
+    add: Words = ()
+    """Laws of friction beside viscous and Coulomb friction, such as offset, a constant torque of each joint."""
+    without: Words = ()
+    """Parameters to leave out, as if they were zero."""
+
+    def of(self, robot: str | None) -> Subject:
+        """Return the robot of this name or file."""
+        return Subject(robot or CLOSED_FORM, self.armature, self.add, self.without)
+
+
+Asked = Annotated[Parameters, tyro.conf.OmitArgPrefixes]

@@ -1,0 +1,90 @@
+"""The robot that is identified: its basis, its joints, and what is true of it where it is simulated."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal, final
+
+import numpy as np
+
+from experiments.errors import ExperimentError
+from identify import BLOCKS, AbstractFriction, BaseParameters, Basis, KinematicTree, scara, tree_basis
+from sim.robot import Robot
+from sim.scara import scara_truth
+from sim.tree import kinematic_tree, standard_parameters
+
+CLOSED_FORM = "scara"
+"""The robot whose basis is the paper's, in closed form."""
+
+Armature = Literal["file", "all"]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """A robot by its name or file, and which of its parameters are asked for.
+
+    Parameters
+    ----------
+    name : str
+        Name of a robot that ships, or path of an MJCF or URDF file.
+    armature : {"file", "all"}
+        Which joints have the inertia of a rotor: those to which the file gives one, or all.
+    add : sequence of str
+        Friction laws of the table of blocks, beside viscous and Coulomb friction.
+    without : sequence of str
+        Parameters that are left out.
+    """
+
+    name: str = CLOSED_FORM
+    armature: Armature = "file"
+    add: Sequence[str] = ()
+    without: Sequence[str] = ()
+
+    @cached_property
+    def robot(self) -> Robot:
+        """The robot as its file describes it."""
+        return Robot.load(self.name)
+
+    @cached_property
+    def tree(self) -> KinematicTree:
+        """Its description."""
+        tree = kinematic_tree(self.robot)
+        if self.armature == "file":
+            return tree
+        return replace(tree, joints=tuple(replace(joint, armature=True) for joint in tree.joints))
+
+    @cached_property
+    def base(self) -> BaseParameters | None:
+        """How its standard parameters are grouped; None for the closed form."""
+        if self.name == CLOSED_FORM and self.armature == "file":
+            return None
+        return BaseParameters.of(self.tree, self._with_laws(tree_basis(self.tree)))
+
+    @cached_property
+    def basis(self) -> Basis:
+        """What is identified."""
+        basis = self._with_laws(scara()) if self.base is None else self.base.basis
+        return basis.without(*self.without) if self.without else basis
+
+    def truth(self, robot: Robot) -> dict[str, float]:
+        """Return the true value of every parameter of the basis for `robot`, this one as it is simulated.
+
+        What the simulated robot does not have, such as an offset, is zero.
+        """
+        if self.base is None:
+            known = scara_truth(robot)
+        else:
+            standard = standard_parameters(robot)
+            values = np.array([standard.get(name, 0.0) for name in self.base.standard.parameters])
+            known = dict(zip(self.base.names, map(float, self.base.base(values)), strict=True))
+        return {name: known.get(name, 0.0) for name in self.basis.parameters}
+
+    def _with_laws(self, basis: Basis) -> Basis:
+        for name in self.add:
+            block = BLOCKS.create(name)
+            if not isinstance(block, AbstractFriction):
+                laws = [known for known in BLOCKS if isinstance(BLOCKS.create(known), AbstractFriction)]
+                raise ExperimentError(f"--add {name}: that is no law of a joint's friction; known: {', '.join(laws)}")
+            basis = basis + block
+        return basis

@@ -1,0 +1,123 @@
+"""How well parameters foretell the torques of a motion that they were not fitted to."""
+
+from dataclasses import dataclass, replace
+from typing import final
+
+import numpy as np
+import numpy.typing as npt
+
+from identify.arrays import Array
+from identify.basis import Basis
+from identify.chain import Chain
+from identify.errors import LogError
+from identify.masks.complement import Complement
+from identify.models import ExplicitModel
+from identify.motion_log import MotionLog
+from identify.system import System
+
+LAGS = 10
+"""Rows over which residuals are compared with themselves."""
+
+HELD_OUT = 0.25
+"""Share of a log, at its end, that is held out where there is no second log."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """Torques measured and foretold at the rows of a chain, joint by joint; all arrays have the shape (joint,).
+
+    Parameters
+    ----------
+    rms : Array
+        Of measured - foretold torque while the joint moves [N m].
+    level : Array
+        Rms of the measured torque there [N m].
+    R2 : Array
+        Share of the measured torque's variance that is foretold there.
+    standing : Array
+        Rms of the error where the joint stands or turns [N m], where friction is not determined; NaN if it never does.
+    correlation : Array
+        Largest correlation of the error with itself, by size, 2 to `LAGS` rows later. (Noise of differentiated positions
+        alternates from row to row: what is one row later says nothing of the model.)
+    rows : int array
+        How many rows move.
+    """
+
+    rms: Array
+    level: Array
+    R2: Array
+    standing: Array
+    correlation: Array
+    rows: npt.NDArray[np.intp]
+
+    @property
+    def percent(self) -> Array:
+        """100 rms / level."""
+        return 100 * np.divide(self.rms, self.level, out=np.full(self.rms.shape, np.nan), where=self.level > 0)
+
+    @property
+    def bound(self) -> Array:
+        """What the correlation of white noise stays below in 95 % of joints: the largest of LAGS - 1 normal ones."""
+        return 2.77 / np.sqrt(self.rows)
+
+    @property
+    def white(self) -> npt.NDArray[np.bool_]:
+        """Whether the error is not to be told from noise."""
+        return np.abs(self.correlation) <= self.bound
+
+
+def validate(log: MotionLog, basis: Basis, X: Array, chain: Chain) -> Validation:
+    """Return how well the parameters `X` foretell the torques of one log, by the explicit model.
+
+    Both sides go through the same chain. What its mask leaves out is judged apart.
+
+    Raises
+    ------
+    LogError
+        If the log does not fit the basis, is too short for the chain, or a joint of it never moves.
+    """
+    moving = chain.build(log, basis, ExplicitModel())
+    standing = replace(chain, mask=Complement(chain.mask)).build(log, basis, ExplicitModel())
+    each = [_judge(moving, X, j) for j in range(basis.n)]
+    still = [_rms(_residual(standing, X, j)[0]) for j in range(basis.n)]
+    rms, level, R2, correlation, rows = zip(*each, strict=True)
+    if 0 in rows:
+        raise LogError(
+            f"joint {rows.index(0) + 1} never moves in this log, as far as the mask of the chain sees: use a motion in which "
+            "all joints do"
+        )
+    return Validation(*map(np.array, (rms, level, R2, still, correlation, rows)))
+
+
+def split(log: MotionLog, share: float = HELD_OUT) -> tuple[MotionLog, MotionLog]:
+    """Return the beginning of a log, and the `share` at its end that is held out."""
+    cut = round((1 - share) * log.samples)
+    return log.part(0, cut), log.part(cut, log.samples)
+
+
+def _residual(system: System, X: Array, joint: int) -> tuple[Array, Array]:
+    """Return residual and measured torque of a joint's rows, void ones left out."""
+    rows = (system.group == joint) & system.valid
+    return system.Y[rows] - system.W[rows] @ X, system.Y[rows]
+
+
+def _judge(system: System, X: Array, joint: int) -> tuple[float, float, float, float, int]:
+    rho, y = _residual(system, X, joint)
+    if not len(rho):
+        return np.nan, np.nan, np.nan, np.nan, 0
+    spread = float(np.sum((y - y.mean()) ** 2))
+    return _rms(rho), _rms(y), 1 - float(rho @ rho) / max(spread, 1e-300), _correlation(system, X, joint), len(rho)
+
+
+def _rms(x: Array) -> float:
+    return float(np.sqrt(np.mean(x**2))) if len(x) else np.nan
+
+
+def _correlation(system: System, X: Array, joint: int) -> float:
+    rows = system.group == joint
+    rho = (system.Y[rows] - system.W[rows] @ X) * system.valid[rows]
+    rho = rho - np.sum(rho) / max(np.count_nonzero(system.valid[rows]), 1) * system.valid[rows]
+    squares = max(float(rho @ rho), 1e-300)
+    found = np.array([rho[lag:] @ rho[:-lag] / squares for lag in range(2, min(LAGS, len(rho) - 1) + 1)])
+    return float(found[np.argmax(np.abs(found))]) if len(found) else 0.0
