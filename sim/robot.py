@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Self
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -12,6 +13,10 @@ import numpy as np
 import models
 from sim.errors import BenchError, RobotError
 from sim.motors import Array, Motors
+
+
+FILES = (".xml", ".urdf")
+"""What names of files end with."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,19 +51,46 @@ class Robot:
         RobotError
             If there is no such robot or file, or MuJoCo cannot compile it.
         """
+        spec = cls.spec(name)
         try:
-            path = Path(name) if name.endswith(".xml") else models.path(name)
-            spec = mujoco.MjSpec.from_file(str(path))
             for edit in edits:
                 edit(spec)
-            model = spec.compile()
-        except KeyError as error:
-            raise RobotError(f"{error.args[0]}, or give the path of an MJCF file (.xml)") from None
+            return cls(Path(name).stem, spec.compile())
         except BenchError:
             raise
         except ValueError as error:
-            raise RobotError(f"MuJoCo cannot load {name!r}: {' '.join(str(error).split())}") from error
-        return cls(path.stem, model)
+            raise RobotError(f"MuJoCo cannot compile {name!r}: {' '.join(str(error).split())}{_way_out(str(error))}") from error
+
+    @staticmethod
+    def path(name: str) -> Path:
+        """Return the file of a robot; raise RobotError if `name` is neither one that ships nor that of a file."""
+        try:
+            return Path(name) if Path(name).suffix in FILES else models.path(name)
+        except KeyError as error:
+            raise RobotError(f"{error.args[0]}, or give the path of an MJCF or URDF file ({', '.join(FILES)})") from None
+
+    @staticmethod
+    def spec(name: str) -> mujoco.MjSpec:
+        """Return the description of the robot that ships as `name`, or of an MJCF or URDF file, to be edited and compiled.
+
+        Of a URDF only what moves is read, not the shapes: their meshes are mostly in formats that MuJoCo does not read.
+
+        Raises
+        ------
+        RobotError
+            If there is no such robot or file, or MuJoCo cannot read it.
+        """
+        path = Robot.path(name)
+        try:
+            text = path.read_text(encoding="utf-8")
+            urdf = "<robot" in text
+            spec = mujoco.MjSpec.from_string(_without_shapes(text)) if urdf else mujoco.MjSpec.from_file(str(path))
+            spec.compiler.fusestatic = False  # bodies stay those of the file
+            return spec
+        except OSError as error:
+            raise RobotError(f"cannot read robot {name!r}: {error.strerror}") from error
+        except (ValueError, ElementTree.ParseError) as error:
+            raise RobotError(f"MuJoCo cannot read {name!r}: {' '.join(str(error).split())}") from error
 
     @property
     def n(self) -> int:
@@ -96,3 +128,21 @@ class Robot:
             if model.actuator_ctrllimited[a] and is_force:
                 limits[joint] = min(limits[joint], gear * model.actuator_gainprm[a, 0] * model.actuator_ctrlrange[a].max())
         return limits
+
+
+def _without_shapes(urdf: str) -> str:
+    """Return a URDF without its shapes."""
+    root = ElementTree.fromstring(urdf)
+    for link in root.iter("link"):
+        for shape in [child for child in link if child.tag in ("visual", "collision")]:
+            link.remove(shape)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _way_out(reason: str) -> str:
+    """Return what to do about a reason why MuJoCo does not compile a model."""
+    if "mass and inertia" in reason:
+        return "; give every body that a joint moves a mass and an inertia"
+    if "file" in reason.lower():
+        return "; put the file there, or take the mesh and its geoms out: identification needs the inertials alone"
+    return ""

@@ -1,0 +1,198 @@
+"""Physically consistent standard parameters that agree with an estimate of the base parameters."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from scipy import linalg, sparse, stats
+
+from identify.arrays import Array
+from identify.base_parameters import BaseParameters
+from identify.basis.tree import joint_number
+from identify.basis.wrench import INERTIAL
+from identify.errors import IdentificationError
+
+NEAR = 1e-4
+"""What a step to twice the given model costs, beside one sigma of the estimate: nothing, where the estimate knows anything."""
+
+MARGIN = 1e-6
+"""Smallest eigenvalue of a link's pseudo-inertia, as a share of the given one: a body with some extent in every direction."""
+
+CONFIDENCE = 0.999
+"""A model within the ellipsoid that holds the truth with this probability agrees with the estimate."""
+
+NOT_NEGATIVE = ("Ia", "Fv", "Fs")
+
+_ROOT2 = np.sqrt(2.0)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Consistent:
+    """Standard parameters of bodies that can exist.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the standard parameters.
+    standard : Array, shape (p,)
+        Their values.
+    base : Array, shape (b,)
+        The base values that they give.
+    departure : Array, shape (b,)
+        By how many sigma those differ from the estimate.
+    distance : float
+        Mahalanobis distance to the estimate: its squares would be distributed as chi^2 with b degrees of freedom.
+    """
+
+    names: tuple[str, ...]
+    standard: Array
+    base: Array
+    departure: Array
+    distance: float
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the estimate's uncertainty explains the distance."""
+        return bool(self.distance**2 <= stats.chi2.ppf(CONFIDENCE, len(self.base)))
+
+
+def consistent_parameters(grouping: BaseParameters, X: Array, covariance: Array, given: Array) -> Consistent:
+    """Return the standard parameters with positive pseudo-inertias that agree best with an estimate.
+
+    They minimise (K x - X)' C^-1 (K x - X) + `NEAR` d(x, given) over all x for which every link's pseudo-inertia
+
+        [ tr(I)/2 1 - I    MS ]
+        [ MS'              M  ]
+
+    is positive definite (P. M. Wensing, S. Kim and J.-J. Slotine, "Linear matrix inequalities for physically consistent inertial
+    parameter identification", IEEE RA-L 3 (2018) 60-67), and armatures and frictions are not negative. d, the squared distance
+    to the given model, is tr((S^-1 dS)^2) of each link's pseudo-inertia S, which depends on no frame (T. Lee, P. M. Wensing and
+    F. C. Park, "Geometric robot dynamic identification: a convex programming approach", IEEE T-RO 36 (2020) 348-365). So base
+    values are the estimate's where bodies can have them, and what no motion shows stays as it was given.
+
+    Parameters
+    ----------
+    grouping : BaseParameters
+        K.
+    X : Array, shape (b,)
+        The estimate.
+    covariance : Array, shape (b, b)
+        C.
+    given : Array, shape (p,)
+        Standard parameters of the given model, consistent themselves.
+
+    Raises
+    ------
+    IdentificationError
+        If Clarabel is not installed, the covariance is not positive definite, the given model has a link that cannot exist, or
+        the solver fails.
+    """
+    clarabel = _solver()
+    names = grouping.standard.parameters
+    problem = _Problem(names, np.asarray(given, dtype=np.float64))
+    root = _root(covariance)
+    # x = start + J u + N z: u counts sigma away from the estimate, z is what no motion shows.
+    start = grouping.nearest(X, problem.given, problem.scale)
+    J = problem.scale[:, None] * np.linalg.pinv(grouping.K * problem.scale) @ root
+    N = problem.scale[:, None] * linalg.null_space(grouping.K * problem.scale)
+    T = np.concatenate([J, N], axis=1)
+    steps, away = T / problem.scale[:, None], (start - problem.given) / problem.scale
+    quadratic = NEAR * steps.T @ problem.metric @ steps + np.diag(np.r_[np.ones(len(X)), np.zeros(N.shape[1])])
+    G, h, (signs, links) = problem.cones()
+    found = clarabel.DefaultSolver(
+        sparse.csc_matrix(np.triu(2 * quadratic)),
+        2 * NEAR * steps.T @ problem.metric @ away,
+        sparse.csc_matrix(G @ T),
+        h - G @ start,
+        [clarabel.NonnegativeConeT(signs), *(clarabel.PSDTriangleConeT(4) for _ in range(links))],
+        _quiet(clarabel),
+    ).solve()
+    if str(found.status) not in ("Solved", "AlmostSolved"):
+        raise IdentificationError(f"no physically consistent parameters were found: the solver says {found.status}")
+    standard = start + T @ np.array(found.x)
+    base = grouping.base(standard)
+    distance = float(np.linalg.norm(np.linalg.solve(root, base - X)))
+    return Consistent(names, standard, base, (base - X) / np.sqrt(np.diagonal(covariance)), distance)
+
+
+def pseudo_inertia(values: Array) -> Array:
+    """Return the pseudo-inertia of a link's XX XY XZ YY YZ ZZ MX MY MZ M, shape (4, 4)."""
+    xx, xy, xz, yy, yz, zz, *first, mass = values
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    S = np.empty((4, 4))
+    S[:3, :3] = np.trace(inertia) / 2 * np.eye(3) - inertia
+    S[:3, 3] = S[3, :3] = first
+    S[3, 3] = mass
+    return S
+
+
+PSEUDO = np.array([pseudo_inertia(e) for e in np.eye(len(INERTIAL))])
+"""What each inertial parameter adds to a pseudo-inertia, shape (10, 4, 4)."""
+
+
+class _Problem:
+    """Scales, metric and cones of standard parameters."""
+
+    def __init__(self, names: Sequence[str], given: Array) -> None:
+        self._names, self.given = names, given
+        numbers = sorted({joint_number(name) for name in names if name.startswith("MX")})
+        self._links = [[names.index(f"{x}{j}") for x in INERTIAL] for j in numbers]
+        self._signed = [i for i, name in enumerate(names) if name.rstrip("0123456789") in NOT_NEGATIVE]
+        self.scale, self.metric = np.where(given == 0, 1.0, np.abs(given)), np.eye(len(names))
+        for number, link in zip(numbers, self._links, strict=True):
+            S = pseudo_inertia(given[link])
+            if np.linalg.eigvalsh(S)[0] <= 0:
+                raise IdentificationError(
+                    f"link {number} of the given model cannot exist: its pseudo-inertia is not positive (is the centre of mass "
+                    "outside of the body that the inertia describes?); correct the file first"
+                )
+            self.scale[link] = _spread(S)
+            steps = [np.linalg.solve(S, PSEUDO[k] * self.scale[i]) for k, i in enumerate(link)]
+            self.metric[np.ix_(link, link)] = [[np.trace(a @ b) for b in steps] for a in steps]
+
+    def cones(self) -> tuple[Array, Array, tuple[int, int]]:
+        """Return G, h of h - G x in the cones, and the numbers of signs and of matrices among them."""
+        rows = [-np.eye(len(self._names))[self._signed]]
+        limits = [np.zeros(len(self._signed))]
+        lower = [(i, j) for j in range(4) for i in range(j + 1)]  # of the upper triangle, column by column
+        for link in self._links:
+            weights = np.array([[S[i, j] * (1.0 if i == j else _ROOT2) for S in PSEUDO] for i, j in lower])
+            block = np.zeros((len(lower), len(self._names)))
+            block[:, link] = -weights
+            rows.append(block)
+            smallest = MARGIN * np.linalg.eigvalsh(pseudo_inertia(self.given[link]))[0]
+            limits.append(np.array([-smallest if i == j else 0.0 for i, j in lower]))
+        return np.concatenate(rows), np.concatenate(limits), (len(self._signed), len(self._links))
+
+
+def _spread(S: Array) -> Array:
+    """Return what counts as a large change of each of a link's parameters: geometric means of the diagonal of S."""
+    root = np.sqrt(np.diagonal(S))
+    return np.array([np.max(np.abs(P) * np.outer(root, root)) for P in PSEUDO])
+
+
+def _root(covariance: Array) -> Array:
+    """Return the triangular L with L L' = C."""
+    try:
+        sigma = np.sqrt(np.diagonal(covariance))
+        return sigma[:, None] * np.linalg.cholesky(covariance / np.outer(sigma, sigma))
+    except np.linalg.LinAlgError as error:
+        raise IdentificationError("the covariance of the estimate is not positive definite: it does not say what is known") from error
+
+
+def _quiet(clarabel):  # type: ignore[no-untyped-def]  # a module without types
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    return settings
+
+
+def _solver():  # type: ignore[no-untyped-def]  # a module without types
+    try:
+        import clarabel
+    except ImportError as error:
+        raise IdentificationError(
+            "physically consistent parameters need the solver Clarabel: install the extra `consistent` (uv run --extra consistent)"
+        ) from error
+    return clarabel
