@@ -10,7 +10,9 @@ from typing import Annotated
 import tyro
 from rich.console import Console
 
+import experiments.identify_command
 import experiments.log_commands
+import experiments.robot_command
 import experiments.run_commands
 import experiments.study_commands  # noqa: F401  # all register their commands
 from experiments.app import app

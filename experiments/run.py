@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from experiments.chosen import Parameters
 from experiments.identified import Identified
 from experiments.subject import Subject
 from identify import AbstractEstimator, Chain
@@ -30,6 +31,8 @@ class ScenarioRun:
         Hears how much of the simulation is done.
     watch : Watch, optional
         Hears what happens in it.
+    parameters : Parameters
+        Which parameters are identified.
     """
 
     scenario: Scenario
@@ -38,6 +41,7 @@ class ScenarioRun:
     method: tuple[Chain, AbstractEstimator] | None = None
     progress: Progress | None = None
     watch: Watch | None = None
+    parameters: Parameters = Parameters()  # noqa: RUF009  # frozen
 
     def __post_init__(self) -> None:
         # What is wrong with names, or a robot that is no SCARA, is told before the simulation.
@@ -47,7 +51,7 @@ class ScenarioRun:
     @cached_property
     def subject(self) -> Subject:
         """The robot."""
-        return Subject(self.scenario.robot)
+        return self.parameters.of(self.scenario.robot)
 
     @cached_property
     def run(self) -> Run:

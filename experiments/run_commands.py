@@ -10,14 +10,17 @@ from rich.text import Text
 
 from experiments.app import app
 from experiments.audience import Audience, Watched, Watching, Window
+from experiments.chosen import Asked, Parameters
 from experiments.errors import ExperimentError
 from experiments.interruption import importing
 from experiments.page import new_page, show, shown
 from experiments.results import results_folder, tell_of, write_recording, write_summary, write_whole
 from identify.log_file import write_log
 from sim.engine import Progress
+from sim.robot import Robot
 from sim.scenario import Scenario
 from sim.scenario_file import load, names, to_toml
+from sim.trajectories import Quintic
 
 if TYPE_CHECKING:
     from experiments.recording.identified import RunRecording
@@ -25,6 +28,7 @@ if TYPE_CHECKING:
 
 File = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
 Name = Annotated[str | None, tyro.conf.arg(metavar="SCENARIO")]
+Named = Annotated[str | None, tyro.conf.arg(metavar="NAME|FILE")]
 From = Annotated[Path | None, tyro.conf.arg(name="from", metavar="DIR")]
 Index = Annotated[int | None, tyro.conf.arg(metavar="N")]
 
@@ -39,6 +43,8 @@ def run(  # noqa: PLR0913, PLR0917  # the options of a command
     index: Index = None,
     method: Index = None,
     inner: Window = None,
+    robot: Named = None,
+    parameters: Asked = Parameters(),  # noqa: B008  # frozen
     watching: Watched = Watching(),  # noqa: B008  # frozen
 ) -> None:
     """Simulate a scenario in closed loop, identify it with all models, and record it.
@@ -52,6 +58,9 @@ def run(  # noqa: PLR0913, PLR0917  # the options of a command
         chain: Signal processing.
         estimator: OLS, WLS, ...
         inner: From when to when [s] the signals inside the loop are recorded at the full rate of the drive, such as 10 10.5.
+        robot: Another robot than the scenario's: name of one that ships, or a file (MJCF or URDF). A trajectory that does not
+            fit it is replaced by random moves.
+        parameters: Which parameters are identified.
         watching: How it is watched.
     """
     with importing():
@@ -59,11 +68,11 @@ def run(  # noqa: PLR0913, PLR0917  # the options of a command
         from experiments.tables import print_identified
 
     page = new_page()
-    made = (
-        _again(page, study, index, method)
-        if scenario is None
-        else ScenarioRun(load(_alone(scenario, study, index)), chain, estimator)
-    )
+    if scenario is None:
+        made = replace(_again(page, study, index, method), parameters=parameters)
+    else:
+        described = _with_robot(page, load(_alone(scenario, study, index)), robot)
+        made = ScenarioRun(described, chain, estimator, parameters=parameters)
     _require_window(inner, watching)
     described, lost = made.scenario, ""
     folder_name = out or Path("runs") / described.name
@@ -82,6 +91,17 @@ def run(  # noqa: PLR0913, PLR0917  # the options of a command
         tell_of(lost, folder_name)
         _doubt_window(page, inner, recording)
         page.print(f"written to {folder_name}{watching.hint(folder_name)}", soft_wrap=True)
+
+
+def _with_robot(page: Console, scenario: Scenario, robot: str | None) -> Scenario:
+    """Return a scenario with another robot, and moves that fit it."""
+    if robot is None:
+        return scenario
+    other = replace(scenario, robot=robot, name=f"{scenario.name}-{Path(robot).stem}")
+    if isinstance(scenario.trajectory, Quintic) and Robot.load(robot).n != Robot.load(scenario.robot).n:
+        page.print(f"the trajectory of {scenario.name} is none for robot {robot}: it makes the random moves of scenario arm")
+        other = replace(other, trajectory=load("arm").trajectory, start=())
+    return other
 
 
 def _require_window(inner: tuple[float, float] | None, watching: Watching) -> None:

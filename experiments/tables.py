@@ -1,6 +1,6 @@
 """Estimates as text."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from math import isfinite
 
 from rich import box
@@ -10,10 +10,11 @@ from rich.text import Text
 
 from experiments.identified import Identified
 from experiments.table2 import PAPER, PAPER_ROWS, REALIZATIONS, Table2
-from identify import AsLogged, Estimate
+from experiments.validation import Validated
+from identify import AsLogged, Estimate, IdentificationError
 
-WELL_EXPLAINED = 0.95
-"""Share of a torque's variance that a model of the right robot explains on any log that is worth identifying."""
+WORTHLESS = 999.0
+"""Percentages from here on all say the same."""
 
 
 def new_table(title: str, columns: Iterable[str]) -> Table:
@@ -51,8 +52,6 @@ def print_identified(console: Console, found: Identified, title: str) -> None:
     read = f"{channel.meaning}, delay {1e3 * channel.delay:.4g} ms"
     logged = isinstance(found.processing.alignment, AsLogged)
     console.print(Text(f"torque: {read}" + (f", which chain {found.chain} ignores: it takes it as logged" if logged else "")))
-    for doubt in _doubts(found):
-        console.print(Text(f"doubtful: {doubt}"))
     console.print()
 
 
@@ -62,24 +61,48 @@ def _cells(estimate: Estimate, found: Identified, i: int) -> tuple[str, str, str
     else:
         error = float(estimate.error_percent(list(found.truth.values()))[i])
         second = percent(error) if isfinite(error) else ""
-    return f"{estimate.X[i]:#.5g}", second, f"{100 * estimate.corrected_sigma[i] / abs(estimate.X[i]):.2g}"
+    share = 100 * estimate.corrected_sigma[i] / abs(estimate.X[i])
+    return number(estimate.X[i]), second, f"{share:.2g}" if share < WORTHLESS else f">{WORTHLESS:g}"
 
 
-def _doubts(found: Identified) -> Iterator[str]:
-    """Yield what no healthy identification shows."""
-    for name, estimate in found.estimates.items():
-        friction = zip(found.basis.parameters, estimate.X, estimate.corrected_sigma, strict=True)
-        negative = [p for p, x, sigma in friction if p.startswith("F") and x < -2 * sigma]
-        if negative:
-            yield f"{', '.join(negative)} below zero in the {name} model: is the torque's meaning or delay wrong?"
-        poor = [f"{100 * share:.0f} % of tau{j + 1}" for j, share in enumerate(found.explained[name]) if share < WELL_EXPLAINED]
-        if poor:
-            yield f"the {name} model explains {', '.join(poor)}: are units, signs and the torque's delay right?"
+def number(x: float) -> str:
+    """Return a number to five digits, a small one to three."""
+    return f"{x:#.5g}" if abs(x) >= 1e-3 or x == 0 else f"{x:.2e}"
+
+
+def print_validated(console: Console, validated: Validated) -> None:
+    """Print how well torques of an unseen motion are foretold, what the simulated robot does on it, and verdicts."""
+    try:
+        torques = validated.torques
+    except IdentificationError as error:
+        if validated.second is not None:
+            raise
+        console.print(Text(f"not validated on {validated.title}: {error}\n"), soft_wrap=True)
+        return
+    heads = [f"{model}\n{what}" for model in torques for what in ("rms", "%", "R2", "q rms")]
+    grid = new_table(f"{validated.title}: torque error while moving [N m], of a simulated robot's position [rad]", heads)
+    for j, joint in enumerate(validated.found.subject.robot.joints):
+        grid.add_row(joint, *(cell for model in torques for cell in _validation_cells(validated, model, j)))
+    console.print(grid)
+    still = next(iter(torques.values())).standing
+    apart = [f"{joint} {rms:.2g}" for joint, rms in zip(validated.found.subject.robot.joints, still, strict=True)]
+    console.print(Text(f"standing and turning, where friction is not determined: {', '.join(apart)} N m"), soft_wrap=True)
+    for model in torques:
+        word, reasons = validated.verdict(model)
+        console.print(Text(f"{model}: {word}: {'; '.join(reasons)}"), soft_wrap=True)
+    console.print()
+
+
+def _validation_cells(validated: Validated, model: str, j: int) -> tuple[str, str, str, str]:
+    told, off = validated.torques[model], validated.position_error(model)
+    return f"{told.rms[j]:.2g}", f"{told.percent[j]:.2g}", f"{told.R2[j]:.5f}", "" if off is None else f"{off[j]:.1e}"
 
 
 def percent(share: float) -> str:
     """Return a signed percentage to two decimals, to none from a hundred on, to one digit below a hundredth."""
     size = abs(share)
+    if size >= WORTHLESS:
+        return f"{'-' if share < 0 else ''}>{WORTHLESS:g}"
     return f"{share:+.0f}" if size >= 100 else f"{share:+.2f}" if size >= 0.01 else f"{share:+.0e}" if size else "0"
 
 

@@ -26,6 +26,8 @@ from identify.chain import CHAINS as CHAINS
 from identify.chain import Chain as Chain
 from identify.chain import idbench_chain as idbench_chain
 from identify.chain import paper_chain as paper_chain
+from identify.consistent import Consistent as Consistent
+from identify.consistent import consistent_parameters as consistent_parameters
 from identify.diagnosis import Instants as Instants
 from identify.diagnosis import binned as binned
 from identify.diagnosis import cutoffs as cutoffs
@@ -50,6 +52,7 @@ from identify.estimators import AbstractEstimator as AbstractEstimator
 from identify.estimators import OrdinaryLeastSquares as OrdinaryLeastSquares
 from identify.estimators import Problem as Problem
 from identify.estimators import WeightedLeastSquares as WeightedLeastSquares
+from identify.excitation import showing_moves as showing_moves
 from identify.kinematics import Joint as Joint
 from identify.kinematics import KinematicTree as KinematicTree
 from identify.masks import MASKS as MASKS
@@ -86,3 +89,6 @@ from identify.torques import AbstractAlignment as AbstractAlignment
 from identify.torques import AbstractTorque as AbstractTorque
 from identify.torques import AsLogged as AsLogged
 from identify.torques import ByChannel as ByChannel
+from identify.validation import Validation as Validation
+from identify.validation import split as split
+from identify.validation import validate as validate

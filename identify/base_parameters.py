@@ -1,6 +1,7 @@
 """Base parameters: the combinations of standard parameters that a motion can tell at all."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self, final
@@ -28,6 +29,9 @@ with less than a millionth of its column is none that a log could tell."""
 
 NEGLIGIBLE = 1e-8
 """Coefficients below this share of the largest of their grouping are rounding."""
+
+ROUNDING = 1e-13
+"""Sums below this share of their terms are zero but for rounding."""
 
 SPEED, ACCELERATION = 5.0, 25.0
 """Largest rates of the random states [rad/s, rad/s^2]: as heavy as gravity, so that no kind of column drowns."""
@@ -80,7 +84,7 @@ class BaseParameters:
         K = np.zeros((rank, W.shape[1]))
         solved = np.linalg.lstsq(R[:, kept], R, rcond=None)[0]
         K[:, seen] = solved * length[seen] / length[seen][kept][:, None]
-        K[np.abs(solved_share(K)) < NEGLIGIBLE] = 0.0
+        K[np.abs(K) < NEGLIGIBLE * np.abs(K).max(axis=1, keepdims=True)] = 0.0
         K[:, seen[kept]] = np.eye(rank)
         return cls(standard, tuple(int(k) for k in seen[kept]), K)
 
@@ -100,7 +104,12 @@ class BaseParameters:
     @property
     def unseen(self) -> tuple[str, ...]:
         """Standard parameters that no motion shows."""
-        return tuple(name for name, used in zip(self.standard.parameters, self.K.any(axis=0), strict=True) if not used)
+        return tuple(name for name, used in zip(self.standard.parameters, np.any(self.K, axis=0), strict=True) if not used)
+
+    def only(self, names: Sequence[str]) -> "BaseParameters":
+        """Return the grouping of some of the base parameters."""
+        rows = [self.names.index(name) for name in names]
+        return BaseParameters(self.standard, tuple(self.kept[i] for i in rows), self.K[rows])
 
     def grouping(self, i: int) -> str:
         """Return what base parameter `i` is made of, such as ZZ1 + Ia1 + 0.25 M2."""
@@ -113,8 +122,10 @@ class BaseParameters:
         return " ".join(terms)
 
     def base(self, standard: Array) -> Array:
-        """Return the base values of standard values, shape (..., p)."""
-        return np.asarray(standard) @ self.K.T
+        """Return the base values of standard values, shape (..., p); sums that are rounding alone are zero."""
+        values = np.asarray(standard, dtype=np.float64)
+        total, size = values @ self.K.T, np.abs(values) @ np.abs(self.K.T)
+        return np.where(np.abs(total) > ROUNDING * size, total, 0.0)
 
     def nearest(self, base: Array, standard: Array, scale: Array) -> Array:
         """Return the standard values with the base values `base` that lie nearest to `standard`, in units of `scale`.
@@ -128,11 +139,6 @@ class BaseParameters:
         """
         K = self.K * scale
         return np.asarray(standard) + scale * np.linalg.lstsq(K, base - self.base(standard), rcond=None)[0]
-
-
-def solved_share(K: Array) -> Array:
-    """Return coefficients as shares of the largest of their grouping."""
-    return K / np.abs(K).max(axis=1, keepdims=True)
 
 
 def _explicit_columns(tree: KinematicTree, basis: Basis) -> Array:

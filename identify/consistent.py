@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import final
+from types import ModuleType
+from typing import Any, final
 
 import numpy as np
 from scipy import linalg, sparse, stats
@@ -66,9 +67,9 @@ def consistent_parameters(grouping: BaseParameters, X: Array, covariance: Array,
         [ tr(I)/2 1 - I    MS ]
         [ MS'              M  ]
 
-    is positive definite (P. M. Wensing, S. Kim and J.-J. Slotine, "Linear matrix inequalities for physically consistent inertial
-    parameter identification", IEEE RA-L 3 (2018) 60-67), and armatures and frictions are not negative. d, the squared distance
-    to the given model, is tr((S^-1 dS)^2) of each link's pseudo-inertia S, which depends on no frame (T. Lee, P. M. Wensing and
+    is positive definite (P. M. Wensing, S. Kim and J.-J. Slotine, "Linear matrix inequalities for physically consistent
+    inertial parameter identification", IEEE RA-L 3 (2018) 60-67), and armatures and frictions are not negative. d, the squared
+    distance to the given model, is tr((S^-1 dS)^2) of each link's pseudo-inertia S, which depends on no frame (T. Lee, P. M. Wensing and
     F. C. Park, "Geometric robot dynamic identification: a convex programming approach", IEEE T-RO 36 (2020) 348-365). So base
     values are the estimate's where bodies can have them, and what no motion shows stays as it was given.
 
@@ -179,20 +180,22 @@ def _root(covariance: Array) -> Array:
         sigma = np.sqrt(np.diagonal(covariance))
         return sigma[:, None] * np.linalg.cholesky(covariance / np.outer(sigma, sigma))
     except np.linalg.LinAlgError as error:
-        raise IdentificationError("the covariance of the estimate is not positive definite: it does not say what is known") from error
+        raise IdentificationError(
+            "the covariance of the estimate is not positive definite: it does not say what is known"
+        ) from error
 
 
-def _quiet(clarabel):  # type: ignore[no-untyped-def]  # a module without types
+def _quiet(clarabel: ModuleType) -> Any:
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     return settings
 
 
-def _solver():  # type: ignore[no-untyped-def]  # a module without types
+def _solver() -> ModuleType:
     try:
         import clarabel
     except ImportError as error:
         raise IdentificationError(
-            "physically consistent parameters need the solver Clarabel: install the extra `consistent` (uv run --extra consistent)"
+            "physically consistent parameters need the solver Clarabel: install the extra `consistent` (uv sync --extra consistent)"
         ) from error
     return clarabel

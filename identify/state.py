@@ -9,7 +9,6 @@ import numpy as np
 
 from identify.arrays import Array
 
-
 T = TypeVar("T")
 
 

@@ -1,5 +1,6 @@
 """A robot's file with other parameters."""
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from xml.etree import ElementTree
@@ -19,11 +20,11 @@ ROUNDING = 1e-9
 Values = Mapping[str, float]
 
 
-def rewritten(name: str, standard: Values) -> str:
+def rewritten(name: str, standard: Values, folder: Path | None = None) -> str:
     """Return the file of a robot as MJCF, with other standard parameters.
 
-    The inertia of a link stands at the body that its joint moves; bodies that are welded to it become massless. Everything else,
-    comments included, stays as it is; files that the file includes are put in their places.
+    The inertia of a link stands at the body that its joint moves; bodies that are welded to it become massless. Everything
+    else, comments included, stays as it is; files that the file includes are put in their places.
 
     Parameters
     ----------
@@ -31,6 +32,8 @@ def rewritten(name: str, standard: Values) -> str:
         Name of a robot that ships, or path of its file.
     standard : mapping of str to float
         Values by the names that `sim.tree.standard_parameters` gives; those that it leaves out stay.
+    folder : Path, optional
+        Where it will be written, so that it finds its meshes; by default where the file of the robot is.
 
     Raises
     ------
@@ -50,9 +53,38 @@ def rewritten(name: str, standard: Values) -> str:
             joint.set(attribute, repr(wanted[f"{letters}{j + 1}"]))
         if f"M{j + 1}" in wanted:
             _set_link(robot, bodies, j, wanted)
-    text = ElementTree.tostring(root, encoding="unicode") + "\n"
-    _require_same(name, text, wanted)
-    return text
+    _require_same(name, compiled(name, _text(root)), wanted)
+    if folder is not None:
+        _relocate(root, Robot.path(name).absolute().parent, folder)
+    return _text(root)
+
+
+def compiled(name: str, text: str) -> Robot:
+    """Return the robot of a text that stands for the file of a robot; raise RobotError if it does not compile."""
+    try:
+        spec = mujoco.MjSpec.from_string(text)
+        spec.modelfiledir = str(Robot.path(name).parent)  # for meshes and textures
+        return Robot(Path(name).stem, spec.compile())
+    except ValueError as error:
+        raise RobotError(f"MuJoCo cannot compile {name!r} with these parameters: {' '.join(str(error).split())}") from error
+
+
+def _text(root: ElementTree.Element) -> str:
+    return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _relocate(root: ElementTree.Element, old: Path, new: Path) -> None:
+    """Let a file in another folder find the meshes and textures of this one."""
+    assets = [asset for kind in ("mesh", "texture", "hfield") for asset in root.iter(kind) if asset.get("file")]
+    if not assets or old == new:
+        return
+    compiler = root.find("compiler")
+    if compiler is None:
+        compiler = ElementTree.Element("compiler")
+        root.insert(0, compiler)
+    for attribute in ("meshdir", "texturedir"):
+        folder = compiler.get(attribute, compiler.get("assetdir", ""))
+        compiler.set(attribute, os.path.relpath(old / folder, new))
 
 
 def _document(name: str) -> ElementTree.Element:
@@ -128,15 +160,9 @@ def _numbers(values: npt.ArrayLike) -> str:
     return " ".join(repr(float(value)) for value in np.asarray(values))
 
 
-def _require_same(name: str, text: str, wanted: Values) -> None:
-    """Raise RobotError if the text does not compile to the parameters that were written into it."""
-    folder = Robot.path(name).parent
-    try:
-        spec = mujoco.MjSpec.from_string(text)
-        spec.modelfiledir = str(folder)  # for meshes and textures
-        found = standard_parameters(Robot(Path(name).stem, spec.compile()))
-    except ValueError as error:
-        raise RobotError(f"MuJoCo cannot compile {name!r} with these parameters: {' '.join(str(error).split())}") from error
+def _require_same(name: str, made: Robot, wanted: Values) -> None:
+    """Raise RobotError if a robot does not have the parameters that were written into its file."""
+    found = standard_parameters(made)
     largest = max(abs(value) for value in wanted.values())
     for key, value in wanted.items():
         if not abs(found[key] - value) <= ROUNDING * largest:

@@ -14,7 +14,6 @@ import models
 from sim.errors import BenchError, RobotError
 from sim.motors import Array, Motors
 
-
 FILES = (".xml", ".urdf")
 """What names of files end with."""
 
@@ -100,7 +99,7 @@ class Robot:
     @cached_property
     def joints(self) -> tuple[str, ...]:
         """Names of the joints."""
-        return tuple(self.model.joint(j).name for j in range(self.n))
+        return tuple(self.model.joint(j).name or f"joint {j + 1}" for j in range(self.n))
 
     @cached_property
     def motors(self) -> Motors:

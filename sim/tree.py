@@ -57,8 +57,8 @@ def kinematic_tree(robot: Robot) -> KinematicTree:
 def standard_parameters(robot: Robot) -> dict[str, float]:
     """Return the true standard parameters: ten a link, armature, viscous and Coulomb friction of every joint.
 
-    Inertias and first moments [kg m^2, kg m] are about the origin of the frame of the body that a joint moves, in its axes, with
-    all bodies that are welded to it; see `identify.tree_basis` for the names.
+    Inertias and first moments [kg m^2, kg m] are about the origin of the frame of the body that a joint moves, in its axes,
+    with all bodies that are welded to it; see `identify.tree_basis` for the names.
     """
     model = robot.model
     found: dict[str, float] = {}
@@ -88,8 +88,8 @@ def _require_open(robot: Robot) -> None:
     ties += [f"tendon {model.tendon(i).name!r}" for i in range(model.ntendon) if _is_stiff(model, i)]
     if ties:
         raise RobotError(
-            f"robot {robot.name!r} is no tree of free joints: {', '.join(ties)} closes a chain or couples joints; remove it, and "
-            "the joints that it ties, from the file"
+            f"robot {robot.name!r} is no tree of free joints: {', '.join(ties)} closes a chain or couples joints; remove it, "
+            "and the joints that it ties, from the file"
         )
 
 

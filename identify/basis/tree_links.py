@@ -92,9 +92,7 @@ class TreeLinks(AbstractConservativeBlock):
         """(joint, link that it moves)."""
         return tuple((i, j) for j in self._massive for i in self.tree.ancestors(j))
 
-    def _columns(
-        self, state: State, rows: tuple[tuple[int, int], ...], column: Callable[[int, int, int], Term]
-    ) -> Columns:
+    def _columns(self, state: State, rows: tuple[tuple[int, int], ...], column: Callable[[int, int, int], Term]) -> Columns:
         """Return the columns of (row, link) that are asked for and not zero at all times."""
         shape, found = state.q[..., 0, :].shape, {}
         for i, j in rows:

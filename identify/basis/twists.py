@@ -8,7 +8,6 @@ import numpy as np
 
 from identify.basis.terms import (
     ZERO,
-    Matrix,
     Term,
     Vector,
     add,

@@ -1,0 +1,158 @@
+"""The command that identifies a log."""
+
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+from rich.console import Console
+from rich.text import Text
+
+from experiments.app import app
+from experiments.audience import Audience, Watched, Watching
+from experiments.chosen import Asked, Parameters
+from experiments.doubts import doubts_of_log, doubts_of_result, helpful_moves
+from experiments.errors import ExperimentError
+from experiments.identified import Identified
+from experiments.interruption import importing
+from experiments.page import new_page, shown
+from experiments.reading import Delay, Held, file_of, read, told_by
+from experiments.results import results_folder, tell_of, write_recording, write_summary
+from experiments.subject import Subject
+from experiments.validation import Validated
+from experiments.written import Written
+from identify import MODELS, IdentificationError, MotionLog
+from identify.log_file import read_columns, read_log, write_log
+
+File = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
+Named = Annotated[str | None, tyro.conf.arg(metavar="NAME|FILE")]
+
+
+@app.command(name="identify")
+def identify(  # noqa: PLR0913, PLR0917  # the options of a command
+    log: tyro.conf.Positional[Path],
+    robot: Named = None,
+    torque: Held = None,
+    torque_delay: Delay = None,
+    chain: str = "idbench",
+    model: str = "all",
+    estimator: str = "WLS",
+    validate: File = None,
+    write_mjcf: File = None,
+    out: File = None,
+    label: str = "",
+    parameters: Asked = Parameters(),  # noqa: B008  # frozen
+    watching: Watched = Watching(),  # noqa: B008  # frozen
+) -> None:
+    """Identify a log: CSV or Parquet with the columns t, q1, q2, ..., tau1, tau2, ... in SI units.
+
+    Args:
+        log: The file; its times uniform to 1 %. Or the folder of a run, whose recording gets a layer of this identification.
+        robot: Name of a robot that ships, or a file that describes it (MJCF or URDF); scara, or that of the run, by default.
+        torque: What a torque sample means: held from its sample on for a period (a controller's command), the torque at an
+            instant (a measurement), or the mean over a period. Asked for unless the file says it.
+        torque_delay: From a sample to the instant it speaks for, in seconds, or `estimate` to find it from the log.
+        chain: Signal processing.
+        model: all, explicit, implicit or power.
+        estimator: OLS, WLS, ...
+        validate: A second log, on which the result is judged; without it the last quarter of the first, by a fit of the rest.
+        write_mjcf: File to write: the robot's own with the inertias, armatures and frictions that were found, made physically
+            consistent (extra `consistent`); those of the first model.
+        out: Folder for summary.json, recording.rrd and log.parquet.
+        label: What to call this identification in a recording; by default chain and estimator. One of that name is replaced.
+        parameters: Which parameters are asked for.
+        watching: How it is watched.
+    """
+    with importing():
+        from experiments.tables import print_identified, print_validated
+
+    page, models, said = new_page(), tuple(MODELS) if model == "all" else (model,), told_by(log)
+    _require_label(label)
+    subject = parameters.of(robot or said.get("robot"))
+    named = Identified((), subject, models=models, chain=chain, estimator=estimator, name=label)  # complains of names first
+    known, about_delay = read(file_of(log), torque, torque_delay, named)
+    found = replace(named, logs=(known,), truth=_truth(said, named))
+    doubts, validated = doubts_of_log(known, subject.robot), _validated(found, validate, known)
+    with watching.audience() as audience, shown(page):
+        with _explained(subject, doubts):
+            print_identified(page, found, str(log))
+            print_validated(page, validated)
+        _say(page, [*doubts, *doubts_of_result(found)])
+        if about_delay:
+            page.print(about_delay)
+        if write_mjcf is not None:
+            _write_mjcf(page, found, write_mjcf)
+        if out is not None:
+            _write_results(page, out, log.name, validated, watching, audience)
+        elif log.is_dir() and watching.rerun:
+            from experiments.recording.identified import add_layer
+
+            with results_folder(log) as folder:
+                lost = write_recording(folder, add_layer(log, found, audience))
+            tell_of(lost, log)
+            page.print(f"added to the recording in {log}{watching.hint(log)}", soft_wrap=True)
+        elif audience:
+            from experiments.recording.identified import record_log
+
+            for _, stream in record_log(found, audience):
+                stream.close()
+
+
+def _require_label(label: str) -> None:
+    if label and (not re.fullmatch(r"[A-Za-z0-9][\w.-]*", label) or label == "inner"):
+        raise ExperimentError(f"--label {label!r} must be of letters, digits, dots, hyphens and underscores, and not 'inner'")
+
+
+def _truth(said: dict[str, Any], named: Identified) -> dict[str, float] | None:
+    """Return the truth that the summary of a run states, if it is of the same parameters."""
+    truth: dict[str, float] | None = said.get("truth")
+    return truth if truth and tuple(truth) == named.basis.parameters else None
+
+
+def _validated(found: Identified, second: Path | None, first: MotionLog) -> Validated:
+    """Return the identification, to be judged on a second log, its torque read as that of the first unless it says more."""
+    if second is None:
+        return Validated(found)
+    path = file_of(second)
+    return Validated(found, read_log(path, read_columns(path).torque or first.torque), str(second))
+
+
+@contextmanager
+def _explained(subject: Subject, doubts: Sequence[str]) -> Iterator[None]:
+    """Add to what goes wrong what is suspicious about the log, and which moves would help."""
+    try:
+        yield
+    except IdentificationError as error:
+        told = [str(error), *helpful_moves(error, subject), *(f"doubtful: {doubt}" for doubt in doubts)]
+        raise ExperimentError("; ".join(told)) from error
+
+
+def _say(page: Console, doubts: Sequence[str]) -> None:
+    for doubt in doubts:
+        page.print(Text(f"doubtful: {doubt}"), soft_wrap=True)
+
+
+def _write_mjcf(page: Console, found: Identified, path: Path) -> None:
+    written = Written(found, next(iter(found.estimates)))
+    written.write(path)
+    page.print(Text(f"written to {path}: the robot with the parameters of the {written.model} model"), soft_wrap=True)
+    _say(page, written.doubts)
+
+
+def _write_results(
+    page: Console, out: Path, name: str, validated: Validated, watching: Watching, audience: Audience | None
+) -> None:
+    lost, found = "", validated.found
+    with results_folder(out) as folder:
+        write_log(found.logs[0], folder / "log.parquet")
+        summary = {"experiment": "identify", "log": name, **found.summary(), "validation": validated.summary()}
+        write_summary(folder / "summary.json", summary)
+        if watching.rerun:
+            from experiments.recording.identified import record_log
+
+            lost = write_recording(folder, record_log(found, audience))
+    tell_of(lost, out)
+    page.print(f"written to {out}{watching.hint(out)}", soft_wrap=True)

@@ -1,0 +1,84 @@
+"""The command that tells what can be identified of a robot."""
+
+from math import isfinite
+from typing import TYPE_CHECKING
+
+import numpy as np
+import tyro
+from rich.console import Console
+from rich.text import Text
+
+from experiments.app import app
+from experiments.chosen import Asked, Parameters
+from experiments.interruption import importing
+from experiments.page import new_page, show
+from experiments.subject import Subject
+
+if TYPE_CHECKING:
+    from experiments.budget import Budget
+
+
+@app.command(name="robot")
+def robot(
+    name: tyro.conf.Positional[str],
+    parameters: Asked = Parameters(),  # noqa: B008  # frozen
+) -> None:
+    """Tell what can be identified of a robot: its joints, its base parameters, what its torques are made of.
+
+    Args:
+        name: Name of a robot that ships, or a file that describes it (MJCF or URDF).
+        parameters: Which parameters are asked for.
+    """
+    with importing():
+        from experiments.budget import Budget
+        from sim.trajectories import RandomMoves
+
+    subject, page = parameters.of(name), new_page()
+    truth = subject.truth(subject.robot)
+    _print_joints(page, subject)
+    _print_parameters(page, subject, truth)
+    moves = RandomMoves(moves=20, durations=(0.8, 1.6), velocity=(2.0,))
+    _print_budget(page, Budget(subject.robot, moves.sample(subject.robot, 100.0)))
+    show(page)
+
+
+def _print_joints(page: Console, subject: Subject) -> None:
+    from experiments.tables import new_table
+
+    tree, found = subject.tree, subject.robot
+    grid = new_table(f"robot {tree.name}: {tree.n} joints", ["kind", "on", "from", "to", "armature", "Fv", "Fs"])
+    model = found.model
+    for j, joint in enumerate(tree.joints):
+        values = model.dof_armature[j], model.dof_damping[j], model.dof_frictionloss[j]
+        carrier = tree.joints[joint.parent].name if joint.parent >= 0 else "ground"
+        ends = (f"{x:.4g}" if isfinite(x) else "" for x in joint.range)
+        grid.add_row(f"{j + 1} {joint.name}", joint.kind, carrier, *ends, *(f"{x:g}" if x else "" for x in values))
+    page.print(grid)
+    if not any(joint.armature for joint in tree.joints):
+        page.print(Text("the file gives no joint an armature; behind gears rotors weigh more than links: --armature all"))
+
+
+def _print_parameters(page: Console, subject: Subject, truth: dict[str, float]) -> None:
+    from experiments.tables import new_table
+
+    basis, base = subject.basis, subject.base
+    grid = new_table(f"{len(basis.parameters)} parameters that a motion can tell", ["of the file", "unit"])
+    if base is not None:
+        grid.add_column("made of")
+    made = dict(zip(base.names, map(base.grouping, range(len(base.names))), strict=True)) if base else {}
+    for parameter, unit in zip(basis.parameters, basis.units, strict=True):
+        grid.add_row(parameter, f"{truth[parameter]:.5g}", unit, *([made[parameter]] if made else []))
+    page.print(grid)
+    if base is not None and base.unseen:
+        page.print(Text(f"no motion shows {', '.join(base.unseen)}"), soft_wrap=True)
+    page.print()
+
+
+def _print_budget(page: Console, budget: "Budget") -> None:
+    from experiments.tables import new_table
+
+    grid = new_table("torque budget: largest [N m] along 20 random moves of 0.8 to 1.6 s, at most 2 rad/s", budget.largest)
+    for j, joint in enumerate(budget.robot.joints):
+        values = [value[j] for value in budget.largest.values()]
+        grid.add_row(joint, *(f"{value:.3g}" if np.isfinite(value) else "" for value in values))
+    page.print(grid)

@@ -1,0 +1,122 @@
+"""Is an identification any good? Torques of a motion it has not seen, and the identified robot, simulated on it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, final
+
+import numpy as np
+
+from experiments.identified import Identified
+from experiments.written import Written
+from identify import Array, IdentificationError, MotionLog, Validation, split, validate
+from sim.errors import BenchError
+from sim.replay import Replay, replay
+
+GOOD, FAIR = 2.0, 10.0
+"""Torque errors [% of the torque] up to which a model is good, or fair: those of published identifications of industrial arms
+lie between 2 and 10 %."""
+
+BANDWIDTH = 5.0
+"""Of the loop that holds the simulated robot to the log [rad/s]: weak, so that errors of the model show."""
+
+LONGEST = 60.0
+"""Time [s] that is simulated, from the beginning of the unseen motion."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Validated:
+    """An identification, judged on a motion that it has not seen.
+
+    Parameters
+    ----------
+    found : Identified
+        The identification, of all of its log.
+    second : MotionLog, optional
+        The unseen motion. Without one, the end of the log is held out: the judged parameters are those of the rest.
+    name : str
+        Of the second log.
+    """
+
+    found: Identified
+    second: MotionLog | None = None
+    name: str = ""
+
+    @cached_property
+    def judged(self) -> Identified:
+        """The identification that is judged."""
+        return self.found if self.second is not None else replace(self.found, logs=(split(self.found.logs[0])[0],))
+
+    @cached_property
+    def unseen(self) -> MotionLog:
+        """The motion on which it is judged."""
+        return split(self.found.logs[0])[1] if self.second is None else self.second
+
+    @property
+    def title(self) -> str:
+        """What it is judged on."""
+        return f"unseen motion {self.name}" if self.name else "the last quarter of the log, by a fit of the rest"
+
+    @cached_property
+    def torques(self) -> dict[str, Validation]:
+        """How well each model foretells the torques."""
+        basis, chain = self.judged.basis, self.judged.processing
+        return {model: validate(self.unseen, basis, e.X, chain) for model, e in self.judged.estimates.items()}
+
+    @cached_property
+    def replays(self) -> dict[str, Replay | str]:
+        """What the robot with each model's parameters does with the torques of the log, or why that is not known."""
+        return {model: self._replay(model) for model in self.judged.estimates}
+
+    def _replay(self, model: str) -> Replay | str:
+        try:
+            robot = Written(self.judged, model).robot
+            log = self.unseen.part(0, round(min(LONGEST, self.unseen.samples / self.unseen.fs) * self.unseen.fs))
+            qd = np.swapaxes(self.judged.processing.signals(log).state.qd, -1, -2)
+            return replay(robot, log, qd, BANDWIDTH)
+        except (BenchError, IdentificationError) as error:
+            return str(error)
+
+    def position_error(self, model: str) -> Array | None:
+        """Return the rms of logged - simulated position [rad], shape (joint,)."""
+        found = self.replays[model]
+        return None if isinstance(found, str) else np.sqrt(np.mean((self.unseen.q[: len(found.q)] - found.q) ** 2, axis=0))
+
+    def verdict(self, model: str) -> tuple[str, list[str]]:
+        """Return a word, and the reasons for it."""
+        told = self.torques[model]
+        worst = int(np.argmax(told.percent))
+        word = "good" if told.percent[worst] <= GOOD else "fair" if told.percent[worst] <= FAIR else "poor"
+        return word, list(self._reasons(model, told, worst))
+
+    def _reasons(self, model: str, told: Validation, worst: int) -> Iterator[str]:
+        joints = self.found.subject.robot.joints
+        yield f"the torque of {joints[worst]} is off by {told.percent[worst]:.2g} %, the others by less"
+        coloured = [joint for joint, white in zip(joints, told.white, strict=True) if not white]
+        if coloured and told.percent.max() > GOOD:
+            yield f"what is left of {', '.join(coloured)} is no noise: friction, elasticity or a delay is not modelled"
+        elif coloured:
+            yield f"what is left of {', '.join(coloured)} is no noise, but small"
+        else:
+            yield "what is left is not to be told from noise"
+        if isinstance(self.replays[model], str):
+            yield f"not simulated: {self.replays[model]}"
+
+    def summary(self) -> dict[str, Any]:
+        """Return what a summary.json says of it."""
+        return {"on": self.title, "models": {model: self._of(model) for model in self.torques}}
+
+    def _of(self, model: str) -> dict[str, Any]:
+        told, (word, reasons), off = self.torques[model], self.verdict(model), self.position_error(model)
+        return {
+            "verdict": word,
+            "reasons": reasons,
+            "torque_error_rms": told.rms.tolist(),
+            "torque_error_percent": [float(x) if np.isfinite(x) else None for x in told.percent],
+            "R2": told.R2.tolist(),
+            "standing_error_rms": [float(x) if np.isfinite(x) else None for x in told.standing],
+            "residual_correlation": told.correlation.tolist(),
+            "residual_correlation_bound": told.bound.tolist(),
+            "position_error_rms": None if off is None else off.tolist(),
+        }
