@@ -18,9 +18,6 @@ SLACK = 0.05
 MOST_TURNS = 2.0
 """Turns from zero beyond which a joint without a range is suspected to be logged in degrees."""
 
-TOLD = 5
-"""Parameters that are named; more of them are counted."""
-
 
 def doubts_of_log(log: MotionLog, robot: Robot) -> list[str]:
     """Return what is suspicious about a log of a robot: degrees, positions out of range, power that comes out of the joints."""
@@ -40,9 +37,9 @@ def doubts_of_log(log: MotionLog, robot: Robot) -> list[str]:
 
 
 def _fits_in_degrees(ends: Array, low: float, high: float) -> bool:
-    turns = np.abs(ends).max() > MOST_TURNS * 2 * np.pi
+    """Return whether positions span more than a joint can, and in degrees would not."""
     inside = np.deg2rad(ends[0]) >= low - SLACK and np.deg2rad(ends[1]) <= high + SLACK
-    return bool(inside and (turns or ends[0] < low or ends[1] > high))
+    return bool(inside and ends[1] - ends[0] > min(high - low, MOST_TURNS * 2 * np.pi))
 
 
 def doubts_of_result(found: Identified) -> list[str]:
@@ -105,10 +102,19 @@ def helpful_moves(error: IdentificationError, subject: Subject) -> list[str]:
 
 
 def _moves(subject: Subject, names: Sequence[str]) -> str:
-    """Return parameters with the joints that must move to show them."""
+    """Return parameters by the joints that show them when they move."""
     if subject.base is None:
         return ", ".join(names)
-    joints = showing_moves(subject.tree, subject.base, names[:TOLD])
-    each = [f"{name} (shown by {' with '.join(subject.robot.joints[j] for j in found)})" for name, found in joints.items()]
-    more = f" and {len(names) - TOLD} more" if len(names) > TOLD else ""
-    return ", ".join(each) + more
+    moves: dict[tuple[int, ...], list[str]] = {}
+    for name, joints in showing_moves(subject.tree, subject.base, names).items():
+        moves.setdefault(joints, []).append(name)
+    each = [f"{', '.join(shown)} (move {_joints(subject, joints)})" for joints, shown in sorted(moves.items(), key=_size)]
+    return "; ".join(each)
+
+
+def _size(move: tuple[tuple[int, ...], list[str]]) -> int:
+    return len(move[0])
+
+
+def _joints(subject: Subject, joints: Sequence[int]) -> str:
+    return "all joints" if len(joints) == subject.robot.n > 1 else " with ".join(subject.robot.joints[j] for j in joints)

@@ -20,6 +20,7 @@ from identify import (
     Estimate,
     ExplicitModel,
     MotionLog,
+    System,
     identify_each,
 )
 
@@ -92,7 +93,7 @@ class Identified:
     def explained(self) -> dict[str, Array]:
         """How much of each joint's torque every estimate explains, as a share of its variance, shape (joint,)."""
         system = self.processing.build(self._fit, self.basis, ExplicitModel())
-        return {name: _explained(system.Y, system.W @ e.X, system.group) for name, e in self.estimates.items()}
+        return {name: _explained(system, e.X) for name, e in self.estimates.items()}
 
     @property
     def _fit(self) -> MotionLog | Sequence[MotionLog]:
@@ -116,9 +117,12 @@ class Identified:
         }
 
 
-def _explained(measured: Array, predicted: Array, group: np.typing.NDArray[np.intp]) -> Array:
+def _explained(system: System, X: Array) -> Array:
+    """Return the share of each joint's torque that W X explains: of its variance, of its squares where rows are compressed."""
     shares = []
-    for joint in np.unique(group):
-        y, rest = measured[group == joint], (measured - predicted)[group == joint]
-        shares.append(1 - np.sum(rest**2) / max(np.sum((y - y.mean()) ** 2), 1e-300))
+    for joint in np.unique(system.group):
+        rows = system.group == joint
+        y, rest = system.Y[rows], system.Y[rows] - system.W[rows] @ X
+        middle = y.mean() if system.stands_for is None else 0.0
+        shares.append(1 - np.sum(rest**2) / max(np.sum((y - middle) ** 2), 1e-300))
     return np.array(shares)

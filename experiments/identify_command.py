@@ -26,6 +26,7 @@ from experiments.validation import Validated
 from experiments.written import Written
 from identify import MODELS, IdentificationError, MotionLog
 from identify.log_file import read_columns, read_log, write_log
+from identify.long import is_long
 
 File = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
 Named = Annotated[str | None, tyro.conf.arg(metavar="NAME|FILE")]
@@ -69,11 +70,12 @@ def identify(  # noqa: PLR0913, PLR0917  # the options of a command
     with importing():
         from experiments.tables import print_identified, print_validated
 
-    page, models, said = new_page(), tuple(MODELS) if model == "all" else (model,), told_by(log)
+    page, models = new_page(), tuple(MODELS) if model == "all" else (model,)
+    path, said = file_of(log), told_by(log)
     _require_label(label)
     subject = parameters.of(robot or said.get("robot"))
     named = Identified((), subject, models=models, chain=chain, estimator=estimator, name=label)  # complains of names first
-    known, about_delay = read(file_of(log), torque, torque_delay, named)
+    known, about_delay = read(path, torque, torque_delay, named)
     found = replace(named, logs=(known,), truth=_truth(said, named))
     doubts, validated = doubts_of_log(known, subject.robot), _validated(found, validate, known)
     with watching.audience() as audience, shown(page):
@@ -87,14 +89,14 @@ def identify(  # noqa: PLR0913, PLR0917  # the options of a command
             _write_mjcf(page, found, write_mjcf)
         if out is not None:
             _write_results(page, out, log.name, validated, watching, audience)
-        elif log.is_dir() and watching.rerun:
+        elif log.is_dir() and watching.rerun and not is_long(known):
             from experiments.recording.identified import add_layer
 
             with results_folder(log) as folder:
                 lost = write_recording(folder, add_layer(log, found, audience))
             tell_of(lost, log)
             page.print(f"added to the recording in {log}{watching.hint(log)}", soft_wrap=True)
-        elif audience:
+        elif audience and not is_long(known):
             from experiments.recording.identified import record_log
 
             for _, stream in record_log(found, audience):
@@ -150,7 +152,9 @@ def _write_results(
         write_log(found.logs[0], folder / "log.parquet")
         summary = {"experiment": "identify", "log": name, **found.summary(), "validation": validated.summary()}
         write_summary(folder / "summary.json", summary)
-        if watching.rerun:
+        if is_long(found.logs[0]):
+            page.print("not recorded: the rows of so long a log are not kept; identify a part of it to look inside")
+        elif watching.rerun:
             from experiments.recording.identified import record_log
 
             lost = write_recording(folder, record_log(found, audience))

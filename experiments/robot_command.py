@@ -43,42 +43,42 @@ def robot(
 
 
 def _print_joints(page: Console, subject: Subject) -> None:
-    from experiments.tables import new_table
+    from experiments.tables import new_table, print_titled
 
     tree, found = subject.tree, subject.robot
-    grid = new_table(f"robot {tree.name}: {tree.n} joints", ["kind", "on", "from", "to", "armature", "Fv", "Fs"])
+    grid = new_table("", ["kind", "on", "from", "to", "armature", "Fv", "Fs"])
     model = found.model
     for j, joint in enumerate(tree.joints):
         values = model.dof_armature[j], model.dof_damping[j], model.dof_frictionloss[j]
         carrier = tree.joints[joint.parent].name if joint.parent >= 0 else "ground"
         ends = (f"{x:.4g}" if isfinite(x) else "" for x in joint.range)
         grid.add_row(f"{j + 1} {joint.name}", joint.kind, carrier, *ends, *(f"{x:g}" if x else "" for x in values))
-    page.print(grid)
+    print_titled(page, f"robot {tree.name}: {tree.n} joints", grid)
     if not any(joint.armature for joint in tree.joints):
         page.print(Text("the file gives no joint an armature; behind gears rotors weigh more than links: --armature all"))
 
 
 def _print_parameters(page: Console, subject: Subject, truth: dict[str, float]) -> None:
-    from experiments.tables import new_table
+    from experiments.tables import new_table, print_titled
 
     basis, base = subject.basis, subject.base
-    grid = new_table(f"{len(basis.parameters)} parameters that a motion can tell", ["of the file", "unit"])
+    grid = new_table("", ["of the file", "unit"])
     if base is not None:
         grid.add_column("made of")
     made = dict(zip(base.names, map(base.grouping, range(len(base.names))), strict=True)) if base else {}
     for parameter, unit in zip(basis.parameters, basis.units, strict=True):
         grid.add_row(parameter, f"{truth[parameter]:.5g}", unit, *([made[parameter]] if made else []))
-    page.print(grid)
+    print_titled(page, f"{len(basis.parameters)} parameters that a motion can tell", grid)
     if base is not None and base.unseen:
         page.print(Text(f"no motion shows {', '.join(base.unseen)}"), soft_wrap=True)
     page.print()
 
 
 def _print_budget(page: Console, budget: "Budget") -> None:
-    from experiments.tables import new_table
+    from experiments.tables import new_table, print_titled
 
-    grid = new_table("torque budget: largest [N m] along 20 random moves of 0.8 to 1.6 s, at most 2 rad/s", budget.largest)
+    grid = new_table("", budget.largest)
     for j, joint in enumerate(budget.robot.joints):
         values = [value[j] for value in budget.largest.values()]
         grid.add_row(joint, *(f"{value:.3g}" if np.isfinite(value) else "" for value in values))
-    page.print(grid)
+    print_titled(page, "torque budget: largest [N m] along 20 random moves of 0.8 to 1.6 s, at most 2 rad/s", grid)

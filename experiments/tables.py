@@ -28,6 +28,12 @@ def new_table(title: str, columns: Iterable[str]) -> Table:
     return grid
 
 
+def print_titled(console: Console, title: str, grid: Table) -> None:
+    """Print a table below a title that may be wider than it."""
+    console.print(Text(title, style="bold"), soft_wrap=True)
+    console.print(grid)
+
+
 def print_identified(console: Console, found: Identified, title: str) -> None:
     """Print truth, if it is known, and of each model estimate, error or sigma, %sigma, Cond(W) and what is explained.
 
@@ -36,7 +42,7 @@ def print_identified(console: Console, found: Identified, title: str) -> None:
     known = found.truth is not None
     what = ("X", "%e" if known else "sigma", "%sigma")
     heads = [f"{model}\n{w}" for model in found.estimates for w in what]
-    grid = new_table(f"{title}: chain {found.chain}, {found.estimator}", [*(["true\nX"] if known else []), *heads])
+    grid = new_table("", [*(["true\nX"] if known else []), *heads])
     for i, name in enumerate(found.basis.parameters):
         true = [f"{list(found.truth.values())[i]:g}"] if found.truth is not None else []
         grid.add_row(name, *true, *(cell for e in found.estimates.values() for cell in _cells(e, found, i)))
@@ -47,7 +53,7 @@ def print_identified(console: Console, found: Identified, title: str) -> None:
     for j in range(found.basis.n):
         shares = [f"{100 * share[j]:.3f} %" for share in found.explained.values()]
         grid.add_row(f"tau{j + 1} explained", *lead, *(c for share in shares for c in (share, "", "")))
-    console.print(grid)
+    print_titled(console, f"{title}: chain {found.chain}, {found.estimator}", grid)
     channel = found.logs[0].torque
     read = f"{channel.meaning}, delay {1e3 * channel.delay:.4g} ms"
     logged = isinstance(found.processing.alignment, AsLogged)
@@ -80,10 +86,12 @@ def print_validated(console: Console, validated: Validated) -> None:
         console.print(Text(f"not validated on {validated.title}: {error}\n"), soft_wrap=True)
         return
     heads = [f"{model}\n{what}" for model in torques for what in ("rms", "%", "R2", "q rms")]
-    grid = new_table(f"{validated.title}: torque error while moving [N m], of a simulated robot's position [rad]", heads)
+    grid = new_table("", heads)
     for j, joint in enumerate(validated.found.subject.robot.joints):
         grid.add_row(joint, *(cell for model in torques for cell in _validation_cells(validated, model, j)))
-    console.print(grid)
+    print_titled(
+        console, f"{validated.title}: torque error while moving [N m], position error of the simulated robot [rad]", grid
+    )
     still = next(iter(torques.values())).standing
     apart = [f"{joint} {rms:.2g}" for joint, rms in zip(validated.found.subject.robot.joints, still, strict=True)]
     console.print(Text(f"standing and turning, where friction is not determined: {', '.join(apart)} N m"), soft_wrap=True)

@@ -7,10 +7,9 @@ from typing import final
 
 import numpy as np
 
-from experiments.errors import ExperimentError
 from experiments.identified import Identified
 from experiments.results import write_whole
-from identify import Consistent, consistent_parameters
+from identify import Array, BaseParameters, Consistent, consistent_parameters, transfer, tree_basis
 from sim.rewrite import compiled, rewritten
 from sim.robot import Robot
 from sim.tree import standard_parameters
@@ -37,24 +36,25 @@ class Written:
 
     @cached_property
     def consistent(self) -> Consistent:
-        """Its standard parameters.
-
-        Raises
-        ------
-        ExperimentError
-            If the robot was identified in closed form.
-        """
+        """Its standard parameters."""
         subject = self.found.subject
-        if subject.base is None:
-            raise ExperimentError(
-                f"robot {subject.name!r} has the parameters of the paper's closed form; for those of its links give the file "
-                f"itself: --robot {Robot.path(subject.name)}"
-            )
         given = standard_parameters(subject.robot)
-        values = np.array([given.get(name, 0.0) for name in subject.base.standard.parameters])
-        estimate, kept = self.found.estimates[self.model], subject.base.only(subject.basis.parameters)
+        grouping, T = self._grouping
+        values = np.array([given.get(name, 0.0) for name in grouping.standard.parameters])
+        estimate = self.found.estimates[self.model]
         C = estimate.corrected_covariance
-        return consistent_parameters(kept, estimate.X, C if np.isfinite(C).all() else estimate.covariance, values)
+        C = C if np.isfinite(C).all() else estimate.covariance
+        return consistent_parameters(grouping, T @ estimate.X, T @ C @ T.T, values)
+
+    @property
+    def _grouping(self) -> tuple[BaseParameters, Array]:
+        """The grouping of the standard parameters, and what turns those that were identified into its base parameters."""
+        subject = self.found.subject
+        if subject.base is not None:
+            kept = subject.base.only(subject.basis.parameters)
+            return kept, np.eye(len(kept.names))
+        grouping = BaseParameters.of(subject.tree, tree_basis(subject.tree))
+        return grouping, transfer(subject.tree, subject.basis, grouping.basis)
 
     @cached_property
     def text(self) -> str:
@@ -77,7 +77,7 @@ class Written:
     @property
     def doubts(self) -> list[str]:
         """What is wrong about it."""
-        found, names = self.consistent, self.found.basis.parameters
+        found, names = self.consistent, self._grouping[0].names
         told = []
         if not found.agrees:
             far = [f"{n} by {abs(d):.1f}" for n, d in zip(names, found.departure, strict=True) if abs(d) > SIGMAS]

@@ -9,6 +9,7 @@ on Decision and Control, 1996).
 from identify.arrays import Array as Array
 from identify.arrays import Columns as Columns
 from identify.base_parameters import BaseParameters as BaseParameters
+from identify.base_parameters import transfer as transfer
 from identify.basis import BLOCKS as BLOCKS
 from identify.basis import AbstractBlock as AbstractBlock
 from identify.basis import AbstractConservativeBlock as AbstractConservativeBlock

@@ -16,7 +16,7 @@ from identify.kinematics import KinematicTree
 from identify.state import State
 
 STATES_A_PARAMETER = 4
-"""Random states for each standard parameter."""
+"""Random states for each of a joint's fourteen standard parameters, with its rotor and three laws of friction."""
 
 SEED = 0
 """Of the random states: any others give the same grouping, up to rounding."""
@@ -141,9 +141,24 @@ class BaseParameters:
         return np.asarray(standard) + scale * np.linalg.lstsq(K, base - self.base(standard), rcond=None)[0]
 
 
+def transfer(tree: KinematicTree, start: Basis, end: Basis) -> Array:
+    """Return T so that T X are the parameters of the basis `end` that make the torques of X in the basis `start`.
+
+    Raises
+    ------
+    SettingError
+        If the columns of one do not span those of the other.
+    """
+    A, B = _explicit_columns(tree, end), _explicit_columns(tree, start)
+    T: Array = np.asarray(np.linalg.lstsq(A, B, rcond=None)[0], dtype=np.float64)
+    if np.abs(A @ T - B).max() > DEPENDENT * np.abs(B).max():
+        raise SettingError(f"the parameters {', '.join(start.parameters)} do not describe robot {tree.name!r} as its links do")
+    return T
+
+
 def _explicit_columns(tree: KinematicTree, basis: Basis) -> Array:
     """Return the columns of the explicit model at random states, shape (states x joint, p)."""
-    q, qd, qdd = random_states(tree, STATES_A_PARAMETER * len(basis.parameters))
+    q, qd, qdd = random_states(tree, STATES_A_PARAMETER * 14 * tree.n)
     W = np.zeros((tree.n, len(basis.parameters), q.shape[-1]))
     for (row, name), signal in basis.explicit(State(q, qd, lambda _: qdd)).items():
         W[row, basis.parameters.index(name)] = signal

@@ -13,6 +13,7 @@ from identify.basis import Basis
 from identify.differentiators import AbstractDifferentiator, CentralDifference
 from identify.errors import LogError, SettingError
 from identify.grid import Grid
+from identify.long import build_long, is_long
 from identify.masks import AbstractMask, NoMask, ReversalMask
 from identify.models import AbstractModel
 from identify.motion_log import MotionLog, TorqueChannel
@@ -82,12 +83,14 @@ class Chain:
         if log.n != basis.n:
             hint = "; its axes are (time, joint), is it transposed?" if log.samples == basis.n else ""
             raise LogError(f"the log has {log.n} joints, the basis {basis.n}{hint}")
+        if is_long(log):
+            return build_long(self, log, basis, models)
         grid, signals = self.rows(log), self.signals(log)
         return [self.operator.system(model.balance(basis, signals), grid) for model in models]
 
     def rows(self, log: MotionLog) -> Grid:
         """Return where the rows of `log` lie; raise LogError if it leaves none."""
-        return self.operator.grid(log.samples, log.fs, self._margin(log))
+        return self.operator.grid(log.samples, log.fs, self.margin(log))
 
     def signals(self, log: MotionLog) -> Signals:
         """Return what the models see of `log`: prefiltered, differentiated, aligned, weighted."""
@@ -110,7 +113,8 @@ class Chain:
         stages = self.prefilter.halo(fs), derivatives, self.mask.halo(fs), torque.halo(), self.operator.halo(fs)
         return sum(stages)
 
-    def _margin(self, log: MotionLog) -> float:
+    def margin(self, log: MotionLog) -> float:
+        """Return the time at either end of `log` that makes no rows [s]; raise SettingError if `trim` is too short."""
         halo = self.halo(log.fs, log.torque)
         if self.trim is None:
             return halo

@@ -69,9 +69,9 @@ def consistent_parameters(grouping: BaseParameters, X: Array, covariance: Array,
 
     is positive definite (P. M. Wensing, S. Kim and J.-J. Slotine, "Linear matrix inequalities for physically consistent
     inertial parameter identification", IEEE RA-L 3 (2018) 60-67), and armatures and frictions are not negative. d, the squared
-    distance to the given model, is tr((S^-1 dS)^2) of each link's pseudo-inertia S, which depends on no frame (T. Lee, P. M. Wensing and
-    F. C. Park, "Geometric robot dynamic identification: a convex programming approach", IEEE T-RO 36 (2020) 348-365). So base
-    values are the estimate's where bodies can have them, and what no motion shows stays as it was given.
+    distance to the given model, is tr((S^-1 dS)^2) of each link's pseudo-inertia S, which depends on no frame (T. Lee,
+    P. M. Wensing and F. C. Park, "Geometric robot dynamic identification: a convex programming approach", IEEE T-RO 36 (2020)
+    348-365). So base values are the estimate's where bodies can have them, and what no motion shows stays as it was given.
 
     Parameters
     ----------
@@ -177,12 +177,14 @@ def _spread(S: Array) -> Array:
 def _root(covariance: Array) -> Array:
     """Return the triangular L with L L' = C."""
     try:
-        sigma = np.sqrt(np.diagonal(covariance))
-        return sigma[:, None] * np.linalg.cholesky(covariance / np.outer(sigma, sigma))
+        variance = np.diagonal(covariance)
+        sigma = np.sqrt(np.where(variance > 0, variance, 1.0))
+        root: Array = sigma[:, None] * np.linalg.cholesky(covariance / np.outer(sigma, sigma))
     except np.linalg.LinAlgError as error:
         raise IdentificationError(
             "the covariance of the estimate is not positive definite: it does not say what is known"
         ) from error
+    return root
 
 
 def _quiet(clarabel: ModuleType) -> Any:
@@ -196,6 +198,6 @@ def _solver() -> ModuleType:
         import clarabel
     except ImportError as error:
         raise IdentificationError(
-            "physically consistent parameters need the solver Clarabel: install the extra `consistent` (uv sync --extra consistent)"
+            "physically consistent parameters need the solver Clarabel: uv run --extra consistent ..., or pip install clarabel"
         ) from error
     return clarabel

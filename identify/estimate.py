@@ -25,12 +25,15 @@ class Estimate:
         Covariance of the error of X, as the estimator has it: as if rows were independent.
     solved : System, optional
         The rows, as they were weighted, whose least-squares solution X is; without them there is no corrected sigma.
+    correction : Array, shape (..., p), optional
+        Corrected over uncorrected sigma, where it is known from a part of the rows.
     """
 
     system: System
     X: Array
     covariance: Array
     solved: System | None
+    correction: Array | None = None
 
     @classmethod
     def judge(
@@ -67,6 +70,8 @@ class Estimate:
         (`Carrier`). So X is such a sum too, and its covariance is sum_j sigma_j^2 H_j H_j' with H_j the weights of the torque
         of joint j: rows may overlap, be weighted or multiplied by velocities, and joints may differ.
         """
+        if self.correction is not None:
+            return self.covariance * self.correction[..., None] * self.correction[..., None, :]
         solved, p = self.solved, len(self.parameters)
         total = np.zeros(self.covariance.shape)
         if solved is None or solved.levels is None or not solved.carriers:

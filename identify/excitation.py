@@ -1,24 +1,33 @@
-"""Which move shows a parameter."""
+"""Which moves show a parameter."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import cache
+from itertools import combinations
 
 import numpy as np
 
 from identify.arrays import Array
-from identify.base_parameters import STATES_A_PARAMETER, BaseParameters, random_states
+from identify.base_parameters import BaseParameters, random_states
 from identify.basis import Basis
 from identify.kinematics import KinematicTree
 from identify.state import State
+from identify.system import UNSEEN
 
-ENOUGH = 0.5
-"""Joints are named until they show this share of what all of them together show."""
+ENOUGH = 0.2
+"""Share of what a parameter adds of its own to the torques while all joints move, from which some of them will do."""
+
+MOST_JOINTS = 3
+"""Joints of a move; what more of them must show together is said to need all."""
+
+STATES = 200
+"""Random states of a move."""
 
 
 def showing_moves(tree: KinematicTree, grouping: BaseParameters, names: Sequence[str]) -> dict[str, tuple[int, ...]]:
-    """Return for each base parameter the joints that must move to show it, the one that shows most first, from 0.
+    """Return for each base parameter the fewest joints that show it when they move, from 0; all where it takes many.
 
-    A joint alone moves at random, while the others stand in random poses; what they show together counts as a whole. A
-    parameter that shows at rest, by its weight, needs poses of the joints that turn it.
+    Some joints move at random, the others stand where they are. A parameter shows by what its column has that no combination of
+    the others has.
 
     Parameters
     ----------
@@ -29,34 +38,40 @@ def showing_moves(tree: KinematicTree, grouping: BaseParameters, names: Sequence
     names : sequence of str
         Some of them.
     """
-    basis = grouping.basis.renamed({name: name for name in names})
-    states = random_states(tree, STATES_A_PARAMETER * len(grouping.names))
-    alone = np.array([_shown(basis, _only(states, [j])) for j in range(tree.n)])
-    whole = _shown(basis, states)
+    basis, states = grouping.basis, random_states(tree, STATES)
+
+    @cache
+    def shown(joints: tuple[int, ...]) -> Array:
+        return _shown(basis, _only(states, joints))
+
+    whole = shown(tuple(range(tree.n)))
     found = {}
     for name in names:
         i = basis.parameters.index(name)
-        order = np.argsort(-alone[:, i], kind="stable")
-        joints: list[int] = []
-        for j in order:
-            joints.append(int(j))
-            if _shown(basis, _only(states, joints))[i] >= ENOUGH * whole[i]:
-                break
-        found[name] = tuple(joints)
+        found[name] = next((joints for joints in _moves(tree.n) if shown(joints)[i] >= ENOUGH * whole[i]), tuple(range(tree.n)))
     return found
 
 
+def _moves(n: int) -> Iterator[tuple[int, ...]]:
+    for count in range(1, min(MOST_JOINTS, n) + 1):
+        yield from combinations(range(n), count)
+
+
 def _only(states: Array, joints: Sequence[int]) -> Array:
-    """Return the states with some joints moving and the others standing where they are."""
-    moving = np.zeros(states.shape[1], dtype=bool)
+    """Return the states with some joints moving and the others standing where they are first."""
+    moving = np.zeros((states.shape[1], 1), dtype=bool)
     moving[list(joints)] = True
-    return np.stack([states[0], states[1] * moving[:, None], states[2] * moving[:, None]])
+    return np.stack([np.where(moving, states[0], states[0, :, :1]), states[1] * moving, states[2] * moving])
 
 
 def _shown(basis: Basis, states: Array) -> Array:
-    """Return how much the columns of each parameter vary, shape (b,)."""
+    """Return the length of each column off all others, shape (b,)."""
     q, qd, qdd = states
-    squares = np.zeros(len(basis.parameters))
-    for (_, name), column in basis.explicit(State(q, qd, lambda _: qdd)).items():
-        squares[basis.parameters.index(name)] += np.var(column)
-    return np.sqrt(squares)
+    W = np.zeros((basis.n, len(basis.parameters), q.shape[-1]))
+    for (row, name), column in basis.explicit(State(q, qd, lambda _: qdd)).items():
+        W[row, basis.parameters.index(name)] = column
+    _, values, directions = np.linalg.svd(np.moveaxis(W, 1, -1).reshape(-1, len(basis.parameters)), full_matrices=False)
+    seen = values > UNSEEN * values[0]
+    hidden = np.sum(directions[~seen] ** 2, axis=0) > UNSEEN
+    spread = np.sqrt(np.sum((directions[seen] / values[seen][:, None]) ** 2, axis=0))
+    return np.divide(1.0, spread, out=np.zeros(len(spread)), where=~hidden & (spread > 0))

@@ -10,9 +10,13 @@ from identify.chain import Chain, idbench_chain
 from identify.errors import IdentificationError
 from identify.estimate import Estimate
 from identify.estimators import AbstractEstimator, Problem, WeightedLeastSquares
+from identify.long import build_long, is_long, sampled
 from identify.models import AbstractModel, ExplicitModel
 from identify.motion_log import MotionLog
 from identify.noise import torque_noise
+
+SAMPLED = 8
+"""Pieces of a long log from which the correction of sigma is taken."""
 
 
 def identify(
@@ -75,6 +79,8 @@ def identify_each(
     _require(estimator, AbstractEstimator, 'an estimator, such as ESTIMATORS.create("OLS")')
     for model in models.values():
         _require(model, AbstractModel, 'a model, such as MODELS.create("power")')
+    if is_long(log):
+        return _identify_long(log, basis, models, chain, estimator, throw=throw)  # type: ignore[arg-type]  # a single log
     *systems, explicit = chain.build_each(log, basis, [*models.values(), ExplicitModel()])
     levels = torque_noise(explicit)
     estimates = {}
@@ -84,6 +90,27 @@ def identify_each(
             system.check()
         rebuild = partial(chain.build, basis=basis, model=model)
         estimates[name] = estimator.fit(Problem(system, rebuild=rebuild, simulate=simulate))
+    return estimates
+
+
+def _identify_long(
+    log: MotionLog,
+    basis: Basis,
+    models: Mapping[str, AbstractModel],
+    chain: Chain,
+    estimator: AbstractEstimator,
+    *,
+    throw: bool,
+) -> dict[str, Estimate]:
+    """Return the estimates of a log whose rows are not kept; some of its pieces tell how sigma is to be corrected."""
+    systems = build_long(chain, log, basis, list(models.values()))
+    some = identify_each(sampled(chain, log, SAMPLED), basis, models, chain, estimator, throw=False)
+    estimates = {}
+    for (name, model), system in zip(models.items(), systems, strict=True):
+        if throw and estimator.full_rank:
+            system.check()
+        found = estimator.fit(Problem(system, rebuild=partial(chain.build, basis=basis, model=model)))
+        estimates[name] = replace(found, correction=some[name].corrected_sigma / some[name].sigma)
     return estimates
 
 

@@ -1,10 +1,12 @@
 """How well parameters foretell the torques of a motion that they were not fitted to."""
 
 from dataclasses import dataclass, replace
+from math import sqrt
 from typing import final
 
 import numpy as np
 import numpy.typing as npt
+from scipy import stats
 
 from identify.arrays import Array
 from identify.basis import Basis
@@ -13,10 +15,17 @@ from identify.errors import LogError
 from identify.masks.complement import Complement
 from identify.models import ExplicitModel
 from identify.motion_log import MotionLog
+from identify.operators import AbstractOperator
 from identify.system import System
 
 LAGS = 10
 """Rows over which residuals are compared with themselves."""
+
+FAINT = 0.5
+"""Rows of which the mask leaves less than this share say little, and are not compared."""
+
+WHITE = 0.95
+"""Share of white residuals that are called white."""
 
 HELD_OUT = 0.25
 """Share of a log, at its end, that is held out where there is no second log."""
@@ -40,6 +49,9 @@ class Validation:
     correlation : Array
         Largest correlation of the error with itself, by size, 2 to `LAGS` rows later. (Noise of differentiated positions
         alternates from row to row: what is one row later says nothing of the model.)
+    bound : Array
+        What the correlation of noise that was white before the operator stays below in 95 % of joints; in 90 % where a mask
+        takes part of many rows.
     rows : int array
         How many rows move.
     """
@@ -49,17 +61,13 @@ class Validation:
     R2: Array
     standing: Array
     correlation: Array
+    bound: Array
     rows: npt.NDArray[np.intp]
 
     @property
     def percent(self) -> Array:
         """100 rms / level."""
         return 100 * np.divide(self.rms, self.level, out=np.full(self.rms.shape, np.nan), where=self.level > 0)
-
-    @property
-    def bound(self) -> Array:
-        """What the correlation of white noise stays below in 95 % of joints: the largest of LAGS - 1 normal ones."""
-        return 2.77 / np.sqrt(self.rows)
 
     @property
     def white(self) -> npt.NDArray[np.bool_]:
@@ -87,13 +95,25 @@ def validate(log: MotionLog, basis: Basis, X: Array, chain: Chain) -> Validation
             f"joint {rows.index(0) + 1} never moves in this log, as far as the mask of the chain sees: use a motion in which "
             "all joints do"
         )
-    return Validation(*map(np.array, (rms, level, R2, still, correlation, rows)))
+    bound = _bound(chain.operator, log.fs) / np.sqrt(rows)
+    return Validation(*map(np.array, (rms, level, R2, still, correlation, bound, rows)))
 
 
 def split(log: MotionLog, share: float = HELD_OUT) -> tuple[MotionLog, MotionLog]:
     """Return the beginning of a log, and the `share` at its end that is held out."""
     cut = round((1 - share) * log.samples)
     return log.part(0, cut), log.part(cut, log.samples)
+
+
+def _bound(operator: AbstractOperator, fs: float) -> float:
+    """Return what the correlation of rows that an operator makes of white noise stays below, times the root of their number.
+
+    It is the largest of LAGS - 1 normal ones, whose variance is the sum of squares of the rows' own correlations (Bartlett).
+    """
+    h, step = operator.response(fs), operator.step(fs)
+    own = np.array([h[lag:] @ h[: len(h) - lag] for lag in range(0, len(h), step)]) / (h @ h)
+    largest = stats.norm.ppf((1 + WHITE ** (1 / (LAGS - 1))) / 2)
+    return float(largest * np.sqrt(1 + 2 * np.sum(own[1:] ** 2)))
 
 
 def _residual(system: System, X: Array, joint: int) -> tuple[Array, Array]:
@@ -115,9 +135,18 @@ def _rms(x: Array) -> float:
 
 
 def _correlation(system: System, X: Array, joint: int) -> float:
+    """Return the sum of products of a joint's residuals with later ones that departs most from that of noise, as a correlation.
+
+    Rows that the mask takes part of are smaller: each is divided by what white noise would leave of it.
+    """
     rows = system.group == joint
-    rho = (system.Y[rows] - system.W[rows] @ X) * system.valid[rows]
-    rho = rho - np.sum(rho) / max(np.count_nonzero(system.valid[rows]), 1) * system.valid[rows]
-    squares = max(float(rho @ rho), 1e-300)
-    found = np.array([rho[lag:] @ rho[:-lag] / squares for lag in range(2, min(LAGS, len(rho) - 1) + 1)])
-    return float(found[np.argmax(np.abs(found))]) if len(found) else 0.0
+    spread = np.sqrt(np.concatenate([carrier.variance() for carrier in system.carriers], axis=-1)[rows])
+    valid = system.valid[rows] & (spread > FAINT * spread.max(initial=0.0))
+    rho = np.divide(system.Y[rows] - system.W[rows] @ X, spread, out=np.zeros(len(spread)), where=valid)
+    rho[valid] -= rho[valid].mean()
+    variance = max(float(np.mean(rho[valid] ** 2)), 1e-300)
+    departures = [0.0]
+    for lag in range(2, min(LAGS, len(rho) - 1) + 1):
+        pairs = int(np.count_nonzero(valid[lag:] & valid[:-lag]))
+        departures.append(float(rho[lag:] @ rho[:-lag]) / variance / sqrt(max(pairs, 1)))
+    return max(departures, key=abs) / sqrt(max(int(np.count_nonzero(system.valid[rows])), 1))

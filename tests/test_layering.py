@@ -19,6 +19,7 @@ ALLOWED = {
 
 ALLOWED_IN = {
     "identify/log_file.py": {"pyarrow"},
+    "identify/consistent.py": {"clarabel"},
     "sim/scenario_file.py": {"tomli_w"},
     "experiments/recording/columns.py": {"pyarrow"},
     "experiments/study/study.py": {"pydantic"},

@@ -46,7 +46,7 @@ def _level(system: System, X: Array) -> Array:
     residual, level = system.Y - np.matmul(system.W, X[..., None])[..., 0], np.ones_like(system.Y)
     for group in np.unique(system.group):
         rows = system.group == group
-        count = np.count_nonzero(system.valid & rows, axis=-1, keepdims=True)
+        count = system.count(rows)[..., None]
         # Sums over all rows, not over picked ones: their order in memory would depend on the number of runs.
         squares = np.sum(residual**2 * rows, axis=-1, keepdims=True)
         level[..., rows] = np.sqrt(squares / np.maximum(count, 1))

@@ -22,7 +22,8 @@ SHORT = RandomMoves(moves=4, rest=0.6)
 def shortened(name, tmp_path):
     """Write a scenario that ships to a file, on a motion of five seconds; a payload needs no other robot."""
     path = tmp_path / f"{name}.toml"
-    path.write_text(to_toml(replace(load(name), trajectory=SHORT)))
+    moves = SHORT if load(name).robot == "scara" else replace(SHORT, velocity=(2.0,), durations=(0.8, 1.6), moves=12)
+    path.write_text(to_toml(replace(load(name), trajectory=moves)))
     return path
 
 
@@ -98,7 +99,7 @@ def test_a_file_that_does_not_say_is_asked(csv, complaint):
     ("args", "message"),
     [
         (["--torque-delay", "soon"], "--torque-delay soon must be seconds, such as 0.002, or estimate"),
-        (["--robot", "puma"], "no basis for robot 'puma'; known: scara"),
+        (["--robot", "puma"], "no robot 'puma'; known: panda, puma560, scara"),
         (["--chain", "papre"], "no 'papre' among the chains"),
         (["--model", "powr"], "no 'powr' among the models (did you mean 'power'?)"),
         (["--estimator", "LS"], "no 'LS' among the estimators"),

@@ -1,0 +1,167 @@
+"""Base parameters against published counts, the closed form, and their own definition."""
+
+import numpy as np
+import pytest
+
+from identify import (
+    MODELS,
+    Armature,
+    BaseParameters,
+    Basis,
+    CoulombFriction,
+    Joint,
+    KinematicTree,
+    Offset,
+    SettingError,
+    State,
+    TreeLinks,
+    ViscousFriction,
+    idbench_chain,
+    identify_each,
+    scara,
+    tree_basis,
+)
+from identify.motion_log import MotionLog, TorqueChannel
+from sim.ideal import ideal_log
+from sim.robot import Robot
+from sim.trajectories import RandomMoves
+from sim.tree import kinematic_tree, standard_parameters
+
+
+def inertial(tree):
+    """Return the grouping of the links alone, no rotors, no friction."""
+    return BaseParameters.of(tree, Basis(tree.n, (TreeLinks(tree),)))
+
+
+def columns(basis, q, qd, qdd):
+    W = np.zeros((basis.n, q.shape[-1], len(basis.parameters)))
+    for (row, name), signal in basis.explicit(State(q, qd, lambda _: qdd)).items():
+        W[row, :, basis.parameters.index(name)] = signal
+    return W.reshape(-1, len(basis.parameters))
+
+
+def planar(count, gravity):
+    """A chain of hinges about parallel z axes, a metre apart."""
+    joints = [Joint(f"j{k}", "hinge", k - 1, [float(k > 0), 0, 0], np.eye(3), [0, 0, 1], [0, 0, 0]) for k in range(count)]
+    return KinematicTree("planar", tuple(joints), gravity)
+
+
+@pytest.mark.parametrize(("robot", "hinges", "parallel"), [("puma560", 6, 1), ("panda", 7, 1), ("scara", 2, 2)], ids=str)
+def test_counts_are_those_that_were_published(robot, hinges, parallel):
+    """7 n - 4 b - 2 inertial parameters, for hinges that follow each other parallel or at right angles on a first axis along
+    gravity, b of them always parallel to it: H. Mayeda, K. Yoshida and K. Osuka, "Base parameters of manipulator dynamic
+    models", IEEE Trans. Robotics and Automation 6 (1990) 312-321; theirs for the PUMA 560 is 36, 43 for 7 joints.
+    """
+    assert len(inertial(kinematic_tree(Robot.load(robot))).names) == 7 * hinges - 4 * parallel - 2
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_counts_of_planar_arms_with_and_without_gravity(count):
+    """The same source: 7 n - 4 b where the first axis is not along gravity, here b = n."""
+    assert len(inertial(planar(count, [0, 0, -9.81])).names) == 3 * count - 2
+    assert len(inertial(planar(count, [0, -9.81, 0])).names) == 3 * count
+
+
+def test_counts_of_other_peoples_arms(peer):
+    """UR5: 36 by the formula above; and the rank of the columns at other states, by singular values, of either."""
+    found = inertial(peer.tree)
+    q, qd, qdd = np.random.default_rng(1).uniform(-2, 2, (3, peer.tree.n, 400))
+    rank = np.linalg.matrix_rank(columns(found.standard, q, qd, qdd), tol=1e-6 * q.shape[-1])
+    assert len(found.names) == rank
+    assert peer.tree.n != 6 or rank == 36
+
+
+@pytest.mark.parametrize("robot", ["scara", "puma560", "panda"])
+def test_base_parameters_make_the_same_torques_and_map_both_ways(robot, rng):
+    tree = kinematic_tree(Robot.load(robot))
+    found = BaseParameters.of(tree, tree_basis(tree))
+    states = rng.uniform(-3, 3, (3, tree.n, 50))
+    X = rng.normal(size=len(found.standard.parameters))
+    torques = columns(found.standard, *states) @ X
+    np.testing.assert_allclose(columns(found.basis, *states) @ found.base(X), torques, atol=1e-10 * np.abs(torques).max())
+    wanted, scale = rng.normal(size=len(found.names)), rng.uniform(0.1, 2, len(X))
+    back = found.nearest(wanted, X, scale)
+    np.testing.assert_allclose(found.base(back), wanted, atol=1e-9)
+    # Nearest: the step has no part, in units of scale, that base values do not see.
+    hidden = np.linalg.svd(found.K * scale)[2][len(found.names) :]
+    np.testing.assert_allclose(hidden @ ((back - X) / scale), 0, atol=1e-9)
+
+
+def test_names_show_the_grouping():
+    tree = kinematic_tree(Robot.load("scara"))
+    found = BaseParameters.of(tree, tree_basis(tree))
+    assert found.names == ("ZZR1", "Fv1", "Fs1", "ZZ2", "MX2", "MY2", "Fv2", "Fs2")
+    assert found.grouping(0) == "ZZ1 + Ia1 + 0.25 M2"
+    assert found.grouping(4) == "MX2"
+    assert "M1" in found.unseen
+    assert "ZZ1" not in found.unseen
+
+
+def test_the_offset_of_a_vertical_slide_is_grouped_with_its_weight():
+    """(M + Ia) qdd + M g + off: a mass more and a rotor less is a constant force."""
+    slide = Joint("lift", "slide", -1, [0, 0, 0], np.eye(3), [0, 0, 1], [0, 0, 0])
+    tree = KinematicTree("lift", (slide,), [0, 0, -9.81])
+    found = BaseParameters.of(tree, tree_basis(tree) + Offset())
+    assert found.names == ("MR1", "IaR1", "Fv1", "Fs1")
+    assert found.grouping(0) == f"M1 + {1 / 9.81:.6g} off1"
+    assert found.grouping(1) == f"Ia1 - {1 / 9.81:.6g} off1"
+
+
+def test_the_scaras_tree_spans_its_closed_form_and_gives_the_same_estimates(log, rng):
+    tree = kinematic_tree(Robot.load("scara"))
+    standard = Basis(2, (TreeLinks(tree), Armature((0,)), ViscousFriction(), CoulombFriction()))
+    found = BaseParameters.of(tree, standard)
+    states = rng.uniform(-3, 3, (3, 2, 200))
+    mine, closed = columns(found.basis, *states), columns(scara(), *states)
+    T = np.linalg.lstsq(mine, closed, rcond=None)[0]
+    np.testing.assert_allclose(mine @ T, closed, atol=1e-12)
+    assert np.linalg.cond(T) < 10
+    models = {name: MODELS.create(name) for name in MODELS.builtin}
+    by_tree, by_form = identify_each(log, found.basis, models), identify_each(log, scara(), models)
+    for name, estimate in by_form.items():
+        np.testing.assert_allclose(T @ estimate.X, by_tree[name].X, rtol=1e-9)
+        np.testing.assert_allclose(by_tree[name].residual_rms, estimate.residual_rms, rtol=1e-4, atol=1e-12)
+
+
+@pytest.mark.parametrize("robot", ["puma560", "panda"])
+def test_ideal_data_give_every_base_parameter_in_all_models(robot):
+    """Torques by MuJoCo, sensors exact: what is left is the error of differences and of what lies between samples."""
+    arm = Robot.load(robot)
+    tree = kinematic_tree(arm)
+    found = BaseParameters.of(tree, tree_basis(tree))
+    moves = RandomMoves(moves=25, durations=(0.9, 1.5), velocity=(2.0,), rest=1.0)
+    log = ideal_log(arm, moves.sample(arm, 200.0))
+    truth = standard_parameters(arm)
+    X = found.base(np.array([truth[name] for name in found.standard.parameters]))
+    models = {name: MODELS.create(name) for name in MODELS.builtin}
+    for name, estimate in identify_each(log, found.basis, models, idbench_chain()).items():
+        weight = np.linalg.norm(estimate.system.W, axis=0) / np.linalg.norm(estimate.system.Y)
+        assert np.abs((estimate.X - X) * weight).max() < 1e-5, name  # shares of the torque that errors make
+
+
+def test_a_motion_that_hides_parameters_is_told_from_a_robot_that_does(log):
+    """Structural: ZZ1 and Ia1 are one parameter on any motion. Of the data: joint 2 stands, and what it moves is not shown."""
+    tree = kinematic_tree(Robot.load("scara"))
+    found = BaseParameters.of(tree, tree_basis(tree))
+    still = MotionLog(log.fs, log.q * [1, 0], log.tau, TorqueChannel("instantaneous"))
+    system = idbench_chain().build(still, found.basis, MODELS.create("power"))
+    assert set(system.unseen()) >= {"Fv2", "Fs2"}
+    assert "Fv1" not in system.unseen()
+    assert len(found.names) == 8
+
+
+def test_parameters_can_be_left_out_and_unknown_ones_are_refused():
+    tree = kinematic_tree(Robot.load("panda"))
+    basis = BaseParameters.of(tree, tree_basis(tree)).basis
+    fewer = basis.without("Fs1", "ZZR1")
+    assert set(basis.parameters) - set(fewer.parameters) == {"Fs1", "ZZR1"}
+    assert len(fewer.units) == len(fewer.parameters)
+    with pytest.raises(SettingError, match="no parameter Fs9"):
+        basis.without("Fs9")
+
+
+def test_the_grouping_is_the_same_every_time():
+    tree = kinematic_tree(Robot.load("panda"))
+    one, two = (BaseParameters.of(tree, tree_basis(tree)) for _ in range(2))
+    assert one.names == two.names
+    np.testing.assert_array_equal(one.K, two.K)

@@ -1,0 +1,111 @@
+"""Physically consistent parameters: bodies that can exist, that agree with the estimate, and are otherwise those given."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from identify import BaseParameters, IdentificationError, consistent_parameters, tree_basis
+from identify.basis.wrench import INERTIAL
+from identify.consistent import CONFIDENCE, pseudo_inertia
+from sim.robot import Robot
+from sim.tree import kinematic_tree, standard_parameters
+
+
+@pytest.fixture(scope="module", params=["scara", "puma560", "panda"])
+def arm(request):
+    robot = Robot.load(request.param)
+    tree = kinematic_tree(robot)
+    grouping = BaseParameters.of(tree, tree_basis(tree))
+    truth = standard_parameters(robot)
+    return grouping, np.array([truth[name] for name in grouping.standard.parameters])
+
+
+def links(grouping, values):
+    names = grouping.standard.parameters
+    for j in range(grouping.standard.n):
+        yield pseudo_inertia(values[[names.index(f"{x}{j + 1}") for x in INERTIAL]])
+
+
+def cloud(inertia, first, mass):
+    """Return the second moments of a body: those of points of mass 1/4 each at the corners of a tetrahedron have rank 4."""
+    S = np.zeros((4, 4))
+    S[:3, :3], S[:3, 3], S[3, :3], S[3, 3] = inertia, first, first, mass
+    return S
+
+
+def test_a_pseudo_inertia_holds_the_second_moments_of_the_mass(rng):
+    points, masses = rng.normal(size=(20, 3)), rng.uniform(0.1, 1, 20)
+    homogeneous = np.column_stack([points, np.ones(20)])
+    inertia = sum(m * (x @ x * np.eye(3) - np.outer(x, x)) for m, x in zip(masses, points, strict=True))
+    values = *inertia[np.triu_indices(3)], *(masses @ points), masses.sum()
+    np.testing.assert_allclose(pseudo_inertia(values), (homogeneous.T * masses) @ homogeneous, atol=1e-12)
+
+
+def test_the_truth_comes_back_from_an_estimate_without_error(arm):
+    grouping, X = arm
+    found = consistent_parameters(grouping, grouping.base(X), 1e-6 * np.eye(len(grouping.names)), X)
+    assert found.agrees
+    np.testing.assert_allclose(found.standard, X, atol=1e-5 * np.abs(X).max())
+
+
+def test_another_given_model_changes_what_no_motion_shows_and_nothing_else(arm, rng):
+    grouping, X = arm
+    base = grouping.base(X)
+    sigma = 1e-3 * np.maximum(np.abs(base), 0.01)
+    other = X.copy()
+    for j in range(grouping.standard.n):
+        mine = [grouping.standard.parameters.index(f"{x}{j + 1}") for x in INERTIAL]
+        other[mine] *= rng.uniform(0.8, 1.25)
+    found = consistent_parameters(grouping, base, np.diag(sigma**2), other)
+    assert found.agrees
+    assert np.abs(found.departure).max() < 0.1  # of a sigma
+    assert min(np.linalg.eigvalsh(S)[0] for S in links(grouping, found.standard)) > 0
+    assert np.abs(found.standard - X).max() > 1e-3  # the given model's where nothing else is known
+
+
+def test_impossible_estimates_get_the_nearest_possible_bodies_and_are_told(arm):
+    """Fs1 below zero by ten sigma: the nearest has none."""
+    grouping, X = arm
+    base = grouping.base(X)
+    sigma = np.full(len(base), 1e-3)
+    i = grouping.names.index("Fs1")
+    base[i] = -0.01
+    found = consistent_parameters(grouping, base, np.diag(sigma**2), X)
+    assert found.distance == pytest.approx(10, rel=1e-3)
+    assert found.base[i] == pytest.approx(0, abs=1e-6)
+    assert found.agrees == (len(base) > 60)  # 10^2 is within 0.999 of chi^2 with 62 degrees of freedom, not with 8
+
+
+def test_a_link_too_slender_for_its_inertia_is_moved_as_little_as_its_sigma_asks():
+    """SCARA: ZZ2 must exceed (MX2^2 + MY2^2) / M2, whatever M2: with M2 free there are bodies; negative ZZ2 has none."""
+    robot = Robot.load("scara")
+    tree = kinematic_tree(robot)
+    grouping = BaseParameters.of(tree, tree_basis(tree))
+    truth = standard_parameters(robot)
+    X = np.array([truth[name] for name in grouping.standard.parameters])
+    base, sigma = grouping.base(X), np.full(8, 1e-3)
+    slender = base.copy()
+    slender[grouping.names.index("ZZ2")] = 0.005  # below 0.0289 of 2 kg there
+    found = consistent_parameters(grouping, slender, np.diag(sigma**2), X)
+    assert found.agrees
+    mass = dict(zip(found.names, found.standard, strict=True))["M2"]
+    assert mass > (0.24**2 + 0.01**2) / 0.0051
+    impossible = base.copy()
+    impossible[grouping.names.index("ZZ2")] = -0.05
+    assert not consistent_parameters(grouping, impossible, np.diag(sigma**2), X).agrees
+    assert 0.99 < CONFIDENCE < 1
+
+
+def test_what_cannot_be_used_is_refused(arm, monkeypatch):
+    grouping, X = arm
+    base, C = grouping.base(X), np.eye(len(grouping.names))
+    with pytest.raises(IdentificationError, match="covariance of the estimate is not positive definite"):
+        consistent_parameters(grouping, base, C - 2 * np.eye(len(C)), X)
+    wrong = X.copy()
+    wrong[grouping.standard.parameters.index("XX1")] = -1.0
+    with pytest.raises(IdentificationError, match="link 1 of the given model cannot exist"):
+        consistent_parameters(grouping, base, C, wrong)
+    monkeypatch.setitem(sys.modules, "clarabel", None)
+    with pytest.raises(IdentificationError, match="pip install clarabel"):
+        consistent_parameters(grouping, base, C, X)

@@ -1,0 +1,192 @@
+"""Descriptions read from compiled models: against MuJoCo's own dynamics, and refused where they would be wrong."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from identify import BaseParameters, State, tree_basis
+from sim.errors import RobotError
+from sim.inverse_dynamics import coulomb_torque, inverse_dynamics
+from sim.rewrite import rewritten
+from sim.robot import Robot
+from sim.tree import kinematic_tree, standard_parameters
+
+CROOKED = """
+<mujoco model="crooked">
+  <compiler angle="degree"/>
+  <option gravity="1 -2 -9"/>
+  <worldbody>
+    <body pos="0.1 0.2 0.3" euler="10 20 30">
+      <body name="shoulder" pos="0.1 0 0.2" euler="0 40 0">
+        <joint name="yaw" axis="1 2 3" pos="0.05 0.1 -0.1" damping="0.3" frictionloss="0.2" armature="0.1" ref="15"/>
+        <joint name="pitch" axis="0 1 0.2" pos="-0.1 0 0.1" damping="0.2"/>
+        <geom type="box" size="0.1 0.2 0.3" pos="0.1 0.2 0" euler="5 6 7" density="300"/>
+        <body name="flange" pos="0.3 0.1 0" euler="0 0 50">
+          <geom type="capsule" size="0.05 0.2" density="500"/>
+          <body name="rail" pos="0.2 0 0.1" euler="20 0 0">
+            <joint name="lift" type="slide" axis="1 1 0" armature="0.4" frictionloss="0.1" ref="0.1" range="-1 1"/>
+            <geom type="ellipsoid" size="0.1 0.2 0.1" pos="0.1 0 0" density="400"/>
+          </body>
+        </body>
+        <body name="hand" pos="-0.2 0.1 0.1" euler="0 70 0">
+          <joint name="wrist" axis="0 0 1" pos="0.1 0.1 0"/>
+          <geom type="box" size="0.1 0.05 0.3" pos="0 0.2 0" density="200"/>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+"""Welded bodies, two hinges on one body beside their frames, a slide, two branches, references, gravity askew."""
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(text, name="arm.xml"):
+        path = tmp_path / name
+        path.write_text(text)
+        return str(path)
+
+    return write
+
+
+def torques(robot, basis, X, states):
+    q, qd, qdd = states
+    found = np.zeros(q.shape)
+    for (row, name), signal in basis.explicit(State(q, qd, lambda _: qdd)).items():
+        found[row] += signal * X[basis.parameters.index(name)]
+    return found
+
+
+@pytest.mark.parametrize("name", ["crooked", "scara", "puma560", "panda"])
+def test_columns_times_truth_are_mujocos_inverse_dynamics(name, written, rng):
+    robot = Robot.load(written(CROOKED) if name == "crooked" else name)
+    tree, truth = kinematic_tree(robot), standard_parameters(robot)
+    found = BaseParameters.of(tree, tree_basis(tree))
+    X = np.array([truth[p] for p in found.standard.parameters])
+    states = rng.uniform(-3, 3, (3, robot.n, 200))
+    q, qd, qdd = (x.T for x in states)
+    tau = (inverse_dynamics(robot, q, qd, qdd) + coulomb_torque(robot, qd)).T
+    for basis, values in ((found.standard, X), (found.basis, found.base(X))):
+        np.testing.assert_allclose(torques(robot, basis, values, states), tau, atol=1e-10)
+
+
+def test_links_and_joints_are_those_of_the_file(written):
+    tree = kinematic_tree(Robot.load(written(CROOKED)))
+    assert [joint.name for joint in tree.joints] == ["yaw", "pitch", "lift", "wrist"]
+    assert [joint.parent for joint in tree.joints] == [-1, 0, 1, 1]
+    assert [joint.kind for joint in tree.joints] == ["hinge", "hinge", "slide", "hinge"]
+    assert [joint.massive for joint in tree.joints] == [False, True, True, True]
+    assert [joint.armature for joint in tree.joints] == [True, False, True, False]
+    assert tree.joints[2].range == (-1.0, 1.0)
+    assert tree.joints[0].range == (-np.inf, np.inf)
+    np.testing.assert_array_equal(tree.gravity, [1, -2, -9])
+
+
+def one(joint, extra="", inside='<geom size="0.1"/>'):
+    return f'<mujoco><worldbody><body name="a">{joint}{inside}</body></worldbody>{extra}</mujoco>'
+
+
+PAIR = '<geom size="0.1"/><body name="b" pos="1 0 0"><joint name="second"/><geom size="0.1"/></body>'
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (one('<freejoint name="float"/>'), "only hinge and slide joints can be simulated, not float"),
+        (one('<joint name="ball" type="ball"/>'), "only hinge and slide joints can be simulated, not ball"),
+        (
+            one('<joint name="first"/>', '<equality><connect name="loop" body1="b" anchor="0 0 0"/></equality>', PAIR),
+            "connect 'loop' closes a chain",
+        ),
+        (
+            one('<joint name="first"/>', '<equality><joint name="mimic" joint1="first" joint2="second"/></equality>', PAIR),
+            "joint 'mimic' closes a chain or couples joints",
+        ),
+        (
+            one(
+                '<joint name="first"/>',
+                '<tendon><fixed name="belt" stiffness="1"><joint joint="first" coef="1"/></fixed></tendon>',
+            ),
+            "tendon 'belt' closes a chain or couples joints",
+        ),
+        (one('<joint name="light"/>', inside=""), "give every body that a joint moves a mass and an inertia"),
+        (
+            one("<joint/>", '<asset><mesh name="m" file="gone.stl"/></asset>', '<geom type="mesh" mesh="m"/>'),
+            "gone.stl.*; put the file there, or take the mesh and its geoms out",
+        ),
+        ("<mujoco><worldbody>", "MuJoCo cannot read"),
+        ("<mujoco/>", "has no joints"),
+    ],
+)
+def test_what_is_no_open_tree_is_refused_by_name(text, message, written):
+    with pytest.raises(RobotError, match=message):
+        kinematic_tree(Robot.load(written(text)))
+
+
+@pytest.mark.parametrize(
+    ("name", "message"), [("kuka", "no robot 'kuka'; known: panda, puma560, scara"), ("no.xml", "cannot read")]
+)
+def test_robots_that_are_not_there(name, message):
+    with pytest.raises(RobotError, match=message):
+        Robot.load(name)
+
+
+def test_a_urdf_needs_no_meshes(written):
+    shape = '<visual><geometry><mesh filename="package://gone/visual.dae"/></geometry></visual>'
+    inertial = '<inertial><mass value="2"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    links = f'<link name="ground"/><link name="arm">{inertial}{shape}</link>'
+    joint = '<joint name="turn" type="revolute"><parent link="ground"/><child link="arm"/><axis xyz="0 0 1"/>'
+    text = f'<robot name="r">{links}{joint}<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+    robot = Robot.load(written(text, "arm.urdf"))
+    assert robot.joints == ("turn",)
+    assert standard_parameters(robot)["M1"] == 2
+
+
+@pytest.mark.parametrize("name", ["crooked", "scara", "puma560", "panda"])
+def test_a_rewritten_file_compiles_to_what_was_written(name, written, rng):
+    """By MuJoCo's inverse dynamics; comments and everything that has no parameter stay."""
+    path = written(CROOKED) if name == "crooked" else name
+    robot = Robot.load(path)
+    truth = standard_parameters(robot)
+    factor = {key: rng.uniform(0.8, 1.2) for key in ("links", "Ia", "Fv", "Fs")}
+    wanted = {key: value * factor[letters if (letters := key[:2]) in factor else "links"] for key, value in truth.items()}
+    text = rewritten(path, wanted)
+    made = Robot(name, mujoco.MjSpec.from_string(text).compile())
+    assert {key: pytest.approx(value, abs=1e-9) for key, value in wanted.items()} == standard_parameters(made)
+    q = rng.uniform(-2, 2, (20, robot.n))
+    still = np.zeros_like(q)
+    ratio = inverse_dynamics(made, q, still, still) - factor["links"] * inverse_dynamics(robot, q, still, still)
+    np.testing.assert_allclose(ratio, 0, atol=1e-9)
+    if name == "panda":
+        assert "feasible set of" in text
+        assert text.count("<geom") == Robot.path(name).read_text().count("<geom")
+
+
+def test_impossible_links_are_not_written():
+    robot = Robot.load("scara")
+    truth = standard_parameters(robot)
+    with pytest.raises(RobotError, match="link 2 with a mass of 2 kg and this inertia cannot exist"):
+        rewritten("scara", {**truth, "ZZ2": 0.001})
+
+
+def test_inclusions_are_put_in_their_places(written, tmp_path):
+    (tmp_path / "link.xml").write_text(
+        '<mujocoinclude><joint name="turn"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></mujocoinclude>'
+    )
+    path = written('<mujoco><worldbody><body name="a"><include file="link.xml"/></body></worldbody></mujoco>')
+    text = rewritten(path, {**standard_parameters(Robot.load(path)), "M1": 3.0})
+    assert "include" not in text
+    made = Robot("x", mujoco.MjSpec.from_string(text).compile())
+    assert standard_parameters(made)["M1"] == 3.0
+
+
+def test_meshes_are_found_from_another_folder(written, tmp_path):
+    (tmp_path / "arm").mkdir()
+    corners = "\n".join(f"v {x} {y} {z}" for x in (0, 1) for y in (0, 1) for z in (0, 1))
+    (tmp_path / "arm" / "box.obj").write_text(corners + "\nf 1 2 3\nf 2 3 4\nf 5 6 7\nf 6 7 8\nf 1 2 5\nf 3 4 7\n")
+    asset, inside = '<asset><mesh name="m" file="box.obj"/></asset>', '<geom type="mesh" mesh="m"/>'
+    path = written(one('<joint name="turn"/>', asset, inside), "arm/arm.xml")
+    truth = standard_parameters(Robot.load(path))
+    (tmp_path / "out.xml").write_text(rewritten(path, truth, tmp_path))
+    assert standard_parameters(Robot.load(str(tmp_path / "out.xml"))) == pytest.approx(truth, abs=1e-9)
