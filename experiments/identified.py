@@ -106,8 +106,11 @@ class Identified:
         for name, share in self.explained.items():
             models[name]["explained_share"] = share.tolist()
         channel = self.logs[0].torque
+        base = self.subject.base
         return {
             "parameters": list(self.basis.parameters),
+            "units": list(self.basis.units),
+            "made_of": None if base is None else dict(zip(base.names, map(base.grouping, range(len(base.names))), strict=True)),
             "truth": truth,
             "robot": self.subject.name,
             "chain": self.chain,

@@ -25,7 +25,7 @@ from experiments.subject import Subject
 from experiments.validation import Validated
 from experiments.written import Written
 from identify import MODELS, IdentificationError, MotionLog
-from identify.log_file import read_columns, read_log, write_log
+from identify.log_file import read_columns, write_log
 from identify.long import is_long
 
 File = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
@@ -118,8 +118,9 @@ def _validated(found: Identified, second: Path | None, first: MotionLog) -> Vali
     """Return the identification, to be judged on a second log, its torque read as that of the first unless it says more."""
     if second is None:
         return Validated(found)
-    path = file_of(second)
-    return Validated(found, read_log(path, read_columns(path).torque or first.torque), str(second))
+    columns = read_columns(file_of(second)).ordered(found.subject.robot.joints)
+    log = MotionLog.at_times(columns.t, columns.q, columns.tau, columns.torque or first.torque)
+    return Validated(found, log, str(second))
 
 
 @contextmanager

@@ -11,7 +11,7 @@ import tyro
 
 from experiments.errors import ExperimentError
 from experiments.identified import Identified
-from identify import MotionLog, TimeError, TorqueChannel
+from identify import LogError, MotionLog, TimeError, TorqueChannel
 from identify.log_file import read_columns
 
 Meaning = Literal["held", "instantaneous", "averaged"]
@@ -45,12 +45,10 @@ def told_by(log: Path) -> dict[str, Any]:
 def read(path: Path, torque: Meaning | None, delay: str | None, named: Identified) -> tuple[MotionLog, str]:
     """Return the log, its torque read as the options say, and what is to be said of its delay."""
     columns = read_columns(path)
-    joints = named.subject.robot.joints
-    if columns.q.shape[1] != len(joints):
-        raise ExperimentError(
-            f"{path} has {columns.q.shape[1]} joints, robot {named.subject.name!r} has {len(joints)}: {', '.join(joints)}; "
-            "name the robot of the log with --robot"
-        )
+    try:
+        columns = columns.ordered(named.subject.robot.joints)
+    except LogError as error:
+        raise ExperimentError(f"{path}: {error}; name the robot of the log with --robot") from error
     meaning = torque or (columns.torque.meaning if columns.torque else None)
     if meaning is None:
         raise ExperimentError(

@@ -21,6 +21,7 @@ from identify.basis import Offset as Offset
 from identify.basis import ScaraLinks as ScaraLinks
 from identify.basis import TreeLinks as TreeLinks
 from identify.basis import ViscousFriction as ViscousFriction
+from identify.basis import joint_number as joint_number
 from identify.basis import scara as scara
 from identify.basis import tree_basis as tree_basis
 from identify.chain import CHAINS as CHAINS

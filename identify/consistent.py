@@ -10,7 +10,7 @@ from scipy import linalg, sparse, stats
 
 from identify.arrays import Array
 from identify.base_parameters import BaseParameters
-from identify.basis.tree import joint_number
+from identify.basis import joint_number
 from identify.basis.wrench import INERTIAL
 from identify.errors import IdentificationError
 

@@ -2,7 +2,8 @@
 
 import json
 import re
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -31,12 +32,34 @@ class Columns:
         [rad], [N m].
     torque : TorqueChannel or None
         What the file says of its torque.
+    joints : tuple of str
+        Names of the joints, where the columns have them.
     """
 
     t: Array
     q: Array
     tau: Array
     torque: TorqueChannel | None
+    joints: tuple[str, ...] = ()
+
+    def ordered(self, joints: Sequence[str]) -> "Columns":
+        """Return the columns in the order of `joints`, where they have names.
+
+        Raises
+        ------
+        LogError
+            If there are others, or not as many.
+        """
+        if self.joints and set(self.joints) != set(joints):
+            missing, over = ", ".join(set(joints) - set(self.joints)), ", ".join(set(self.joints) - set(joints))
+            wrong = "; ".join(text for text in (missing and f"missing: {missing}", over and f"not the robot's: {over}") if text)
+            raise LogError(f"the log names the joints {', '.join(self.joints)}, the robot {', '.join(joints)}: {wrong}")
+        if self.q.shape[1] != len(joints):
+            raise LogError(f"the log has {self.q.shape[1]} joints, the robot {len(joints)}: {', '.join(joints)}")
+        if not self.joints:
+            return self
+        place = [self.joints.index(joint) for joint in joints]
+        return replace(self, q=self.q[:, place], tau=self.tau[:, place], joints=tuple(joints))
 
 
 def write_log(log: MotionLog, path: Path) -> None:
@@ -96,24 +119,27 @@ def read_log(path: Path, torque: TorqueChannel | None = None) -> MotionLog:
 def read_columns(path: Path) -> Columns:
     """Read t, q and tau from a file, whatever their times; raise LogError as `read_log`.
 
-    Columns qd1, qd2, ... are allowed and not used: velocities come from the positions, by the chain's own differences.
+    Joints may have names instead of numbers: q_elbow, tau_elbow. Columns qd1, qd2, ... are allowed and not used: velocities
+    come from the positions, by the chain's own differences.
     """
     table = _table(Path(path))
     names = [name.strip(' "') for name in table.column_names]
     if not table.num_rows:
         raise LogError(f"{path} holds no samples")
     said, table = (table.schema.metadata or {}).get(_TORQUE), table.rename_columns(names)
+    joints = tuple(name.removeprefix("q_") for name in names if name.startswith("q_"))
     n = max(sum(bool(re.fullmatch(r"q\d+", name)) for name in names), 1)
-    needed = ["t", *(f"q{j + 1}" for j in range(n)), *(f"tau{j + 1}" for j in range(n))]
-    present = [name for name in names if re.fullmatch(r"t|(q|tau)\d+", name)]
+    ends = [f"_{joint}" for joint in joints] or [str(j + 1) for j in range(n)]
+    needed = ["t", *(f"q{end}" for end in ends), *(f"tau{end}" for end in ends)]
+    present = [name for name in names if re.fullmatch(r"t|(q|tau)(_.+|\d+)", name)]
     if wrong := set(needed) ^ set(present) | {name for name in present if present.count(name) > 1}:
         raise LogError(
             f"{path} must have a header with the columns {', '.join(needed)}; missing, left over or twice: "
             f"{', '.join(sorted(wrong))}"
         )
     numbers = {name: _numbers(path, table, name) for name in needed}
-    q, tau = (np.stack([numbers[f"{letter}{j + 1}"] for j in range(n)], axis=-1) for letter in ("q", "tau"))
-    return Columns(numbers["t"], q, tau, None if said is None else _channel(path, said))
+    q, tau = (np.stack([numbers[f"{letter}{end}"] for end in ends], axis=-1) for letter in ("q", "tau"))
+    return Columns(numbers["t"], q, tau, None if said is None else _channel(path, said), joints)
 
 
 def _table(path: Path) -> pa.Table:

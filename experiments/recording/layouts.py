@@ -6,10 +6,14 @@ from collections.abc import Set as AbstractSet
 import rerun.blueprint as rrb
 
 from experiments.errors import ResultsError
-from experiments.recording.views import Part, Shelf, arm, bars, column, grid, lanes, plot, side_by_side, text
+from experiments.recording.views import Part, Shelf, arm, bars, column, grid, lanes, plot, side_by_side, tabbed, text
+from identify import joint_number
 
 UNITS = {"Fv": "N m s/rad", "Fs": "N m", "off": "N m", "M": "kg", "MX": "kg m", "MY": "kg m", "MZ": "kg m", "Ia": "kg m²"}
 """Units of parameters, by their letters; LMX, LMY and elements of inertia matrices, two of X, Y and Z, have kg m²."""
+
+ESTIMATES = 12
+"""Plots of estimates that have room beside each other."""
 
 CHARTS = 7
 """Charts of imperfections in a column."""
@@ -116,14 +120,24 @@ def excitation(shelf: Shelf) -> Part:
 
 def parameters(shelf: Shelf) -> Part:
     """Return how every estimate comes about, with its sigma, and the truth."""
-    views = [_estimate(shelf, name) for name in shelf.last("identify/*/*/estimate/*")]
+    names = shelf.last("identify/*/*/estimate/*")
     judged = [
         bars(shelf, f"{what} [%] of each parameter, {method}", f"identify/{method}/*/{kind}")
         for method in shelf.methods
         for what, kind in (("error", "error"), ("sigma", "relative_sigma"))
     ]
     left = column(text(shelf, "identify/*/report"), *judged, shares=[3.0, *[2.0] * len(judged)])
-    return side_by_side("parameters", left, grid("estimates", views, 2), shares=[2, 3]) if views else None
+    return side_by_side("parameters", left, _estimates(shelf, names), shares=[2, 3]) if names else None
+
+
+def _estimates(shelf: Shelf, names: Sequence[str]) -> Part:
+    """Return how estimates come about, those of many parameters in a tab for each joint."""
+    if len(names) <= ESTIMATES:
+        return grid("estimates", [_estimate(shelf, name) for name in names], 2)
+    by_joint: dict[int, list[str]] = {}
+    for name in sorted(names, key=joint_number):
+        by_joint.setdefault(joint_number(name), []).append(name)
+    return tabbed([grid(f"joint {j}", [_estimate(shelf, name) for name in of_joint], 3) for j, of_joint in by_joint.items()])
 
 
 def _height(shelf: Shelf, pattern: str) -> float:

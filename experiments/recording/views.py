@@ -108,6 +108,12 @@ def side_by_side(name: str, *parts: Part, shares: Sequence[float]) -> Part:
     return rrb.Horizontal(*(p for p, _ in there), column_shares=[s for _, s in there], name=name)
 
 
+def tabbed(parts: Sequence[Part]) -> Part:
+    """Return parts behind each other, the first in front."""
+    there = [part for part in parts if part is not None]
+    return rrb.Tabs(*there, active_tab=0) if there else None
+
+
 def grid(name: str, parts: Sequence[Part], columns: int) -> Part:
     """Return the parts that there are in a grid."""
     there = [part for part in parts if part is not None]

@@ -8,6 +8,7 @@ from identify.basis.base import AbstractBlock as AbstractBlock
 from identify.basis.base import AbstractConservativeBlock as AbstractConservativeBlock
 from identify.basis.base import AbstractFriction as AbstractFriction
 from identify.basis.basis import Basis as Basis
+from identify.basis.basis import joint_number as joint_number
 from identify.basis.coulomb import CoulombFriction as CoulombFriction
 from identify.basis.offset import Offset as Offset
 from identify.basis.scara import ScaraLinks as ScaraLinks

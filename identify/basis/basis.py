@@ -1,14 +1,23 @@
 """A robot as identification sees it: a sum of column blocks."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self, final
 
 from identify.arrays import Columns
-from identify.basis.base import AbstractBlock, Narrowing
+from identify.basis.armature import Armature
+from identify.basis.base import AbstractBlock, AbstractFriction, Narrowing
 from identify.errors import SettingError
 from identify.state import State
+
+LINEAR = {"N m": "N", "N m s/rad": "N s/m", "kg m^2": "kg"}
+"""Units of what resists a hinge, for a slide."""
+
+
+def joint_number(parameter: str) -> int:
+    """Return the number of the joint, from 1, that ends the name of a parameter, such as 2 of ZZR2; 0 without one."""
+    return int(parameter[len(parameter.rstrip("0123456789")) :] or 0)
 
 
 @final
@@ -26,6 +35,8 @@ class Basis:
         Parameters to be put first, in this order; those of the blocks that it leaves out follow as they come.
     kept : mapping of str to str, optional
         Parameters of the blocks that stay, and what they are called here; all, by their own names, by default.
+    slides : tuple of int
+        Joints that slide, from 0: their frictions and rotors have units of translation.
 
     Raises
     ------
@@ -37,6 +48,7 @@ class Basis:
     blocks: tuple[AbstractBlock, ...]
     order: tuple[str, ...] = ()
     kept: Mapping[str, str] | None = None
+    slides: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         names = [name for block in self.blocks for name in block.names(self.n)]
@@ -76,8 +88,13 @@ class Basis:
 
     @cached_property
     def _units(self) -> dict[str, str]:
-        units = {n: u for block in self.blocks for n, u in zip(block.names(self.n), block.units(self.n), strict=True)}
+        units = {name: unit for block in self.blocks for name, unit in self._units_of(block)}
         return {new: units[name] for name, new in self._names.items()}
+
+    def _units_of(self, block: AbstractBlock) -> Iterator[tuple[str, str]]:
+        sliding = self.slides if isinstance(block, (AbstractFriction, Armature)) else ()
+        for name, unit in zip(block.names(self.n), block.units(self.n), strict=True):
+            yield name, LINEAR.get(unit, unit) if joint_number(name) - 1 in sliding else unit
 
     @cached_property
     def _names(self) -> dict[str, str]:

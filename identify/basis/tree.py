@@ -1,7 +1,7 @@
 """The basis of any tree of links."""
 
 from identify.basis.armature import Armature
-from identify.basis.basis import Basis
+from identify.basis.basis import Basis, joint_number
 from identify.basis.coulomb import CoulombFriction
 from identify.basis.tree_links import TreeLinks
 from identify.basis.viscous import ViscousFriction
@@ -18,9 +18,5 @@ def tree_basis(tree: KinematicTree) -> Basis:
     blocks = TreeLinks(tree), Armature(driven), ViscousFriction(), CoulombFriction()
     names = [name for block in blocks for name in block.names(tree.n)]
     order = tuple(sorted(names, key=joint_number))
-    return Basis(tree.n, blocks, order)
-
-
-def joint_number(parameter: str) -> int:
-    """Return the number of the joint, from 1, that ends the name of a parameter, such as 2 of ZZR2."""
-    return int(parameter[len(parameter.rstrip("0123456789")) :])
+    slides = tuple(j for j, joint in enumerate(tree.joints) if joint.kind == "slide")
+    return Basis(tree.n, blocks, order, slides=slides)

@@ -129,8 +129,8 @@ def test_parameters_can_be_left_out_and_laws_added(told, logs):
 @pytest.mark.parametrize(
     ("robot", "message"),
     [
-        ("panda", "has 6 joints, robot 'panda' has 7: joint1, joint2"),
-        ("scara", "has 6 joints, robot 'scara' has 2: joint1, joint2"),
+        ("panda", "the log has 6 joints, the robot 7: joint1, joint2"),
+        ("scara", "the log has 6 joints, the robot 2: joint1, joint2"),
         ("kuka", "no robot 'kuka'; known: panda, puma560, scara"),
         ("gone.xml", "cannot read robot 'gone.xml': No such file"),
     ],
@@ -141,6 +141,26 @@ def test_robots_that_do_not_fit(told, logs, robot, message):
     assert message in err
     assert not out
     assert err.count("\n") == 1
+
+
+def test_joints_by_name_are_put_in_order_and_unknown_ones_refused(told, logs, tmp_path):
+    from pyarrow import csv, parquet
+
+    table = parquet.read_table(logs / "first.parquet")
+    order = [0, 3, 1, 2, 4, 6, 5]  # of t and the joints
+    columns = [table.column_names[k] for k in order] + [table.column_names[6 + k] for k in order[1:]]
+    mixed = table.select(columns).replace_schema_metadata({})
+    names = [name.replace("tau", "tau_joint").replace("q", "q_joint") for name in columns]
+    csv.write_csv(mixed.rename_columns(names), tmp_path / "named.csv")
+    words = "--robot", "puma560", "--model", "explicit", "--torque", "held", "--torque-delay", "0.000659"
+    code, out, err = told("identify", "named.csv", *words)
+    assert code == 0, err
+    _, plain, _ = told("identify", logs / "first.parquet", *words)
+    assert next(x for x in out.splitlines() if " MYR3 " in x) == next(x for x in plain.splitlines() if " MYR3 " in x)
+    csv.write_csv(mixed.rename_columns([name.replace("joint3", "elbow") for name in names]), tmp_path / "other.csv")
+    code, _, err = told("identify", "other.csv", *words)
+    assert code == 2
+    assert "missing: joint3; not the robot's: elbow" in err
 
 
 def test_a_log_in_degrees_is_pointed_out(told, changed):

@@ -103,6 +103,7 @@ def test_the_offset_of_a_vertical_slide_is_grouped_with_its_weight():
     tree = KinematicTree("lift", (slide,), [0, 0, -9.81])
     found = BaseParameters.of(tree, tree_basis(tree) + Offset())
     assert found.names == ("MR1", "IaR1", "Fv1", "Fs1")
+    assert found.basis.units == ("kg", "kg", "N s/m", "N")
     assert found.grouping(0) == f"M1 + {1 / 9.81:.6g} off1"
     assert found.grouping(1) == f"Ia1 - {1 / 9.81:.6g} off1"
 
