@@ -63,6 +63,7 @@ PICTURES = {
     "recording-gain": Picture(GAIN),
     "recording-gain-parameters": Picture(GAIN, "parameters"),
     "recording-saturation": Picture(("run saturation --out OUT",), "parameters"),
+    "any-arm": Picture(("run arm --out OUT",), "", 0.4),
     "table1": Picture(("table1 --out OUT",), "", 0.6),
     "table2": Picture(("table2 --out OUT",), "", 0.6),
 }

@@ -93,8 +93,10 @@ def print_validated(console: Console, validated: Validated) -> None:
         console, f"{validated.title}: torque error while moving [N m], position error of the simulated robot [rad]", grid
     )
     still = next(iter(torques.values())).standing
-    apart = [f"{joint} {rms:.2g}" for joint, rms in zip(validated.found.subject.robot.joints, still, strict=True)]
-    console.print(Text(f"standing and turning, where friction is not determined: {', '.join(apart)} N m"), soft_wrap=True)
+    joints = validated.found.subject.robot.joints
+    apart = [f"{joint} {rms:.2g}" for joint, rms in zip(joints, still, strict=True) if isfinite(rms)]
+    if apart:
+        console.print(Text(f"standing and turning, where friction is not determined: {', '.join(apart)} N m"), soft_wrap=True)
     for model in torques:
         word, reasons = validated.verdict(model)
         console.print(Text(f"{model}: {word}: {'; '.join(reasons)}"), soft_wrap=True)

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import ceil
 from typing import Any, final
 
 import numpy as np
@@ -74,16 +75,22 @@ class Validated:
     def _replay(self, model: str) -> Replay | str:
         try:
             robot = Written(self.judged, model).robot
-            log = self.unseen.part(0, round(min(LONGEST, self.unseen.samples / self.unseen.fs) * self.unseen.fs))
-            qd = np.swapaxes(self.judged.processing.signals(log).state.qd, -1, -2)
-            return replay(robot, log, qd, BANDWIDTH)
+            return replay(robot, *self._replayed, BANDWIDTH)
         except (BenchError, IdentificationError) as error:
             return str(error)
+
+    @cached_property
+    def _replayed(self) -> tuple[MotionLog, Array]:
+        """What is simulated, and its velocities; without the ends, where differences are none."""
+        log, chain = self.unseen.part(0, round(LONGEST * self.unseen.fs)), self.judged.processing
+        edge = ceil((chain.prefilter.halo(log.fs) + chain.differentiator.halo(log.fs)) * log.fs)
+        qd = np.swapaxes(chain.signals(log).state.qd, -1, -2)
+        return log.part(edge, log.samples - edge), qd[edge : log.samples - edge]
 
     def position_error(self, model: str) -> Array | None:
         """Return the rms of logged - simulated position [rad], shape (joint,)."""
         found = self.replays[model]
-        return None if isinstance(found, str) else np.sqrt(np.mean((self.unseen.q[: len(found.q)] - found.q) ** 2, axis=0))
+        return None if isinstance(found, str) else np.sqrt(np.mean((self._replayed[0].q - found.q) ** 2, axis=0))
 
     def verdict(self, model: str) -> tuple[str, list[str]]:
         """Return a word, and the reasons for it."""
