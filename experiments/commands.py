@@ -14,6 +14,7 @@ import experiments.identify_command
 import experiments.log_commands
 import experiments.robot_command
 import experiments.run_commands
+import experiments.scenario_command
 import experiments.study_commands  # noqa: F401  # all register their commands
 from experiments.app import app
 from experiments.audience import Watched, Watching

@@ -13,13 +13,13 @@ from experiments.audience import Audience, Watched, Watching, Window
 from experiments.chosen import Asked, Parameters
 from experiments.errors import ExperimentError
 from experiments.interruption import importing
-from experiments.page import new_page, show, shown
-from experiments.results import results_folder, tell_of, write_recording, write_summary, write_whole
+from experiments.page import new_page, shown
+from experiments.results import results_folder, tell_of, write_recording, write_summary
 from identify.log_file import write_log
 from sim.engine import Progress
 from sim.robot import Robot
 from sim.scenario import Scenario
-from sim.scenario_file import load, names, to_toml
+from sim.scenario_file import load, to_toml
 from sim.trajectories import Quintic
 
 if TYPE_CHECKING:
@@ -193,28 +193,6 @@ def table2(
         tell_of(lost, out)
         _doubt_window(page, inner, recording)
         page.print(f"written to {out}{watching.hint(out)}", soft_wrap=True)
-
-
-@app.command(name="scenario")
-def scenario(name: tyro.conf.Positional[Annotated[str | None, tyro.conf.arg(metavar="NAME")]] = None, out: File = None) -> None:
-    """Write a scenario out to start from, every setting explained; without a name, list those that ship.
-
-    Args:
-        name: Name of a scenario, or a file.
-        out: File (TOML) to write; printed if none is given.
-    """
-    page = new_page()
-    if name is None:
-        for known in names():
-            page.out(f"{known:16} {load(known).origin}")
-    elif out is None:
-        page.out(to_toml(load(name)).rstrip("\n"))
-    elif out.exists():
-        raise ExperimentError(f"{out} exists: choose another --out")
-    else:
-        write_whole(out, to_toml(load(name)))
-        page.out(f"written to {out}; run it: uv run idbench run {out}")
-    show(page)
 
 
 def watch(what: str) -> Progress:

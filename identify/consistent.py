@@ -11,8 +11,9 @@ from scipy import linalg, sparse, stats
 from identify.arrays import Array
 from identify.base_parameters import BaseParameters
 from identify.basis import joint_number
-from identify.basis.wrench import INERTIAL
 from identify.errors import IdentificationError
+from identify.kinematics import INERTIAL
+from identify.pseudo_inertia import PSEUDO, pseudo_inertia
 
 NEAR = 1e-4
 """What a step to twice the given model costs, beside one sigma of the estimate: nothing, where the estimate knows anything."""
@@ -116,21 +117,6 @@ def consistent_parameters(grouping: BaseParameters, X: Array, covariance: Array,
     base = grouping.base(standard)
     distance = float(np.linalg.norm(np.linalg.solve(root, base - X)))
     return Consistent(names, standard, base, (base - X) / np.sqrt(np.diagonal(covariance)), distance)
-
-
-def pseudo_inertia(values: Array) -> Array:
-    """Return the pseudo-inertia of a link's XX XY XZ YY YZ ZZ MX MY MZ M, shape (4, 4)."""
-    xx, xy, xz, yy, yz, zz, *first, mass = values
-    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    S = np.empty((4, 4))
-    S[:3, :3] = np.trace(inertia) / 2 * np.eye(3) - inertia
-    S[:3, 3] = S[3, :3] = first
-    S[3, 3] = mass
-    return S
-
-
-PSEUDO = np.array([pseudo_inertia(e) for e in np.eye(len(INERTIAL))])
-"""What each inertial parameter adds to a pseudo-inertia, shape (10, 4, 4)."""
 
 
 class _Problem:

@@ -14,6 +14,9 @@ Kind = Literal["hinge", "slide"]
 GROUND = -1
 """Number of the parent of a joint that stands on the ground."""
 
+INERTIAL = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
+"""Letters of a link's ten parameters: inertia matrix about the origin of its frame, first moments, mass."""
+
 ROUNDING = 1e-12
 """Entries of rotations and axes below this are rounding, and zero."""
 

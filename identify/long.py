@@ -5,6 +5,7 @@ from math import ceil
 from typing import Protocol
 
 from identify.basis import Basis
+from identify.compression import compressed
 from identify.grid import Grid
 from identify.models import AbstractModel
 from identify.motion_log import MotionLog
@@ -58,7 +59,7 @@ def build_long(chain: Builder, log: MotionLog, basis: Basis, models: Sequence[Ab
     for piece in pieces(chain, log):
         made = chain.build_each(piece, basis, models)
         joined = [System.stack([before, new]) for before, new in zip(found, made, strict=True)] if found else made
-        found = [system.compressed() for system in joined]
+        found = [compressed(system) for system in joined]
     return found
 
 

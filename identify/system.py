@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -16,10 +16,6 @@ from identify.errors import ExcitationError, IdentificationError, LogError
 UNSEEN = 1e-6
 """A direction of the parameters, in columns scaled to unit length, counts as unseen when its singular value is below this
 share of the largest: it would take columns known to seven digits to tell it to 10 %, and no log gives those."""
-
-
-NOISE_STEP = 1.05
-"""Rows whose noise differs by less than this factor are weighted alike once they are compressed."""
 
 
 class Status(IntEnum):
@@ -186,39 +182,6 @@ class System:
             parameters=first.parameters,
             carriers=tuple(carrier for s in systems for carrier in s.carriers),
         )
-
-    def compressed(self) -> Self:
-        """Return a system of few rows with the same least-squares solutions, whatever the weights of its groups.
-
-        The rows of each group become their triangular factor; so do, apart, those whose noise differs by more than a step of
-        `NOISE_STEP`. Only of a single run.
-        """
-        noise = np.where(self.valid, self.noise, 1.0)
-        step = np.round(np.log(noise) / np.log(NOISE_STEP)).astype(int)
-        parts = [
-            self._factor(self.valid & (self.group == group) & (step == level), float(NOISE_STEP**level))
-            for group in np.unique(self.group)
-            for level in np.unique(step[self.valid & (self.group == group)])
-        ]
-        if not parts:
-            return replace(self, carriers=())
-        joined: dict[str, Any] = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-        return type(self)(**joined, parameters=self.parameters)
-
-    def _factor(self, rows: npt.NDArray[np.bool_], noise: float) -> dict[str, npt.NDArray[Any]]:
-        """Return the triangular factor of some rows of one group, as rows."""
-        R: Array = np.linalg.qr(np.column_stack([self.W[rows], self.Y[rows]]), mode="r")  # type: ignore[assignment]
-        stands_for = np.zeros(len(R), dtype=np.intp)
-        stands_for[0] = self.count(rows)
-        return {
-            "W": R[:, :-1],
-            "Y": R[:, -1],
-            "noise": np.full(len(R), noise),
-            "valid": np.ones(len(R), dtype=bool),
-            "time": np.full(len(R), self.time[rows].mean()),
-            "group": np.full(len(R), self.group[rows][0]),
-            "stands_for": stands_for,
-        }
 
     def weighted(self, weight: Array) -> Self:
         """Return this system with its rows multiplied by `weight`, shape (..., r)."""

@@ -9,10 +9,11 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from identify.kinematics import INERTIAL
 from sim.errors import RobotError
 from sim.motors import Array
 from sim.robot import Robot
-from sim.tree import LETTERS, standard_parameters
+from sim.tree import standard_parameters
 
 ROUNDING = 1e-9
 """Share of the largest parameter by which those of the compiled file may differ from what was written into it."""
@@ -135,7 +136,7 @@ def _require_alike(robot: Robot, root: ElementTree.Element) -> None:
 def _set_link(robot: Robot, bodies: list[ElementTree.Element], joint: int, wanted: Values) -> None:
     """Give a link its mass, centre of mass and inertia, and the bodies welded to it none."""
     model, link = robot.model, int(robot.model.jnt_bodyid[joint])
-    xx, xy, xz, yy, yz, zz, *first, mass = (wanted[f"{x}{joint + 1}"] for x in LETTERS)
+    xx, xy, xz, yy, yz, zz, *first, mass = (wanted[f"{x}{joint + 1}"] for x in INERTIAL)
     centre = np.array(first) / mass if mass > 0 else np.zeros(3)
     about_origin = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     inertia = about_origin - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))

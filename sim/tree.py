@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
-from identify.kinematics import GROUND, Joint, KinematicTree
+from identify.kinematics import GROUND, INERTIAL, Joint, KinematicTree
 from sim.errors import RobotError
 from sim.motors import Array
 from sim.robot import Robot
@@ -67,14 +67,10 @@ def standard_parameters(robot: Robot) -> dict[str, float]:
         if j + 1 == robot.n or model.jnt_bodyid[j + 1] != body:
             inertia, first, mass = _inertial(model, body)
             values = *inertia[np.triu_indices(3)], *first, mass
-            found |= {f"{x}{j + 1}": float(v) for x, v in zip(LETTERS, values, strict=True)}
+            found |= {f"{x}{j + 1}": float(v) for x, v in zip(INERTIAL, values, strict=True)}
         for letters, field in (("Ia", "dof_armature"), ("Fv", "dof_damping"), ("Fs", "dof_frictionloss")):
             found[f"{letters}{j + 1}"] = float(getattr(model, field)[j])
     return found
-
-
-LETTERS = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
-"""Of the inertial parameters of a link: inertia matrix about the origin of its frame, first moments, mass."""
 
 
 def _require_open(robot: Robot) -> None:

@@ -10,9 +10,9 @@ from identify.arrays import Columns
 from identify.basis.base import AbstractConservativeBlock
 from identify.basis.terms import Term, is_zero, minus
 from identify.basis.twists import Twists
-from identify.basis.wrench import INERTIAL, UNITS, Wrench, energy
+from identify.basis.wrench import UNITS, Wrench, energy
 from identify.errors import SettingError
-from identify.kinematics import KinematicTree
+from identify.kinematics import INERTIAL, KinematicTree
 from identify.state import State
 
 

@@ -4,9 +4,7 @@ from typing import NamedTuple, Self
 
 from identify.basis.terms import ZERO, Matrix, Term, Vector, add, cross, dot, minus, plus, scaled, times
 from identify.basis.twists import Twist
-
-INERTIAL = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
-"""Letters of a link's ten parameters: inertia matrix about the origin of its frame, first moments, mass."""
+from identify.kinematics import INERTIAL
 
 MX, M = INERTIAL.index("MX"), INERTIAL.index("M")
 

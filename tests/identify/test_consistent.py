@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from identify import BaseParameters, IdentificationError, consistent_parameters, tree_basis
-from identify.basis.wrench import INERTIAL
-from identify.consistent import CONFIDENCE, pseudo_inertia
+from identify.consistent import CONFIDENCE
+from identify.kinematics import INERTIAL
+from identify.pseudo_inertia import pseudo_inertia
 from sim.robot import Robot
 from sim.tree import kinematic_tree, standard_parameters
 

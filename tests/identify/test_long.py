@@ -7,6 +7,7 @@ import pytest
 
 import identify.long
 from identify import CHAINS, ESTIMATORS, MODELS, MotionLog, System, TorqueChannel, idbench_chain, identify_each, scara
+from identify.compression import compressed
 from identify.long import is_long, pieces
 
 
@@ -68,12 +69,12 @@ def test_a_trim_of_its_own_is_kept(noisy, short, monkeypatch):
 
 def test_compressing_keeps_what_least_squares_needs(noisy):
     system = idbench_chain().build(noisy, scara(), MODELS.create("explicit"))
-    small = system.compressed()
+    small = compressed(system)
     assert len(small.Y) <= 2 * 9
     assert small.rows == system.rows
     for group in (0, 1):
         mine, theirs = ((s.W[s.group == group], s.Y[s.group == group]) for s in (small, system))
         np.testing.assert_allclose(mine[0].T @ mine[0], theirs[0].T @ theirs[0], rtol=1e-9)
         np.testing.assert_allclose(mine[0].T @ mine[1], theirs[0].T @ theirs[1], rtol=1e-9)
-    again = System.stack([small, system]).compressed()
+    again = compressed(System.stack([small, system]))
     assert again.rows == 2 * system.rows

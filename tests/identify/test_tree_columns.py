@@ -12,7 +12,7 @@ import pytest
 
 import identify.basis.tree_links
 from identify import Joint, KinematicTree, State, TreeLinks
-from identify.basis.wrench import INERTIAL
+from identify.kinematics import INERTIAL
 
 TIMES = 25
 EPS = 1e-30
