@@ -11,7 +11,7 @@ import numpy as np
 from experiments.identified import Identified
 from experiments.written import Written
 from identify import Array, IdentificationError, MotionLog, Validation, split, validate
-from identify.long import LONG, is_long
+from identify.long import manageable
 from sim.errors import BenchError
 from sim.replay import Replay, replay
 
@@ -53,8 +53,7 @@ class Validated:
     @cached_property
     def unseen(self) -> MotionLog:
         """The motion on which it is judged; of a long one the beginning."""
-        log = split(self.found.logs[0])[1] if self.second is None else self.second
-        return log.part(0, int(LONG / log.n**2)) if is_long(log) else log
+        return manageable(split(self.found.logs[0])[1] if self.second is None else self.second)
 
     @property
     def title(self) -> str:

@@ -36,6 +36,11 @@ def is_long(log: MotionLog | Sequence[MotionLog]) -> bool:
     return isinstance(log, MotionLog) and log.q.ndim == 2 and log.samples * log.n**2 > LONG
 
 
+def manageable(log: MotionLog) -> MotionLog:
+    """Return a log, or the beginning of one whose rows would be too many to be kept."""
+    return log.part(0, int(LONG / log.n**2)) if is_long(log) else log
+
+
 def pieces(chain: Builder, log: MotionLog) -> Iterator[MotionLog]:
     """Yield pieces of a log, each with what its rows look at, whose rows together are those of the log.
 

@@ -198,3 +198,12 @@ def test_the_example_of_the_docs_is_a_study(root):
     study = study_from(tomllib.loads(example), "study")
     assert study.size == 3 * 3 * 64
     assert len(study.methods) == 2
+
+
+def test_a_study_may_be_of_any_arm_but_of_one(content):
+    content["settings"]["robot"] = "panda"
+    study = study_from(axes(content, field="fs", values=[50.0]), "study")
+    assert len(study.parameters) == 62
+    assert study.parameters[0] == "ZZR1"
+    with pytest.raises(StudyError, match="robots 'panda' and 'puma560' have other parameters"):
+        _ = study_from(axes(content, field="robot", values=["panda", "puma560"]), "study").points
