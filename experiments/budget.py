@@ -12,6 +12,9 @@ from sim.inverse_dynamics import coulomb_torque, inverse_dynamics
 from sim.robot import Robot
 from sim.trajectories import Reference
 
+ROUNDING = 1e-12
+"""Torques below this share of the total are rounding."""
+
 
 @final
 @dataclass(frozen=True, eq=False)
@@ -48,4 +51,5 @@ class Budget:
         """Largest torque of every cause, of all together, and of the motor [N m], shape (joint,)."""
         found = {name: np.abs(part).max(axis=0) for name, part in self.parts.items()}
         total = np.abs(np.sum(list(self.parts.values()), axis=0)).max(axis=0)
+        found = {name: np.where(part > ROUNDING * total, part, 0.0) for name, part in found.items()}
         return {**found, "total": total, "limit": self.robot.torque_limits}

@@ -1,50 +1,26 @@
-"""What is suspicious about a log, or about what was identified from it."""
+"""What is suspicious about what was identified from a log, and what would help."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from experiments.identified import Identified
+from experiments.log_doubts import resting
 from experiments.subject import Subject
-from identify import Array, ExcitationError, IdentificationError, MotionLog, showing_moves
+from identify import Estimate, ExcitationError, IdentificationError, MotionLog, brisk_shares, showing_moves
 from sim.robot import Robot
+from sim.tree import unmodelled
 
 WELL_EXPLAINED = 0.95
 """Share of a torque's variance that a model of the right robot explains on any log that is worth identifying."""
 
-SLACK = 0.05
-"""Positions may be beyond a range by this share of it: ranges of files are rounded."""
-
-MOST_TURNS = 2.0
-"""Turns from zero beyond which a joint without a range is suspected to be logged in degrees."""
-
-
-def doubts_of_log(log: MotionLog, robot: Robot) -> list[str]:
-    """Return what is suspicious about a log of a robot: degrees, positions out of range, power that comes out of the joints."""
-    found, (low, high) = [], robot.ranges.T
-    ends = np.array([log.q.min(axis=0), log.q.max(axis=0)])
-    width = np.where(np.isfinite(high - low), high - low, 0.0)
-    beyond = (ends[0] < low - SLACK * width) | (ends[1] > high + SLACK * width)
-    turned = np.isinf(width) | (np.abs(ends).max(axis=0) > MOST_TURNS * 2 * np.pi)
-    hinges = np.array([robot.model.jnt_type[j] == 3 for j in range(robot.n)])
-    for j in np.flatnonzero(beyond | (turned & hinges)):
-        at = f"{robot.joints[j]} goes from {ends[0, j]:.4g} to {ends[1, j]:.4g}"
-        if hinges[j] and _fits_in_degrees(ends[:, j], low[j], high[j]):
-            found.append(f"{at}: are positions logged in degrees? They must be in rad")
-        elif beyond[j]:
-            found.append(f"{at}, out of its range, {low[j]:.4g} to {high[j]:.4g}: are joints in the order of the robot's file?")
-    return found
-
-
-def _fits_in_degrees(ends: Array, low: float, high: float) -> bool:
-    """Return whether positions span more than a joint can, and in degrees would not."""
-    inside = np.deg2rad(ends[0]) >= low - SLACK and np.deg2rad(ends[1]) <= high + SLACK
-    return bool(inside and ends[1] - ends[0] > min(high - low, MOST_TURNS * 2 * np.pi))
+OPEN = 0.02
+"""Share of a joint's torque on a brisk motion that one sigma of a parameter may make before it is said to be left open."""
 
 
 def doubts_of_result(found: Identified) -> list[str]:
-    """Return what no healthy identification shows, and what the log hardly tells."""
-    told = _sign(found)
+    """Return what no healthy identification shows, and what the log leaves open."""
+    told = wrong_sign(found)
     for name, estimate in found.estimates.items():
         friction = zip(found.basis.parameters, estimate.X, estimate.corrected_sigma, strict=True)
         negative = [p for p, x, sigma in friction if p.startswith(("F", "Ia")) and x < -2 * sigma]
@@ -52,28 +28,40 @@ def doubts_of_result(found: Identified) -> list[str]:
             told.append(f"{', '.join(negative)} below zero in the {name} model: is the torque's meaning or delay wrong?")
         poor = [f"{100 * share:.0f} % of tau{j + 1}" for j, share in enumerate(found.explained[name]) if share < WELL_EXPLAINED]
         if poor:
-            told.append(f"the {name} model explains {', '.join(poor)}: are units, signs and the torque's delay right?")
-    return [*told, *_hardly_told(found)]
+            told.append(
+                f"the {name} model explains {', '.join(poor)}: are units, signs, order of columns and the torque's delay right?"
+            )
+    return told or _left_open(found)
 
 
-def _sign(found: Identified) -> list[str]:
+def doubts_of_robot(robot: Robot) -> list[str]:
+    """Return what of a robot's file no parameter describes."""
+    found = unmodelled(robot)
+    return [f"the file of robot {robot.name!r} has {', '.join(found)}, which no parameter describes"] if found else []
+
+
+def wrong_sign(found: Identified) -> list[str]:
     """Return which torques have the wrong sign: those that drive their joint by friction."""
     model, estimate = next(iter(found.estimates.items()))
-    X = dict(zip(found.basis.parameters, estimate.X, strict=True))
-    sigma = dict(zip(found.basis.parameters, estimate.corrected_sigma, strict=True))
-    frictions = [
-        (X.get(f"Fv{j}", 0.0), X.get(f"Fs{j}", 0.0), 2 * sigma.get(f"Fs{j}", 0.0)) for j in range(1, found.basis.n + 1)
+    X, sigma = _named(estimate, estimate.X), _named(estimate, estimate.corrected_sigma)
+    joints = found.subject.robot.joints
+    wrong = [
+        joint
+        for j, joint in enumerate(joints, 1)
+        if X.get(f"Fv{j}", 0.0) < 0 and X.get(f"Fs{j}", 0.0) < -2 * sigma.get(f"Fs{j}", 0.0)
     ]
-    wrong = [j for j, (Fv, Fs, least) in enumerate(frictions) if Fv < 0 and Fs < -least]
     if not wrong:
         return []
-    joints = ", ".join(found.subject.robot.joints[j] for j in wrong)
     work = _work(found.logs[0])
     balance = f", and the torques of the log take out {-work:.3g} J in all" if work < 0 else ""
     return [
-        f"friction drives {joints} in the {model} model{balance}: does the torque have the wrong sign (it must be that on "
-        "the joint, positive where it speeds up a positive motion)?"
+        f"friction drives {', '.join(wrong)} in the {model} model{balance}: does the torque have the wrong sign (it must be "
+        "that on the joint, positive where it speeds up a positive motion)?"
     ]
+
+
+def _named(estimate: Estimate, values: np.ndarray) -> Mapping[str, float]:
+    return dict(zip(estimate.parameters, map(float, values), strict=True))
 
 
 def _work(log: MotionLog) -> float:
@@ -82,31 +70,34 @@ def _work(log: MotionLog) -> float:
     return float(np.sum((tau[1:] + tau[:-1]) / 2 * np.diff(log.q, axis=0)))
 
 
-def _hardly_told(found: Identified) -> list[str]:
-    """Return which base parameters the log does not tell from zero, and what would show them."""
+def _left_open(found: Identified) -> list[str]:
+    """Return which base parameters the log leaves open so far that a brisk motion would show it, and what would tell them."""
     subject, (model, estimate) = found.subject, next(iter(found.estimates.items()))
-    lost = np.abs(estimate.X) < 2 * estimate.corrected_sigma
-    names = [name for name, poor in zip(found.basis.parameters, lost, strict=True) if poor]
-    if subject.base is None or not names:
+    if subject.base is None:
         return []
-    return [f"not to be told from zero by this log ({model} model): {_moves(subject, names)}"]
+    shares = brisk_shares(subject.tree, found.basis, estimate.X, estimate.corrected_sigma)
+    names = [name for name, share in zip(found.basis.parameters, shares, strict=True) if share > OPEN]
+    if not names:
+        return []
+    return [f"one sigma of these parameters is above {100 * OPEN:g} % of a brisk motion's torque ({model} model): "
+            f"{_moves(subject, names)}"]  # fmt: skip
 
 
-def helpful_moves(error: IdentificationError, subject: Subject) -> list[str]:
-    """Return which moves would show the parameters that an error names."""
-    if subject.base is None or not isinstance(error, ExcitationError):
+def helpful_moves(error: IdentificationError, subject: Subject, log: MotionLog) -> list[str]:
+    """Return what would show the parameters that an error names: joints that never move, or else moves."""
+    if not isinstance(error, ExcitationError):
         return []
+    if still := resting(log, subject.tree):
+        return [f"{', '.join(still)} never moves in this log: move it"]
     words = str(error).split(":")[0].replace(",", " ").split()
     names = [name for name in subject.basis.parameters if name in words]
-    return [_moves(subject, names)] if names else []
+    return [_moves(subject, names)] if names and subject.base is not None else []
 
 
 def _moves(subject: Subject, names: Sequence[str]) -> str:
     """Return parameters by the joints that show them when they move."""
-    if subject.base is None:
-        return ", ".join(names)
     moves: dict[tuple[int, ...], list[str]] = {}
-    for name, joints in showing_moves(subject.tree, subject.base, names).items():
+    for name, joints in showing_moves(subject.tree, subject.grouping, names).items():
         moves.setdefault(joints, []).append(name)
     each = [f"{', '.join(shown)} (move {_joints(subject, joints)})" for joints, shown in sorted(moves.items(), key=_size)]
     return "; ".join(each)

@@ -23,6 +23,7 @@ from identify import (
     System,
     identify_each,
 )
+from identify.long import build_long, is_long
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +92,12 @@ class Identified:
 
     @cached_property
     def explained(self) -> dict[str, Array]:
-        """How much of each joint's torque every estimate explains, as a share of its variance, shape (joint,)."""
-        system = self.processing.build(self._fit, self.basis, ExplicitModel())
+        """How much of each joint's torque every estimate explains, shape (joint,).
+
+        A share of its variance; of a log whose rows are not kept, of its squares.
+        """
+        build = build_long if is_long(self._fit) else Chain.build_each
+        (system,) = build(self.processing, self._fit, self.basis, [ExplicitModel()])
         return {name: _explained(system, e.X) for name, e in self.estimates.items()}
 
     @property

@@ -14,19 +14,21 @@ from rich.text import Text
 from experiments.app import app
 from experiments.audience import Audience, Watched, Watching
 from experiments.chosen import Asked, Parameters
-from experiments.doubts import doubts_of_log, doubts_of_result, helpful_moves
+from experiments.doubts import doubts_of_result, doubts_of_robot, helpful_moves
 from experiments.errors import ExperimentError
 from experiments.identified import Identified
 from experiments.interruption import importing
+from experiments.log_doubts import doubts_of_log
 from experiments.page import new_page, shown
 from experiments.reading import Delay, Held, file_of, read, told_by
 from experiments.results import results_folder, tell_of, write_recording, write_summary
 from experiments.subject import Subject
 from experiments.validation import Validated
 from experiments.written import Written
-from identify import MODELS, IdentificationError, MotionLog
+from identify import MODELS, IdentificationError, LogError, MotionLog
 from identify.log_file import read_columns, write_log
 from identify.long import is_long
+from sim.robot import Robot
 
 File = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
 Named = Annotated[str | None, tyro.conf.arg(metavar="NAME|FILE")]
@@ -73,20 +75,22 @@ def identify(  # noqa: PLR0913, PLR0917  # the options of a command
     page, models = new_page(), tuple(MODELS) if model == "all" else (model,)
     path, said = file_of(log), told_by(log)
     _require_label(label)
-    subject = parameters.of(robot or said.get("robot"))
+    subject = parameters.of(said.get("robot") if robot is None else robot)
+    _require_target(write_mjcf, subject)
     named = Identified((), subject, models=models, chain=chain, estimator=estimator, name=label)  # complains of names first
     known, about_delay = read(path, torque, torque_delay, named)
     found = replace(named, logs=(known,), truth=_truth(said, named))
-    doubts, validated = doubts_of_log(known, subject.robot), _validated(found, validate, known)
+    validated = _validated(found, validate, known if torque or torque_delay else None)
+    doubts = [*doubts_of_log(known, subject.tree), *doubts_of_robot(subject.robot)]
+    if validate is not None:
+        doubts += [f"{validate}: {doubt}" for doubt in doubts_of_log(validated.unseen, subject.tree)]
     with watching.audience() as audience, shown(page):
-        with _explained(subject, doubts):
+        with _explained(subject, known, doubts):
             print_identified(page, found, str(log))
             print_validated(page, validated)
         _say(page, [*doubts, *doubts_of_result(found)])
         if about_delay:
             page.print(about_delay)
-        if write_mjcf is not None:
-            _write_mjcf(page, found, write_mjcf)
         if out is not None:
             _write_results(page, out, log.name, validated, watching, audience)
         elif log.is_dir() and watching.rerun and not is_long(known):
@@ -101,11 +105,25 @@ def identify(  # noqa: PLR0913, PLR0917  # the options of a command
 
             for _, stream in record_log(found, audience):
                 stream.close()
+        if write_mjcf is not None:
+            _write_mjcf(page, found, write_mjcf)
 
 
 def _require_label(label: str) -> None:
     if label and (not re.fullmatch(r"[A-Za-z0-9][\w.-]*", label) or label == "inner"):
         raise ExperimentError(f"--label {label!r} must be of letters, digits, dots, hyphens and underscores, and not 'inner'")
+
+
+def _require_target(target: Path | None, subject: Subject) -> None:
+    """Raise ExperimentError if the robot cannot be written there; before the work, not after it."""
+    if target is None:
+        return
+    if target.suffix != ".xml":
+        raise ExperimentError(f"--write-mjcf {target}: its name must end with .xml, or nothing would read it back")
+    if target.is_dir() or not target.absolute().parent.is_dir():
+        raise ExperimentError(f"--write-mjcf {target}: there is no folder {target.parent} for it, or it is a folder itself")
+    if target.exists() and target.samefile(Robot.path(subject.name)):
+        raise ExperimentError(f"--write-mjcf {target} is the robot's own file: choose another name")
 
 
 def _truth(said: dict[str, Any], named: Identified) -> dict[str, float] | None:
@@ -114,22 +132,26 @@ def _truth(said: dict[str, Any], named: Identified) -> dict[str, float] | None:
     return truth if truth and tuple(truth) == named.basis.parameters else None
 
 
-def _validated(found: Identified, second: Path | None, first: MotionLog) -> Validated:
-    """Return the identification, to be judged on a second log, its torque read as that of the first unless it says more."""
+def _validated(found: Identified, second: Path | None, said: MotionLog | None) -> Validated:
+    """Return the identification, to be judged on a second log: its torque is that of the first if options say it."""
     if second is None:
         return Validated(found)
-    columns = read_columns(file_of(second)).ordered(found.subject.robot.joints)
-    log = MotionLog.at_times(columns.t, columns.q, columns.tau, columns.torque or first.torque)
-    return Validated(found, log, str(second))
+    path = file_of(second)
+    try:
+        columns = read_columns(path).ordered(found.subject.robot.joints)
+        channel = said.torque if said else columns.torque or found.logs[0].torque
+        return Validated(found, MotionLog.at_times(columns.t, columns.q, columns.tau, channel), str(second))
+    except LogError as error:
+        raise ExperimentError(f"--validate {path}: {error}") from error
 
 
 @contextmanager
-def _explained(subject: Subject, doubts: Sequence[str]) -> Iterator[None]:
+def _explained(subject: Subject, log: MotionLog, doubts: Sequence[str]) -> Iterator[None]:
     """Add to what goes wrong what is suspicious about the log, and which moves would help."""
     try:
         yield
     except IdentificationError as error:
-        told = [str(error), *helpful_moves(error, subject), *(f"doubtful: {doubt}" for doubt in doubts)]
+        told = [str(error), *helpful_moves(error, subject, log), *(f"doubtful: {doubt}" for doubt in doubts)]
         raise ExperimentError("; ".join(told)) from error
 
 

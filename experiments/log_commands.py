@@ -1,5 +1,6 @@
 """Commands that change the form of logs."""
 
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -9,8 +10,9 @@ import tyro
 from experiments.app import app
 from experiments.errors import ExperimentError
 from experiments.page import new_page, show
-from experiments.reading import Delay, Held, channel_of
+from experiments.reading import Delay, Held, channel_of, told_by
 from experiments.results import results_folder
+from experiments.subject import CLOSED_FORM
 from identify import MotionLog
 from identify.log_file import read_columns, read_log, write_log
 
@@ -36,7 +38,7 @@ def resample(log: tyro.conf.Positional[Path], fs: float, out: Path, torque: Held
         raise ExperimentError(f"{log} does not say what its torque means: add --torque held, instantaneous or averaged")
     channel = channel_of(columns.torque, meaning, torque_delay)
     made, widest = at(columns.t, columns.q, columns.tau, channel, fs), float(np.diff(columns.t).max())
-    _write(made, out)
+    _write(made, out, columns.joints)
     page.print(f"written to {out}: torque {made.torque.meaning}, delay {made.torque.delay:g} s", soft_wrap=True)
     if widest > 2 / fs:
         page.print(f"doubtful: a gap of {widest:.3g} s was filled in, with positions and torques that nobody measured")
@@ -57,16 +59,20 @@ def export(folder: tyro.conf.Positional[Path], out: File = None) -> None:
     for path in logs:
         log, target = read_log(path), (out or folder) / f"{path.stem}.csv"
         _write(log, target)
-        delay = f"--torque-delay {log.torque.delay:g}"
-        page.print(
-            f"written to {target}; uv run idbench identify {target} --torque {log.torque.meaning} {delay}", soft_wrap=True
-        )
+        said = f"--torque {log.torque.meaning} --torque-delay {log.torque.delay:g}{_robot_of(folder)}"
+        page.print(f"written to {target}; uv run idbench identify {target} {said}", soft_wrap=True)
     show(page)
 
 
-def _write(log: MotionLog, path: Path) -> None:
+def _robot_of(folder: Path) -> str:
+    """Return the option that names the robot of a results folder, where it is not the one by default."""
+    robot = told_by(folder).get("robot", CLOSED_FORM)
+    return "" if robot == CLOSED_FORM else f" --robot {shlex.quote(robot)}"
+
+
+def _write(log: MotionLog, path: Path, joints: tuple[str, ...] = ()) -> None:
     try:
         with results_folder(path.parent) as folder:
-            write_log(log, folder / path.name)
+            write_log(log, folder / path.name, joints)
     except ValueError as error:
         raise ExperimentError(f"cannot write {path}: {error}") from error

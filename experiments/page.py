@@ -16,7 +16,9 @@ WIDTH = 132
 def new_page() -> Console:
     """Return a console that keeps what is printed: it is shown when everything has gone well, whatever the terminal does."""
     terminal = Console()
-    return Console(file=StringIO(), width=max(terminal.width, WIDTH), force_terminal=terminal.is_terminal, highlight=False)
+    return Console(
+        file=StringIO(), width=max(terminal.width, WIDTH), force_terminal=terminal.is_terminal, highlight=False, markup=False
+    )
 
 
 @contextmanager

@@ -13,7 +13,6 @@ from experiments.errors import ExperimentError
 from experiments.identified import Identified
 from identify import LogError, MotionLog, TimeError, TorqueChannel
 from identify.log_file import read_columns
-from identify.long import manageable
 
 Meaning = Literal["held", "instantaneous", "averaged"]
 Delay = Annotated[str | None, tyro.conf.arg(metavar="SECONDS|estimate")]
@@ -71,7 +70,7 @@ def read(path: Path, torque: Meaning | None, delay: str | None, named: Identifie
         return log, "no --torque-delay was given, 0 is assumed: `estimate` finds it" if assumed else ""
     from identify.delay import estimate_delay
 
-    found = estimate_delay(manageable(log), named.basis, named.processing)
+    found = estimate_delay(log, named.basis, named.processing)
     told = MotionLog(log.fs, log.q, log.tau, replace(channel, delay=found.delay))
     sure = f"{1e3 * found.delay:.4g} ms, sigma {1e3 * found.sigma:.2g} ms (not in the sigmas above)"
     return told, f"torque delay estimated from the log: {sure}"

@@ -10,6 +10,7 @@ from rich.text import Text
 
 from experiments.app import app
 from experiments.chosen import Asked, Parameters
+from experiments.doubts import doubts_of_robot
 from experiments.interruption import importing
 from experiments.page import new_page, show
 from experiments.subject import Subject
@@ -31,14 +32,20 @@ def robot(
     """
     with importing():
         from experiments.budget import Budget
+        from sim.errors import BenchError
         from sim.trajectories import RandomMoves
 
     subject, page = parameters.of(name), new_page()
     truth = subject.truth(subject.robot)
     _print_joints(page, subject)
     _print_parameters(page, subject, truth)
-    moves = RandomMoves(moves=20, durations=(0.8, 1.6), velocity=(2.0,))
-    _print_budget(page, Budget(subject.robot, moves.sample(subject.robot, 100.0)))
+    try:
+        moves = RandomMoves(moves=20, durations=(0.8, 1.6), velocity=(2.0,)).sample(subject.robot, 100.0)
+        _print_budget(page, Budget(subject.robot, moves))
+    except BenchError as error:  # the parameters are worth knowing all the same
+        page.print(Text(f"no torque budget: {error}"), soft_wrap=True)
+    for doubt in doubts_of_robot(subject.robot):
+        page.print(Text(f"doubtful: {doubt}"), soft_wrap=True)
     show(page)
 
 
@@ -46,7 +53,7 @@ def _print_joints(page: Console, subject: Subject) -> None:
     from experiments.tables import new_table, print_titled
 
     tree, found = subject.tree, subject.robot
-    grid = new_table("", ["kind", "on", "from", "to", "armature", "Fv", "Fs"])
+    grid = new_table("", ["kind", "on", "from [rad, m]", "to", "armature", "Fv", "Fs"])
     model = found.model
     for j, joint in enumerate(tree.joints):
         values = model.dof_armature[j], model.dof_damping[j], model.dof_frictionloss[j]
@@ -81,4 +88,6 @@ def _print_budget(page: Console, budget: "Budget") -> None:
     for j, joint in enumerate(budget.robot.joints):
         values = [value[j] for value in budget.largest.values()]
         grid.add_row(joint, *(f"{value:.3g}" if np.isfinite(value) else "" for value in values))
-    print_titled(page, "torque budget: largest [N m] along 20 random moves of 0.8 to 1.6 s, at most 2 rad/s", grid)
+    print_titled(
+        page, "torque budget: largest [N m, N of slides] along 20 random moves of 0.8 to 1.6 s, at most 2 rad/s or m/s", grid
+    )

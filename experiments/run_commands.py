@@ -10,13 +10,17 @@ from rich.text import Text
 
 from experiments.app import app
 from experiments.audience import Audience, Watched, Watching, Window
-from experiments.chosen import Asked, Parameters
+from experiments.chosen import Asked, Parameters, absolute
+from experiments.doubts import doubts_of_robot
 from experiments.errors import ExperimentError
 from experiments.interruption import importing
 from experiments.page import new_page, shown
 from experiments.results import results_folder, tell_of, write_recording, write_summary
 from identify.log_file import write_log
+from sim.drives import IdealDrive
 from sim.engine import Progress
+from sim.errors import RobotError
+from sim.ripple import Ripple
 from sim.robot import Robot
 from sim.scenario import Scenario
 from sim.scenario_file import load, to_toml
@@ -69,6 +73,8 @@ def run(  # noqa: PLR0913, PLR0917  # the options of a command
 
     page = new_page()
     if scenario is None:
+        if robot is not None:
+            raise ExperimentError(f"--robot {robot}: a run of a study is of the study's robot")
         made = replace(_again(page, study, index, method), parameters=parameters)
     else:
         described = _with_robot(page, load(_alone(scenario, study, index)), robot)
@@ -83,6 +89,8 @@ def run(  # noqa: PLR0913, PLR0917  # the options of a command
             recording = _recording(described, audience, inner) if watching.rerun else None
             ran = replace(made, progress=watch(f"simulating {described.name}"), watch=recording.watch if recording else None)
             print_identified(page, ran.identified, f"Scenario {described.name}")
+            for doubt in doubts_of_robot(ran.run.robots[0]):
+                page.print(f"doubtful: {doubt}", soft_wrap=True)
             write_log(ran.run.alone(), folder / "log.parquet")
             (folder / "scenario.toml").write_text(to_toml(described))
             write_summary(folder / "summary.json", ran.summary())
@@ -97,11 +105,21 @@ def _with_robot(page: Console, scenario: Scenario, robot: str | None) -> Scenari
     """Return a scenario with another robot, and moves that fit it."""
     if robot is None:
         return scenario
-    other = replace(scenario, robot=robot, name=f"{scenario.name}-{Path(robot).stem}")
+    other = replace(scenario, robot=absolute(robot), name=f"{scenario.name}-{Path(robot).stem}")
     if isinstance(scenario.trajectory, Quintic) and Robot.load(robot).n != Robot.load(scenario.robot).n:
         page.print(f"the trajectory of {scenario.name} is none for robot {robot}: it makes the random moves of scenario arm")
         other = replace(other, trajectory=load("arm").trajectory, start=())
+    if not isinstance(other.drive, IdealDrive) and not _has_motors(robot):
+        page.print(f"robot {robot} has no motors (dcmotor elements of MJCF): its drives are ideal, without ripple")
+        other = replace(other, drive=IdealDrive(), ripple=Ripple())
     return other
+
+
+def _has_motors(robot: str) -> bool:
+    try:
+        return Robot.load(robot).motors is not None
+    except RobotError:
+        return False
 
 
 def _require_window(inner: tuple[float, float] | None, watching: Watching) -> None:

@@ -55,17 +55,24 @@ class Subject:
         return replace(tree, joints=tuple(replace(joint, armature=True) for joint in tree.joints))
 
     @cached_property
-    def base(self) -> BaseParameters | None:
-        """How its standard parameters are grouped; None for the closed form."""
-        if self.name == CLOSED_FORM and self.armature == "file":
-            return None
+    def grouping(self) -> BaseParameters:
+        """How its standard parameters are grouped."""
         return BaseParameters.of(self.tree, self._with_laws(tree_basis(self.tree)))
+
+    @cached_property
+    def base(self) -> BaseParameters | None:
+        """The grouping, where its base parameters are what is identified; None for the closed form."""
+        return None if self.name == CLOSED_FORM and self.armature == "file" else self.grouping
+
+    @cached_property
+    def whole(self) -> Basis:
+        """What could be identified."""
+        return self._with_laws(scara()) if self.base is None else self.base.basis
 
     @cached_property
     def basis(self) -> Basis:
         """What is identified."""
-        basis = self._with_laws(scara()) if self.base is None else self.base.basis
-        return basis.without(*self.without) if self.without else basis
+        return self.whole.without(*self.without) if self.without else self.whole
 
     def truth(self, robot: Robot) -> dict[str, float]:
         """Return the true value of every parameter of the basis for `robot`, this one as it is simulated.

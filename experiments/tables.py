@@ -90,7 +90,7 @@ def print_validated(console: Console, validated: Validated) -> None:
     for j, joint in enumerate(validated.found.subject.robot.joints):
         grid.add_row(joint, *(cell for model in torques for cell in _validation_cells(validated, model, j)))
     print_titled(
-        console, f"{validated.title}: torque error while moving [N m], position error of the simulated robot [rad]", grid
+        console, f"{validated.title}: torque error while moving [N m, N], position error of the simulated robot [rad, m]", grid
     )
     still = next(iter(torques.values())).standing
     joints = validated.found.subject.robot.joints

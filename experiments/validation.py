@@ -1,6 +1,6 @@
 """Is an identification any good? Torques of a motion it has not seen, and the identified robot, simulated on it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil
@@ -8,9 +8,10 @@ from typing import Any, final
 
 import numpy as np
 
+from experiments.doubts import wrong_sign
 from experiments.identified import Identified
 from experiments.written import Written
-from identify import Array, IdentificationError, MotionLog, Validation, split, validate
+from identify import Array, Basis, IdentificationError, MotionLog, State, Validation, split, validate
 from identify.long import manageable
 from sim.errors import BenchError
 from sim.replay import Replay, replay
@@ -18,6 +19,9 @@ from sim.replay import Replay, replay
 GOOD, FAIR = 2.0, 10.0
 """Torque errors [% of the torque] up to which a model is good, or fair: those of published identifications of industrial arms
 lie between 2 and 10 %."""
+
+STRAYS, LOST = 1.0, 5.0
+"""Position errors [% of a joint's way] up to which a simulated robot is good, or fair."""
 
 BANDWIDTH = 5.0
 """Of the loop that holds the simulated robot to the log [rad/s]: weak, so that errors of the model show."""
@@ -73,8 +77,9 @@ class Validated:
 
     def _replay(self, model: str) -> Replay | str:
         try:
-            robot = Written(self.judged, model).robot
-            return replay(robot, *self._replayed, BANDWIDTH)
+            written = Written(self.judged, model)
+            log, qd = self._replayed
+            return replay(written.robot, _without(log, qd, self.judged.subject.grouping.standard, written.lost), qd, BANDWIDTH)
         except (BenchError, IdentificationError) as error:
             return str(error)
 
@@ -93,14 +98,34 @@ class Validated:
 
     def verdict(self, model: str) -> tuple[str, list[str]]:
         """Return a word, and the reasons for it."""
-        told = self.torques[model]
-        worst = int(np.argmax(told.percent))
-        word = "good" if told.percent[worst] <= GOOD else "fair" if told.percent[worst] <= FAIR else "poor"
-        return word, list(self._reasons(model, told, worst))
+        told, strays = self.torques[model], self.straying(model)
+        worst, strayed = float(told.percent.max()), 0.0 if strays is None else float(strays.max())
+        word = "good" if worst <= GOOD and strayed <= STRAYS else "fair" if worst <= FAIR and strayed <= LOST else "poor"
+        if wrong := wrong_sign(self.judged):
+            return "poor", [*wrong, *self._reasons(model, told)]
+        return word, [*self._reasons(model, told), *([] if word == "good" else self._worth_a_try)]
 
-    def _reasons(self, model: str, told: Validation, worst: int) -> Iterator[str]:
-        joints = self.found.subject.robot.joints
-        yield f"the torque of {joints[worst]} is off by {told.percent[worst]:.2g} %, the others by less"
+    @property
+    def _worth_a_try(self) -> list[str]:
+        """What may be missing in a model that is not good."""
+        subject = self.found.subject
+        options = [] if "offset" in subject.add else ["--add offset"]
+        if not all(joint.armature for joint in subject.tree.joints):
+            options.append("--armature all")
+        return [f"worth a try: {', '.join(options)}"] if options else []
+
+    def straying(self, model: str) -> Array | None:
+        """Return the rms of the position error as a share of the way between a joint's ends [%], shape (joint,)."""
+        off, q = self.position_error(model), self._replayed[0].q
+        return None if off is None else 100 * off / np.maximum(np.ptp(q, axis=0), 1e-12)
+
+    def _reasons(self, model: str, told: Validation) -> Iterator[str]:
+        joints, worst = self.found.subject.robot.joints, int(np.argmax(told.percent))
+        others = ", the others by less" if len(joints) > 1 else ""
+        yield f"the torque of {joints[worst]} is off by {_percent(told.percent[worst])}{others}"
+        strays = self.straying(model)
+        if strays is not None and strays.max() > STRAYS:
+            yield f"the simulated robot strays by {_percent(strays.max())} of its way in {joints[int(np.argmax(strays))]}"
         coloured = [joint for joint, white in zip(joints, told.white, strict=True) if not white]
         if coloured and told.percent.max() > GOOD:
             yield f"what is left of {', '.join(coloured)} is no noise: friction, elasticity or a delay is not modelled"
@@ -128,3 +153,18 @@ class Validated:
             "residual_correlation_bound": told.bound.tolist(),
             "position_error_rms": None if off is None else off.tolist(),
         }
+
+
+def _percent(share: float) -> str:
+    return f"{share:.2g} %" if share < 100 else f"{share:.0f} %"
+
+
+def _without(log: MotionLog, qd: Array, standard: Basis, lost: Mapping[str, float]) -> MotionLog:
+    """Return a log without the torques of laws of friction that a simulated robot does not have."""
+    if not lost:
+        return log
+    state = State(log.q.T, np.ascontiguousarray(qd.T), np.zeros_like)
+    tau = log.tau * np.asarray(log.torque.gain)
+    for (joint, name), column in standard.renamed({name: name for name in lost}).explicit(state).items():
+        tau[:, joint] -= lost[name] * column
+    return MotionLog(log.fs, log.q, tau, replace(log.torque, gain=1.0))

@@ -9,10 +9,13 @@ import numpy as np
 
 from experiments.identified import Identified
 from experiments.results import write_whole
-from identify import Array, BaseParameters, Consistent, consistent_parameters, transfer, tree_basis
+from identify import Array, Consistent, consistent_parameters, transfer
 from sim.rewrite import compiled, rewritten
 from sim.robot import Robot
 from sim.tree import standard_parameters
+
+SURE = 0.1
+"""Sigma of what was left out, as a share of the least of the others."""
 
 SIGMAS = 3.0
 """Departures from the estimate beyond this many sigma are told."""
@@ -38,23 +41,22 @@ class Written:
     def consistent(self) -> Consistent:
         """Its standard parameters."""
         subject = self.found.subject
-        given = standard_parameters(subject.robot)
-        grouping, T = self._grouping
+        given, grouping = standard_parameters(subject.robot), subject.grouping
         values = np.array([given.get(name, 0.0) for name in grouping.standard.parameters])
-        estimate = self.found.estimates[self.model]
+        T = np.eye(len(grouping.names)) if subject.base else transfer(subject.tree, subject.whole, grouping.basis)
+        X, C = self._of_all()
+        return consistent_parameters(grouping, T @ X, T @ C @ T.T, values)
+
+    def _of_all(self) -> tuple[Array, Array]:
+        """Return estimate and covariance with the parameters that were left out: they are zero, and known to be."""
+        estimate, names = self.found.estimates[self.model], self.found.subject.whole.parameters
         C = estimate.corrected_covariance
         C = C if np.isfinite(C).all() else estimate.covariance
-        return consistent_parameters(grouping, T @ estimate.X, T @ C @ T.T, values)
-
-    @property
-    def _grouping(self) -> tuple[BaseParameters, Array]:
-        """The grouping of the standard parameters, and what turns those that were identified into its base parameters."""
-        subject = self.found.subject
-        if subject.base is not None:
-            kept = subject.base.only(subject.basis.parameters)
-            return kept, np.eye(len(kept.names))
-        grouping = BaseParameters.of(subject.tree, tree_basis(subject.tree))
-        return grouping, transfer(subject.tree, subject.basis, grouping.basis)
+        place = [names.index(name) for name in estimate.parameters]
+        X, sure = np.zeros(len(names)), SURE * np.sqrt(np.diagonal(C).min())
+        whole = sure**2 * np.eye(len(names))
+        X[place], whole[np.ix_(place, place)] = estimate.X, C
+        return X, whole
 
     @cached_property
     def text(self) -> str:
@@ -77,7 +79,7 @@ class Written:
     @property
     def doubts(self) -> list[str]:
         """What is wrong about it."""
-        found, names = self.consistent, self._grouping[0].names
+        found, names = self.consistent, self.found.subject.grouping.names
         told = []
         if not found.agrees:
             far = [f"{n} by {abs(d):.1f}" for n, d in zip(names, found.departure, strict=True) if abs(d) > SIGMAS]
@@ -85,7 +87,12 @@ class Written:
                 f"no bodies that can exist have the estimate of the {self.model} model: the nearest are {found.distance:.1f} "
                 f"sigma off{', ' + ', '.join(far) + ' sigma' if far else ''}"
             )
-        lost = [name for name in found.names if name not in standard_parameters(self.robot)]
-        if lost:
-            told.append(f"{', '.join(lost)} have no place in an MJCF file and are left out")
+        if self.lost:
+            told.append(f"{', '.join(self.lost)} have no place in an MJCF file and are left out")
         return told
+
+    @property
+    def lost(self) -> dict[str, float]:
+        """Standard parameters that have no place in the file, and their values."""
+        known = standard_parameters(self.found.subject.robot)
+        return {name: value for name, value in self._values().items() if name not in known}

@@ -54,6 +54,7 @@ from identify.estimators import AbstractEstimator as AbstractEstimator
 from identify.estimators import OrdinaryLeastSquares as OrdinaryLeastSquares
 from identify.estimators import Problem as Problem
 from identify.estimators import WeightedLeastSquares as WeightedLeastSquares
+from identify.excitation import brisk_shares as brisk_shares
 from identify.excitation import showing_moves as showing_moves
 from identify.kinematics import Joint as Joint
 from identify.kinematics import KinematicTree as KinematicTree

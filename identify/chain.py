@@ -13,7 +13,6 @@ from identify.basis import Basis
 from identify.differentiators import AbstractDifferentiator, CentralDifference
 from identify.errors import LogError, SettingError
 from identify.grid import Grid
-from identify.long import build_long, is_long
 from identify.masks import AbstractMask, NoMask, ReversalMask
 from identify.models import AbstractModel
 from identify.motion_log import MotionLog, TorqueChannel
@@ -83,8 +82,6 @@ class Chain:
         if log.n != basis.n:
             hint = "; its axes are (time, joint), is it transposed?" if log.samples == basis.n else ""
             raise LogError(f"the log has {log.n} joints, the basis {basis.n}{hint}")
-        if is_long(log):
-            return build_long(self, log, basis, models)
         grid, signals = self.rows(log), self.signals(log)
         return [self.operator.system(model.balance(basis, signals), grid) for model in models]
 

@@ -21,6 +21,9 @@ NEAR = 1e-4
 MARGIN = 1e-6
 """Smallest eigenvalue of a link's pseudo-inertia, as a share of the given one: a body with some extent in every direction."""
 
+FLAT = 1e-6
+"""Share of the largest eigenvalue below which the least says that a body is flat."""
+
 CONFIDENCE = 0.999
 """A model within the ellipsoid that holds the truth with this probability agrees with the estimate."""
 
@@ -112,7 +115,10 @@ def consistent_parameters(grouping: BaseParameters, X: Array, covariance: Array,
         _quiet(clarabel),
     ).solve()
     if str(found.status) not in ("Solved", "AlmostSolved"):
-        raise IdentificationError(f"no physically consistent parameters were found: the solver says {found.status}")
+        raise IdentificationError(
+            f"bodies that can exist come nowhere near these parameters (the solver ends with {found.status}): is the torque's "
+            "sign, unit and delay right?"
+        )
     standard = start + T @ np.array(found.x)
     base = grouping.base(standard)
     distance = float(np.linalg.norm(np.linalg.solve(root, base - X)))
@@ -130,7 +136,10 @@ class _Problem:
         self.scale, self.metric = np.where(given == 0, 1.0, np.abs(given)), np.eye(len(names))
         for number, link in zip(numbers, self._links, strict=True):
             S = pseudo_inertia(given[link])
-            if np.linalg.eigvalsh(S)[0] <= 0:
+            lowest, largest = np.linalg.eigvalsh(S)[[0, -1]]
+            if -FLAT * largest <= lowest < FLAT * largest:  # a plate, a rod: bodies have some thickness
+                S = S + FLAT * largest * np.eye(4)
+            elif lowest <= 0:
                 raise IdentificationError(
                     f"link {number} of the given model cannot exist: its pseudo-inertia is not positive (is the centre of mass "
                     "outside of the body that the inertia describes?); correct the file first"
@@ -149,7 +158,7 @@ class _Problem:
             block = np.zeros((len(lower), len(self._names)))
             block[:, link] = -weights
             rows.append(block)
-            smallest = MARGIN * np.linalg.eigvalsh(pseudo_inertia(self.given[link]))[0]
+            smallest = MARGIN * max(np.linalg.eigvalsh(pseudo_inertia(self.given[link]))[0], 0.0)
             limits.append(np.array([-smallest if i == j else 0.0 for i, j in lower]))
         return np.concatenate(rows), np.concatenate(limits), (len(self._signed), len(self._links))
 

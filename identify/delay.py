@@ -12,6 +12,7 @@ from identify.basis import Basis
 from identify.chain import Chain, idbench_chain
 from identify.errors import LogError, SettingError
 from identify.estimators import Problem, WeightedLeastSquares
+from identify.long import manageable
 from identify.models import ExplicitModel
 from identify.motion_log import MotionLog
 from identify.system import System
@@ -73,7 +74,7 @@ def estimate_delay(
     ExcitationError
         If the motion does not show the parameters.
     """
-    logs = [log] if isinstance(log, MotionLog) else list(log)
+    logs = [manageable(one) for one in ([log] if isinstance(log, MotionLog) else log)]
     if any(one.q.ndim != 2 for one in logs):
         raise LogError("the delay is estimated from one run, or a sequence of them: give the runs one by one")
     if not within[0] < within[1]:

@@ -62,10 +62,10 @@ class Columns:
         return replace(self, q=self.q[:, place], tau=self.tau[:, place], joints=tuple(joints))
 
 
-def write_log(log: MotionLog, path: Path) -> None:
+def write_log(log: MotionLog, path: Path, joints: Sequence[str] = ()) -> None:
     """Write one run to a CSV or Parquet file; the torque channel goes into the metadata of Parquet.
 
-    CSV has no place for it; its torques are in N m, gain included.
+    CSV has no place for it; its torques are in N m, gain included. Columns are named after the `joints`, or numbered.
 
     Raises
     ------
@@ -76,12 +76,12 @@ def write_log(log: MotionLog, path: Path) -> None:
     """
     if log.q.ndim != 2:
         raise LogError(f"a file holds one run, the log has shape {log.q.shape}: write each run by itself")
-    joints = range(log.n)
+    ends = [f"_{joint}" for joint in joints] or [str(j + 1) for j in range(log.n)]
     columns = {"t": log.t}
-    columns |= {f"q{j + 1}": log.q[:, j] for j in joints}
+    columns |= {f"q{end}": x for end, x in zip(ends, log.q.T, strict=True)}
     in_newton_metres = path.suffix.lower() == CSV
     tau = log.tau * np.asarray(log.torque.gain) if in_newton_metres else log.tau
-    columns |= {f"tau{j + 1}": tau[:, j] for j in joints}
+    columns |= {f"tau{end}": x for end, x in zip(ends, tau.T, strict=True)}
     table = pa.table({name: pa.array(values) for name, values in columns.items()})
     if in_newton_metres:
         csv.write_csv(table, path)
@@ -90,7 +90,7 @@ def write_log(log: MotionLog, path: Path) -> None:
     parquet.write_table(table.replace_schema_metadata({_TORQUE: json.dumps(torque).encode()}), path)
 
 
-def read_log(path: Path, torque: TorqueChannel | None = None) -> MotionLog:
+def read_log(path: Path, torque: TorqueChannel | None = None, joints: Sequence[str] = ()) -> MotionLog:
     """Read a log from a CSV or Parquet file.
 
     Parameters
@@ -99,6 +99,8 @@ def read_log(path: Path, torque: TorqueChannel | None = None) -> MotionLog:
         The file; CSV if its name ends with .csv.
     torque : TorqueChannel, optional
         What its torque means; by default what the file says of it.
+    joints : sequence of str, optional
+        Names of the joints, in the order of the log; needed where the columns have names.
 
     Raises
     ------
@@ -107,6 +109,9 @@ def read_log(path: Path, torque: TorqueChannel | None = None) -> MotionLog:
         holds values that make no log.
     """
     found = read_columns(path)
+    if found.joints and not joints:
+        raise LogError(f"{path} names its joints, {', '.join(found.joints)}: say their order with joints=(...)")
+    found = found.ordered(joints) if joints else found
     channel = torque or found.torque
     if channel is None:
         raise LogError(
@@ -127,11 +132,12 @@ def read_columns(path: Path) -> Columns:
     if not table.num_rows:
         raise LogError(f"{path} holds no samples")
     said, table = (table.schema.metadata or {}).get(_TORQUE), table.rename_columns(names)
-    joints = tuple(name.removeprefix("q_") for name in names if name.startswith("q_"))
-    n = max(sum(bool(re.fullmatch(r"q\d+", name)) for name in names), 1)
+    n = sum(bool(re.fullmatch(r"q\d+", name)) for name in names)
+    joints = () if n else tuple(name.removeprefix("q_") for name in names if name.startswith("q_"))
+    n = max(n, 1)
     ends = [f"_{joint}" for joint in joints] or [str(j + 1) for j in range(n)]
     needed = ["t", *(f"q{end}" for end in ends), *(f"tau{end}" for end in ends)]
-    present = [name for name in names if re.fullmatch(r"t|(q|tau)(_.+|\d+)", name)]
+    present = [name for name in names if re.fullmatch(r"t|(q|tau)_.+" if joints else r"t|(q|tau)\d+", name)]
     if wrong := set(needed) ^ set(present) | {name for name in present if present.count(name) > 1}:
         raise LogError(
             f"{path} must have a header with the columns {', '.join(needed)}; missing, left over or twice: "

@@ -80,7 +80,21 @@ def identify_each(
     for model in models.values():
         _require(model, AbstractModel, 'a model, such as MODELS.create("power")')
     if is_long(log):
-        return _identify_long(log, basis, models, chain, estimator, throw=throw)  # type: ignore[arg-type]  # a single log
+        return _identify_long(log, basis, models, chain, estimator, throw=throw)
+    return _identify_rows(log, basis, models, chain, estimator, simulate, throw=throw)
+
+
+def _identify_rows(
+    log: MotionLog | Sequence[MotionLog],
+    basis: Basis,
+    models: Mapping[str, AbstractModel],
+    chain: Chain,
+    estimator: AbstractEstimator,
+    simulate: Callable[[Array], MotionLog] | None = None,
+    *,
+    throw: bool,
+) -> dict[str, Estimate]:
+    """Return the estimates from all rows."""
     *systems, explicit = chain.build_each(log, basis, [*models.values(), ExplicitModel()])
     levels = torque_noise(explicit)
     estimates = {}
@@ -94,7 +108,7 @@ def identify_each(
 
 
 def _identify_long(
-    log: MotionLog,
+    log: MotionLog | Sequence[MotionLog],
     basis: Basis,
     models: Mapping[str, AbstractModel],
     chain: Chain,
@@ -104,7 +118,7 @@ def _identify_long(
 ) -> dict[str, Estimate]:
     """Return the estimates of a log whose rows are not kept; some of its pieces tell how sigma is to be corrected."""
     systems = build_long(chain, log, basis, list(models.values()))
-    some = identify_each(sampled(chain, log, SAMPLED), basis, models, chain, estimator, throw=False)
+    some = _identify_rows(sampled(chain, log, SAMPLED), basis, models, chain, estimator, throw=False)
     estimates = {}
     for (name, model), system in zip(models.items(), systems, strict=True):
         if throw and estimator.full_rank:

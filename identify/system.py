@@ -145,6 +145,9 @@ class System:
                 f"{self.rows[run]} rows of {self.valid.shape[-1]} are left by the mask for {p} parameters: use a longer "
                 "motion, in which every joint moves; in the power model all must move at once"
             )
+        if self.rows[run] < 2 * p:
+            rows = f"{self.rows[run]} rows for {p} parameters tell {self.rank[run]} of them"
+            return f"{rows}: use a longer log, in which all joints move"
         return (
             f"the motion does not show {', '.join(self.unseen(run))}: W has rank {self.rank[run]} of {p}; "
             "move every joint, with others standing and moving, or leave these parameters out of the basis"

@@ -12,6 +12,7 @@ from identify.arrays import Array
 from identify.basis import Basis
 from identify.chain import Chain
 from identify.errors import LogError
+from identify.long import manageable
 from identify.masks.complement import Complement
 from identify.models import ExplicitModel
 from identify.motion_log import MotionLog
@@ -78,13 +79,16 @@ class Validation:
 def validate(log: MotionLog, basis: Basis, X: Array, chain: Chain) -> Validation:
     """Return how well the parameters `X` foretell the torques of one log, by the explicit model.
 
-    Both sides go through the same chain. What its mask leaves out is judged apart.
+    Both sides go through the same chain. What its mask leaves out is judged apart; of a long log the beginning is judged.
 
     Raises
     ------
     LogError
-        If the log does not fit the basis, is too short for the chain, or a joint of it never moves.
+        If the log holds several runs, does not fit the basis, is too short for the chain, or a joint of it never moves.
     """
+    if log.q.ndim != 2:
+        raise LogError(f"a motion is judged by itself, the log has shape {log.q.shape}: give the runs one by one")
+    log = manageable(log)
     moving = chain.build(log, basis, ExplicitModel())
     standing = replace(chain, mask=Complement(chain.mask)).build(log, basis, ExplicitModel())
     each = [_judge(moving, X, j) for j in range(basis.n)]

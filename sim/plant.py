@@ -39,7 +39,8 @@ class Plant:
         model = copy(robot.model)
         model.opt.timestep = h
         model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{physics.integrator.upper()}")
-        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+        # Bodies do not touch: shapes of neighbours overlap in many files, and a torque of contact is none of the models'.
+        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION) | int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
         self.robot, self.batch = robot, Batch(model, nsim, threads)
         for name, values in vary.items():
             _vary(self.batch, name, np.asarray(values, dtype=np.float64))

@@ -4,6 +4,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 from xml.etree import ElementTree
+from xml.parsers import expat
 
 import mujoco
 import numpy as np
@@ -54,38 +55,54 @@ def rewritten(name: str, standard: Values, folder: Path | None = None) -> str:
             joint.set(attribute, repr(wanted[f"{letters}{j + 1}"]))
         if f"M{j + 1}" in wanted:
             _set_link(robot, bodies, j, wanted)
-    _require_same(name, compiled(name, _text(root)), wanted)
+    home = Robot.path(name).absolute().parent
     if folder is not None:
-        _relocate(root, Robot.path(name).absolute().parent, folder)
-    return _text(root)
+        _relocate(root, home, folder)
+    text = _around(name, ElementTree.tostring(root, encoding="unicode"))
+    _require_same(name, compiled(name, text, folder or home), wanted)
+    return text
 
 
-def compiled(name: str, text: str) -> Robot:
-    """Return the robot of a text that stands for the file of a robot; raise RobotError if it does not compile."""
+def compiled(name: str, text: str, folder: Path | None = None) -> Robot:
+    """Return the robot of a text that stands for the file of a robot; raise RobotError if it does not compile.
+
+    Meshes are looked for from `folder`, by default that of the robot's file.
+    """
     try:
         spec = mujoco.MjSpec.from_string(text)
-        spec.modelfiledir = str(Robot.path(name).parent)  # for meshes and textures
+        spec.modelfiledir = str(folder or Robot.path(name).parent)
         return Robot(Path(name).stem, spec.compile())
     except ValueError as error:
         raise RobotError(f"MuJoCo cannot compile {name!r} with these parameters: {' '.join(str(error).split())}") from error
 
 
-def _text(root: ElementTree.Element) -> str:
-    return ElementTree.tostring(root, encoding="unicode") + "\n"
+def _around(name: str, text: str) -> str:
+    """Return a text with what stands before and after the element of the robot in its file: licences, as a rule."""
+    raw = Robot.path(name).read_bytes()
+    parser, starts, ends = expat.ParserCreate(), list[int](), [0]
+    parser.StartElementHandler = lambda *_: starts.append(parser.CurrentByteIndex)
+    parser.EndElementHandler = lambda *_: ends.append(parser.CurrentByteIndex)
+    parser.Parse(raw, True)
+    before, after = raw[: starts[0]], raw[raw.index(b">", ends[-1]) + 1 :]
+    if b"<robot" in raw[starts[0] : starts[0] + 6]:  # a URDF became MJCF
+        before = after = b""
+    return before.decode() + text + (after.decode() or "\n")
 
 
 def _relocate(root: ElementTree.Element, old: Path, new: Path) -> None:
     """Let a file in another folder find the meshes and textures of this one."""
-    assets = [asset for kind in ("mesh", "texture", "hfield") for asset in root.iter(kind) if asset.get("file")]
+    assets = [asset for assets in root.iter("asset") for asset in assets if any(key.startswith("file") for key in asset.attrib)]
     if not assets or old == new:
         return
-    compiler = root.find("compiler")
-    if compiler is None:
-        compiler = ElementTree.Element("compiler")
-        root.insert(0, compiler)
+    compilers = root.findall("compiler")
+    settings: dict[str, str] = {}
+    for compiler in compilers:  # the last that says it holds
+        settings |= {key: compiler.attrib.pop(key) for key in ("assetdir", "meshdir", "texturedir") if key in compiler.attrib}
+    first = compilers[0] if compilers else ElementTree.Element("compiler")
+    if not compilers:
+        root.insert(0, first)
     for attribute in ("meshdir", "texturedir"):
-        folder = compiler.get(attribute, compiler.get("assetdir", ""))
-        compiler.set(attribute, os.path.relpath(old / folder, new))
+        first.set(attribute, os.path.relpath(old / settings.get(attribute, settings.get("assetdir", "")), new))
 
 
 def _document(name: str) -> ElementTree.Element:
@@ -169,5 +186,5 @@ def _require_same(name: str, made: Robot, wanted: Values) -> None:
         if not abs(found[key] - value) <= ROUNDING * largest:
             raise RobotError(
                 f"robot {name!r} compiles to {key} = {found[key]:.6g} instead of {value:.6g}: does its file bound or balance "
-                "inertias (boundmass, boundinertia, balanceinertia)?"
+                "inertias (boundmass, boundinertia, balanceinertia, settotalmass)?"
             )

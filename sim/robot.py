@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
 from typing import Self
@@ -35,7 +36,7 @@ class Robot:
 
     def __post_init__(self) -> None:
         simple = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
-        other = [self.model.joint(j).name for j in range(self.model.njnt) if self.model.jnt_type[j] not in simple]
+        other = [_called(self.model, j) for j in range(self.model.njnt) if self.model.jnt_type[j] not in simple]
         if other:
             raise RobotError(f"robot {self.name!r}: only hinge and slide joints can be simulated, not {', '.join(other)}")
         if not self.model.njnt:
@@ -66,7 +67,9 @@ class Robot:
         try:
             return Path(name) if Path(name).suffix in FILES else models.path(name)
         except KeyError as error:
-            raise RobotError(f"{error.args[0]}, or give the path of an MJCF or URDF file ({', '.join(FILES)})") from None
+            near = get_close_matches(name, models.names(), 1)
+            hint = f" (did you mean {near[0]!r}?)" if near else ""
+            raise RobotError(f"{error.args[0]}{hint}, or give the path of an MJCF or URDF file ({', '.join(FILES)})") from None
 
     @staticmethod
     def spec(name: str) -> mujoco.MjSpec:
@@ -120,6 +123,8 @@ class Robot:
         """
         limits, model = np.full(self.n, np.inf), self.model
         for a in range(model.nu):
+            if model.actuator_trntype[a] != int(mujoco.mjtTrn.mjTRN_JOINT):
+                continue
             joint, gear = model.actuator_trnid[a, 0], abs(model.actuator_gear[a, 0])
             if model.actuator_forcelimited[a]:
                 limits[joint] = min(limits[joint], gear * model.actuator_forcerange[a].max())
@@ -138,10 +143,18 @@ def _without_shapes(urdf: str) -> str:
     return ElementTree.tostring(root, encoding="unicode")
 
 
+def _called(model: mujoco.MjModel, joint: int) -> str:
+    """Return what a joint is called, or the body that it moves."""
+    kind = mujoco.mjtJoint(model.jnt_type[joint]).name.removeprefix("mjJNT_").lower()
+    return f"{model.joint(joint).name or kind} of body {model.body(model.jnt_bodyid[joint]).name!r}"
+
+
 def _way_out(reason: str) -> str:
     """Return what to do about a reason why MuJoCo does not compile a model."""
     if "mass and inertia" in reason:
         return "; give every body that a joint moves a mass and an inertia"
+    if "eigenvalues" in reason or "A + B" in reason or "inertia must satisfy" in reason:
+        return "; correct the inertia of that body: it must be that of a body that can exist"
     if "file" in reason.lower():
         return "; put the file there, or take the mesh and its geoms out: identification needs the inertials alone"
     return ""

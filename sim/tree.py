@@ -76,17 +76,36 @@ def standard_parameters(robot: Robot) -> dict[str, float]:
 def _require_open(robot: Robot) -> None:
     """Raise RobotError if something other than the tree ties joints together."""
     model = robot.model
-    ties = [
-        f"{mujoco.mjtEq(model.eq_type[i]).name.removeprefix('mjEQ_').lower()} {model.equality(i).name!r}"
-        for i in range(model.neq)
-        if model.eq_active0[i]
-    ]
+    ties = [_tie(model, i) for i in range(model.neq) if model.eq_active0[i]]
     ties += [f"tendon {model.tendon(i).name!r}" for i in range(model.ntendon) if _is_stiff(model, i)]
     if ties:
         raise RobotError(
-            f"robot {robot.name!r} is no tree of free joints: {', '.join(ties)} closes a chain or couples joints; remove it, "
-            "and the joints that it ties, from the file"
+            f"robot {robot.name!r} is no open tree: {', '.join(ties)} closes a chain or couples joints; remove it from the "
+            "file, and weld or remove the joints that follow others"
         )
+
+
+def _tie(model: mujoco.MjModel, equality: int) -> str:
+    """Return kind and name of an equality constraint, and what it ties."""
+    kind = mujoco.mjtEq(model.eq_type[equality]).name.removeprefix("mjEQ_").lower()
+    one, two, name = int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality]), model.equality(equality).name
+    of = model.joint if kind == "joint" else model.body if model.eq_objtype[equality] == mujoco.mjtObj.mjOBJ_BODY else None
+    tied = f" ({' and '.join(of(i).name for i in (one, two) if i >= 0)})" if of else ""
+    return f"{kind} {name!r}{tied}" if name else f"{kind}{tied}"
+
+
+def unmodelled(robot: Robot) -> list[str]:
+    """Return what of a robot's file makes torques that no parameter describes."""
+    model = robot.model
+    sprung = [robot.joints[j] for j in np.flatnonzero(model.jnt_stiffness.reshape(robot.n, -1).any(axis=1))]
+    found = [f"springs at {', '.join(sprung)}"] if sprung else []
+    if model.body_gravcomp.any():
+        found.append("gravity compensation (gravcomp)")
+    if model.opt.density or model.opt.viscosity:
+        found.append("a fluid (density, viscosity)")
+    if hasattr(model, "dof_dampingpoly") and model.dof_dampingpoly.any():
+        found.append("damping that is not proportional to the velocity")
+    return found
 
 
 def _is_stiff(model: mujoco.MjModel, tendon: int) -> bool:

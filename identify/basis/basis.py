@@ -84,6 +84,8 @@ class Basis:
     def without(self, *names: str) -> Self:
         """Return the basis without some of its parameters, which then count as zero."""
         self.renamed({name: name for name in names})  # complains of those that there are not
+        if not set(self.parameters) - set(names):
+            raise SettingError(f"without {', '.join(names)} there is no parameter left")
         return self.renamed({name: name for name in self.parameters if name not in names})
 
     @cached_property

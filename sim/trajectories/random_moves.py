@@ -2,10 +2,12 @@
 
 from typing import Annotated, final
 
+import mujoco
 import numpy as np
 from pydantic import Field
 
 from sim.errors import ScenarioError
+from sim.motors import Array
 from sim.robot import Robot
 from sim.settings import EachPositive, NotNegative, Positive, Seed, Whole, per_joint, settings
 from sim.trajectories.base import AbstractTrajectory
@@ -27,9 +29,9 @@ class RandomMoves(AbstractTrajectory):
     rest: NotNegative = 3.0
     """Time at rest before the first and after the last move [s]."""
     clearance: NotNegative = 0.2
-    """Distance of waypoints from the ends of the joints' ranges [rad]."""
+    """Distance of waypoints from the ends of the joints' ranges [rad]; a tenth of narrow ones."""
     smallest_move: Positive = 0.4
-    """Least distance that every joint moves [rad]."""
+    """Least distance that every joint moves [rad]; a quarter of narrow ranges."""
     seed: Seed = 0
     """The same seed gives the same waypoints."""
 
@@ -40,10 +42,20 @@ class RandomMoves(AbstractTrajectory):
     def plan(self, robot: Robot) -> PointToPoint:
         """Draw waypoints and times; every joint moves in every move."""
         rng, points = np.random.default_rng(self.seed), np.zeros((self.moves + 1, robot.n))
+        ranges = _room(robot)
+        width = np.diff(ranges, axis=1)[:, 0]
+        clearance, smallest = np.minimum(self.clearance, width / 10), np.minimum(self.smallest_move, width / 4)
         for k in range(self.moves + 1):
             neighbours = points[max(k - 1, 0) : k]
-            points[k] = draw_waypoint(rng, robot.ranges, neighbours, self.clearance, self.smallest_move)
+            points[k] = draw_waypoint(rng, ranges, neighbours, clearance, smallest)
         velocity = per_joint(self.velocity, robot.n, "trajectory.velocity")
         fastest = (PEAK_VELOCITY * np.abs(np.diff(points, axis=0)) / velocity).max(axis=1)
         times = np.maximum(rng.uniform(*self.durations, self.moves), fastest)
         return at_rest(points, times, self.rest)
+
+
+def _room(robot: Robot) -> Array:
+    """Return where joints move at random, shape (joint, 2): their ranges, or half a turn or metre to either side."""
+    free = np.where(robot.model.jnt_type == int(mujoco.mjtJoint.mjJNT_SLIDE), 0.5, np.pi)
+    around = robot.model.qpos0[:, None] + free[:, None] * [-1.0, 1.0]
+    return np.where(np.isfinite(robot.ranges), robot.ranges, around)

@@ -9,7 +9,9 @@ DRAWS = 10000
 """Draws after which no waypoint is believed to exist."""
 
 
-def draw_waypoint(rng: np.random.Generator, ranges: Array, neighbours: Array, clearance: float, smallest_move: float) -> Array:
+def draw_waypoint(
+    rng: np.random.Generator, ranges: Array, neighbours: Array, clearance: Array | float, smallest_move: Array | float
+) -> Array:
     """Return a random waypoint [rad], shape (joint,).
 
     Parameters
@@ -19,20 +21,20 @@ def draw_waypoint(rng: np.random.Generator, ranges: Array, neighbours: Array, cl
         Lowest and highest position [rad].
     neighbours : Array, shape (any, joint)
         Waypoints before and after it; every joint moves at least `smallest_move` [rad] from and to them.
-    clearance, smallest_move : float
-        Distance from the ends of the ranges, and of a move [rad].
+    clearance, smallest_move : float or Array, shape (joint,)
+        Distance from the ends of the ranges, and of a move [rad], of all joints or of each.
 
     Raises
     ------
     ScenarioError
         If there is no such waypoint.
     """
-    low, high = ranges.T + np.array([[clearance], [-clearance]])
+    low, high = ranges[:, 0] + clearance, ranges[:, 1] - clearance
     for _ in range(DRAWS if (low < high).all() and np.isfinite(ranges).all() else 0):
         point = rng.uniform(low, high)
         if (np.abs(neighbours - point) >= smallest_move).all():
             return point
     raise ScenarioError(
-        f"no waypoint is {smallest_move:g} rad from its neighbours and {clearance:g} rad inside the joints' "
+        f"no waypoint is {np.max(smallest_move):g} rad from its neighbours and {np.max(clearance):g} rad inside the joints' "
         f"ranges, {ranges.tolist()}: lower smallest_move or clearance"
     )

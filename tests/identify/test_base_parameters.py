@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import identify.base_parameters
 from identify import (
     MODELS,
     Armature,
@@ -161,8 +162,10 @@ def test_parameters_can_be_left_out_and_unknown_ones_are_refused():
         basis.without("Fs9")
 
 
-def test_the_grouping_is_the_same_every_time():
+def test_the_grouping_does_not_depend_on_the_states_that_were_drawn(monkeypatch):
     tree = kinematic_tree(Robot.load("panda"))
-    one, two = (BaseParameters.of(tree, tree_basis(tree)) for _ in range(2))
+    one = BaseParameters.of(tree, tree_basis(tree))
+    monkeypatch.setattr(identify.base_parameters, "SEED", 7)
+    two = BaseParameters.of(tree, tree_basis(tree))
     assert one.names == two.names
-    np.testing.assert_array_equal(one.K, two.K)
+    np.testing.assert_allclose(one.K, two.K, atol=1e-9)

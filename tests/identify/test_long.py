@@ -6,9 +6,21 @@ import numpy as np
 import pytest
 
 import identify.long
-from identify import CHAINS, ESTIMATORS, MODELS, MotionLog, System, TorqueChannel, idbench_chain, identify_each, scara
+from identify import (
+    CHAINS,
+    ESTIMATORS,
+    MODELS,
+    MotionLog,
+    System,
+    TorqueChannel,
+    idbench_chain,
+    identify_each,
+    scara,
+    validate,
+)
 from identify.compression import compressed
-from identify.long import is_long, pieces
+from identify.delay import estimate_delay
+from identify.long import build_long, is_long, spans
 
 
 @pytest.fixture
@@ -50,8 +62,8 @@ def test_estimates_are_those_of_all_rows(estimator, noisy, short, monkeypatch):
 def test_pieces_have_the_rows_of_the_log(chain, noisy, short, monkeypatch):
     """All of chain idbench, whose memory ends; those of an IIR filter to what it forgets: 1 %."""
     made, model = CHAINS.create(chain), MODELS.create("implicit")
-    by_piece = System.stack([replace(made, trim=None).build(p, scara(), model) for p in pieces(made, noisy)])
-    monkeypatch.setattr(identify.long, "LONG", 1e9)
+    pieces = [one.part(first, end) for one, first, end in spans(made, noisy)]
+    by_piece = System.stack([replace(made, trim=None).build(piece, scara(), model) for piece in pieces])
     whole = made.build(noisy, scara(), model)
     assert by_piece.W.shape == whole.W.shape
     scale = np.abs(whole.W).max(axis=0)
@@ -60,8 +72,7 @@ def test_pieces_have_the_rows_of_the_log(chain, noisy, short, monkeypatch):
 
 def test_a_trim_of_its_own_is_kept(noisy, short, monkeypatch):
     made = replace(idbench_chain(), trim=3.0)
-    cut = made.build(noisy, scara(), MODELS.create("explicit"))
-    monkeypatch.setattr(identify.long, "LONG", 1e9)
+    (cut,) = build_long(made, noisy, scara(), [MODELS.create("explicit")])
     whole = made.build(noisy, scara(), MODELS.create("explicit"))
     assert cut.rows == whole.rows
     np.testing.assert_allclose(np.abs(np.diagonal(cut.R)), np.abs(np.diagonal(whole.R)), rtol=1e-9)
@@ -78,3 +89,21 @@ def test_compressing_keeps_what_least_squares_needs(noisy):
         np.testing.assert_allclose(mine[0].T @ mine[1], theirs[0].T @ theirs[1], rtol=1e-9)
     again = compressed(System.stack([small, system]))
     assert again.rows == 2 * system.rows
+
+
+def test_a_fit_of_several_long_logs_is_that_of_all_their_rows(noisy, short, monkeypatch):
+    parts = [noisy.part(0, 2400), noisy.part(2200, 4600)]
+    cut = identify_each(parts, scara(), MODEL)
+    monkeypatch.setattr(identify.long, "LONG", 1e9)
+    whole = identify_each(parts, scara(), MODEL)
+    for name in ("explicit", "implicit"):
+        assert cut[name].rows == whole[name].rows
+        np.testing.assert_allclose(cut[name].X, whole[name].X, rtol=1e-9)
+
+
+def test_what_needs_rows_takes_the_beginning_of_a_long_log(noisy, truth, monkeypatch):
+    monkeypatch.setattr(identify.long, "LONG", 4 * 2000)
+    beginning = noisy.part(0, 2000)
+    assert estimate_delay(noisy, scara()).delay == estimate_delay(beginning, scara()).delay
+    one, two = (validate(log, scara(), truth, idbench_chain()) for log in (noisy, beginning))
+    np.testing.assert_array_equal(one.rms, two.rms)

@@ -93,15 +93,15 @@ PAIR = '<geom size="0.1"/><body name="b" pos="1 0 0"><joint name="second"/><geom
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (one('<freejoint name="float"/>'), "only hinge and slide joints can be simulated, not float"),
+        (one('<freejoint name="float"/>'), "only hinge and slide joints can be simulated, not float of body 'a'"),
         (one('<joint name="ball" type="ball"/>'), "only hinge and slide joints can be simulated, not ball"),
         (
             one('<joint name="first"/>', '<equality><connect name="loop" body1="b" anchor="0 0 0"/></equality>', PAIR),
-            "connect 'loop' closes a chain",
+            r"connect 'loop' \(a and b\) closes a chain|connect 'loop' \(b and world\) closes a chain",
         ),
         (
             one('<joint name="first"/>', '<equality><joint name="mimic" joint1="first" joint2="second"/></equality>', PAIR),
-            "joint 'mimic' closes a chain or couples joints",
+            r"joint 'mimic' \(first and second\) closes a chain or couples joints",
         ),
         (
             one(
@@ -190,3 +190,19 @@ def test_meshes_are_found_from_another_folder(written, tmp_path):
     truth = standard_parameters(Robot.load(path))
     (tmp_path / "out.xml").write_text(rewritten(path, truth, tmp_path))
     assert standard_parameters(Robot.load(str(tmp_path / "out.xml"))) == pytest.approx(truth, abs=1e-9)
+
+
+def test_what_stands_around_the_robot_stays_and_every_asset_is_found(written, tmp_path):
+    """A licence before the element, two compilers, a texture in a folder of its own."""
+    (tmp_path / "arm" / "sub").mkdir(parents=True)
+    corners = "\n".join(f"v {x} {y} {z}" for x in (0, 1) for y in (0, 1) for z in (0, 1))
+    (tmp_path / "arm" / "sub" / "box.obj").write_text(corners + "\nf 1 2 3\nf 2 3 4\nf 5 6 7\nf 6 7 8\nf 1 2 5\nf 3 4 7\n")
+    asset, inside = '<asset><mesh name="m" file="box.obj"/></asset>', '<geom type="mesh" mesh="m"/>'
+    compilers = '<compiler angle="radian"/><compiler meshdir="sub"/>'
+    body = one('<joint name="turn"/>', asset, inside).replace("<mujoco>", f"<mujoco>{compilers}")
+    path = written(f"<!-- a licence -->\n{body}\n<!-- the end -->\n", "arm/arm.xml")
+    text = rewritten(path, standard_parameters(Robot.load(path)), tmp_path)
+    assert text.startswith("<!-- a licence -->\n<mujoco>")
+    assert text.endswith("<!-- the end -->\n")
+    (tmp_path / "out.xml").write_text(text)
+    assert Robot.load(str(tmp_path / "out.xml")).joints == ("turn",)

@@ -1,0 +1,46 @@
+"""What is suspicious about a log before anything is made of it."""
+
+import numpy as np
+
+from identify import Array, Joint, KinematicTree, MotionLog
+
+SLACK = 0.05
+"""Positions may be beyond a range by this share of it: ranges of files are rounded."""
+
+MOST_TURNS = 2.0
+"""Turns of a hinge between the ends of a log beyond which degrees are suspected, where the robot gives it no range."""
+
+
+def doubts_of_log(log: MotionLog, tree: KinematicTree) -> list[str]:
+    """Return what is suspicious about the positions of a log: degrees, millimetres, places that a joint cannot reach."""
+    found = []
+    for joint, q in zip(tree.joints, log.q.reshape(-1, log.n).T, strict=True):
+        ends = np.array([q.min(), q.max()])
+        reason = _reason(joint, ends)
+        if reason:
+            found.append(f"{joint.name} goes from {ends[0]:.4g} to {ends[1]:.4g}{reason}")
+    return found
+
+
+def _reason(joint: Joint, ends: Array) -> str:
+    low, high = joint.range
+    slack = SLACK * (high - low) if np.isfinite(high - low) else SLACK
+    span, room = float(np.ptp(ends)), min(high - low, MOST_TURNS * 2 * np.pi if joint.kind == "hinge" else np.inf)
+    unit, other, scale = ("rad", "degrees", np.pi / 180) if joint.kind == "hinge" else ("m", "millimetres", 1e-3)
+    # In the other unit a joint moves farther than any does in its own.
+    if span > 3 * room and scale * ends[0] >= low - slack and scale * ends[1] <= high + slack:
+        return f": are positions logged in {other}? They must be in {unit}"
+    if ends[0] < low - slack or ends[1] > high + slack:
+        order = "are joints in the order of the robot's file, and counted from its zero in its direction?"
+        return f", out of its range, {low:.4g} to {high:.4g}: {order}"
+    return ""
+
+
+def resting(log: MotionLog, tree: KinematicTree) -> list[str]:
+    """Return the joints that never move."""
+    travel = np.ptp(log.q.reshape(-1, log.n), axis=0)
+    return [joint.name for joint, way in zip(tree.joints, travel, strict=True) if way <= STILL * travel.max()]
+
+
+STILL = 1e-3
+"""A joint that travels less than this share of what the busiest does stands still, and trembles."""
