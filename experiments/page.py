@@ -9,7 +9,7 @@ from rich.console import Console
 
 from experiments.errors import ExperimentError, ResultsError
 
-WIDTH = 132
+WIDTH = 144
 """Characters that the widest table needs."""
 
 

@@ -5,7 +5,6 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
-from rich.markup import escape
 from rich.text import Text
 
 from experiments.results import results_folder, tell_of, write_recording, write_summary
@@ -37,13 +36,13 @@ def write_results(page: Console, store: Store, recording: "StudyRecording | None
 def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:
     axes = [short(field) for field in store.study.varied]
     grid = new_table(
-        escape(store.study.question), [*axes[1:], "identified by", "runs", "failed", "typical error", "within 2 sigma"]
+        store.study.question, [*axes[1:], "identified by", "runs", "failed", "typical error", "within 2 sigma"]
     )
     for cell in found:
         settings = [value(x) for x in cell.settings.values()]
         numbers = f"{cell.runs}", f"{cell.failed or ''}"
         judged = (percent(cell.typical), f"{100 * cell.coverage(cell.sigma).mean():.0f} %") if cell.runs else ("", "")
-        grid.add_row(*map(escape, settings), escape(method(cell, found)), *numbers, *judged)
+        grid.add_row(*settings, method(cell, found), *numbers, *judged)
     grid.columns[0].header = axes[0]
     page.print(grid)
     page.print(Text(answer(found)))
