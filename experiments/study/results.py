@@ -35,9 +35,7 @@ def write_results(page: Console, store: Store, recording: "StudyRecording | None
 
 def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:
     axes = [short(field) for field in store.study.varied]
-    grid = new_table(
-        store.study.question, [*axes[1:], "identified by", "runs", "failed", "typical error", "within 2 sigma"]
-    )
+    grid = new_table(store.study.question, [*axes[1:], "identified by", "runs", "failed", "typical error", "within 2 sigma"])
     for cell in found:
         settings = [value(x) for x in cell.settings.values()]
         numbers = f"{cell.runs}", f"{cell.failed or ''}"

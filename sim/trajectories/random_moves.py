@@ -28,10 +28,10 @@ class RandomMoves(AbstractTrajectory):
     """Largest speed [rad/s], of all joints or of each; a move that would be faster takes longer."""
     rest: NotNegative = 3.0
     """Time at rest before the first and after the last move [s]."""
-    clearance: NotNegative = 0.2
-    """Distance of waypoints from the ends of the joints' ranges [rad]; a tenth of narrow ones."""
-    smallest_move: Positive = 0.4
-    """Least distance that every joint moves [rad]; a quarter of narrow ranges."""
+    clearance: NotNegative | None = None
+    """Distance of waypoints from the ends of the joints' ranges [rad]; without it 0.2, or a tenth of narrow ranges."""
+    smallest_move: Positive | None = None
+    """Least distance that every joint moves [rad]; without it 0.4, or a quarter of narrow ranges."""
     seed: Seed = 0
     """The same seed gives the same waypoints."""
 
@@ -44,7 +44,8 @@ class RandomMoves(AbstractTrajectory):
         rng, points = np.random.default_rng(self.seed), np.zeros((self.moves + 1, robot.n))
         ranges = _room(robot)
         width = np.diff(ranges, axis=1)[:, 0]
-        clearance, smallest = np.minimum(self.clearance, width / 10), np.minimum(self.smallest_move, width / 4)
+        clearance = np.minimum(0.2, width / 10) if self.clearance is None else self.clearance
+        smallest = np.minimum(0.4, width / 4) if self.smallest_move is None else self.smallest_move
         for k in range(self.moves + 1):
             neighbours = points[max(k - 1, 0) : k]
             points[k] = draw_waypoint(rng, ranges, neighbours, clearance, smallest)
