@@ -81,9 +81,7 @@ def identify(  # noqa: PLR0913, PLR0917  # the options of a command
     known, about_delay = read(path, torque, torque_delay, named)
     found = replace(named, logs=(known,), truth=_truth(said, named))
     validated = _validated(found, validate, known if torque or torque_delay else None)
-    doubts = [*doubts_of_log(known, subject.tree), *doubts_of_robot(subject.robot)]
-    if validate is not None:
-        doubts += [f"{validate}: {doubt}" for doubt in doubts_of_log(validated.unseen, subject.tree)]
+    doubts = _doubts(validated)
     with watching.audience() as audience, shown(page):
         with _explained(subject, known, doubts):
             print_identified(page, found, str(log))
@@ -94,19 +92,27 @@ def identify(  # noqa: PLR0913, PLR0917  # the options of a command
         if out is not None:
             _write_results(page, out, log.name, validated, watching, audience)
         elif log.is_dir() and watching.rerun and not is_long(known):
-            from experiments.recording.identified import add_layer
-
-            with results_folder(log) as folder:
-                lost = write_recording(folder, add_layer(log, found, audience))
-            tell_of(lost, log)
-            page.print(f"added to the recording in {log}{watching.hint(log)}", soft_wrap=True)
+            _add_layer(page, log, found, watching, audience)
         elif audience and not is_long(known):
-            from experiments.recording.identified import record_log
-
-            for _, stream in record_log(found, audience):
-                stream.close()
+            _show(found, audience)
         if write_mjcf is not None:
             _write_mjcf(page, found, write_mjcf)
+
+
+def _add_layer(page: Console, folder: Path, found: Identified, watching: Watching, audience: Audience | None) -> None:
+    from experiments.recording.identified import add_layer
+
+    with results_folder(folder) as hidden:
+        lost = write_recording(hidden, add_layer(folder, found, audience))
+    tell_of(lost, folder)
+    page.print(f"added to the recording in {folder}{watching.hint(folder)}", soft_wrap=True)
+
+
+def _show(found: Identified, audience: Audience) -> None:
+    from experiments.recording.identified import record_log
+
+    for _, stream in record_log(found, audience):
+        stream.close()
 
 
 def _require_label(label: str) -> None:
@@ -124,6 +130,13 @@ def _require_target(target: Path | None, subject: Subject) -> None:
         raise ExperimentError(f"--write-mjcf {target}: there is no folder {target.parent} for it, or it is a folder itself")
     if target.exists() and target.samefile(Robot.path(subject.name)):
         raise ExperimentError(f"--write-mjcf {target} is the robot's own file: choose another name")
+
+
+def _doubts(validated: Validated) -> list[str]:
+    """Return what is suspicious about the robot's file and the logs."""
+    subject, second = validated.found.subject, validated.second
+    found = [*doubts_of_log(validated.found.logs[0], subject.tree), *doubts_of_robot(subject.robot)]
+    return found + ([f"{validated.name}: {doubt}" for doubt in doubts_of_log(second, subject.tree)] if second else [])
 
 
 def _truth(said: dict[str, Any], named: Identified) -> dict[str, float] | None:

@@ -1,7 +1,6 @@
 """Base parameters: the combinations of standard parameters that a motion can tell at all."""
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self, final
@@ -15,8 +14,8 @@ from identify.errors import SettingError
 from identify.kinematics import KinematicTree
 from identify.state import State
 
-STATES_A_PARAMETER = 4
-"""Random states for each of a joint's fourteen standard parameters, with its rotor and three laws of friction."""
+STATES = 56
+"""Random states for each joint: four for each of its fourteen standard parameters, with a rotor and three laws of friction."""
 
 SEED = 0
 """Of the random states: any others give the same grouping, up to rounding."""
@@ -106,11 +105,6 @@ class BaseParameters:
         """Standard parameters that no motion shows."""
         return tuple(name for name, used in zip(self.standard.parameters, np.any(self.K, axis=0), strict=True) if not used)
 
-    def only(self, names: Sequence[str]) -> "BaseParameters":
-        """Return the grouping of some of the base parameters."""
-        rows = [self.names.index(name) for name in names]
-        return BaseParameters(self.standard, tuple(self.kept[i] for i in rows), self.K[rows])
-
     def grouping(self, i: int) -> str:
         """Return what base parameter `i` is made of, such as ZZ1 + Ia1 + 0.25 M2."""
         first, *others = [self.kept[i], *(k for k in np.flatnonzero(self.K[i]) if k != self.kept[i])]
@@ -157,12 +151,17 @@ def transfer(tree: KinematicTree, start: Basis, end: Basis) -> Array:
 
 
 def _explicit_columns(tree: KinematicTree, basis: Basis) -> Array:
-    """Return the columns of the explicit model at random states, shape (states x joint, p)."""
-    q, qd, qdd = random_states(tree, STATES_A_PARAMETER * 14 * tree.n)
-    W = np.zeros((tree.n, len(basis.parameters), q.shape[-1]))
+    """Return the columns of the explicit model at random states, shape (joint x state, p)."""
+    return np.moveaxis(columns_at(basis, random_states(tree, STATES * tree.n)), 1, -1).reshape(-1, len(basis.parameters))
+
+
+def columns_at(basis: Basis, states: Array) -> Array:
+    """Return the columns of the explicit model at q, qd, qdd, shape (3, joint, state), as (joint, p, state)."""
+    q, qd, qdd = states
+    W = np.zeros((basis.n, len(basis.parameters), q.shape[-1]))
     for (row, name), signal in basis.explicit(State(q, qd, lambda _: qdd)).items():
         W[row, basis.parameters.index(name)] = signal
-    return np.moveaxis(W, 1, -1).reshape(-1, len(basis.parameters))
+    return W
 
 
 def random_states(tree: KinematicTree, count: int) -> Array:

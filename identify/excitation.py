@@ -7,10 +7,9 @@ from itertools import combinations
 import numpy as np
 
 from identify.arrays import Array
-from identify.base_parameters import BaseParameters, random_states
+from identify.base_parameters import BaseParameters, columns_at, random_states
 from identify.basis import Basis
 from identify.kinematics import KinematicTree
-from identify.state import State
 from identify.system import UNSEEN
 
 ENOUGH = 0.2
@@ -71,7 +70,7 @@ def brisk_shares(tree: KinematicTree, basis: Basis, X: Array, sigma: Array) -> A
     Array, shape (b,)
         Rms of the column times sigma, over the rms of the torque.
     """
-    W = _columns(basis, random_states(tree, STATES))
+    W = columns_at(basis, random_states(tree, STATES))
     torque = np.sqrt(np.mean(np.einsum("jpt,p->jt", W, X) ** 2, axis=-1))
     parts = np.sqrt(np.mean(W**2, axis=-1)) * sigma
     return np.max(parts / np.maximum(torque, 1e-300)[:, None], axis=0)
@@ -91,18 +90,9 @@ def _only(states: Array, joints: Sequence[int]) -> Array:
 
 def _shown(basis: Basis, states: Array) -> Array:
     """Return the length of each column off all others, shape (b,)."""
-    W = _columns(basis, states)
+    W = columns_at(basis, states)
     _, values, directions = np.linalg.svd(np.moveaxis(W, 1, -1).reshape(-1, len(basis.parameters)), full_matrices=False)
     seen = values > UNSEEN * values[0]
     hidden = np.sum(directions[~seen] ** 2, axis=0) > UNSEEN
     spread = np.sqrt(np.sum((directions[seen] / values[seen][:, None]) ** 2, axis=0))
     return np.divide(1.0, spread, out=np.zeros(len(spread)), where=~hidden & (spread > 0))
-
-
-def _columns(basis: Basis, states: Array) -> Array:
-    """Return the columns of the explicit model, shape (joint, b, state)."""
-    q, qd, qdd = states
-    W = np.zeros((basis.n, len(basis.parameters), q.shape[-1]))
-    for (row, name), column in basis.explicit(State(q, qd, lambda _: qdd)).items():
-        W[row, basis.parameters.index(name)] = column
-    return W

@@ -79,9 +79,8 @@ def identify_each(
     _require(estimator, AbstractEstimator, 'an estimator, such as ESTIMATORS.create("OLS")')
     for model in models.values():
         _require(model, AbstractModel, 'a model, such as MODELS.create("power")')
-    if is_long(log):
-        return _identify_long(log, basis, models, chain, estimator, throw=throw)
-    return _identify_rows(log, basis, models, chain, estimator, simulate, throw=throw)
+    way = _identify_long if is_long(log) else _identify_rows
+    return way(log, basis, models, chain, estimator, simulate, throw=throw)
 
 
 def _identify_rows(
@@ -99,11 +98,8 @@ def _identify_rows(
     levels = torque_noise(explicit)
     estimates = {}
     for (name, model), rows in zip(models.items(), systems, strict=True):
-        system = replace(rows, levels=levels)
-        if throw and estimator.full_rank:
-            system.check()
-        rebuild = partial(chain.build, basis=basis, model=model)
-        estimates[name] = estimator.fit(Problem(system, rebuild=rebuild, simulate=simulate))
+        problem = Problem(replace(rows, levels=levels), partial(chain.build, basis=basis, model=model), simulate)
+        estimates[name] = _fitted(problem, estimator, throw=throw)
     return estimates
 
 
@@ -113,6 +109,7 @@ def _identify_long(
     models: Mapping[str, AbstractModel],
     chain: Chain,
     estimator: AbstractEstimator,
+    simulate: Callable[[Array], MotionLog] | None = None,
     *,
     throw: bool,
 ) -> dict[str, Estimate]:
@@ -121,11 +118,16 @@ def _identify_long(
     some = _identify_rows(sampled(chain, log, SAMPLED), basis, models, chain, estimator, throw=False)
     estimates = {}
     for (name, model), system in zip(models.items(), systems, strict=True):
-        if throw and estimator.full_rank:
-            system.check()
-        found = estimator.fit(Problem(system, rebuild=partial(chain.build, basis=basis, model=model)))
-        estimates[name] = replace(found, correction=some[name].corrected_sigma / some[name].sigma)
+        problem = Problem(system, partial(chain.build, basis=basis, model=model), simulate)
+        correction = some[name].corrected_sigma / some[name].sigma
+        estimates[name] = replace(_fitted(problem, estimator, throw=throw), correction=correction)
     return estimates
+
+
+def _fitted(problem: Problem, estimator: AbstractEstimator, *, throw: bool) -> Estimate:
+    if throw and estimator.full_rank:
+        problem.system.check()
+    return estimator.fit(problem)
 
 
 def _require(given: object, kind: type, wanted: str, *others: type) -> None:

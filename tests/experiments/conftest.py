@@ -1,8 +1,14 @@
 """What the tests of the command line share."""
 
+from dataclasses import replace
+
 import pytest
 
 from experiments.cli import main
+from identify import MotionLog
+from identify.log_file import read_log, write_log
+from sim.engine import simulate
+from sim.scenario_file import load, to_toml
 
 
 @pytest.fixture
@@ -23,3 +29,58 @@ def complaint(capfd):
         return lines[0]
 
     return run
+
+
+@pytest.fixture(scope="session")
+def logs(tmp_path_factory):
+    """Return a folder with two logs of the PUMA, short ones."""
+    folder, arm = tmp_path_factory.mktemp("logs"), load("arm")
+    for name, moves, seed in (("first", 12, 0), ("second", 5, 3)):
+        trajectory = replace(arm.trajectory, moves=moves, seed=seed)
+        log = simulate(replace(arm, robot="puma560", fs=250.0, trajectory=trajectory)).alone()
+        write_log(log, folder / f"{name}.parquet")
+    return folder
+
+
+@pytest.fixture
+def told(capsys, monkeypatch, tmp_path):
+    """Run a command in an empty folder; return its code, what it printed, and its complaint."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words):
+        code = main([str(word) for word in words])
+        out, err = capsys.readouterr()
+        return code, out, err
+
+    return run
+
+
+@pytest.fixture
+def changed(logs, tmp_path):
+    """Write the first log with positions and torques changed."""
+
+    def write(q=lambda q: q, tau=lambda tau: tau, name="changed.parquet"):
+        log = read_log(logs / "first.parquet")
+        write_log(MotionLog(log.fs, q(log.q), tau(log.tau), log.torque), tmp_path / name)
+        return tmp_path / name
+
+    return write
+
+
+ARM = """
+<mujoco><worldbody><geom type="plane" size="2 2 0.1"/>
+  <body name="a" pos="0 0 0.5"><joint name="turn" axis="0 0 1"/><geom size="0.1" pos="0.1 0 0"/>
+    <body name="b" pos="0.1 0 0"><joint name="reach" type="slide" axis="1 0 0" range="0 0.4" damping="3"/><geom size="0.1"/>
+    </body></body></worldbody></mujoco>
+"""
+"""A hinge without range, a short slide, bodies that overlap each other and a floor, no motors."""
+
+
+@pytest.fixture
+def arm(tmp_path):
+    (tmp_path / "arm.xml").write_text(ARM)
+    arm = load("arm")
+    for name, moves, seed in (("first", 16, 0), ("second", 8, 3)):
+        trajectory = replace(arm.trajectory, moves=moves, seed=seed)
+        (tmp_path / f"{name}.toml").write_text(to_toml(replace(arm, name=name, fs=250.0, trajectory=trajectory)))
+    return tmp_path / "arm.xml"
