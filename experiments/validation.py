@@ -102,7 +102,7 @@ class Validated:
         worst, strayed = float(told.percent.max()), 0.0 if strays is None else float(strays.max())
         word = "good" if worst <= GOOD and strayed <= STRAYS else "fair" if worst <= FAIR and strayed <= LOST else "poor"
         if wrong := wrong_sign(self.judged):
-            return "poor", [*wrong, *self._reasons(model, told)]
+            return "poor", [*(reason.partition(":")[0] for reason in wrong), *self._reasons(model, told)]
         return word, [*self._reasons(model, told), *([] if word == "good" else self._worth_a_try)]
 
     @property
@@ -156,7 +156,7 @@ class Validated:
 
 
 def _percent(share: float) -> str:
-    return f"{share:.2g} %" if share < 100 else f"{share:.0f} %"
+    return f"{share:.2g} %" if share < 10 else f"{share:.0f} %"
 
 
 def _without(log: MotionLog, qd: Array, standard: Basis, lost: Mapping[str, float]) -> MotionLog:

@@ -1,6 +1,5 @@
 """What is wrong with robots and their logs, in one line each."""
 
-
 import numpy as np
 import pytest
 

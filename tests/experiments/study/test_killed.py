@@ -14,12 +14,13 @@ from experiments.study.store import Store
 
 CODE = """
 import sys
+import time
 from pathlib import Path
 from experiments.study.engine import local_pool, run_missing
 from experiments.study.store import Store
 store = Store.open(Path(sys.argv[1]))
 with local_pool(store.study, 2) as pool:
-    run_missing(store, pool, 2, lambda done: None)
+    run_missing(store, pool, 2, lambda done: time.sleep(0.05))  # time for the kill, whatever else the machine does
 """
 
 
