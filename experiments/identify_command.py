@@ -13,7 +13,7 @@ from rich.text import Text
 
 from experiments.app import app
 from experiments.audience import Audience, Watched, Watching
-from experiments.chosen import Asked, Parameters
+from experiments.chosen import Asked, Parameters, absolute
 from experiments.doubts import doubts_of_result, doubts_of_robot, helpful_moves
 from experiments.errors import ExperimentError
 from experiments.identified import Identified
@@ -22,7 +22,7 @@ from experiments.log_doubts import doubts_of_log
 from experiments.page import new_page, shown
 from experiments.reading import Delay, Held, file_of, read, told_by
 from experiments.results import results_folder, tell_of, write_recording, write_summary
-from experiments.subject import Subject
+from experiments.subject import CLOSED_FORM, Subject
 from experiments.validation import Validated
 from experiments.written import Written
 from identify import MODELS, IdentificationError, LogError, MotionLog
@@ -75,7 +75,7 @@ def identify(  # noqa: PLR0913, PLR0917  # the options of a command
     page, models = new_page(), tuple(MODELS) if model == "all" else (model,)
     path, said = file_of(log), told_by(log)
     _require_label(label)
-    subject = parameters.of(said.get("robot") if robot is None else robot)
+    subject = Subject(said.get("robot", CLOSED_FORM) if robot is None else absolute(robot), parameters)
     _require_target(write_mjcf, subject)
     named = Identified((), subject, models=models, chain=chain, estimator=estimator, name=label)  # complains of names first
     known, about_delay = read(path, torque, torque_delay, named)

@@ -10,6 +10,9 @@ SLACK = 0.05
 MOST_TURNS = 2.0
 """Turns of a hinge between the ends of a log beyond which degrees are suspected, where the robot gives it no range."""
 
+STILL = 1e-3
+"""A joint that travels less than this share of what the busiest does stands still, and trembles."""
+
 
 def doubts_of_log(log: MotionLog, tree: KinematicTree) -> list[str]:
     """Return what is suspicious about the positions of a log: degrees, millimetres, places that a joint cannot reach."""
@@ -40,7 +43,3 @@ def resting(log: MotionLog, tree: KinematicTree) -> list[str]:
     """Return the joints that never move."""
     travel = np.ptp(log.q.reshape(-1, log.n), axis=0)
     return [joint.name for joint, way in zip(tree.joints, travel, strict=True) if way <= STILL * travel.max()]
-
-
-STILL = 1e-3
-"""A joint that travels less than this share of what the busiest does stands still, and trembles."""

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.text import Text
 
 from experiments.app import app
-from experiments.chosen import Asked, Parameters
+from experiments.chosen import Asked, Parameters, absolute
 from experiments.doubts import doubts_of_robot
 from experiments.interruption import importing
 from experiments.page import new_page, show
@@ -35,7 +35,7 @@ def robot(
         from sim.errors import BenchError
         from sim.trajectories import RandomMoves
 
-    subject, page = parameters.of(name), new_page()
+    subject, page = Subject(absolute(name), parameters), new_page()
     truth = subject.truth(subject.robot)
     _print_joints(page, subject)
     _print_parameters(page, subject, truth)

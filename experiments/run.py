@@ -51,7 +51,7 @@ class ScenarioRun:
     @cached_property
     def subject(self) -> Subject:
         """The robot."""
-        return self.parameters.of(self.scenario.robot)
+        return Subject(self.scenario.robot, self.parameters)
 
     @cached_property
     def run(self) -> Run:

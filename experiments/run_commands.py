@@ -17,6 +17,7 @@ from experiments.interruption import importing
 from experiments.page import new_page, shown
 from experiments.results import results_folder, tell_of, write_recording, write_summary
 from identify.log_file import write_log
+from identify.long import is_long
 from sim.drives import IdealDrive
 from sim.engine import Progress
 from sim.errors import RobotError
@@ -98,6 +99,8 @@ def run(  # noqa: PLR0913, PLR0917  # the options of a command
                 lost = write_recording(folder, recording.finish(ran))
         tell_of(lost, folder_name)
         _doubt_window(page, inner, recording)
+        if recording and is_long(ran.run.alone()):
+            page.print("the identification is not recorded: the rows of so long a log are not kept")
         page.print(f"written to {folder_name}{watching.hint(folder_name)}", soft_wrap=True)
 
 

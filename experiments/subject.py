@@ -1,12 +1,12 @@
 """The robot that is identified: its basis, its joints, and what is true of it where it is simulated."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, final
+from typing import final
 
 import numpy as np
 
+from experiments.chosen import Parameters
 from experiments.errors import ExperimentError
 from identify import BLOCKS, AbstractFriction, BaseParameters, Basis, KinematicTree, scara, tree_basis
 from sim.robot import Robot
@@ -15,8 +15,6 @@ from sim.tree import kinematic_tree, standard_parameters
 
 CLOSED_FORM = "scara"
 """The robot whose basis is the paper's, in closed form."""
-
-Armature = Literal["file", "all"]
 
 
 @final
@@ -28,18 +26,12 @@ class Subject:
     ----------
     name : str
         Name of a robot that ships, or path of an MJCF or URDF file.
-    armature : {"file", "all"}
-        Which joints have the inertia of a rotor: those to which the file gives one, or all.
-    add : sequence of str
-        Friction laws of the table of blocks, beside viscous and Coulomb friction.
-    without : sequence of str
-        Parameters that are left out.
+    asked : Parameters
+        Which of its parameters are asked for.
     """
 
     name: str = CLOSED_FORM
-    armature: Armature = "file"
-    add: Sequence[str] = ()
-    without: Sequence[str] = ()
+    asked: Parameters = Parameters()  # noqa: RUF009  # frozen
 
     @cached_property
     def robot(self) -> Robot:
@@ -50,7 +42,7 @@ class Subject:
     def tree(self) -> KinematicTree:
         """Its description."""
         tree = kinematic_tree(self.robot)
-        if self.armature == "file":
+        if self.asked.armature == "file":
             return tree
         return replace(tree, joints=tuple(replace(joint, armature=True) for joint in tree.joints))
 
@@ -62,7 +54,7 @@ class Subject:
     @cached_property
     def base(self) -> BaseParameters | None:
         """The grouping, where its base parameters are what is identified; None for the closed form."""
-        return None if self.name == CLOSED_FORM and self.armature == "file" else self.grouping
+        return None if self.name == CLOSED_FORM and self.asked.armature == "file" else self.grouping
 
     @cached_property
     def whole(self) -> Basis:
@@ -72,7 +64,7 @@ class Subject:
     @cached_property
     def basis(self) -> Basis:
         """What is identified."""
-        return self.whole.without(*self.without) if self.without else self.whole
+        return self.whole.without(*self.asked.without) if self.asked.without else self.whole
 
     def truth(self, robot: Robot) -> dict[str, float]:
         """Return the true value of every parameter of the basis for `robot`, this one as it is simulated.
@@ -88,7 +80,7 @@ class Subject:
         return {name: known.get(name, 0.0) for name in self.basis.parameters}
 
     def _with_laws(self, basis: Basis) -> Basis:
-        for name in self.add:
+        for name in self.asked.add:
             block = BLOCKS.create(name)
             if not isinstance(block, AbstractFriction):
                 laws = [known for known in BLOCKS if isinstance(BLOCKS.create(known), AbstractFriction)]

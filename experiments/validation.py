@@ -17,11 +17,10 @@ from sim.errors import BenchError
 from sim.replay import Replay, replay
 
 GOOD, FAIR = 2.0, 10.0
-"""Torque errors [% of the torque] up to which a model is good, or fair: those of published identifications of industrial arms
-lie between 2 and 10 %."""
+"""Torque errors [% of the torque] up to which a model is called good, or fair; a choice of ours."""
 
 STRAYS, LOST = 1.0, 5.0
-"""Position errors [% of a joint's way] up to which a simulated robot is good, or fair."""
+"""Position errors [% of a joint's way] up to which a simulated robot is called good, or fair; a choice of ours too."""
 
 BANDWIDTH = 5.0
 """Of the loop that holds the simulated robot to the log [rad/s]: weak, so that errors of the model show."""
@@ -109,7 +108,7 @@ class Validated:
     def _worth_a_try(self) -> list[str]:
         """What may be missing in a model that is not good."""
         subject = self.found.subject
-        options = [] if "offset" in subject.add else ["--add offset"]
+        options = [] if "offset" in subject.asked.add else ["--add offset"]
         if not all(joint.armature for joint in subject.tree.joints):
             options.append("--armature all")
         return [f"worth a try: {', '.join(options)}"] if options else []

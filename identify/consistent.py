@@ -133,17 +133,9 @@ class _Problem:
         numbers = sorted({joint_number(name) for name in names if name.startswith("MX")})
         self._links = [[names.index(f"{x}{j}") for x in INERTIAL] for j in numbers]
         self._signed = [i for i, name in enumerate(names) if name.rstrip("0123456789") in NOT_NEGATIVE]
+        self._inertias = [_thick(pseudo_inertia(given[link]), j) for j, link in zip(numbers, self._links, strict=True)]
         self.scale, self.metric = np.where(given == 0, 1.0, np.abs(given)), np.eye(len(names))
-        for number, link in zip(numbers, self._links, strict=True):
-            S = pseudo_inertia(given[link])
-            lowest, largest = np.linalg.eigvalsh(S)[[0, -1]]
-            if -FLAT * largest <= lowest < FLAT * largest:  # a plate, a rod: bodies have some thickness
-                S = S + FLAT * largest * np.eye(4)
-            elif lowest <= 0:
-                raise IdentificationError(
-                    f"link {number} of the given model cannot exist: its pseudo-inertia is not positive (is the centre of mass "
-                    "outside of the body that the inertia describes?); correct the file first"
-                )
+        for S, link in zip(self._inertias, self._links, strict=True):
             self.scale[link] = _spread(S)
             steps = [np.linalg.solve(S, PSEUDO[k] * self.scale[i]) for k, i in enumerate(link)]
             self.metric[np.ix_(link, link)] = [[np.trace(a @ b) for b in steps] for a in steps]
@@ -153,14 +145,25 @@ class _Problem:
         rows = [-np.eye(len(self._names))[self._signed]]
         limits = [np.zeros(len(self._signed))]
         lower = [(i, j) for j in range(4) for i in range(j + 1)]  # of the upper triangle, column by column
-        for link in self._links:
+        for S_given, link in zip(self._inertias, self._links, strict=True):
             weights = np.array([[S[i, j] * (1.0 if i == j else _ROOT2) for S in PSEUDO] for i, j in lower])
             block = np.zeros((len(lower), len(self._names)))
             block[:, link] = -weights
             rows.append(block)
-            smallest = MARGIN * max(np.linalg.eigvalsh(pseudo_inertia(self.given[link]))[0], 0.0)
+            smallest = MARGIN * np.linalg.eigvalsh(S_given)[0]
             limits.append(np.array([-smallest if i == j else 0.0 for i, j in lower]))
         return np.concatenate(rows), np.concatenate(limits), (len(self._signed), len(self._links))
+
+
+def _thick(S: Array, number: int) -> Array:
+    """Return the pseudo-inertia of a link, that of a plate or a rod with some thickness; raise if there is no such body."""
+    lowest, largest = np.linalg.eigvalsh(S)[[0, -1]]
+    if lowest < -FLAT * largest or largest <= 0:
+        raise IdentificationError(
+            f"link {number} of the given model cannot exist: its pseudo-inertia is not positive (is the centre of mass "
+            "outside of the body that the inertia describes?); correct the file first"
+        )
+    return S + FLAT * largest * np.eye(4) if lowest < FLAT * largest else S
 
 
 def _spread(S: Array) -> Array:

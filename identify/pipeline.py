@@ -14,6 +14,7 @@ from identify.long import build_long, is_long, sampled
 from identify.models import AbstractModel, ExplicitModel
 from identify.motion_log import MotionLog
 from identify.noise import torque_noise
+from identify.system import System
 
 SAMPLED = 8
 """Pieces of a long log from which the correction of sigma is taken."""
@@ -79,55 +80,28 @@ def identify_each(
     _require(estimator, AbstractEstimator, 'an estimator, such as ESTIMATORS.create("OLS")')
     for model in models.values():
         _require(model, AbstractModel, 'a model, such as MODELS.create("power")')
-    way = _identify_long if is_long(log) else _identify_rows
-    return way(log, basis, models, chain, estimator, simulate, throw=throw)
+
+    def fit(systems: Sequence[System], throw: bool) -> dict[str, Estimate]:
+        found = {}
+        for (name, model), system in zip(models.items(), systems, strict=True):
+            if throw and estimator.full_rank:
+                system.check()
+            found[name] = estimator.fit(Problem(system, partial(chain.build, basis=basis, model=model), simulate))
+        return found
+
+    given = list(models.values())
+    if not is_long(log):
+        return fit(_systems(chain, log, basis, given), throw)
+    whole = fit(build_long(chain, log, basis, given), throw)
+    some = fit(_systems(chain, sampled(chain, log, SAMPLED), basis, given), False)
+    return {name: replace(e, correction=some[name].corrected_sigma / some[name].sigma) for name, e in whole.items()}
 
 
-def _identify_rows(
-    log: MotionLog | Sequence[MotionLog],
-    basis: Basis,
-    models: Mapping[str, AbstractModel],
-    chain: Chain,
-    estimator: AbstractEstimator,
-    simulate: Callable[[Array], MotionLog] | None = None,
-    *,
-    throw: bool,
-) -> dict[str, Estimate]:
-    """Return the estimates from all rows."""
-    *systems, explicit = chain.build_each(log, basis, [*models.values(), ExplicitModel()])
+def _systems(chain: Chain, log: MotionLog | Sequence[MotionLog], basis: Basis, models: Sequence[AbstractModel]) -> list[System]:
+    """Return the rows of each model, which know the noise of the torques."""
+    *systems, explicit = chain.build_each(log, basis, [*models, ExplicitModel()])
     levels = torque_noise(explicit)
-    estimates = {}
-    for (name, model), rows in zip(models.items(), systems, strict=True):
-        problem = Problem(replace(rows, levels=levels), partial(chain.build, basis=basis, model=model), simulate)
-        estimates[name] = _fitted(problem, estimator, throw=throw)
-    return estimates
-
-
-def _identify_long(
-    log: MotionLog | Sequence[MotionLog],
-    basis: Basis,
-    models: Mapping[str, AbstractModel],
-    chain: Chain,
-    estimator: AbstractEstimator,
-    simulate: Callable[[Array], MotionLog] | None = None,
-    *,
-    throw: bool,
-) -> dict[str, Estimate]:
-    """Return the estimates of a log whose rows are not kept; some of its pieces tell how sigma is to be corrected."""
-    systems = build_long(chain, log, basis, list(models.values()))
-    some = _identify_rows(sampled(chain, log, SAMPLED), basis, models, chain, estimator, throw=False)
-    estimates = {}
-    for (name, model), system in zip(models.items(), systems, strict=True):
-        problem = Problem(system, partial(chain.build, basis=basis, model=model), simulate)
-        correction = some[name].corrected_sigma / some[name].sigma
-        estimates[name] = replace(_fitted(problem, estimator, throw=throw), correction=correction)
-    return estimates
-
-
-def _fitted(problem: Problem, estimator: AbstractEstimator, *, throw: bool) -> Estimate:
-    if throw and estimator.full_rank:
-        problem.system.check()
-    return estimator.fit(problem)
+    return [replace(rows, levels=levels) for rows in systems]
 
 
 def _require(given: object, kind: type, wanted: str, *others: type) -> None:

@@ -1,4 +1,4 @@
-"""A robot: a compiled MuJoCo model of one serial arm and what the bench asks of it."""
+"""A robot: a compiled MuJoCo model of one arm and what the bench asks of it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ class Robot:
 
     @classmethod
     def load(cls, name: str, *edits: Callable[[mujoco.MjSpec], None]) -> Self:
-        """Return the robot that ships as `name`, or that of an MJCF file, changed by `edits` before it is compiled.
+        """Return the robot that ships as `name`, or that of an MJCF or URDF file, changed by `edits` before it is compiled.
 
         Raises
         ------

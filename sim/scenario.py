@@ -58,7 +58,7 @@ class Scenario:
     trajectory: AbstractTrajectory
     """Where the joints shall go: a table with a kind, or the name of a scenario whose trajectory it takes."""
     robot: str = "scara"
-    """Name of a robot that ships, or path of an MJCF file."""
+    """Name of a robot that ships, or path of an MJCF or URDF file."""
     fs: Positive = 100.0
     """Sampling frequency of controller and log [Hz]."""
     seed: Seed = 0

@@ -103,7 +103,7 @@ def unmodelled(robot: Robot) -> list[str]:
         found.append("gravity compensation (gravcomp)")
     if model.opt.density or model.opt.viscosity:
         found.append("a fluid (density, viscosity)")
-    if hasattr(model, "dof_dampingpoly") and model.dof_dampingpoly.any():
+    if model.dof_dampingpoly.any():
         found.append("damping that is not proportional to the velocity")
     return found
 
@@ -120,8 +120,6 @@ def _placement(model: mujoco.MjModel, body: int) -> tuple[int, Array, Array]:
         turned = _rotation(model.body_quat[parent])
         position, rotation = model.body_pos[parent] + turned @ position, turned @ rotation
         parent = int(model.body_parentid[parent])
-    if not parent:  # bodies of the ground are placed in the world
-        return 0, position, rotation
     return parent, position, rotation
 
 
@@ -142,12 +140,7 @@ def _welded(model: mujoco.MjModel, link: int) -> Iterator[tuple[int, Array, Arra
     yield link, np.zeros(3), np.eye(3)
     for body in range(link + 1, model.nbody):
         if model.body_weldid[body] == link:
-            position, rotation = np.array(model.body_pos[body]), _rotation(model.body_quat[body])
-            parent = int(model.body_parentid[body])
-            while parent != link:
-                turned = _rotation(model.body_quat[parent])
-                position, rotation = model.body_pos[parent] + turned @ position, turned @ rotation
-                parent = int(model.body_parentid[parent])
+            _, position, rotation = _placement(model, body)
             yield body, position, rotation
 
 

@@ -7,10 +7,24 @@ import rerun.blueprint as rrb
 
 from experiments.errors import ResultsError
 from experiments.recording.views import Part, Shelf, arm, bars, column, grid, lanes, plot, side_by_side, tabbed, text
-from identify import joint_number
+from identify import BLOCKS, joint_number
+from identify.basis.wrench import UNITS
+from identify.kinematics import INERTIAL
 
-UNITS = {"Fv": "N m s/rad", "Fs": "N m", "off": "N m", "M": "kg", "MX": "kg m", "MY": "kg m", "MZ": "kg m", "Ia": "kg m²"}
-"""Units of parameters, by their letters; LMX, LMY and elements of inertia matrices, two of X, Y and Z, have kg m²."""
+DIGITS = "0123456789"
+
+
+def _letters(name: str) -> str:
+    """Return the letters of a parameter, without the R of those that are grouped."""
+    return name.rstrip(DIGITS).removesuffix("R")
+
+
+def _known_units() -> dict[str, str]:
+    """Return the units of the parameters of links and of the blocks that are built in, by their letters."""
+    blocks = [BLOCKS.create(name) for name in BLOCKS.builtin]
+    each = [pair for block in blocks for pair in zip(block.names(2), block.units(2), strict=True)]
+    return dict(zip(INERTIAL, UNITS, strict=True)) | {_letters(name): unit for name, unit in each}
+
 
 ESTIMATES = 12
 """Plots of estimates that have room beside each other."""
@@ -158,8 +172,7 @@ def _unit(row: str) -> str:
 
 
 def _estimate(shelf: Shelf, name: str) -> Part:
-    letters = name.rstrip("0123456789").removesuffix("R")  # of those that are grouped
-    unit = UNITS.get(letters, "kg m²" if set(letters) <= set("LMXYZ") else "")
+    unit = _known_units().get(_letters(name), "").replace("^2", "²")
     return plot(shelf, f"{name} [{unit}]" if unit else name, f"identify/*/*/estimate/{name}", f"truth/{name}", legend=False)
 
 
