@@ -11,6 +11,7 @@ from sim.clock import Clock
 from sim.controllers import Task
 from sim.drives.base import every
 from sim.errors import ScenarioError
+from sim.failures import Failures
 from sim.history import History
 from sim.inverse_dynamics import inverse_dynamics
 from sim.measurement import CurrentSensor
@@ -46,7 +47,6 @@ class Bench:
         self._clock = clock = Clock(round(1 / fs / self._h), self._h, scenario.timing.delay)
         self._plant = Plant(robot, nsim, scenario.physics, self._h, vary, threads)
         self._plant.q[:] = planned.q[0]
-        self._ranges = tuple(every(limit, nsim) for limit in robot.ranges.T)
         self._law = scenario.controller.start(Task(scenario.nominal_robot, planned, nsim))
         self._drive = scenario.drive.start(robot, nsim, self._h)
         self._ripple = scenario.ripple.start(robot)
@@ -55,7 +55,8 @@ class Bench:
         self._sensor = CurrentSensor(scenario.torque, nsim, n)
         self._jitter = self._drawn_jitter(samples)
         self._history = History(clock.late + clock.per_sample, nsim, n, self._h)
-        self._failures: dict[int, str] = {}
+        self._failures = Failures(robot, planned, seeds)
+        self._going: npt.NDArray[np.intp] | None = None
         at_rest = every(planned.q[0], nsim) if planned.q.ndim == 2 else planned.q[0]
         self._at_rest, still = at_rest, np.zeros((nsim, n))
         self._before = self._command = self._demand = inverse_dynamics(robot, at_rest, still, still)
@@ -85,9 +86,10 @@ class Bench:
         """Advance from physics step `step` to where something may change; return how many steps that were."""
         q, qd = self._plant.q, self._plant.qd
         sample = self._clock.sample(step)
+        if sample is not None:
+            self._stop_failed(step)
         if sample is not None and sample < len(self._q):
             self._q[sample], self._speeds[sample], self._currents[sample] = q, qd, self._sensor.value
-            self._stop_those_out_of_range(sample)
             if self._watcher and self._watcher.due(self._final(step)):
                 self.tell(step)
         self._history.put(step, q, qd)
@@ -100,11 +102,14 @@ class Bench:
         electric = self._drive.step(self._demand, mid_qd * constant, steps)
         self._sensor.take(electric, steps * self._h)
         tau = electric * constant + self._ripple.cogging.at(mid_q)
-        if self._failures:
-            tau[:, list(self._failures)] = 0.0
+        resistance = self._friction.torque(mid_qd[0])
+        total = tau + resistance
+        if not np.isfinite(total).all():
+            self._stop_failed(step)
+            self._failures.finite({"the drive": tau, "the friction": resistance})
         if self._watcher:
             self._watcher.take(Step(step, steps, tau, self._drive.trace))
-        self._plant.step(tau + self._friction.torque(mid_qd[0]), steps)
+        self._plant.step(total, steps, self._going)
         current = step // self._clock.per_sample
         if current < len(self._tau):
             self._tau[current] += tau.mean(axis=0) * steps
@@ -146,13 +151,18 @@ class Bench:
             return 1  # the current of a new command settles in a step of its own, and so does a mixture of two
         return min(clock.undisturbed(step), self._most)
 
+    @property
+    def failures(self) -> Mapping[int, str]:
+        """Why simulations have failed, by their number."""
+        return self._failures.reasons
+
     def run(self, skipped: int) -> Run:
         """Return what has happened since sample `skipped`."""
         channels = self._measured, self._commands, self._currents, self._q, self._speeds, self._tau / self._clock.per_sample
         measured, command, current, q, qd, tau = (np.swapaxes(x[skipped:], 0, 1) for x in channels)
         for sim in np.flatnonzero(~np.isfinite(command).all(axis=(1, 2))):
-            self._failures.setdefault(int(sim), f"the controller commands no finite torque (seed {self._seeds[sim]})")
-        for failed in self._failures:
+            self._failures.add(int(sim), "the controller commands no finite torque")
+        for failed in self._failures.reasons:
             measured[failed] = command[failed] = current[failed] = 0.0
         scenario, n = self._scenario, q.shape[-1]
         logged = scenario.torque.logged(
@@ -161,24 +171,18 @@ class Bench:
         planned = replace(self._planned, **{x: getattr(self._planned, x)[skipped:] for x in ("q", "qd", "qdd")})
         lag = float(scenario.drive.lag(self._plant.robot).mean()) - scenario.physics.early * self._h
         log = MotionLog(scenario.fs, measured, logged, scenario.torque.channel(scenario.timing.delay, lag, scenario.fs))
-        return Run(scenario, self._seeds, self._plant.robots, planned, log, q, qd, tau, command, self._failures)
+        return Run(scenario, self._seeds, self._plant.robots, planned, log, q, qd, tau, command, self._failures.reasons)
 
-    def _stop_those_out_of_range(self, sample: int) -> None:
-        """Leave simulations at rest, without torque, of which a joint has left its range: at its stop, or unstable."""
-        q, (low, high) = self._q[sample], self._ranges
-        inside = (q >= low) & (q <= high)
-        if inside.all():
-            return
-        for sim, j in np.argwhere(~inside):
-            reason = (
-                f"joint {self._plant.robot.joints[j]} leaves its range {sample / self._scenario.fs:.3g} s after the start "
-                f"(seed {self._seeds[sim]}): the loop is unstable or too weak; lower controller.bandwidth or timing.delay, "
-                "raise fs, or ask less of the drive"
-            )
-            self._failures.setdefault(int(sim), reason)
-        failed = np.unique(np.argwhere(~inside)[:, 0])
-        self._plant.q[failed] = self._q[sample, failed] = self._at_rest[failed]
-        self._plant.qd[failed] = self._speeds[sample, failed] = 0.0
+    def _stop_failed(self, step: int) -> None:
+        """Leave simulations at rest that cannot go on."""
+        plant, failures = self._plant, self._failures
+        failures.look(step / self._clock.per_sample, plant.q, plant.qd)
+        for sim, complaint in plant.troubles.items():
+            failures.add(sim, f"MuJoCo cannot go on: {complaint}")
+        if failures.reasons:
+            failed = list(failures.reasons)
+            plant.q[failed], plant.qd[failed] = self._at_rest[failed], 0.0
+            self._going = np.setdiff1d(np.arange(len(self._seeds)), failed)
 
 
 def _generators(seeds: Sequence[int], stream: int) -> list[np.random.Generator]:

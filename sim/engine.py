@@ -53,7 +53,7 @@ def simulate(  # noqa: PLR0913  # all but two by their names
     Raises
     ------
     ScenarioError
-        If settings do not fit each other or the robot, or a joint leaves its range.
+        If settings do not fit each other or the robot, a joint leaves its range, or the loop is unstable.
     RobotError
         If the robot does not have what the scenario asks of it.
     """
@@ -63,12 +63,13 @@ def simulate(  # noqa: PLR0913  # all but two by their names
     h = scenario.drive.step_length(scenario.fs, scenario.physics.step)
     watcher = Watcher(watch, scenario.fs, h, skipped) if watch else None
     bench = Bench(scenario, robot, planned, seeds, vary or {}, threads, watcher)
-    step, told = 0, -1
-    while step < bench.steps:
-        step += bench.advance(step)
-        if progress and 100 * step // bench.steps > told:
-            told = 100 * step // bench.steps
-            progress(step / bench.steps)
+    step, told, bearable = 0, -1, 0 if throw else len(seeds) - 1
+    with np.errstate(over="ignore", invalid="ignore"):  # of simulations that diverge: they are told, and end, alone
+        while step < bench.steps and len(bench.failures) <= bearable:
+            step += bench.advance(step)
+            if progress and 100 * step // bench.steps > told:
+                told = 100 * step // bench.steps
+                progress(step / bench.steps)
     bench.tell(bench.steps)
     run = bench.run(skipped)
     if throw and run.failures:

@@ -13,6 +13,15 @@ from sim.motors import Array
 from sim.robot import Robot
 from sim.scenario import Physics
 
+SWITCHED_OFF = (
+    mujoco.mjtDisableBit.mjDSBL_ACTUATION,
+    # Shapes of neighbours overlap in many files, and a torque of contact is none of the models'.
+    mujoco.mjtDisableBit.mjDSBL_CONTACT,
+    # A simulation that diverges would begin anew without a word.
+    mujoco.mjtDisableBit.mjDSBL_AUTORESET,
+)
+"""Of MuJoCo."""
+
 
 class Plant:
     """Simulations of a robot whose joints are driven by torques; its actuators are switched off.
@@ -39,9 +48,10 @@ class Plant:
         model = copy(robot.model)
         model.opt.timestep = h
         model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{physics.integrator.upper()}")
-        # Bodies do not touch: shapes of neighbours overlap in many files, and a torque of contact is none of the models'.
-        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION) | int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+        for flag in SWITCHED_OFF:
+            model.opt.disableflags |= int(flag)
         self.robot, self.batch = robot, Batch(model, nsim, threads)
+        self._errors: dict[int, str] = {}
         for name, values in vary.items():
             _vary(self.batch, name, np.asarray(values, dtype=np.float64))
         varied = (Robot(robot.name, self.batch.get_model(i)) for i in range(nsim))
@@ -50,8 +60,8 @@ class Plant:
         expanded = self.batch.expanded("dof_frictionloss")
         self.Fs: Array = np.array(np.broadcast_to(model.dof_frictionloss, (nsim, robot.n)) if expanded is None else expanded)
 
-    def step(self, torques: Array, steps: int) -> None:
-        """Advance every simulation by `steps` physics steps.
+    def step(self, torques: Array, steps: int, going: npt.NDArray[np.intp] | None = None) -> None:
+        """Advance simulations by `steps` physics steps.
 
         Parameters
         ----------
@@ -59,16 +69,26 @@ class Plant:
             On the joints in every step, or the same in all of them [N m].
         steps : int
             How many.
+        going : int array, optional
+            The simulations that advance; all by default.
         """
         try:
             if len(torques) == 1:
                 self._applied[:] = torques[0]
-                self.batch.step(nstep=steps)
+                self.batch.step(going, steps)
             else:
-                control = np.ascontiguousarray(np.swapaxes(torques, 0, 1))
-                self.batch.rollout(steps, control, int(mujoco.mjtState.mjSTATE_QFRC_APPLIED), record=())
+                control = np.ascontiguousarray(np.swapaxes(torques if going is None else torques[:, going], 0, 1))
+                self.batch.rollout(steps, control, int(mujoco.mjtState.mjSTATE_QFRC_APPLIED), record=(), ids=going)
         except SimulationError as error:
-            raise ScenarioError(f"MuJoCo cannot go on: {' '.join(str(error).split())}") from error
+            self._errors |= {int(sim): " ".join(self.batch.error(int(sim)).split()) for sim in error.ids}
+
+    @property
+    def troubles(self) -> dict[int, str]:
+        """What MuJoCo has complained of, by the number of the simulation."""
+        found = dict(self._errors)
+        for sim, kind in np.argwhere(self.batch.warning[..., 1]).tolist():
+            found.setdefault(sim, mujoco.mju_warningText(kind, int(self.batch.warning[sim, kind, 0])))
+        return found
 
 
 def _vary(batch: Batch, name: str, values: Array) -> None:

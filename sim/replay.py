@@ -6,11 +6,14 @@ from typing import final
 import numpy as np
 
 from identify.motion_log import MotionLog
+from sim.errors import ScenarioError
+from sim.failures import Bounds
 from sim.inverse_dynamics import BLOCK, InverseDynamics
 from sim.motors import Array
 from sim.plant import Plant
 from sim.robot import Robot
 from sim.scenario import Physics
+from sim.trajectories import Reference
 
 
 @final
@@ -46,6 +49,11 @@ def replay(robot: Robot, log: MotionLog, qd: Array, bandwidth: float) -> Replay:
         Velocities of the log [rad/s].
     bandwidth : float
         Natural frequency w of the loop [rad/s].
+
+    Raises
+    ------
+    ScenarioError
+        If it runs away.
     """
     physics = Physics()
     per_sample = int(np.ceil(1 / log.fs / physics.step - 1e-9))
@@ -55,7 +63,10 @@ def replay(robot: Robot, log: MotionLog, qd: Array, bandwidth: float) -> Replay:
     torques = _mean_torques(log, h, per_sample)
     kp = _inertia(robot, log.q) * bandwidth**2
     q, feedback = np.empty(log.q.shape), np.empty(log.q.shape)
+    bounds = Bounds(robot, Reference(log.fs, log.q, qd, np.zeros_like(qd)), 1)
     for k in range(log.samples):
+        if broken := {**plant.troubles, **bounds.broken(plant.q, plant.qd)}:
+            raise ScenarioError(f"a robot with these parameters does not follow the log: {broken[0]} after {k / log.fs:.3g} s")
         q[k] = plant.q[0]
         feedback[k] = kp[k] * (log.q[k] - q[k] + 2 / bandwidth * (qd[k] - plant.qd[0]))
         plant.step((torques[k] + feedback[k])[:, None, :], per_sample)

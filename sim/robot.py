@@ -10,10 +10,15 @@ from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 
 import models
 from sim.errors import BenchError, RobotError
 from sim.motors import Array, Motors
+
+_log = mujoco.MjLogConfig.get()
+_log.logto_console = _log.logto_file = False  # what it warns of is looked at, and told, by the bench
+_log.set()
 
 FILES = (".xml", ".urdf")
 """What names of files end with."""
@@ -114,6 +119,11 @@ class Robot:
         """Lowest and highest position of every joint [rad], shape (joint, 2), infinite where the model has no limits."""
         unlimited = np.tile([-np.inf, np.inf], (self.n, 1))
         return np.where(self.model.jnt_limited[:, None].astype(bool), self.model.jnt_range, unlimited)
+
+    @property
+    def slides(self) -> npt.NDArray[np.bool_]:
+        """Whether each joint slides, shape (joint,); the others are hinges."""
+        return np.asarray(self.model.jnt_type == int(mujoco.mjtJoint.mjJNT_SLIDE))
 
     @property
     def torque_limits(self) -> Array:

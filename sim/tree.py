@@ -36,7 +36,7 @@ def kinematic_tree(robot: Robot) -> KinematicTree:
             joints.append(
                 Joint(
                     name=robot.joints[k],
-                    kind="slide" if model.jnt_type[k] == int(mujoco.mjtJoint.mjJNT_SLIDE) else "hinge",
+                    kind="slide" if robot.slides[k] else "hinge",
                     parent=carrier,
                     position=position if at_first else np.zeros(3),
                     rotation=rotation if at_first else np.eye(3),

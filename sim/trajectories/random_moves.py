@@ -2,7 +2,6 @@
 
 from typing import Annotated, final
 
-import mujoco
 import numpy as np
 from pydantic import Field
 
@@ -57,6 +56,6 @@ class RandomMoves(AbstractTrajectory):
 
 def _room(robot: Robot) -> Array:
     """Return where joints move at random, shape (joint, 2): their ranges, or half a turn or metre to either side."""
-    free = np.where(robot.model.jnt_type == int(mujoco.mjtJoint.mjJNT_SLIDE), 0.5, np.pi)
+    free = np.where(robot.slides, 0.5, np.pi)
     around = robot.model.qpos0[:, None] + free[:, None] * [-1.0, 1.0]
     return np.where(np.isfinite(robot.ranges), robot.ranges, around)

@@ -169,7 +169,7 @@ def test_there_must_be_a_log_to_export(tmp_path, complaint):
     [
         ({"drive": {"kind": "averagd"}}, "drive.kind = 'averagd' is unknown"),
         ({"robot": "nowhere.xml"}, "nowhere.xml"),
-        ({"controller": {"kind": "pd", "bandwidth": 200.0}}, "leaves its range"),
+        ({"controller": {"kind": "pd", "bandwidth": 200.0}}, "runs away"),
     ],
 )
 def test_runs_that_cannot_be_made_are_one_line_and_leave_nothing(tmp_path, change, message, complaint):

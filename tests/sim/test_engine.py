@@ -75,8 +75,91 @@ def test_what_cannot_vary_is_told(short, vary, message):
 
 def test_an_unstable_loop_is_told_with_joint_and_time(short):
     wild = replace(short, controller=PDFeedforward(bandwidth=90.0), timing=Timing(delay=0.03))
-    with pytest.raises(ScenarioError, match=r"joint joint\d leaves its range .* s after the start \(seed 0\): the loop"):
+    with pytest.raises(ScenarioError, match=r"joint joint\d runs away at .* rad/s .* s after the start \(seed 0\): the loop"):
         simulate(wild)
+
+
+def test_a_joint_that_leaves_its_range_is_told(short):
+    weak = replace(short, controller=PDFeedforward(bandwidth=0.3, feedforward=3.0))
+    with pytest.raises(ScenarioError, match=r"joint joint\d leaves its range .* s after the start"):
+        simulate(weak)
+
+
+FREE = """
+<mujoco><worldbody>
+  <body><joint name="turn" axis="0 0 1"/><geom size="0.1" pos="0.1 0 0"/>
+    <body pos="0.1 0 0"><joint name="reach" type="slide" axis="1 0 0" damping="3"/><geom size="0.1"/></body></body>
+</worldbody></mujoco>
+"""
+"""A hinge and a slide that nothing stops."""
+
+
+@pytest.mark.parametrize(("bandwidth", "delay"), [(60.0, 0.009), (200.0, 0.009), (600.0, 0.0), (2000.0, 0.0)])
+def test_a_loop_that_runs_away_without_a_range_fails_quietly(ideal, tmp_path, monkeypatch, capfd, bandwidth, delay):
+    """MuJoCo would warn of Nan and begin anew; neither it nor NumPy prints, or writes MUJOCO_LOG.TXT."""
+    (tmp_path / "free.xml").write_text(FREE)
+    monkeypatch.chdir(tmp_path)
+    wild = replace(
+        ideal,
+        fs=1000.0,
+        robot=str(tmp_path / "free.xml"),
+        trajectory=RandomMoves(moves=4, velocity=(2.0,)),
+        controller=PDFeedforward(bandwidth=bandwidth),
+        timing=Timing(delay=delay),
+    )
+    run = simulate(wild, (0, 1), throw=False)
+    assert list(run.failures) == [0, 1]
+    assert all("the loop is unstable" in reason for reason in run.failures.values())
+    assert np.isfinite(run.q).all()
+    assert capfd.readouterr() == ("", "")
+    assert [path.name for path in tmp_path.iterdir()] == ["free.xml"]
+
+
+def test_an_error_of_mujoco_ends_its_simulation_alone(short, monkeypatch):
+    """MuJoCo raises in the second of three, after a while; the others have the bits that they have alone."""
+    import sim.plant
+
+    class Failing(sim.plant.Batch):
+        calls = 0
+
+        def step(self, ids=None, nstep=1, **kwargs):
+            super().step(ids, nstep, **kwargs)
+            self.calls += 1
+            if self.calls == 50 and self.nsim == 3:
+                raise sim.plant.SimulationError(np.array([1]), "mj_step: stack overflow")
+
+        def error(self, sim):
+            return "mj_step: stack overflow"
+
+    alone = simulate(short, (7,))
+    monkeypatch.setattr(sim.plant, "Batch", Failing)
+    run = simulate(replace(short), (3, 5, 7), throw=False)
+    assert run.failures == {1: "MuJoCo cannot go on: mj_step: stack overflow (seed 5)"}
+    np.testing.assert_array_equal(run.log.tau[2], alone.log.tau[0])
+
+
+@pytest.mark.parametrize(("part", "message"), [("drive", "the drive gives"), ("friction", "the friction gives")])
+def test_a_torque_that_is_not_finite_is_blamed_on_its_part(short, monkeypatch, part, message):
+    import sim.drives.ideal
+    import sim.frictions.coulomb
+
+    owner, name = {
+        "drive": (sim.drives.ideal._Amplifier, "step"),
+        "friction": (sim.frictions.coulomb._Contact, "torque"),
+    }[part]
+    before, calls = getattr(owner, name), []
+
+    def broken(self, x, *others):
+        calls.append(1)
+        found = before(self, x, *others)
+        if len(calls) > 40:
+            found = np.broadcast_to(found, (1, 2, 2) if part == "drive" else (2, 2)).copy()
+            found[..., 1, 0] = np.nan
+        return found
+
+    monkeypatch.setattr(owner, name, broken)
+    run = simulate(short, (3, 5), throw=False)
+    assert run.failures == {1: f"{message} no finite torque (seed 5)"}
 
 
 def test_progress_is_told_about_a_hundred_times_and_grows(short):
@@ -165,7 +248,7 @@ def test_a_simulation_that_fails_ends_alone(short):
     """One of three is driven away by a negative friction: it says why, and the others do not notice."""
     damping = np.array([[0.05, 0.01], [-400.0, 0.01], [0.05, 0.01]])
     busy = replace(short, **BUSY)
-    with pytest.raises(ScenarioError, match="leaves its range"):
+    with pytest.raises(ScenarioError, match="runs away"):
         simulate(busy, (1, 2, 3), vary={"dof_damping": damping})
     run = simulate(busy, (1, 2, 3), vary={"dof_damping": damping}, throw=False)
     assert list(run.failures) == [1]
