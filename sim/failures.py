@@ -41,7 +41,7 @@ class Bounds:
         low, high = planned.q.min(axis=0), planned.q.max(axis=0)
         room = np.where(robot.slides, np.maximum(FAR, high - low), TURN)
         self._joints, self._unit = robot.joints, np.where(robot.slides, "m", "rad")
-        self._limited = np.isfinite(robot.ranges).all(axis=1)
+        self._limited: npt.NDArray[np.bool_] = np.isfinite(robot.ranges).all(axis=1)
         ends = (
             np.where(self._limited, np.minimum(robot.ranges[:, 0], low), low - room),
             np.where(self._limited, np.maximum(robot.ranges[:, 1], high), high + room),
@@ -52,7 +52,7 @@ class Bounds:
     def broken(self, q: Array, qd: Array) -> dict[int, str]:
         """Return the simulations whose state, shape (nsim, joint), is none of a loop at work, and what their joint does."""
         inside: npt.NDArray[np.bool_] = (q >= self._low) & (q <= self._high)  # False for NaN
-        wrong, found = ~(inside & (np.abs(qd) <= self._fastest)), dict[int, str]()
+        wrong, found = np.logical_not(inside & (np.abs(qd) <= self._fastest)), dict[int, str]()
         for sim, j in np.argwhere(wrong).tolist() if wrong.any() else ():
             told = self._told(j, float(q[sim, j]), float(qd[sim, j]), bool(inside[sim, j]))
             found.setdefault(sim, f"joint {self._joints[j]} {told}")

@@ -1,5 +1,6 @@
 """The answer of a study, in two sentences, computed from its cells."""
 
+from collections import Counter
 from collections.abc import Sequence
 from math import comb
 from typing import Any
@@ -44,21 +45,34 @@ def _who(cells: Sequence[Cell]) -> str:
         winner = max(dict.fromkeys(least), key=least.count)
         share = f"{least.count(winner)} of {len(groups)} combinations"
         return f"Least error in {share}: {winner} (too few runs for a test); {span}."
-    names = [_not_worse(group, cell, cells) for group, cell in zip(groups, best, strict=True)]
-    winners = max(dict.fromkeys(names), key=names.count)
-    tie = f", with no sure difference between them (p >= {SURE:g})" if len(winners) > 1 else f", surely so (p < {SURE:g})"
+    return f"{_winners(groups, best, cells)}; {span}."
+
+
+def _winners(groups: Sequence[Sequence[Cell]], best: Sequence[Cell], cells: Sequence[Cell]) -> str:
+    """Return which methods are least often surely worse than another, where they have the least error, and how surely."""
+    rivals = [_not_worse(group, cell, cells) for group, cell in zip(groups, best, strict=True)]
+    counts = Counter(name for names in rivals for name in names)
+    winners = [name for name, count in counts.items() if count == max(counts.values())]
+    least = sum(method(cell, cells) in winners for cell in best)
     lonely = sum(len(group) == 1 for group in groups)
     alone = f" (in {lonely} nothing else gave an estimate)" if lonely else ""
-    return f"Best in {names.count(winners)} of {len(groups)} combinations{alone}: {' and '.join(winners)}{tie}; {span}."
+    sure = sum(set(names) <= set(winners) for names in rivals)
+    tied = sum(len(set(names) & set(winners)) > 1 for names in rivals)
+    tie = f", with no sure difference between them in {tied} (p >= {SURE:g})" if tied else ""
+    clear = (
+        f", surely less than all others in {sure} (p < {SURE:g})"
+        if len({method(c, cells) for c in cells}) > len(winners)
+        else ""
+    )
+    return f"Least error in {least} of {len(groups)} combinations{alone}: {' and '.join(winners)}{tie}{clear}"
 
 
 def _best(group: Sequence[Cell]) -> Cell:
-    """Return the cell with the least errors, in the sense of the test, on the runs that most of the group could identify."""
+    """Return the cell that errs least in the sense of the test: that loses fewest of its comparisons with the others."""
+    losses = Counter({id(cell): 0 for cell in group})
+    losses.update(id(d.worse) for d in differences(group) if d.runs)
     most = max(cell.runs for cell in group)
-    losses = {id(cell): cell.losses() for cell in group if cell.runs > most / 2}
-    common = set.intersection(*(set(loss) for loss in losses.values()))
-    known = [cell for cell in group if id(cell) in losses]
-    return min(known, key=lambda cell: sum(losses[id(cell)][run] for run in sorted(common)))
+    return min((cell for cell in group if cell.runs > most / 2), key=lambda cell: losses[id(cell)])
 
 
 def _not_worse(group: Sequence[Cell], best: Cell, cells: Sequence[Cell]) -> tuple[str, ...]:

@@ -8,6 +8,10 @@ import numpy as np
 from scipy import stats
 
 from experiments.study.statistics import Cell
+from identify import Array
+
+BISECTIONS = 50
+"""Of the gap's range: to 1e-15 of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,9 +21,10 @@ class Difference:
     Parameters
     ----------
     better, worse : Cell
-        The two.
+        The two, in the direction of the statistic that is tested: errors may have tails that turn the sign of their mean.
     ratio : float
-        Typical error of the worse over that of the better, as the geometric mean over runs and parameters.
+        Error of the worse over that of the better, over parameters as the geometric mean, over runs as the Hodges-Lehmann
+        estimate that belongs to the test: the factor for which signed ranks balance.
     p : float
         Probability of so clear a difference if there were none (Wilcoxon's signed-rank test, paired over the runs, Holm's
         correction for all pairs).
@@ -49,7 +54,23 @@ def _difference(a: Cell, b: Cell) -> Difference:
     one, other = a.losses(), b.losses()
     both = sorted(one.keys() & other.keys())
     gap = np.array([one[run] - other[run] for run in both])
-    mean = float(gap.mean()) if len(gap) else 0.0
-    better, worse = (a, b) if mean <= 0 else (b, a)
+    better, worse = (a, b) if _signed_ranks(gap[gap != 0]) <= 0 else (b, a)
     p = float(stats.wilcoxon(gap).pvalue) if np.any(gap) else 1.0
-    return Difference(better, worse, float(np.exp(abs(mean))), p, len(both))
+    return Difference(better, worse, float(np.exp(abs(_shift(gap)))) if both else 1.0, p, len(both))
+
+
+def _signed_ranks(gap: Array) -> float:
+    """Return the sum of the ranks of positive gaps less that of negative ones (Wilcoxon)."""
+    return float(np.sign(gap) @ stats.rankdata(np.abs(gap)))
+
+
+def _shift(gap: Array) -> float:
+    """Return the shift of the gaps that makes their signed ranks balance (Hodges and Lehmann), by bisection."""
+    low, high = float(gap.min()), float(gap.max())
+    for _ in range(BISECTIONS):
+        middle = (low + high) / 2
+        balance = _signed_ranks(gap - middle)
+        if not balance:
+            return middle
+        low, high = (middle, high) if balance > 0 else (low, middle)
+    return (low + high) / 2

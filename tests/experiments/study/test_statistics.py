@@ -123,7 +123,7 @@ def test_the_answer_names_the_better_model_and_both_sigmas(rng):
     group = [cell(error, "explicit", settings={"fs": f}) for f in (1.0, 2.0)]
     worse = [cell(3 * error, "power", settings={"fs": f}) for f in (1.0, 2.0)]
     said = answer([group[0], worse[0], group[1], worse[1]])
-    assert said.startswith("Best in 2 of 2 combinations: explicit, surely so (p < 0.01)")
+    assert said.startswith("Least error in 2 of 2 combinations: explicit, surely less than all others in 2 (p < 0.01)")
     assert said.count(". ") == 1  # two sentences
     few = [cell(error[:4], "explicit"), cell(3 * error[:4], "power")]
     assert answer(few).startswith("Least error in 1 of 1 combinations: explicit (too few runs for a test)")
@@ -150,7 +150,43 @@ def test_the_best_is_what_the_test_says_is_best(rng):
     wild = error.copy()
     wild[0] = 10.0
     said = answer([cell(wild), cell(3 * error, "power")])
-    assert said.startswith("Best in 1 of 1 combinations: explicit, surely so")
+    assert said.startswith("Least error in 1 of 1 combinations: explicit, surely less than all others in 1")
+
+
+def test_the_better_model_is_the_one_that_the_test_finds_whatever_the_tails(rng):
+    """Worse in 60 of 63 runs by 20 %, and better by a factor of 1e9 in the others: the mean of the logs says the contrary."""
+    error = rng.normal(0, 0.01, (63, 2))
+    other = 1.2 * error * np.exp(rng.normal(0, 0.01, (63, 2)))
+    other[:3] = 1e-9 * error[:3]
+    (found,) = differences([cell(error), cell(other, "power")])
+    gap = np.array(list(found.better.losses().values())) - np.array(list(found.worse.losses().values()))
+    assert gap.mean() > 0
+    assert found.better.names[2] == "explicit"
+    assert found.p < 1e-6
+    assert found.ratio == pytest.approx(1.2, rel=0.01)
+    assert answer([found.worse, found.better]).startswith("Least error in 1 of 1 combinations: explicit, surely less")
+
+
+def test_the_ratio_is_the_median_of_walsh_averages(rng):
+    one, other = rng.normal(0, 1, (2, 41, 2))
+    (found,) = differences([cell(one), cell(other, "power")])
+    gap = np.array(list(found.worse.losses().values())) - np.array(list(found.better.losses().values()))
+    i, j = np.triu_indices(41)
+    assert np.log(found.ratio) == pytest.approx(np.median((gap[i] + gap[j]) / 2), abs=1e-3)
+
+
+def test_lowest_in_all_and_sure_in_some_is_said_so(rng):
+    """Power errs least in six of six combinations; in two the difference is not significant."""
+    cells = []
+    for k in range(6):
+        error = rng.normal(0, 1, (40, 2))
+        noise = np.exp(rng.normal(0, 0.05 if k < 4 else 2.0, (40, 2)))
+        explicit = cell(1.1 * error * noise, settings={"fs": float(k)})
+        power = cell(error, "power", settings={"fs": float(k)})
+        while differences([explicit, power])[0].better is not power:
+            explicit = replace(explicit, X=TRUTH + 1.05 * (explicit.X - TRUTH))
+        cells += [explicit, power]
+    assert answer(cells).startswith("Least error in 6 of 6 combinations: power, surely less than all others in 4 (p < 0.01);")
 
 
 def test_the_only_model_with_estimates_is_not_called_better(rng):
