@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Self, final
 
 import numpy as np
-from scipy import linalg
 
 from identify.arrays import Array
 from identify.basis import Basis
@@ -20,14 +19,22 @@ STATES = 56
 SEED = 0
 """Of the random states: any others give the same grouping, up to rounding."""
 
-DEPENDENT = 1e-6
-"""A column counts as a combination of those before it when less than this share of its length is left over.
+DEPENDENT = 1e-3
+"""A column counts as a combination of those before it when what is left over is below this share of a long column of its unit.
 
-Descriptions give angles to some nine digits (1.570796325 for pi/2), so that a share of 1e-9 is theirs; a parameter that shows
-with less than a millionth of its column is none that a log could tell."""
+Descriptions round angles: of the arms of example-robot-data, columns that are dependent in the robot leave up to 3e-6 where
+angles have four digits after the point (1.5708), up to 6e-4 with two (1.57); none that is independent leaves less than 0.09."""
+
+ALIKE = 1e-6
+"""Two bases make the same torques if they differ by less than this share of the largest."""
+
+TOLD = 1e-5
+"""Coefficients below this share of the first are left out where a grouping is told: they are those of rounded angles."""
 
 NEGLIGIBLE = 1e-8
 """Coefficients below this share of the largest of their grouping are rounding."""
+
+FIRST_MOMENT = "kg m"
 
 ROUNDING = 1e-13
 """Sums below this share of their terms are zero but for rounding."""
@@ -62,30 +69,16 @@ class BaseParameters:
 
     @classmethod
     def of(cls, tree: KinematicTree, standard: Basis) -> Self:
-        """Return the grouping of a robot's standard parameters.
-
-        Raises
-        ------
-        SettingError
-            If the rank of the columns is in doubt: pivoting finds another than going from left to right.
-        """
+        """Return the grouping of a robot's standard parameters."""
         W = _explicit_columns(tree, standard)
-        length = np.linalg.norm(W, axis=0)
-        seen = np.flatnonzero(length > DEPENDENT * length.max())
-        scaled = W[:, seen] / length[seen]
-        R: Array = np.linalg.qr(scaled, mode="r")  # type: ignore[assignment]  # mode "r" gives R alone
-        kept, rank = _independent(R), _rank(R)
-        if len(kept) != rank:
-            raise SettingError(
-                f"robot {tree.name!r}: {len(kept)} base parameters from left to right, {rank} with pivoting: some columns are "
-                "nearly dependent; are lengths and angles in the description accurate?"
-            )
-        K = np.zeros((rank, W.shape[1]))
-        solved = np.linalg.lstsq(R[:, kept], R, rcond=None)[0]
-        K[:, seen] = solved * length[seen] / length[seen][kept][:, None]
+        large = _large(tree, standard, np.linalg.norm(W, axis=0))
+        R: Array = np.linalg.qr(W / large, mode="r")  # type: ignore[assignment]  # mode "r" gives R alone
+        kept = _independent(R)
+        K: Array = np.linalg.lstsq(R[:, kept], R, rcond=None)[0] * large / large[kept][:, None]
         K[np.abs(K) < NEGLIGIBLE * np.abs(K).max(axis=1, keepdims=True)] = 0.0
-        K[:, seen[kept]] = np.eye(rank)
-        return cls(standard, tuple(int(k) for k in seen[kept]), K)
+        K[:, np.linalg.norm(R, axis=0) <= DEPENDENT] = 0.0
+        K[:, kept] = np.eye(len(kept))
+        return cls(standard, tuple(kept), K)
 
     @property
     def basis(self) -> Basis:
@@ -107,7 +100,8 @@ class BaseParameters:
 
     def grouping(self, i: int) -> str:
         """Return what base parameter `i` is made of, such as ZZ1 + Ia1 + 0.25 M2."""
-        first, *others = [self.kept[i], *(k for k in np.flatnonzero(self.K[i]) if k != self.kept[i])]
+        shown = np.flatnonzero(np.abs(self.K[i]) > TOLD * np.abs(self.K[i]).max())
+        first, *others = [self.kept[i], *(k for k in shown if k != self.kept[i])]
         terms = [self.standard.parameters[first]]
         for k in others:
             c = self.K[i, k]
@@ -145,7 +139,7 @@ def transfer(tree: KinematicTree, start: Basis, end: Basis) -> Array:
     """
     A, B = _explicit_columns(tree, end), _explicit_columns(tree, start)
     T: Array = np.asarray(np.linalg.lstsq(A, B, rcond=None)[0], dtype=np.float64)
-    if np.abs(A @ T - B).max() > DEPENDENT * np.abs(B).max():
+    if np.abs(A @ T - B).max() > ALIKE * np.abs(B).max():
         raise SettingError(f"the parameters {', '.join(start.parameters)} do not describe robot {tree.name!r} as its links do")
     return T
 
@@ -176,7 +170,7 @@ def random_states(tree: KinematicTree, count: int) -> Array:
 
 
 def _independent(R: Array) -> list[int]:
-    """Return the columns that depend on none before them: their part off those that stay is no rounding."""
+    """Return the columns that depend on none before them: their part off those that stay is no rounding of the file."""
     kept: list[int] = []
     Q = np.zeros((len(R), 0))
     for k in range(R.shape[1]):
@@ -188,9 +182,13 @@ def _independent(R: Array) -> list[int]:
     return kept
 
 
-def _rank(R: Array) -> int:
-    diagonal = np.abs(np.diagonal(linalg.qr(R, mode="r", pivoting=True)[0]))
-    return int(np.count_nonzero(diagonal > DEPENDENT * diagonal[0]))
+def _large(tree: KinematicTree, standard: Basis, length: Array) -> Array:
+    """Return how long a column of each parameter may be: the longest of its unit, that of a first moment against gravity."""
+    units = np.array(standard.units)
+    large = np.array([length[units == unit].max() for unit in units])
+    weight = np.linalg.norm(tree.gravity) * np.sqrt(STATES * tree.n)
+    large[units == FIRST_MOMENT] = np.maximum(large[units == FIRST_MOMENT], weight)
+    return np.maximum(large, ROUNDING * length.max() / DEPENDENT)
 
 
 def _regrouped(name: str) -> str:

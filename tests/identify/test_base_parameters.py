@@ -1,5 +1,9 @@
 """Base parameters against published counts, the closed form, and their own definition."""
 
+import re
+from dataclasses import replace
+from importlib.metadata import files
+
 import numpy as np
 import pytest
 
@@ -169,3 +173,41 @@ def test_the_grouping_does_not_depend_on_the_states_that_were_drawn(monkeypatch)
     two = BaseParameters.of(tree, tree_basis(tree))
     assert one.names == two.names
     np.testing.assert_allclose(one.K, two.K, atol=1e-9)
+
+
+ARMS = {
+    "kinova": "kinova_description/robots/kinova.urdf",
+    "xarm7": "xarm_description/urdf/xarm7.urdf",
+    "z1": "z1_description/urdf/z1.urdf",
+    "so100": "so_arm_description/urdf/so100.urdf",
+    "so101": "so_arm_description/urdf/so101.urdf",
+    "ur3": "ur_description/urdf/ur3_robot.urdf",
+    "talos": "talos_data/robots/talos_left_arm.urdf",
+    "hextilt": "hextilt_description/urdf/hextilt_flying_arm_5.urdf",
+}
+"""Serial arms of other people, as files."""
+
+
+def turned(urdf, angle):
+    """Return a URDF with its roll, pitch and yaw changed."""
+    return re.sub(r'rpy="([^"]*)"', lambda m: f'rpy="{" ".join(angle(float(x)) for x in m[1].split())}"', urdf)
+
+
+def exact(x):
+    """Return the multiple of 45 degrees that an angle stands for, or itself."""
+    near = round(x / (np.pi / 4)) * np.pi / 4
+    return repr(float(near if abs(x - near) < 5e-3 else x))
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_rounded_angles_do_not_change_the_grouping(arm, tmp_path):
+    """As shipped, and with two digits, 1.57: the same parameters stay as with exact angles, and all rotors are asked for."""
+    (path,) = [f.locate() for f in files("example-robot-data") or () if str(f).endswith(ARMS[arm])]
+    kept = []
+    for name, angle in (("exact", exact), ("shipped", str), ("rounded", lambda x: f"{x:.2f}")):
+        (tmp_path / f"{name}.urdf").write_text(turned(path.read_text(), angle))
+        tree = kinematic_tree(Robot.load(str(tmp_path / f"{name}.urdf")))
+        tree = replace(tree, joints=tuple(replace(joint, armature=True) for joint in tree.joints))
+        kept.append(BaseParameters.of(tree, tree_basis(tree)).kept)
+    assert len(kept[0]) == len(kept[1]) == len(kept[2])
+    assert arm not in {"ur3", "z1"} or kept[0] == kept[1] == kept[2]
