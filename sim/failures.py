@@ -41,7 +41,7 @@ class Bounds:
         low, high = planned.q.min(axis=0), planned.q.max(axis=0)
         room = np.where(robot.slides, np.maximum(FAR, high - low), TURN)
         self._joints, self._unit = robot.joints, np.where(robot.slides, "m", "rad")
-        self._limited: npt.NDArray[np.bool_] = np.isfinite(robot.ranges).all(axis=1)
+        self._limited = np.asarray(np.isfinite(robot.ranges).all(axis=1))
         ends = (
             np.where(self._limited, np.minimum(robot.ranges[:, 0], low), low - room),
             np.where(self._limited, np.maximum(robot.ranges[:, 1], high), high + room),
