@@ -1,18 +1,28 @@
 """What is suspicious about what was identified from a log, and what would help."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from experiments.identified import Identified
 from experiments.log_doubts import resting
 from experiments.subject import Subject
-from identify import Estimate, ExcitationError, IdentificationError, MotionLog, brisk_shares, showing_moves
+from identify import Estimate, MotionLog, brisk_shares, showing_moves
 from sim.robot import Robot
 from sim.tree import unmodelled
 
 WELL_EXPLAINED = 0.95
 """Share of a torque's variance that a model of the right robot explains on any log that is worth identifying."""
+
+USELESS = 0.5
+"""Share of a torque that one sigma of the parameters may make before the estimate is said to tell too little; a fifth of it is
+asked of what is recommended instead."""
+
+MUCH_LONGER = 100
+"""Times from which on the length of a log is not what is wrong with it."""
+
+FAR_OFF = 30.0
+"""Factor between measured and expected torques that no missing rotor or friction makes in the joint that carries most."""
 
 OPEN = 0.02
 """Share of a joint's torque on a brisk motion that one sigma of a parameter may make before it is said to be left open."""
@@ -20,18 +30,63 @@ OPEN = 0.02
 
 def doubts_of_result(found: Identified) -> list[str]:
     """Return what no healthy identification shows, and what the log leaves open."""
-    told = wrong_sign(found)
+    told = [*wrong_sign(found), *wrong_unit(found)]
     for name, estimate in found.estimates.items():
         friction = zip(found.basis.parameters, estimate.X, estimate.corrected_sigma, strict=True)
         negative = [p for p, x, sigma in friction if p.startswith(("F", "Ia")) and x < -2 * sigma]
         if negative and not told:
             told.append(f"{', '.join(negative)} below zero in the {name} model: is the torque's meaning or delay wrong?")
-        poor = [f"{100 * share:.0f} % of tau{j + 1}" for j, share in enumerate(found.explained[name]) if share < WELL_EXPLAINED]
-        if poor:
-            told.append(
-                f"the {name} model explains {', '.join(poor)}: are units, signs, order of columns and the torque's delay right?"
-            )
+        told += list(_too_little(found, name)) or list(_badly_explained(found, name))
     return told or _left_open(found)
+
+
+def _too_little(found: Identified, name: str) -> Iterator[str]:
+    """Yield why an estimate says nothing, where its sigma alone makes much of a torque, and what would help."""
+    estimate, shares = found.estimates[name], found.left_open[name]
+    worst = int(np.nan_to_num(shares, nan=np.inf).argmax())
+    if shares[worst] < USELESS:
+        return
+    others = [other for other, open_ in found.left_open.items() if np.nan_to_num(open_, nan=np.inf).max() < USELESS / 5]
+    times = min(1000, int(np.ceil((shares[worst] / (USELESS / 5)) ** 2))) if np.isfinite(shares[worst]) else 1000
+    longer = f"a log {times} times as long" if times < MUCH_LONGER else "a log that moves all joints, and longer"
+    yield (
+        f"the {name} model tells too little: {int(estimate.rows)} rows for {len(estimate.parameters)} parameters, Cond(W) "
+        f"{float(estimate.condition_number):.2g}, one sigma of its parameters makes {100 * shares[worst]:.0f} % of the torque "
+        f"of {found.subject.robot.joints[worst]}: take {f'the {others[0]} model' if others else longer}"
+        + (f", or {longer}" if others else "")
+    )
+
+
+def _badly_explained(found: Identified, name: str) -> Iterator[str]:
+    """Yield which torques a model does not explain: the log is suspected, unless another model explains them."""
+    joints = found.subject.robot.joints
+    poor = {j: share for j, share in enumerate(found.explained[name]) if not share >= WELL_EXPLAINED}
+    if not poor:
+        return
+    told = ", ".join(f"{_share(share)} of tau{j + 1}" for j, share in poor.items())
+    others = [o for o, shares in found.explained.items() if all(shares[j] >= WELL_EXPLAINED for j in poor)]
+    if others:
+        yield (
+            f"the {name} model explains {told}, where the {others[0]} model explains at least {100 * WELL_EXPLAINED:.0f} %: "
+            f"noise of the velocities, or too little motion of {', '.join(joints[j] for j in poor)}; take the {others[0]} model"
+        )
+    else:
+        yield f"the {name} model explains {told}: are units, signs, order of columns and the torque's delay right?"
+
+
+def _share(share: float) -> str:
+    return f"{100 * share:.0f} %" if share > 0 else "nothing"
+
+
+def wrong_unit(found: Identified) -> list[str]:
+    """Return whether torques are far from what the robot's file says of the same motion, as those in other units are."""
+    subject, rows = found.subject, found.explicit_rows
+    filed = rows.W @ np.array(list(subject.truth(subject.robot).values()))
+    sizes = [[float(np.linalg.norm(x[rows.group == joint])) for x in (rows.Y, filed)] for joint in np.unique(rows.group)]
+    measured, expected = max(sizes, key=lambda pair: pair[1])  # the joint of which the file expects most
+    if not expected or 1 / FAR_OFF < measured / expected < FAR_OFF:
+        return []
+    return [f"the torques are {measured / expected:.2g} times what the robot's file says of this motion: are they in N m?"]
 
 
 def doubts_of_robot(robot: Robot) -> list[str]:
@@ -83,15 +138,11 @@ def _left_open(found: Identified) -> list[str]:
             f"{_moves(subject, names)}"]  # fmt: skip
 
 
-def helpful_moves(error: IdentificationError, subject: Subject, log: MotionLog) -> list[str]:
-    """Return what would show the parameters that an error names: joints that never move, or else moves."""
-    if not isinstance(error, ExcitationError):
-        return []
+def helpful_moves(subject: Subject, log: MotionLog, names: Sequence[str]) -> str:
+    """Return what would show parameters that a log hides: joints that never move, or else moves; empty if that is not known."""
     if still := resting(log, subject.tree):
-        return [f"{', '.join(still)} never moves in this log: move it"]
-    words = str(error).split(":")[0].replace(",", " ").split()
-    names = [name for name in subject.basis.parameters if name in words]
-    return [_moves(subject, names)] if names and subject.base is not None else []
+        return f"{', '.join(still)} never moves in this log: move it"
+    return _moves(subject, names) if subject.base is not None else ""
 
 
 def _moves(subject: Subject, names: Sequence[str]) -> str:

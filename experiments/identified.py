@@ -19,9 +19,10 @@ from identify import (
     Chain,
     Estimate,
     ExplicitModel,
+    IdentificationError,
     MotionLog,
     System,
-    identify_each,
+    attempt_each,
 )
 from identify.long import build_long, is_long
 
@@ -85,10 +86,31 @@ class Identified:
         return self.method[1] if self.method else ESTIMATORS.create(self.estimator)
 
     @cached_property
-    def estimates(self) -> dict[str, Estimate]:
-        """The estimate of every model."""
+    def outcomes(self) -> dict[str, Estimate | IdentificationError]:
+        """The estimate of every model, or why it has none."""
         models = {name: MODELS.create(name) for name in self.models}
-        return identify_each(self._fit, self.basis, models, self.processing, self.solver)
+        return attempt_each(self._fit, self.basis, models, self.processing, self.solver)
+
+    @cached_property
+    def estimates(self) -> dict[str, Estimate]:
+        """The estimates, of the models that have one; raise the first model's IdentificationError if none has."""
+        found = {name: outcome for name, outcome in self.outcomes.items() if isinstance(outcome, Estimate)}
+        for outcome in self.outcomes.values():
+            if not found and isinstance(outcome, IdentificationError):
+                raise outcome
+        return found
+
+    @property
+    def failures(self) -> dict[str, str]:
+        """Why models have no estimate."""
+        return {name: str(outcome) for name, outcome in self.outcomes.items() if isinstance(outcome, IdentificationError)}
+
+    @cached_property
+    def explicit_rows(self) -> System:
+        """Rows of the explicit model, by which the torque of every joint is judged."""
+        build = build_long if is_long(self._fit) else Chain.build_each
+        (system,) = build(self.processing, self._fit, self.basis, [ExplicitModel()])
+        return system
 
     @cached_property
     def explained(self) -> dict[str, Array]:
@@ -96,9 +118,12 @@ class Identified:
 
         A share of its variance; of a log whose rows are not kept, of its squares.
         """
-        build = build_long if is_long(self._fit) else Chain.build_each
-        (system,) = build(self.processing, self._fit, self.basis, [ExplicitModel()])
-        return {name: _explained(system, e.X) for name, e in self.estimates.items()}
+        return {name: _explained(self.explicit_rows, e.X) for name, e in self.estimates.items()}
+
+    @cached_property
+    def left_open(self) -> dict[str, Array]:
+        """Sigma of the torque that every estimate predicts on its own log, over that torque's rms, shape (joint,)."""
+        return {name: _left_open(self.explicit_rows, e) for name, e in self.estimates.items()}
 
     @property
     def _fit(self) -> MotionLog | Sequence[MotionLog]:
@@ -122,6 +147,7 @@ class Identified:
             "estimator": self.estimator,
             "torque": {"meaning": channel.meaning, "delay": channel.delay, "gain": channel.gain},
             "models": models,
+            "failures": self.failures,
         }
 
 
@@ -133,4 +159,15 @@ def _explained(system: System, X: Array) -> Array:
         y, rest = system.Y[rows], system.Y[rows] - system.W[rows] @ X
         middle = y.mean() if system.stands_for is None else 0.0
         shares.append(1 - np.sum(rest**2) / max(np.sum((y - middle) ** 2), 1e-300))
+    return np.array(shares)
+
+
+def _left_open(system: System, estimate: Estimate) -> Array:
+    """Return the rms of w C w' over the rows w of every joint, over the rms of their torque; by the square roots of both."""
+    C = estimate.best_covariance
+    shares = []
+    for joint in np.unique(system.group):
+        rows = system.group == joint
+        open_squares = float(np.einsum("rp,pq,rq->", system.W[rows], C, system.W[rows], optimize=True))
+        shares.append(np.sqrt(max(open_squares, 0.0) / max(float(np.sum(system.Y[rows] ** 2)), 1e-300)))
     return np.array(shares)

@@ -5,104 +5,101 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import tyro
+import numpy as np
 from rich.console import Console
 from rich.text import Text
 
-from experiments.app import app
-from experiments.audience import Audience, Watched, Watching
-from experiments.chosen import Asked, Parameters, absolute
+from experiments.audience import Audience, Watching
+from experiments.cli.commands import Identify
 from experiments.doubts import doubts_of_result, doubts_of_robot, helpful_moves
-from experiments.errors import ExperimentError
+from experiments.errors import ExperimentError, ResultsError
 from experiments.identified import Identified
-from experiments.interruption import importing
 from experiments.log_doubts import doubts_of_log
 from experiments.page import new_page, shown
-from experiments.reading import Delay, Held, file_of, read, told_by
-from experiments.results import results_folder, tell_of, write_recording, write_summary
-from experiments.subject import CLOSED_FORM, Subject
+from experiments.plugins import plugin_conflicts
+from experiments.reading import Question, file_of, read, told_by
+from experiments.results import Place, beside, results_folder, tell_of, write_recording, write_summary
+from experiments.subject import CLOSED_FORM, Subject, absolute
+from experiments.tables import print_identified, print_validated
 from experiments.validation import Validated
+from experiments.verdict import Remedies, Verdict
 from experiments.written import Written
-from identify import MODELS, IdentificationError, LogError, MotionLog
-from identify.log_file import read_columns, write_log
+from identify import MODELS, ExcitationError, IdentificationError, LogError, MotionLog
+from identify.log_file import write_log
 from identify.long import is_long
+from sim.errors import BenchError
 from sim.robot import Robot
 
-File = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
-Named = Annotated[str | None, tyro.conf.arg(metavar="NAME|FILE")]
+MOST_STARTS = 1000
+"""Instants of a log that are looked at for the beginning of another."""
 
 
-@app.command(name="identify")
-def identify(  # noqa: PLR0913, PLR0917  # the options of a command
-    log: tyro.conf.Positional[Path],
-    robot: Named = None,
-    torque: Held = None,
-    torque_delay: Delay = None,
-    chain: str = "idbench",
-    model: str = "all",
-    estimator: str = "WLS",
-    validate: File = None,
-    write_mjcf: File = None,
-    out: File = None,
-    label: str = "",
-    parameters: Asked = Parameters(),  # noqa: B008  # frozen
-    watching: Watched = Watching(),  # noqa: B008  # frozen
-) -> None:
-    """Identify a log: CSV or Parquet with the columns t, q1, q2, ..., tau1, tau2, ... in SI units.
-
-    Args:
-        log: The file; its times uniform to 1 %. Or the folder of a run, whose recording gets a layer of this identification.
-        robot: Name of a robot that ships, or a file that describes it (MJCF or URDF); scara, or that of the run, by default.
-        torque: What a torque sample means: held from its sample on for a period (a controller's command), the torque at an
-            instant (a measurement), or the mean over a period. Asked for unless the file says it.
-        torque_delay: From a sample to the instant it speaks for, in seconds, or `estimate` to find it from the log.
-        chain: Signal processing.
-        model: all, explicit, implicit or power.
-        estimator: OLS, WLS, ...
-        validate: A second log, on which the result is judged; without it the last quarter of the first, by a fit of the rest.
-        write_mjcf: File to write: the robot's own with the inertias, armatures and frictions that were found, made physically
-            consistent (extra `consistent`); those of the first model.
-        out: Folder for summary.json, recording.rrd and log.parquet.
-        label: What to call this identification in a recording; by default chain and estimator. One of that name is replaced.
-        parameters: Which parameters are asked for.
-        watching: How it is watched.
-    """
-    with importing():
-        from experiments.tables import print_identified, print_validated
-
-    page, models = new_page(), tuple(MODELS) if model == "all" else (model,)
-    path, said = file_of(log), told_by(log)
-    _require_label(label)
-    subject = Subject(said.get("robot", CLOSED_FORM) if robot is None else absolute(robot), parameters)
-    _require_target(write_mjcf, subject)
-    named = Identified((), subject, models=models, chain=chain, estimator=estimator, name=label)  # complains of names first
-    known, about_delay = read(path, torque, torque_delay, named)
-    found = replace(named, logs=(known,), truth=_truth(said, named))
-    validated = _validated(found, validate, known if torque or torque_delay else None)
-    doubts = _doubts(validated)
-    with watching.audience() as audience, shown(page):
-        with _explained(subject, known, doubts):
-            print_identified(page, found, str(log))
+def identify(asked: Identify) -> None:
+    """Identify a log, judge the result, write it."""
+    page, models, out = new_page(), tuple(MODELS) if asked.model == "all" else (asked.model,), asked.out
+    path, said = file_of(asked.log), told_by(asked.log)
+    _require_label(asked.label)
+    subject = Subject(said.get("robot", CLOSED_FORM) if asked.robot is None else absolute(asked.robot), asked.parameters)
+    _require_target(asked.write_mjcf, subject)
+    place = None if out is None else Place(out, "identify", asked.log.name, asked.force)
+    if place:
+        place.check()
+    named = Identified(  # complains of names first
+        (), subject, models=models, chain=asked.chain, estimator=asked.estimator, name=asked.label
+    )
+    known, about_delay = read(path, Question(asked.torque, asked.torque_delay, asked.unwrap), named)
+    found, hidden = _shown(replace(named, logs=(known,), truth=_truth(said, named)))
+    validated = _validated(found, asked, known)
+    doubts = [*hidden, *_doubts(validated), *plugin_conflicts()]
+    with asked.watching.audience() as audience, shown(page):
+        with _explained(doubts):
+            print_identified(page, found, str(asked.log))
             print_validated(page, validated)
-        _say(page, [*doubts, *doubts_of_result(found)])
+        _say(page, [*doubts, *doubts_of_result(found), *_advice(validated, asked)])
         if about_delay:
             page.print(about_delay)
-        if out is not None:
-            _write_results(page, out, log.name, validated, watching, audience)
-        elif log.is_dir() and watching.rerun and not is_long(known):
-            _add_layer(page, log, found, watching, audience)
+        if place is not None:
+            _write_results(page, place, validated, asked.watching, audience)
+        elif asked.log.is_dir() and asked.watching.rerun and not is_long(known):
+            _add_layer(page, asked.log, found, asked.watching, audience)
         elif audience and not is_long(known):
             _show(found, audience)
-        if write_mjcf is not None:
-            _write_mjcf(page, found, write_mjcf)
+        if asked.write_mjcf is not None:
+            _write_mjcf(page, found, asked.write_mjcf)
+
+
+def _shown(found: Identified) -> tuple[Identified, list[str]]:
+    """Return the identification of what the log shows, and what is to be said of what it hides."""
+    told = []
+    leading = next(iter(found.outcomes.values()))
+    while isinstance(leading, ExcitationError) and leading.hidden and len(leading.hidden) < len(found.basis.parameters):
+        moves = helpful_moves(found.subject, found.logs[0], leading.hidden)
+        told.append(f"this log does not show {', '.join(leading.hidden)}: left out, as if zero{f' ({moves})' if moves else ''}")
+        fewer = replace(found.subject.asked, without=(*found.subject.asked.without, *leading.hidden))
+        subject = Subject(found.subject.name, fewer)
+        truth = None if found.truth is None else {name: found.truth[name] for name in subject.basis.parameters}
+        found = replace(found, subject=subject, truth=truth)
+        leading = next(iter(found.outcomes.values()))
+    return found, told
+
+
+def _advice(validated: Validated, asked: Identify) -> list[str]:
+    """Return what is most likely to mend a result that is not good, of models that have a verdict."""
+    try:
+        words = {Verdict(validated, model).word for model in validated.torques}
+    except IdentificationError:
+        return []
+    if not words or "good" in words or is_long(validated.found.logs[0]):
+        return []
+    return Remedies(validated, asked.torque_delay == "estimate").found()
 
 
 def _add_layer(page: Console, folder: Path, found: Identified, watching: Watching, audience: Audience | None) -> None:
     from experiments.recording.identified import add_layer
 
-    with results_folder(folder) as hidden:
+    with beside(folder) as hidden:
         lost = write_recording(hidden, add_layer(folder, found, audience))
     tell_of(lost, folder)
     page.print(f"added to the recording in {folder}{watching.hint(folder)}", soft_wrap=True)
@@ -145,27 +142,35 @@ def _truth(said: dict[str, Any], named: Identified) -> dict[str, float] | None:
     return truth if truth and tuple(truth) == named.basis.parameters else None
 
 
-def _validated(found: Identified, second: Path | None, said: MotionLog | None) -> Validated:
+def _validated(found: Identified, asked: Identify, known: MotionLog) -> Validated:
     """Return the identification, to be judged on a second log: its torque is that of the first if options say it."""
-    if second is None:
+    if asked.validate is None:
         return Validated(found)
-    path = file_of(second)
+    path = file_of(asked.validate)
+    said = known.torque if asked.torque or asked.torque_delay else None
     try:
-        columns = read_columns(path).ordered(found.subject.robot.joints)
-        channel = said.torque if said else columns.torque or found.logs[0].torque
-        return Validated(found, MotionLog.at_times(columns.t, columns.q, columns.tau, channel), str(second))
-    except LogError as error:
-        raise ExperimentError(f"--validate {path}: {error}") from error
+        second, _ = read(path, Question(unwrap=asked.unwrap, otherwise=said, fallback=known.torque), found)
+    except (LogError, ExperimentError) as error:
+        raise ExperimentError(f"--validate {error}" if str(path) in str(error) else f"--validate {path}: {error}") from error
+    if _within(second, known):
+        raise ExperimentError(f"--validate {path} holds the motion that is identified: give one that it has not seen, or none")
+    return Validated(found, second, str(asked.validate))
+
+
+def _within(one: MotionLog, other: MotionLog) -> bool:
+    """Return whether a log is a part of another, or the other of it."""
+    short, long = sorted((one, other), key=lambda log: log.samples)
+    starts = np.flatnonzero((long.q[: long.samples - short.samples + 1] == short.q[0]).all(axis=1)) if short.n == long.n else ()
+    return any(np.array_equal(long.q[k : k + short.samples], short.q) for k in starts[:MOST_STARTS])
 
 
 @contextmanager
-def _explained(subject: Subject, log: MotionLog, doubts: Sequence[str]) -> Iterator[None]:
-    """Add to what goes wrong what is suspicious about the log, and which moves would help."""
+def _explained(doubts: Sequence[str]) -> Iterator[None]:
+    """Add to what goes wrong what is suspicious about the log."""
     try:
         yield
     except IdentificationError as error:
-        told = [str(error), *helpful_moves(error, subject, log), *(f"doubtful: {doubt}" for doubt in doubts)]
-        raise ExperimentError("; ".join(told)) from error
+        raise ExperimentError("; ".join([str(error), *(f"doubtful: {doubt}" for doubt in doubts)])) from error
 
 
 def _say(page: Console, doubts: Sequence[str]) -> None:
@@ -174,19 +179,21 @@ def _say(page: Console, doubts: Sequence[str]) -> None:
 
 
 def _write_mjcf(page: Console, found: Identified, path: Path) -> None:
-    written = Written(found, next(iter(found.estimates)))
-    written.write(path)
+    """Write the robot's file; raise ResultsError if that fails, which takes nothing else away."""
+    try:
+        written = Written(found, next(iter(found.estimates)))
+        written.write(path)
+    except (IdentificationError, BenchError) as error:
+        raise ResultsError(f"--write-mjcf {path}: {error}; everything else is as printed") from error
     page.print(Text(f"written to {path}: the robot with the parameters of the {written.model} model"), soft_wrap=True)
     _say(page, written.doubts)
 
 
-def _write_results(
-    page: Console, out: Path, name: str, validated: Validated, watching: Watching, audience: Audience | None
-) -> None:
+def _write_results(page: Console, place: Place, validated: Validated, watching: Watching, audience: Audience | None) -> None:
     lost, found = "", validated.found
-    with results_folder(out) as folder:
+    with results_folder(place) as folder:
         write_log(found.logs[0], folder / "log.parquet")
-        summary = {"experiment": "identify", "log": name, **found.summary(), "validation": validated.summary()}
+        summary = {"experiment": "identify", "log": place.of, **found.summary(), "validation": _judged(validated)}
         write_summary(folder / "summary.json", summary)
         if is_long(found.logs[0]):
             page.print("not recorded: the rows of so long a log are not kept; identify a part of it to look inside")
@@ -194,5 +201,15 @@ def _write_results(
             from experiments.recording.identified import record_log
 
             lost = write_recording(folder, record_log(found, audience))
-    tell_of(lost, out)
-    page.print(f"written to {out}{watching.hint(out)}", soft_wrap=True)
+    tell_of(lost, place.out)
+    page.print(f"written to {place.out}{watching.hint(place.out)}", soft_wrap=True)
+
+
+def _judged(validated: Validated) -> dict[str, Any]:
+    """Return what a summary.json says of a validation, verdicts included; why, if there is none."""
+    try:
+        said = validated.summary()
+    except IdentificationError as error:
+        return {"on": validated.title, "models": {}, "failure": str(error)}
+    verdicts = {model: Verdict(validated, model).summary() for model in said["models"]}
+    return {**said, "models": {model: {**verdicts[model], **numbers} for model, numbers in said["models"].items()}}

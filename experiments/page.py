@@ -17,7 +17,12 @@ def new_page() -> Console:
     """Return a console that keeps what is printed: it is shown when everything has gone well, whatever the terminal does."""
     terminal = Console()
     return Console(
-        file=StringIO(), width=max(terminal.width, WIDTH), force_terminal=terminal.is_terminal, highlight=False, markup=False
+        file=StringIO(),
+        width=max(terminal.width, WIDTH),
+        force_terminal=terminal.is_terminal,
+        highlight=False,
+        markup=False,
+        emoji=False,
     )
 
 

@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from experiments.page import new_page, show
 from identify import (
     ALIGNMENTS,
     BLOCKS,
@@ -35,6 +36,13 @@ TABLES: tuple[PluginTable[Any], ...] = (
 """Every plug-in point."""
 
 
+def list_plugins() -> None:
+    """List every plug-in."""
+    page = new_page()
+    print_plugins(page)
+    show(page)
+
+
 def print_plugins(console: Console) -> None:
     """Print every plug-in with the first line of its documentation."""
     for table in TABLES:
@@ -42,3 +50,10 @@ def print_plugins(console: Console) -> None:
         for name in table:
             grid.add_row(f"  {name}", Text(table.summary(name)))
         console.print(Text(f"{table.point} (entry points: idbench.{table.point})", style="bold"), grid, sep="\n")
+    for conflict in plugin_conflicts():
+        console.print(Text(f"doubtful: {conflict}"), soft_wrap=True)
+
+
+def plugin_conflicts() -> list[str]:
+    """Return which plug-ins of other packages cannot be used, since their names are taken."""
+    return [f"{table.point} plug-in {conflict}" for table in TABLES for conflict in table.conflicts]

@@ -6,6 +6,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib.metadata import version
 from math import isfinite
 from pathlib import Path
@@ -18,18 +19,82 @@ if TYPE_CHECKING:
     from experiments.recording.stream import Stream
 
 
-@contextmanager
-def results_folder(out: Path) -> Iterator[Path]:
-    """Give a hidden folder to write into; on success its files replace those of the same names in `out`.
+WRITTEN = ("summary.json", "log.parquet", "scenario.toml", "recording.rrd")
+"""Files of an experiment that others must not lose."""
 
-    Nothing in `out` changes if the block raises, is interrupted or terminated, or the disk is full. The hidden folder lies
+
+@dataclass(frozen=True)
+class Place:
+    """The folder of an experiment's results.
+
+    Parameters
+    ----------
+    out : Path
+        The folder.
+    experiment : str
+        Which kind of experiment writes there.
+    of : str
+        What it is about, where one kind has several: the name of a scenario, or of a log.
+    force : bool
+        Whether results of another experiment may be replaced.
+    """
+
+    out: Path
+    experiment: str
+    of: str = ""
+    force: bool = False
+
+    def check(self) -> None:
+        """Raise ResultsError if the folder holds results of another experiment, or files that nobody knows."""
+        if str(self.out) == "." and not self.force:
+            raise ResultsError("--out is the folder that you are in, or empty: name a folder of its own for the results")
+        if self.force or not self.out.is_dir():
+            return
+        theirs, ours = _experiment_of(self.out), " ".join(filter(None, (self.experiment, self.of)))
+        if theirs is not None and theirs != ours:
+            raise ResultsError(f"{self.out} holds the results of {theirs}: choose another --out, or replace them with --force")
+        taken = [name for name in WRITTEN if (self.out / name).is_file()]
+        if theirs is None and taken:
+            raise ResultsError(
+                f"{self.out} holds {', '.join(taken)}, of no experiment that is known: choose another --out, or replace them "
+                "with --force"
+            )
+
+
+def _experiment_of(folder: Path) -> str | None:
+    """Return which experiment has written to a folder, as the summary says; None without one."""
+    if (folder / "study.toml").is_file():
+        return "a study"
+    if not (folder / "summary.json").is_file():
+        return None
+    try:
+        said = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        named = said["scenario"]["name"] if said["experiment"] == "run" else said.get("log", "")
+        return " ".join(filter(None, (str(said["experiment"]), str(named))))
+    except (OSError, ValueError, KeyError, TypeError):
+        return "something whose summary.json cannot be read"
+
+
+@contextmanager
+def results_folder(place: Place) -> Iterator[Path]:
+    """Give a hidden folder to write into; on success its files replace those of the same names in the place.
+
+    Nothing there changes if the block raises, is interrupted or terminated, or the disk is full. The hidden folder lies
     on the same file system, so that the files are only renamed, summary.json last.
 
     Raises
     ------
     ResultsError
-        If `out` cannot be written, or is a file.
+        If the folder cannot be written, is a file, or holds results of another experiment.
     """
+    place.check()
+    with beside(place.out) as hidden:
+        yield hidden
+
+
+@contextmanager
+def beside(out: Path) -> Iterator[Path]:
+    """Give a hidden folder to write into; on success its files are moved to the folder `out`, whatever is there."""
     try:
         if out.exists() and not out.is_dir():
             raise ResultsError(f"{out} is a file, not a folder: choose another --out")

@@ -1,41 +1,24 @@
 """The command that tells what can be identified of a robot."""
 
 from math import isfinite
-from typing import TYPE_CHECKING
 
 import numpy as np
-import tyro
 from rich.console import Console
 from rich.text import Text
 
-from experiments.app import app
-from experiments.chosen import Asked, Parameters, absolute
+from experiments.budget import Budget
+from experiments.cli.commands import DescribeRobot
 from experiments.doubts import doubts_of_robot
-from experiments.interruption import importing
 from experiments.page import new_page, show
-from experiments.subject import Subject
+from experiments.subject import Subject, absolute
+from experiments.tables import new_table, print_titled
+from sim.errors import BenchError
+from sim.trajectories import RandomMoves
 
-if TYPE_CHECKING:
-    from experiments.budget import Budget
 
-
-@app.command(name="robot")
-def robot(
-    name: tyro.conf.Positional[str],
-    parameters: Asked = Parameters(),  # noqa: B008  # frozen
-) -> None:
-    """Tell what can be identified of a robot: its joints, its base parameters, what its torques are made of.
-
-    Args:
-        name: Name of a robot that ships, or a file that describes it (MJCF or URDF).
-        parameters: Which parameters are asked for.
-    """
-    with importing():
-        from experiments.budget import Budget
-        from sim.errors import BenchError
-        from sim.trajectories import RandomMoves
-
-    subject, page = Subject(absolute(name), parameters), new_page()
+def describe(asked: DescribeRobot) -> None:
+    """Tell what can be identified of a robot."""
+    subject, page = Subject(absolute(asked.name), asked.parameters), new_page()
     truth = subject.truth(subject.robot)
     _print_joints(page, subject)
     _print_parameters(page, subject, truth)
@@ -50,8 +33,6 @@ def robot(
 
 
 def _print_joints(page: Console, subject: Subject) -> None:
-    from experiments.tables import new_table, print_titled
-
     tree, found = subject.tree, subject.robot
     grid = new_table("", ["kind", "on", "from [rad, m]", "to", "armature", "Fv", "Fs"])
     model = found.model
@@ -66,8 +47,6 @@ def _print_joints(page: Console, subject: Subject) -> None:
 
 
 def _print_parameters(page: Console, subject: Subject, truth: dict[str, float]) -> None:
-    from experiments.tables import new_table, print_titled
-
     basis, base = subject.basis, subject.base
     grid = new_table("", ["of the file", "unit"])
     if base is not None:
@@ -81,9 +60,7 @@ def _print_parameters(page: Console, subject: Subject, truth: dict[str, float]) 
     page.print()
 
 
-def _print_budget(page: Console, budget: "Budget") -> None:
-    from experiments.tables import new_table, print_titled
-
+def _print_budget(page: Console, budget: Budget) -> None:
     grid = new_table("", budget.largest)
     for j, joint in enumerate(budget.robot.joints):
         values = [value[j] for value in budget.largest.values()]

@@ -1,10 +1,12 @@
 """A scenario, simulated and identified: what do its imperfections do to each model?"""
 
+import sys
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from experiments.chosen import Parameters
+from experiments.cli.options import Parameters
+from experiments.errors import ExperimentError
 from experiments.identified import Identified
 from experiments.subject import Subject
 from identify import AbstractEstimator, Chain
@@ -13,6 +15,9 @@ from sim.run import Run
 from sim.scenario import Scenario
 from sim.scenario_file import to_dict
 from sim.watch import Watch
+
+LONG, ENDLESS = 3e6, 1e9
+"""Physics steps from which on a simulation takes minutes, and hours or days."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +52,16 @@ class ScenarioRun:
         # What is wrong with names, or a robot that is no SCARA, is told before the simulation.
         Identified((), self.subject, chain=self.chain, estimator=self.estimator)
         self.subject.truth(self.scenario.real_robot)
+
+    def require_bearable(self, yes: bool) -> None:
+        """Say how long a simulation is that takes long; raise ExperimentError if it would hardly end, unless that is wanted."""
+        h = self.scenario.drive.step_length(self.scenario.fs, self.scenario.physics.step)
+        steps = self.scenario.trajectory.plan(self.scenario.real_robot).duration / h
+        size = f"{steps:.1e} physics steps of {h:.2g} s"
+        if steps > ENDLESS and not yes:
+            raise ExperimentError(f"scenario {self.scenario.name} makes {size}: hours or days; if you mean it, add --yes")
+        if steps > LONG:
+            sys.stderr.write(f"idbench: {size} are to be simulated, some tens of thousands a second\n")
 
     @cached_property
     def subject(self) -> Subject:

@@ -2,24 +2,27 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import tyro
 from rich.console import Console
 from rich.text import Text
 
-from experiments.app import app
-from experiments.audience import Audience, Watched, Watching, Window
-from experiments.chosen import Asked, Parameters, absolute
+from experiments.audience import Audience, Watching
+from experiments.cli.commands import Run
+from experiments.cli.commands import Table2 as Repeated
 from experiments.doubts import doubts_of_robot
 from experiments.errors import ExperimentError
-from experiments.interruption import importing
 from experiments.page import new_page, shown
-from experiments.results import results_folder, tell_of, write_recording, write_summary
+from experiments.plugins import plugin_conflicts
+from experiments.progress import progress_of
+from experiments.results import Place, results_folder, tell_of, write_recording, write_summary
+from experiments.run import ScenarioRun
+from experiments.subject import absolute
+from experiments.table2 import Table2
+from experiments.tables import print_identified, print_table2
 from identify.log_file import write_log
 from identify.long import is_long
 from sim.drives import IdealDrive
-from sim.engine import Progress
 from sim.errors import RobotError
 from sim.ripple import Ripple
 from sim.robot import Robot
@@ -29,79 +32,40 @@ from sim.trajectories import Quintic
 
 if TYPE_CHECKING:
     from experiments.recording.identified import RunRecording
-    from experiments.run import ScenarioRun
-
-File = Annotated[Path | None, tyro.conf.arg(metavar="FILE")]
-Name = Annotated[str | None, tyro.conf.arg(metavar="SCENARIO")]
-Named = Annotated[str | None, tyro.conf.arg(metavar="NAME|FILE")]
-From = Annotated[Path | None, tyro.conf.arg(name="from", metavar="DIR")]
-Index = Annotated[int | None, tyro.conf.arg(metavar="N")]
 
 
-@app.command(name="run")
-def run(  # noqa: PLR0913, PLR0917  # the options of a command
-    scenario: tyro.conf.Positional[Name] = None,
-    out: File = None,
-    chain: str = "idbench",
-    estimator: str = "WLS",
-    study: From = None,
-    index: Index = None,
-    method: Index = None,
-    inner: Window = None,
-    robot: Named = None,
-    parameters: Asked = Parameters(),  # noqa: B008  # frozen
-    watching: Watched = Watching(),  # noqa: B008  # frozen
-) -> None:
-    """Simulate a scenario in closed loop, identify it with all models, and record it.
-
-    Args:
-        scenario: Name of a scenario that ships, or a file (TOML).
-        study: Instead of a scenario: the folder of a study, one run of which is made again.
-        index: Number of that run; its rows must come out with the same bits.
-        method: Which of the study's combinations of chain, estimator and their settings is shown; the first by default.
-        out: Folder for summary.json, recording.rrd, log.parquet and scenario.toml; runs/<name of the scenario> by default.
-        chain: Signal processing.
-        estimator: OLS, WLS, ...
-        inner: From when to when [s] the signals inside the loop are recorded at the full rate of the drive, such as 10 10.5.
-        robot: Another robot than the scenario's: name of one that ships, or a file (MJCF or URDF). A trajectory that does not
-            fit it is replaced by random moves.
-        parameters: Which parameters are identified.
-        watching: How it is watched.
-    """
-    with importing():
-        from experiments.run import ScenarioRun
-        from experiments.tables import print_identified
-
-    page = new_page()
-    if scenario is None:
-        if robot is not None:
-            raise ExperimentError(f"--robot {robot}: a run of a study is of the study's robot")
-        made = replace(_again(page, study, index, method), parameters=parameters)
+def run(asked: Run) -> None:
+    """Simulate a scenario, identify it and record it."""
+    page, watching, inner = new_page(), asked.watching, asked.inner
+    if asked.scenario is None:
+        if asked.robot is not None:
+            raise ExperimentError(f"--robot {asked.robot}: a run of a study is of the study's robot")
+        made = replace(_again(page, asked.study, asked.index, asked.method), parameters=asked.parameters)
     else:
-        described = _with_robot(page, load(_alone(scenario, study, index)), robot)
-        made = ScenarioRun(described, chain, estimator, parameters=parameters)
+        described = _with_robot(page, load(_alone(asked.scenario, asked.study, asked.index)), asked.robot)
+        made = ScenarioRun(described, asked.chain, asked.estimator, parameters=asked.parameters)
     _require_window(inner, watching)
     described, lost = made.scenario, ""
-    folder_name = out or Path("runs") / described.name
-    if (folder_name / "study.toml").exists():
-        raise ExperimentError(f"{folder_name} holds a study: choose another --out")
+    place = Place(asked.out or Path("runs") / described.name, "run", described.name, asked.force)
+    place.check()
+    made.require_bearable(asked.yes)
     with watching.audience() as audience, shown(page):
-        with results_folder(folder_name) as folder:
+        with results_folder(place) as folder, progress_of(f"simulating {described.name}") as progress:
             recording = _recording(described, audience, inner) if watching.rerun else None
-            ran = replace(made, progress=watch(f"simulating {described.name}"), watch=recording.watch if recording else None)
+            ran = replace(made, progress=progress, watch=recording.watch if recording else None)
             print_identified(page, ran.identified, f"Scenario {described.name}")
-            for doubt in doubts_of_robot(ran.run.robots[0]):
+            for doubt in [*doubts_of_robot(ran.run.robots[0]), *plugin_conflicts()]:
                 page.print(f"doubtful: {doubt}", soft_wrap=True)
             write_log(ran.run.alone(), folder / "log.parquet")
             (folder / "scenario.toml").write_text(to_toml(described))
             write_summary(folder / "summary.json", ran.summary())
             if recording:
                 lost = write_recording(folder, recording.finish(ran))
-        tell_of(lost, folder_name)
+        tell_of(lost, place.out)
         _doubt_window(page, inner, recording)
         if recording and is_long(ran.run.alone()):
             page.print("the identification is not recorded: the rows of so long a log are not kept")
-        page.print(f"written to {folder_name}{watching.hint(folder_name)}", soft_wrap=True)
+        page.print(f"written to {place.out}{watching.hint(place.out)}", soft_wrap=True)
 
 
 def _with_robot(page: Console, scenario: Scenario, robot: str | None) -> Scenario:
@@ -151,9 +115,8 @@ def _alone(scenario: str, study: Path | None, index: int | None) -> str:
     return scenario
 
 
-def _again(page: Console, folder: Path | None, index: int | None, method: int | None) -> "ScenarioRun":
+def _again(page: Console, folder: Path | None, index: int | None, method: int | None) -> ScenarioRun:
     """Return a run of a study, whose rows come out again, to be identified by one of its methods."""
-    from experiments.run import ScenarioRun
     from experiments.study.again import compare_again
     from experiments.study.store import Store
 
@@ -178,31 +141,16 @@ def _again(page: Console, folder: Path | None, index: int | None, method: int | 
     return ScenarioRun(scenario, *chosen.names, method=(chosen.chain, chosen.estimator))
 
 
-@app.command(name="table2")
-def table2(
-    out: Path = Path("runs/table2"),
-    scenario: str = "table2",
-    inner: Window = None,
-    watching: Watched = Watching(),  # noqa: B008  # frozen
-) -> None:
-    """Repeat the paper's experiment (Table 2) on the virtual robot, and attribute its errors; takes two minutes.
-
-    Args:
-        out: Folder for summary.json, recording.rrd and the logs of the realizations.
-        scenario: Name of a scenario, or a file (TOML).
-        inner: From when to when [s] the signals inside the loop are recorded at the full rate of the drive, such as 10 10.5.
-        watching: How it is watched.
-    """
-    with importing():
-        from experiments.table2 import Table2
-        from experiments.tables import print_table2
-
-    _require_window(inner, watching)
-    page, described, lost = new_page(), load(scenario), ""
+def table2(asked: Repeated) -> None:
+    """Repeat the paper's experiment and attribute its errors."""
+    watching, place = asked.watching, Place(asked.out, "table2", force=asked.force)
+    _require_window(asked.inner, watching)
+    place.check()
+    page, described, lost = new_page(), load(asked.scenario), ""
     with watching.audience() as audience, shown(page):
-        with results_folder(out) as folder:
-            recording = _recording(described, audience, inner) if watching.rerun else None
-            table = Table2(described, watch("simulating"), recording.watch if recording else None)
+        with results_folder(place) as folder, progress_of("simulating") as progress:
+            recording = _recording(described, audience, asked.inner) if watching.rerun else None
+            table = Table2(described, progress, recording.watch if recording else None)
             print_table2(page, table)
             for i in range(len(table.run.seeds)):
                 write_log(table.run.alone(i), folder / f"log{i}.parquet")
@@ -211,17 +159,6 @@ def table2(
                 from experiments.recording.table2 import finish_table2
 
                 lost = write_recording(folder, finish_table2(recording, table))
-        tell_of(lost, out)
-        _doubt_window(page, inner, recording)
-        page.print(f"written to {out}{watching.hint(out)}", soft_wrap=True)
-
-
-def watch(what: str) -> Progress:
-    """Return what shows the share that is done on the terminal's error stream, if it is a terminal."""
-    console = Console(stderr=True)
-
-    def show_share(share: float) -> None:
-        if console.is_terminal:
-            console.print(f"{what}: {share:4.0%}", end="\r", highlight=False)
-
-    return show_share
+        tell_of(lost, asked.out)
+        _doubt_window(page, asked.inner, recording)
+        page.print(f"written to {asked.out}{watching.hint(asked.out)}", soft_wrap=True)

@@ -7,68 +7,37 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import partial
 from math import ceil
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import tyro
-
-from experiments.app import app
-from experiments.audience import Audience, Watched, Watching
+from experiments.audience import Audience
+from experiments.cli.commands import Study
 from experiments.errors import StudyError
-from experiments.interruption import importing
 from experiments.page import new_page, show, shown
+from experiments.study.engine import local_pool, run_missing
+from experiments.study.progress import watching as counting
+from experiments.study.results import write_results
+from experiments.study.shard_file import arrays
+from experiments.study.statistics import cells
+from experiments.study.store import Store
+from experiments.study.study_file import load_study, names
 
 if TYPE_CHECKING:
     from experiments.recording.study import StudyRecording
-    from experiments.study.store import Store
 
 MANY = 100_000
 """Runs beyond which a study is taken for a slip unless --yes says otherwise: days of a machine."""
 
 LARGEST_SHARD = 64
 
-Folder = Annotated[Path | None, tyro.conf.arg(metavar="DIR")]
-Number = Annotated[int | None, tyro.conf.arg(metavar="INT")]
-Name = Annotated[str | None, tyro.conf.arg(metavar="STUDY")]
-Url = Annotated[str | None, tyro.conf.arg(metavar="URL")]
 
-
-@app.command(name="study")
-def study(  # noqa: PLR0913, PLR0917  # the options of a command
-    study: tyro.conf.Positional[Name] = None,
-    out: Folder = None,
-    resume: Folder = None,
-    seeds: Number = None,
-    shard: Number = None,
-    threads: Number = None,
-    workers: Number = None,
-    scheduler: Url = None,
-    yes: bool = False,
-    watching: Watched = Watching(),  # noqa: B008  # frozen
-) -> None:
-    """Run a study: a scenario over a grid and many seeds, identified by every method; without a name, list those that ship.
-
-    Args:
-        study: Name of a study that ships, or a file (TOML).
-        out: Folder of the study; runs/<name of the study> by default.
-        resume: Folder of a study that was interrupted: what it lacks is run, and its report is made anew.
-        seeds: Independent runs of every combination, instead of the study's own number.
-        shard: Most runs that are simulated together; no bit depends on it.
-        threads: Shards at a time; all processors by default.
-        workers: Processes of this machine to run on instead (needs the extra `cluster`).
-        scheduler: Address of a Dask scheduler to run on instead, as tcp://host:8786 (needs the extra `cluster`).
-        yes: Run more than a hundred thousand runs.
-        watching: How it is watched; runs show as they are finished.
-    """
-    with importing():
-        from experiments.study.engine import run_missing
-        from experiments.study.progress import watching as counting
-        from experiments.study.results import write_results
+def study(asked: Study) -> None:
+    """Run a study, or list those that ship."""
+    resume, watching, seeds = asked.resume, asked.watching, asked.seeds
+    shard, threads, workers, scheduler = asked.shard, asked.threads, asked.workers, asked.scheduler
     if watching.pace is not None:
         raise StudyError(f"--pace {watching.pace:g}: a study has no one time that could pass; leave it out")
     page = new_page()
-    if study is None and resume is None:
-        from experiments.study.study_file import load_study, names
-
+    if asked.study is None and resume is None:
         for name in names():
             page.out(f"{name:16} {load_study(name).question}")
         show(page)
@@ -76,7 +45,7 @@ def study(  # noqa: PLR0913, PLR0917  # the options of a command
     for name, value in (("seeds", seeds), ("shard", shard), ("threads", threads), ("workers", workers)):
         if value is not None and value < 1:
             raise StudyError(f"--{name} {value} must be at least 1")
-    store = _resumed(resume, study, out, seeds) if resume else _begun(str(study), out, seeds, yes)
+    store = _resumed(resume, asked.study, asked.out, seeds) if resume else _begun(str(asked.study), asked.out, seeds, asked.yes)
     width = workers or threads or os.cpu_count() or 1
     runs = shard or min(LARGEST_SHARD, ceil(store.study.size / (2 * width)))
     pooled = _pool(store, scheduler, workers, threads, width)
@@ -91,7 +60,7 @@ def study(  # noqa: PLR0913, PLR0917  # the options of a command
         write_results(page, store, recording)
 
 
-def _recording(store: "Store", audience: Audience | None) -> "StudyRecording":
+def _recording(store: Store, audience: Audience | None) -> "StudyRecording":
     """Return the recording of a study, with the runs that are finished already if somebody watches."""
     from experiments.recording.study import StudyRecording
 
@@ -101,19 +70,13 @@ def _recording(store: "Store", audience: Audience | None) -> "StudyRecording":
     return recording
 
 
-def _show(store: "Store", recording: "StudyRecording", runs: range | None = None) -> None:
+def _show(store: Store, recording: "StudyRecording", runs: range | None = None) -> None:
     """Send runs to a recording, those of a shard or all that are finished."""
-    from experiments.study.shard_file import arrays
-    from experiments.study.statistics import cells
-
     table = store.table() if runs is None else store.part(runs)
     recording.add(cells(arrays(table), store.study.varied, store.study.parameters))
 
 
-def _begun(name: str, out: Path | None, seeds: int | None, yes: bool) -> "Store":
-    from experiments.study.store import Store
-    from experiments.study.study_file import load_study
-
+def _begun(name: str, out: Path | None, seeds: int | None, yes: bool) -> Store:
     described = load_study(name) if seeds is None else load_study(name).with_seeds(seeds)
     if described.size > MANY and not yes:
         raise StudyError(f"{name} has {described.size:,} runs, more than {MANY:,}: if you mean it, add --yes")
@@ -121,9 +84,7 @@ def _begun(name: str, out: Path | None, seeds: int | None, yes: bool) -> "Store"
     return Store.new(described, out or Path("runs") / described.name)
 
 
-def _resumed(folder: Path, name: str | None, out: Path | None, seeds: int | None) -> "Store":
-    from experiments.study.store import Store
-
+def _resumed(folder: Path, name: str | None, out: Path | None, seeds: int | None) -> Store:
     given = [f"--{what}" for what, value in (("out", out), ("seeds", seeds)) if value is not None]
     if name is not None or given:
         raise StudyError(
@@ -133,11 +94,10 @@ def _resumed(folder: Path, name: str | None, out: Path | None, seeds: int | None
 
 
 def _pool(
-    store: "Store", scheduler: str | None, workers: int | None, threads: int | None, width: int
+    store: Store, scheduler: str | None, workers: int | None, threads: int | None, width: int
 ) -> AbstractContextManager[Any]:
     """Return where shards are computed; nowhere, if nothing is missing."""
     from experiments.study.cluster import cluster_pool
-    from experiments.study.engine import local_pool
 
     given = [f"--{what}" for what, value in (("workers", workers), ("threads", threads)) if value is not None]
     if (scheduler and given) or len(given) > 1:
@@ -148,7 +108,7 @@ def _pool(
 
 
 @contextmanager
-def _kept(store: "Store") -> Iterator[None]:
+def _kept(store: Store) -> Iterator[None]:
     """Say what is kept and how to go on, if the block is interrupted."""
     try:
         yield

@@ -2,14 +2,15 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import final
 
 import numpy as np
 
-from experiments.chosen import Parameters
+from experiments.cli.options import Parameters
 from experiments.errors import ExperimentError
 from identify import BLOCKS, AbstractFriction, BaseParameters, Basis, KinematicTree, scara, tree_basis
-from sim.robot import Robot
+from sim.robot import FILES, Robot
 from sim.scara import scara_truth
 from sim.tree import kinematic_tree, standard_parameters
 
@@ -87,3 +88,8 @@ class Subject:
                 raise ExperimentError(f"--add {name}: that is no law of a joint's friction; known: {', '.join(laws)}")
             basis = basis + block
         return basis
+
+
+def absolute(robot: str) -> str:
+    """Return the name of a robot, or the path of its file from the root: results are read from other folders too."""
+    return str(Path(robot).absolute()) if Path(robot).suffix in FILES else robot

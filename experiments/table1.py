@@ -30,6 +30,9 @@ from sim.scenario import Scenario
 from sim.scenario_file import to_dict
 from sim.trajectories import Reference
 
+CHAINS_COMPARED = ("paper", "idbench")
+"""Chains of the comparison."""
+
 SCENARIO = "table1"
 """The scenario that ships."""
 

@@ -11,6 +11,7 @@ from rich.text import Text
 from experiments.identified import Identified
 from experiments.table2 import PAPER, PAPER_ROWS, REALIZATIONS, Table2
 from experiments.validation import Validated
+from experiments.verdict import Verdict
 from identify import AsLogged, Estimate, IdentificationError
 
 WORTHLESS = 999.0
@@ -51,14 +52,20 @@ def print_identified(console: Console, found: Identified, title: str) -> None:
     grid.add_row("Cond(W)", *lead, *(c for e in found.estimates.values() for c in (f"{e.condition_number:.1f}", "", "")))
     grid.add_row("rows", *lead, *(c for e in found.estimates.values() for c in (f"{e.rows}", "", "")))
     for j in range(found.basis.n):
-        shares = [f"{100 * share[j]:.3f} %" for share in found.explained.values()]
+        shares = [_explained(share[j]) for share in found.explained.values()]
         grid.add_row(f"tau{j + 1} explained", *lead, *(c for share in shares for c in (share, "", "")))
     print_titled(console, f"{title}: chain {found.chain}, {found.estimator}", grid)
     channel = found.logs[0].torque
     read = f"{channel.meaning}, delay {1e3 * channel.delay:.4g} ms"
     logged = isinstance(found.processing.alignment, AsLogged)
+    for model, why in found.failures.items():
+        console.print(Text(f"{model}: no estimate: {why}"), soft_wrap=True)
     console.print(Text(f"torque: {read}" + (f", which chain {found.chain} ignores: it takes it as logged" if logged else "")))
     console.print()
+
+
+def _explained(share: float) -> str:
+    return f"{100 * share:.3f} %" if share > -WORTHLESS / 100 else f"<-{WORTHLESS:g} %"
 
 
 def _cells(estimate: Estimate, found: Identified, i: int) -> tuple[str, str, str]:
@@ -77,7 +84,7 @@ def number(x: float) -> str:
 
 
 def print_validated(console: Console, validated: Validated) -> None:
-    """Print how well torques of an unseen motion are foretold, what the simulated robot does on it, and verdicts."""
+    """Print how well torques of an unseen motion are predicted, what the simulated robot does on it, and verdicts."""
     try:
         torques = validated.torques
     except IdentificationError as error:
@@ -85,7 +92,7 @@ def print_validated(console: Console, validated: Validated) -> None:
             raise
         console.print(Text(f"not validated on {validated.title}: {error}\n"), soft_wrap=True)
         return
-    heads = [f"{model}\n{what}" for model in torques for what in ("rms", "%", "R2", "q rms")]
+    heads = [f"{model}\n{what}" for model in torques for what in ("rms", "%", "noise %", "R2", "q rms")]
     grid = new_table("", heads)
     for j, joint in enumerate(validated.found.subject.robot.joints):
         grid.add_row(joint, *(cell for model in torques for cell in _validation_cells(validated, model, j)))
@@ -98,14 +105,25 @@ def print_validated(console: Console, validated: Validated) -> None:
     if apart:
         console.print(Text(f"standing and turning, where friction is not determined: {', '.join(apart)} N m"), soft_wrap=True)
     for model in torques:
-        word, reasons = validated.verdict(model)
-        console.print(Text(f"{model}: {word}: {'; '.join(reasons)}"), soft_wrap=True)
+        verdict = Verdict(validated, model)
+        console.print(Text(f"{model}: {verdict.word}: {'; '.join(verdict.reasons)}"), soft_wrap=True)
+    for model, why in validated.judged.failures.items():
+        console.print(Text(f"{model}: not judged: {why}"), soft_wrap=True)
     console.print()
 
 
-def _validation_cells(validated: Validated, model: str, j: int) -> tuple[str, str, str, str]:
+def _validation_cells(validated: Validated, model: str, j: int) -> tuple[str, str, str, str, str]:
     told, off = validated.torques[model], validated.position_error(model)
-    return f"{told.rms[j]:.2g}", f"{told.percent[j]:.2g}", f"{told.R2[j]:.5f}", "" if off is None else f"{off[j]:.1e}"
+    noise = told.percent_of_level(told.noise)[j]
+    error, hidden = (
+        f"{x:.2g}" if x < WORTHLESS else f">{WORTHLESS:g}" if isfinite(x) else "" for x in (told.percent[j], noise)
+    )
+    R2 = f"{told.R2[j]:.5f}" if told.R2[j] > -WORTHLESS else f"<-{WORTHLESS:g}"
+    return f"{told.rms[j]:.2g}", error, hidden, R2, "" if off is None else f"{off[j]:.1e}"
+
+
+def _percentage(x: float) -> str:
+    return f"{x:.2g}" if x < WORTHLESS else f">{WORTHLESS:g}" if isfinite(x) else ""
 
 
 def percent(share: float) -> str:

@@ -1,6 +1,6 @@
-"""Is an identification any good? Torques of a motion it has not seen, and the identified robot, simulated on it."""
+"""Torques of a motion that an identification has not seen, and the identified robot, simulated on it."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil
@@ -8,19 +8,12 @@ from typing import Any, final
 
 import numpy as np
 
-from experiments.doubts import wrong_sign
 from experiments.identified import Identified
 from experiments.written import Written
 from identify import Array, Basis, IdentificationError, MotionLog, State, Validation, split, validate
 from identify.long import manageable
 from sim.errors import BenchError
 from sim.replay import Replay, replay
-
-GOOD, FAIR = 2.0, 10.0
-"""Torque errors [% of the torque] up to which a model is called good, or fair; a choice of ours."""
-
-STRAYS, LOST = 1.0, 5.0
-"""Position errors [% of a joint's way] up to which a simulated robot is called good, or fair; a choice of ours too."""
 
 BANDWIDTH = 5.0
 """Of the loop that holds the simulated robot to the log [rad/s]: weak, so that errors of the model show."""
@@ -65,9 +58,11 @@ class Validated:
 
     @cached_property
     def torques(self) -> dict[str, Validation]:
-        """How well each model foretells the torques."""
+        """How well each model predicts the torques."""
         basis, chain = self.judged.basis, self.judged.processing
-        return {model: validate(self.unseen, basis, e.X, chain) for model, e in self.judged.estimates.items()}
+        return {
+            model: validate(self.unseen, basis, e.X, chain, e.best_covariance) for model, e in self.judged.estimates.items()
+        }
 
     @cached_property
     def replays(self) -> dict[str, Replay | str]:
@@ -95,67 +90,31 @@ class Validated:
         found = self.replays[model]
         return None if isinstance(found, str) else np.sqrt(np.mean((self._replayed[0].q - found.q) ** 2, axis=0))
 
-    def verdict(self, model: str) -> tuple[str, list[str]]:
-        """Return a word, and the reasons for it."""
-        told, strays = self.torques[model], self.straying(model)
-        worst, strayed = float(told.percent.max()), 0.0 if strays is None else float(strays.max())
-        word = "good" if worst <= GOOD and strayed <= STRAYS else "fair" if worst <= FAIR and strayed <= LOST else "poor"
-        if wrong := wrong_sign(self.judged):
-            return "poor", [*(reason.partition(":")[0] for reason in wrong), *self._reasons(model, told)]
-        return word, [*self._reasons(model, told), *([] if word == "good" else self._worth_a_try)]
-
-    @property
-    def _worth_a_try(self) -> list[str]:
-        """What may be missing in a model that is not good."""
-        subject = self.found.subject
-        options = [] if "offset" in subject.asked.add else ["--add offset"]
-        if not all(joint.armature for joint in subject.tree.joints):
-            options.append("--armature all")
-        return [f"worth a try: {', '.join(options)}"] if options else []
-
-    def straying(self, model: str) -> Array | None:
-        """Return the rms of the position error as a share of the way between a joint's ends [%], shape (joint,)."""
-        off, q = self.position_error(model), self._replayed[0].q
-        return None if off is None else 100 * off / np.maximum(np.ptp(q, axis=0), 1e-12)
-
-    def _reasons(self, model: str, told: Validation) -> Iterator[str]:
-        joints, worst = self.found.subject.robot.joints, int(np.argmax(told.percent))
-        others = ", the others by less" if len(joints) > 1 else ""
-        yield f"the torque of {joints[worst]} is off by {_percent(told.percent[worst])}{others}"
-        strays = self.straying(model)
-        if strays is not None and strays.max() > STRAYS:
-            yield f"the simulated robot strays by {_percent(strays.max())} of its way in {joints[int(np.argmax(strays))]}"
-        coloured = [joint for joint, white in zip(joints, told.white, strict=True) if not white]
-        if coloured and told.percent.max() > GOOD:
-            yield f"what is left of {', '.join(coloured)} is no noise: friction, elasticity or a delay is not modelled"
-        elif coloured:
-            yield f"what is left of {', '.join(coloured)} is no noise, but small"
-        else:
-            yield "what is left is not to be told from noise"
-        if isinstance(self.replays[model], str):
-            yield f"not simulated: {self.replays[model]}"
-
     def summary(self) -> dict[str, Any]:
         """Return what a summary.json says of it."""
-        return {"on": self.title, "models": {model: self._of(model) for model in self.torques}}
-
-    def _of(self, model: str) -> dict[str, Any]:
-        told, (word, reasons), off = self.torques[model], self.verdict(model), self.position_error(model)
         return {
-            "verdict": word,
-            "reasons": reasons,
-            "torque_error_rms": told.rms.tolist(),
-            "torque_error_percent": [float(x) if np.isfinite(x) else None for x in told.percent],
-            "R2": told.R2.tolist(),
-            "standing_error_rms": [float(x) if np.isfinite(x) else None for x in told.standing],
-            "residual_correlation": told.correlation.tolist(),
-            "residual_correlation_bound": told.bound.tolist(),
-            "position_error_rms": None if off is None else off.tolist(),
+            "on": self.title,
+            "models": {model: self._of(model) for model in self.torques},
+            "failures": self.judged.failures,
         }
 
-
-def _percent(share: float) -> str:
-    return f"{share:.2g} %" if share < 10 else f"{share:.0f} %"
+    def _of(self, model: str) -> dict[str, Any]:
+        told, off = self.torques[model], self.position_error(model)
+        numbers = {
+            "torque_error_rms": told.rms,
+            "torque_error_percent": told.percent,
+            "noise_rms": told.noise,
+            "sigma_rms": told.open,
+            "unexplained_percent": told.percent_of_level(told.excess),
+            "R2": told.R2,
+            "standing_error_rms": told.standing,
+            "residual_correlation": told.correlation,
+            "residual_correlation_bound": told.bound,
+        }
+        found: dict[str, Any] = {
+            name: [float(x) if np.isfinite(x) else None for x in values] for name, values in numbers.items()
+        }
+        return {**found, "position_error_rms": None if off is None else off.tolist()}
 
 
 def _without(log: MotionLog, qd: Array, standard: Basis, lost: Mapping[str, float]) -> MotionLog:

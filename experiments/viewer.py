@@ -4,13 +4,26 @@ import subprocess
 import tempfile
 from pathlib import Path
 
+from experiments.cli.commands import View
 from experiments.errors import ExperimentError, ResultsError
+from experiments.page import new_page, show
 from experiments.recording.folder import BASE, files, merge
-from experiments.results import results_folder
+from experiments.results import beside
 from experiments.viewers import LOOPBACK, require_display, viewer_binary
 
 
-def view(folder: Path, tab: str = "") -> None:
+def view(asked: View) -> None:
+    """Open a recording, or write it to one file."""
+    if asked.save is None:
+        open_viewer(asked.folder, asked.tab)
+        return
+    page = new_page()
+    save(asked.folder, asked.tab, asked.save)
+    page.print(f"written to {asked.save}", soft_wrap=True)
+    show(page)
+
+
+def open_viewer(folder: Path, tab: str = "") -> None:
     """Open the recording of a results folder, or a recording itself; return when the viewer is closed.
 
     Raises
@@ -41,7 +54,7 @@ def save(folder: Path, tab: str, out: Path) -> None:
     if out.name.startswith("recording.") and out.absolute().parent == folder.absolute():
         raise ResultsError(f"--save {out} would be a part of the recording itself: choose another name")
     paths = _paths(folder)
-    with results_folder(out.parent) as hidden:
+    with beside(out.parent) as hidden:
         merge(paths, tab, hidden / out.name)
 
 

@@ -50,8 +50,7 @@ class Written:
     def _of_all(self) -> tuple[Array, Array]:
         """Return estimate and covariance with the parameters that were left out: they are zero, and known to be."""
         estimate, names = self.found.estimates[self.model], self.found.subject.whole.parameters
-        C = estimate.corrected_covariance
-        C = C if np.isfinite(C).all() else estimate.covariance
+        C = estimate.best_covariance
         place = [names.index(name) for name in estimate.parameters]
         X, sure = np.zeros(len(names)), SURE * np.sqrt(np.diagonal(C).min())
         whole = sure**2 * np.eye(len(names))

@@ -76,6 +76,7 @@ from identify.operators import FirLowPass as FirLowPass
 from identify.operators import IirLowPass as IirLowPass
 from identify.operators import ModulatingFunctions as ModulatingFunctions
 from identify.operators import Windows as Windows
+from identify.pipeline import attempt_each as attempt_each
 from identify.pipeline import identify as identify
 from identify.pipeline import identify_each as identify_each
 from identify.prefilters import PREFILTERS as PREFILTERS

@@ -16,6 +16,9 @@ from identify.state import State
 STATES = 56
 """Random states for each joint: four for each of its fourteen standard parameters, with a rotor and three laws of friction."""
 
+ENOUGH = 4
+"""Joints beyond which more of them need no more states."""
+
 SEED = 0
 """Of the random states: any others give the same grouping, up to rounding."""
 
@@ -146,7 +149,7 @@ def transfer(tree: KinematicTree, start: Basis, end: Basis) -> Array:
 
 def _explicit_columns(tree: KinematicTree, basis: Basis) -> Array:
     """Return the columns of the explicit model at random states, shape (joint x state, p)."""
-    return np.moveaxis(columns_at(basis, random_states(tree, STATES * tree.n)), 1, -1).reshape(-1, len(basis.parameters))
+    return np.moveaxis(columns_at(basis, random_states(tree, _count(tree))), 1, -1).reshape(-1, len(basis.parameters))
 
 
 def columns_at(basis: Basis, states: Array) -> Array:
@@ -182,11 +185,16 @@ def _independent(R: Array) -> list[int]:
     return kept
 
 
+def _count(tree: KinematicTree) -> int:
+    """Return how many random states group a robot's parameters; every state has a row for each joint."""
+    return STATES * min(tree.n, ENOUGH)
+
+
 def _large(tree: KinematicTree, standard: Basis, length: Array) -> Array:
     """Return how long a column of each parameter may be: the longest of its unit, that of a first moment against gravity."""
     units = np.array(standard.units)
     large = np.array([length[units == unit].max() for unit in units])
-    weight = np.linalg.norm(tree.gravity) * np.sqrt(STATES * tree.n)
+    weight = np.linalg.norm(tree.gravity) * np.sqrt(_count(tree))
     large[units == FIRST_MOMENT] = np.maximum(large[units == FIRST_MOMENT], weight)
     return np.maximum(large, ROUNDING * length.max() / DEPENDENT)
 

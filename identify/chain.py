@@ -10,6 +10,7 @@ import numpy as np
 
 from identify.arrays import Array, require_not_negative
 from identify.basis import Basis
+from identify.blame import expect
 from identify.differentiators import AbstractDifferentiator, CentralDifference
 from identify.errors import LogError, SettingError
 from identify.grid import Grid
@@ -92,10 +93,13 @@ class Chain:
     def signals(self, log: MotionLog) -> Signals:
         """Return what the models see of `log`: prefiltered, differentiated, aligned, weighted."""
         fs, s = log.fs, partial(self.differentiator.derivative, fs=log.fs)
-        q = self.prefilter.apply(_time_last(log.q), fs)
-        tau = self.prefilter.apply(_time_last(log.tau * np.asarray(log.torque.gain)), fs)
-        state = State(q, s(q), s)
-        torque, weight = self.alignment.align(tau, log.torque, fs), self.mask.weight(state.qd, fs)
+        q, tau = (
+            expect(self.prefilter, "apply", self.prefilter.apply(_time_last(x), fs), _time_last(x).shape)
+            for x in (log.q, log.tau * np.asarray(log.torque.gain))
+        )
+        state = State(q, expect(self.differentiator, "derivative", s(q), q.shape), s)
+        torque = self.alignment.align(tau, log.torque, fs)
+        weight = expect(self.mask, "weight", self.mask.weight(state.qd, fs), q.shape)
         reach = ceil((self.prefilter.halo(fs) + torque.halo()) * fs - 1e-9)
         return Signals(state, torque, weight, fs, reach, partial(self._transposed, channel=log.torque, fs=fs))
 

@@ -6,7 +6,7 @@ from types import ModuleType
 from typing import Any, final
 
 import numpy as np
-from scipy import linalg, sparse, stats
+import scipy
 
 from identify.arrays import Array
 from identify.base_parameters import BaseParameters
@@ -60,7 +60,7 @@ class Consistent:
     @property
     def agrees(self) -> bool:
         """Whether the estimate's uncertainty explains the distance."""
-        return bool(self.distance**2 <= stats.chi2.ppf(CONFIDENCE, len(self.base)))
+        return bool(self.distance**2 <= scipy.stats.chi2.ppf(CONFIDENCE, len(self.base)))
 
 
 def consistent_parameters(grouping: BaseParameters, X: Array, covariance: Array, given: Array) -> Consistent:
@@ -101,15 +101,15 @@ def consistent_parameters(grouping: BaseParameters, X: Array, covariance: Array,
     # x = start + J u + N z: u counts sigma away from the estimate, z is what no motion shows.
     start = grouping.nearest(X, problem.given, problem.scale)
     J = problem.scale[:, None] * np.linalg.pinv(grouping.K * problem.scale) @ root
-    N = problem.scale[:, None] * linalg.null_space(grouping.K * problem.scale)
+    N = problem.scale[:, None] * scipy.linalg.null_space(grouping.K * problem.scale)
     T = np.concatenate([J, N], axis=1)
     steps, away = T / problem.scale[:, None], (start - problem.given) / problem.scale
     quadratic = NEAR * steps.T @ problem.metric @ steps + np.diag(np.r_[np.ones(len(X)), np.zeros(N.shape[1])])
     G, h, (signs, links) = problem.cones()
     found = clarabel.DefaultSolver(
-        sparse.csc_matrix(np.triu(2 * quadratic)),
+        scipy.sparse.csc_matrix(np.triu(2 * quadratic)),
         2 * NEAR * steps.T @ problem.metric @ away,
-        sparse.csc_matrix(G @ T),
+        scipy.sparse.csc_matrix(G @ T),
         h - G @ start,
         [clarabel.NonnegativeConeT(signs), *(clarabel.PSDTriangleConeT(4) for _ in range(links))],
         _quiet(clarabel),

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy import optimize
+import scipy
 
 from identify.arrays import Array
 from identify.basis import Basis
@@ -100,7 +100,7 @@ class _Search:
                 f"the torque fits best at an end of the range, {grid[best]:g} s: look further, or give the delay; "
                 "a chain that takes torques as logged does not read it at all"
             )
-        found = optimize.minimize_scalar(
+        found = scipy.optimize.minimize_scalar(
             self._misfit, bounds=(grid[best - 1], grid[best + 1]), method="bounded", options={"xatol": 1e-7}
         )
         return DelayEstimate(float(found.x), self._sigma(float(found.x)))

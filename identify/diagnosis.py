@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from identify.arrays import Array
 from identify.basis import Basis
@@ -96,7 +96,7 @@ def spectrum(y: Array, fs: float, resolution: float) -> tuple[Array, Array]:
     resolution : float
         Distance of the frequencies [Hz]; wider if `y` is shorter than its inverse.
     """
-    f, density = signal.welch(y, fs, nperseg=min(len(y), round(fs / resolution)), detrend="constant")
+    f, density = scipy.signal.welch(y, fs, nperseg=min(len(y), round(fs / resolution)), detrend="constant")
     return f, np.sqrt(density)
 
 

@@ -18,7 +18,19 @@ class SettingError(IdentificationError):
 
 
 class ExcitationError(IdentificationError):
-    """A motion that does not show every parameter."""
+    """A motion that does not show every parameter.
+
+    Parameters
+    ----------
+    message : str
+        What to tell.
+    hidden : tuple of str
+        Parameters that, left out, leave some that the motion does show.
+    """
+
+    def __init__(self, message: str, hidden: tuple[str, ...] = ()) -> None:
+        super().__init__(message)
+        self.hidden = hidden
 
 
 class UnknownNameError(IdentificationError, KeyError):

@@ -93,6 +93,12 @@ class Estimate:
         return np.sqrt(np.diagonal(self.corrected_covariance, axis1=-2, axis2=-1))
 
     @property
+    def best_covariance(self) -> Array:
+        """The corrected covariance, or the estimator's own where that is not known, shape (..., p, p)."""
+        known = np.isfinite(self.corrected_covariance).all(axis=(-2, -1), keepdims=True)
+        return np.where(known, self.corrected_covariance, self.covariance)
+
+    @property
     def relative_sigma_percent(self) -> Array:
         """%sigma of section 7.3, 100 sigma / |X|, shape (..., p)."""
         return 100 * self.sigma / np.abs(self.X)

@@ -14,6 +14,9 @@ Meaning = Literal["instantaneous", "held", "averaged"]
 UNIFORMITY = 0.01
 """Largest departure of a time step from the mean step, as a share of it, that still counts as uniform sampling."""
 
+FARTHEST, STRONGEST = 1e9, 1e12
+"""Positions [rad, m] and torques [N m, N] that no robot logs; squares and products of them would overflow in the end."""
+
 
 @dataclass(frozen=True)
 class TorqueChannel:
@@ -98,8 +101,13 @@ class MotionLog:
             raise LogError(f"q has shape {self.q.shape} and tau {self.tau.shape}: every sample needs both, of every joint")
         if self.q.ndim < 2 or 0 in self.q.shape:
             raise LogError(f"q has shape {self.q.shape}, not (..., time, joint) with at least one of each")
-        for name, values in (("q", self.q), ("tau", self.tau)):
+        for name, values, largest in (("q", self.q, FARTHEST), ("tau", self.tau, STRONGEST)):
             _require_finite(name, values)
+            if not np.abs(values).max() < largest:
+                raise LogError(
+                    f"{name} is {values.flat[np.abs(values).argmax()]:.3g} at some instant, where nothing beyond {largest:.0e} "
+                    "is believed: are columns exchanged, or is this a mark for missing samples?"
+                )
         if np.size(self.torque.gain) not in (1, self.n):
             raise LogError(f"{np.size(self.torque.gain)} torque gains for {self.n} joints: give one, or one a joint")
 
@@ -173,7 +181,9 @@ def sampling_frequency(t: Array) -> float:
 
 
 def _real(name: str, values: npt.ArrayLike) -> Array:
-    """Return `values` as an array of floats; raise LogError if they are not real numbers."""
+    """Return `values` as an array of floats; raise LogError if they are not real numbers, or some are masked."""
+    if isinstance(values, np.ma.MaskedArray) and np.any(values.mask):
+        raise LogError(f"{name} is masked at {np.sum(values.mask)} places: cut these samples out, or fill them, first")
     try:
         given = np.asarray(values)
     except ValueError as error:

@@ -6,6 +6,7 @@ from functools import partial
 
 from identify.arrays import Array
 from identify.basis import Basis
+from identify.blame import blamed
 from identify.chain import Chain, idbench_chain
 from identify.errors import IdentificationError
 from identify.estimate import Estimate
@@ -73,6 +74,32 @@ def identify_each(
     throw: bool = True,
 ) -> dict[str, Estimate]:
     """Identify with several models, by name, from the same filtered signals; otherwise as `identify`."""
+    found = attempt_each(log, basis, models, chain, estimator, simulate=simulate, throw=throw)
+    for outcome in found.values():
+        if isinstance(outcome, IdentificationError):
+            raise outcome
+    return {name: outcome for name, outcome in found.items() if isinstance(outcome, Estimate)}
+
+
+def attempt_each(
+    log: MotionLog | Sequence[MotionLog],
+    basis: Basis,
+    models: Mapping[str, AbstractModel],
+    chain: Chain | None = None,
+    estimator: AbstractEstimator | None = None,
+    *,
+    simulate: Callable[[Array], MotionLog] | None = None,
+    throw: bool = True,
+) -> dict[str, Estimate | IdentificationError]:
+    """Identify with several models; return the estimate of each, or the reason why it has none: each stands or falls alone.
+
+    Parameters are those of `identify_each`. With `throw` false, runs that cannot be solved are told by their status alone.
+
+    Raises
+    ------
+    IdentificationError
+        If the log or a setting allows no model an estimate.
+    """
     chain, estimator = chain or idbench_chain(), estimator or WeightedLeastSquares()
     _require(log, Sequence, "a MotionLog or a sequence of them, such as read_log(path)", MotionLog)
     _require(basis, Basis, "a Basis, such as scara()")
@@ -81,25 +108,46 @@ def identify_each(
     for model in models.values():
         _require(model, AbstractModel, 'a model, such as MODELS.create("power")')
 
-    def fit(systems: Sequence[System], throw: bool) -> dict[str, Estimate]:
-        found = {}
-        for (name, model), system in zip(models.items(), systems, strict=True):
-            if throw and estimator.full_rank:
-                system.check()
-            found[name] = estimator.fit(Problem(system, partial(chain.build, basis=basis, model=model), simulate))
-        return found
+    def solved(model: AbstractModel, system: System, throw: bool) -> Estimate:
+        if throw and estimator.full_rank:
+            system.check()
+        with blamed():
+            return estimator.fit(Problem(system, partial(chain.build, basis=basis, model=model), simulate), throw=throw)
+
+    def fit(systems: Sequence[System], throw: bool) -> dict[str, Estimate | IdentificationError]:
+        pairs = zip(models.items(), systems, strict=True)
+        return {name: _outcome(solved, model, system, throw) for (name, model), system in pairs}
 
     given = list(models.values())
     if not is_long(log):
         return fit(_systems(chain, log, basis, given), throw)
-    whole = fit(build_long(chain, log, basis, given), throw)
+    with blamed():
+        systems = build_long(chain, log, basis, given)
+    whole = fit(systems, throw)
     some = fit(_systems(chain, sampled(chain, log, SAMPLED), basis, given), False)
-    return {name: replace(e, correction=some[name].corrected_sigma / some[name].sigma) for name, e in whole.items()}
+    return {name: _corrected(outcome, some[name]) for name, outcome in whole.items()}
+
+
+def _outcome(
+    solve: Callable[[AbstractModel, System, bool], Estimate], model: AbstractModel, system: System, throw: bool
+) -> Estimate | IdentificationError:
+    try:
+        return solve(model, system, throw)
+    except IdentificationError as error:
+        return error
+
+
+def _corrected(whole: Estimate | IdentificationError, part: Estimate | IdentificationError) -> Estimate | IdentificationError:
+    """Return the estimate of a long log, its sigma corrected as that of a part of it is."""
+    if isinstance(whole, IdentificationError) or isinstance(part, IdentificationError):
+        return whole
+    return replace(whole, correction=part.corrected_sigma / part.sigma)
 
 
 def _systems(chain: Chain, log: MotionLog | Sequence[MotionLog], basis: Basis, models: Sequence[AbstractModel]) -> list[System]:
     """Return the rows of each model, which know the noise of the torques."""
-    *systems, explicit = chain.build_each(log, basis, [*models, ExplicitModel()])
+    with blamed():
+        *systems, explicit = chain.build_each(log, basis, [*models, ExplicitModel()])
     levels = torque_noise(explicit)
     return [replace(rows, levels=levels) for rows in systems]
 

@@ -33,9 +33,26 @@ class PluginTable(Mapping[str, Callable[[], T]], Generic[T]):
         self._builtin = builtin
 
     @cached_property
-    def _foreign(self) -> dict[str, EntryPoint]:
-        found = {e.name: e for e in entry_points(group=f"idbench.{self.point}")}
-        return {name: e for name, e in found.items() if name not in self._builtin}
+    def _found(self) -> dict[str, list[EntryPoint]]:
+        """Entry points by their names; one that stands twice, word for word, counts once: the search path may repeat."""
+        found: dict[str, dict[str, EntryPoint]] = {}
+        for entry in entry_points(group=f"idbench.{self.point}"):
+            found.setdefault(entry.name, {})[entry.value] = entry
+        return {name: list(entries.values()) for name, entries in found.items()}
+
+    @property
+    def _foreign(self) -> dict[str, list[EntryPoint]]:
+        return {name: entries for name, entries in self._found.items() if name not in self._builtin}
+
+    @property
+    def conflicts(self) -> list[str]:
+        """What of other packages cannot be used, since its name is taken."""
+        own = [(name, entries) for name, entries in self._found.items() if name in self._builtin]
+        shared = [(name, entries) for name, entries in self._foreign.items() if len(entries) > 1]
+        return [
+            *(f"{name} is built in, {_places(entries)} of the same name is not used: rename it" for name, entries in own),
+            *(f"{name} is provided by {_places(entries)}: rename or remove all but one" for name, entries in shared),
+        ]
 
     @property
     def builtin(self) -> tuple[str, ...]:
@@ -53,7 +70,7 @@ class PluginTable(Mapping[str, Callable[[], T]], Generic[T]):
         if name in self._builtin:
             return self._builtin[name]
         if name in self._foreign:
-            return self._load(self._foreign[name])
+            return self._load(name, self._foreign[name])
         near = get_close_matches(str(name), list(self), 1)
         hint = f" (did you mean {near[0]!r}?)" if near else ""
         raise UnknownNameError(f"no {name!r} among the {self.point}{hint}; known: {', '.join(self)}")
@@ -85,10 +102,17 @@ class PluginTable(Mapping[str, Callable[[], T]], Generic[T]):
             return f"({error})"
         return ((self[name].__doc__ or "").strip() or "(undocumented)").splitlines()[0]
 
-    @staticmethod
-    def _load(entry: EntryPoint) -> Callable[[], T]:
+    def _load(self, name: str, entries: list[EntryPoint]) -> Callable[[], T]:
+        if len(entries) > 1:
+            raise PluginError(f"{self.point} plug-in {name!r} is provided by {_places(entries)}: rename or remove all but one")
+        (entry,) = entries
         try:
             factory: Callable[[], T] = entry.load()
         except Exception as error:
             raise PluginError(f"plug-in {entry.name!r} ({entry.value}) cannot be loaded: {error}") from error
         return factory
+
+
+def _places(entries: list[EntryPoint]) -> str:
+    """Return where plug-ins come from: package and object."""
+    return " and ".join(f"{entry.dist.name if entry.dist else '?'} ({entry.value})" for entry in entries)

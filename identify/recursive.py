@@ -1,7 +1,7 @@
 """Recursive (IIR) filters run forward and backward, which leaves no phase shift."""
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from identify.arrays import Array
 from identify.errors import LogError
@@ -21,4 +21,4 @@ def forward_backward(sections: Array, x: Array) -> Array:
     pad = 3 * (2 * len(sections) + 1)
     if x.shape[-1] <= pad:
         raise LogError(f"the log has {x.shape[-1]} samples, the filter needs more than {pad}: use a longer log")
-    return signal.sosfiltfilt(sections, x, axis=-1, padlen=pad)
+    return scipy.signal.sosfiltfilt(sections, x, axis=-1, padlen=pad)

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy import interpolate
+import scipy
 
 from identify.arrays import Array, require_positive
 from identify.errors import LogError
@@ -45,10 +45,12 @@ def resample(t: Array, q: Array, tau: Array, torque: TorqueChannel, fs: float) -
     if not 1 <= count <= MOST_SAMPLES:
         raise LogError(f"fs = {fs:g} Hz makes {count:.3g} samples of {t[-1] - t[0]:.3g} s; 1 to {MOST_SAMPLES:.0e} are allowed")
     at = t[0] + np.arange(count + 1) / fs
-    positions: Array = np.asarray(interpolate.CubicSpline(t, q)(at[:-1]), dtype=np.float64)
+    positions: Array = np.asarray(scipy.interpolate.CubicSpline(t, q)(at[:-1]), dtype=np.float64)
     if torque.meaning == "held":
         impulse = np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(tau[:-1] * np.diff(t)[:, None], axis=0)])
-        grown: Array = np.asarray(interpolate.interp1d(t, impulse, axis=0, fill_value="extrapolate")(at), dtype=np.float64)
+        grown: Array = np.asarray(
+            scipy.interpolate.interp1d(t, impulse, axis=0, fill_value="extrapolate")(at), dtype=np.float64
+        )
         return MotionLog(fs, positions, np.diff(grown, axis=0) * fs, replace(torque, meaning="averaged"))
-    between = interpolate.interp1d(t, tau, axis=0)(at[:-1])
+    between = scipy.interpolate.interp1d(t, tau, axis=0)(at[:-1])
     return MotionLog(fs, positions, np.asarray(between, dtype=np.float64), torque)

@@ -7,7 +7,7 @@ from functools import lru_cache
 from math import floor
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from identify.arrays import Array
 
@@ -21,11 +21,11 @@ CELL = np.array([1.0, 22.0, 1.0]) / 24
 def slide(x: Array, weights: Array, spacing: int = 1) -> Array:
     """Return sum_i weights[i] x[k + (i - m) spacing] for every k, with `weights` of odd length 2 m + 1."""
     if spacing == 1:
-        return ndimage.correlate1d(x, weights, axis=-1, mode="nearest")
+        return scipy.ndimage.correlate1d(x, weights, axis=-1, mode="nearest")
     result = np.empty_like(x)
     for start in range(spacing):
         comb = slice(start, None, spacing)
-        result[..., comb] = ndimage.correlate1d(x[..., comb], weights, axis=-1, mode="nearest")
+        result[..., comb] = scipy.ndimage.correlate1d(x[..., comb], weights, axis=-1, mode="nearest")
     return result
 
 

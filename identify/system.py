@@ -119,6 +119,17 @@ class System:
         share = np.abs(null).max(axis=0, initial=0.0)
         return tuple(name for name, s in zip(self.parameters, share, strict=True) if s > 1e-3)
 
+    def hidden(self, run: tuple[int, ...] = ()) -> tuple[str, ...]:
+        """Return parameters of `run` without which W has full rank: of each combination that is not shown the last in order."""
+        W, left = self._scaled[run], list(range(len(self.parameters)))
+        while left:
+            _, values, directions = np.linalg.svd(W[:, left])
+            if values[-1] > UNSEEN * values[0]:
+                break
+            share = np.abs(directions[-1])
+            left.pop(int(np.flatnonzero(share > 0.1 * share.max())[-1]))
+        return tuple(name for k, name in enumerate(self.parameters) if k not in left)
+
     def check(self) -> None:
         """Raise unless every run can be solved.
 
@@ -134,8 +145,9 @@ class System:
             return
         run = tuple(int(i) for i in failed[0])
         where = f" (run {run}, and {len(failed) - 1} more)" if run else ""
-        kind = IdentificationError if self.status[run] == Status.TOO_FEW_ROWS else ExcitationError
-        raise kind(self.explain(run) + where)
+        if self.status[run] == Status.TOO_FEW_ROWS:
+            raise IdentificationError(self.explain(run) + where)
+        raise ExcitationError(self.explain(run) + where, self.hidden(run))
 
     def explain(self, run: tuple[int, ...] = ()) -> str:
         """Return why a run whose status is not OK cannot be solved, and what to do."""

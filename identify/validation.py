@@ -6,7 +6,7 @@ from typing import final
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
+import scipy
 
 from identify.arrays import Array
 from identify.basis import Basis
@@ -17,6 +17,7 @@ from identify.masks.complement import Complement
 from identify.models import ExplicitModel
 from identify.motion_log import MotionLog
 from identify.operators import AbstractOperator
+from identify.row_noise import row_noise
 from identify.system import System
 
 LAGS = 10
@@ -27,6 +28,9 @@ FAINT = 0.5
 
 WHITE = 0.95
 """Share of white residuals that are called white."""
+
+MARGIN = 1.3
+"""Errors up to this multiple of what noise and sigma make are explained by them: levels of noise are known to some 20 %."""
 
 HELD_OUT = 0.25
 """Share of a log, at its end, that is held out where there is no second log."""
@@ -55,6 +59,10 @@ class Validation:
         takes part of many rows.
     rows : int array
         How many rows move.
+    noise : Array
+        Rms of the noise of these rows, as what lies above their band tells it [N m] (`row_noise`); NaN if it does not.
+    open : Array
+        Rms of what sigma of the parameters makes of the torque there [N m]; 0 if their covariance is not given.
     """
 
     rms: Array
@@ -64,11 +72,27 @@ class Validation:
     correlation: Array
     bound: Array
     rows: npt.NDArray[np.intp]
+    noise: Array
+    open: Array
+
+    @property
+    def expected(self) -> Array:
+        """Rms error of the right model [N m], with these parameters' sigma, on a log as noisy as this."""
+        return np.sqrt(np.nan_to_num(self.noise) ** 2 + self.open**2)
+
+    @property
+    def excess(self) -> Array:
+        """Error that neither noise nor sigma explains, shape (joint,) [N m]: what the model is wrong by."""
+        return np.sqrt(np.maximum(self.rms**2 - (MARGIN * self.expected) ** 2, 0.0))
+
+    def percent_of_level(self, torque: Array) -> Array:
+        """Return 100 torque / level; NaN where there is no torque."""
+        return 100 * np.divide(torque, self.level, out=np.full(self.rms.shape, np.nan), where=self.level > 0)
 
     @property
     def percent(self) -> Array:
         """100 rms / level."""
-        return 100 * np.divide(self.rms, self.level, out=np.full(self.rms.shape, np.nan), where=self.level > 0)
+        return self.percent_of_level(self.rms)
 
     @property
     def white(self) -> npt.NDArray[np.bool_]:
@@ -76,8 +100,8 @@ class Validation:
         return np.abs(self.correlation) <= self.bound
 
 
-def validate(log: MotionLog, basis: Basis, X: Array, chain: Chain) -> Validation:
-    """Return how well the parameters `X` foretell the torques of one log, by the explicit model.
+def validate(log: MotionLog, basis: Basis, X: Array, chain: Chain, covariance: Array | None = None) -> Validation:
+    """Return how well the parameters `X`, with their `covariance`, predict the torques of one log, by the explicit model.
 
     Both sides go through the same chain. What its mask leaves out is judged apart; of a long log the beginning is judged.
 
@@ -100,7 +124,9 @@ def validate(log: MotionLog, basis: Basis, X: Array, chain: Chain) -> Validation
             "all joints do"
         )
     bound = _bound(chain.operator, log.fs) / np.sqrt(rows)
-    return Validation(*map(np.array, (rms, level, R2, still, correlation, bound, rows)))
+    noise = row_noise(log, basis, X, chain) * [_unmasked(moving, j) for j in range(basis.n)]
+    left_open = [_sigma_rms(moving, covariance, j) for j in range(basis.n)]
+    return Validation(*map(np.array, (rms, level, R2, still, correlation, bound, rows, noise, left_open)))
 
 
 def split(log: MotionLog, share: float = HELD_OUT) -> tuple[MotionLog, MotionLog]:
@@ -116,7 +142,7 @@ def _bound(operator: AbstractOperator, fs: float) -> float:
     """
     h, step = operator.response(fs), operator.step(fs)
     own = np.array([h[lag:] @ h[: len(h) - lag] for lag in range(0, len(h), step)]) / (h @ h)
-    largest = stats.norm.ppf((1 + WHITE ** (1 / (LAGS - 1))) / 2)
+    largest = scipy.stats.norm.ppf((1 + WHITE ** (1 / (LAGS - 1))) / 2)
     return float(largest * np.sqrt(1 + 2 * np.sum(own[1:] ** 2)))
 
 
@@ -132,6 +158,19 @@ def _judge(system: System, X: Array, joint: int) -> tuple[float, float, float, f
         return np.nan, np.nan, np.nan, np.nan, 0
     spread = float(np.sum((y - y.mean()) ** 2))
     return _rms(rho), _rms(y), 1 - float(rho @ rho) / max(spread, 1e-300), _correlation(system, X, joint), len(rho)
+
+
+def _unmasked(system: System, joint: int) -> float:
+    """Return the rms of a joint's rows of white noise over that of rows of which the mask takes nothing."""
+    variance = np.concatenate([carrier.variance() for carrier in system.carriers], axis=-1)[system.group == joint]
+    valid = system.valid[system.group == joint]
+    return float(np.sqrt(variance[valid].mean() / variance.max()))
+
+
+def _sigma_rms(system: System, covariance: Array | None, joint: int) -> float:
+    """Return the rms over a joint's rows of the sigma of W X."""
+    W = system.W[(system.group == joint) & system.valid]
+    return 0.0 if covariance is None else float(np.sqrt(np.mean(np.einsum("rp,pq,rq->r", W, covariance, W, optimize=True))))
 
 
 def _rms(x: Array) -> float:

@@ -1,8 +1,12 @@
 """Settings that check themselves: every field of a scenario has a type, a range, a unit and a description."""
 
+import ast
+import inspect
 from collections.abc import Callable
 from difflib import get_close_matches
-from functools import wraps
+from functools import cache, wraps
+from itertools import pairwise
+from textwrap import dedent
 from typing import Annotated, Any, TypeVar, dataclass_transform
 
 import numpy as np
@@ -16,7 +20,7 @@ C = TypeVar("C", bound=type)
 
 _SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 
-_CHECKED = ConfigDict(extra="forbid", use_attribute_docstrings=True, arbitrary_types_allowed=True)
+_CHECKED = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
 
 Number = Annotated[float, Strict(), AllowInfNan(False)]
 Positive = Annotated[Number, Field(gt=0)]
@@ -128,8 +132,21 @@ def fields_of(cls: type) -> dict[str, Any]:
 
 def description(cls: type, key: str) -> str:
     """Return what a field is, with its unit and range, in one line."""
-    field = fields_of(cls).get(key)
-    return " ".join(str(field.description).split()).rstrip(".") if field is not None and field.description else ""
+    told = (_docstrings(owner)[key] for owner in cls.__mro__ if key in _docstrings(owner))
+    return " ".join(next(told, "").split()).rstrip(".")
+
+
+@cache
+def _docstrings(cls: type) -> dict[str, str]:
+    """Return the docstrings below the fields of a class; read when they are asked for, since that takes its source."""
+    if not hasattr(cls, "__pydantic_fields__"):
+        return {}
+    (body,) = (node.body for node in ast.parse(dedent(inspect.getsource(cls))).body if isinstance(node, ast.ClassDef))
+    return {
+        str(ast.unparse(field.target)): ast.literal_eval(below.value)
+        for field, below in pairwise(body)
+        if isinstance(field, ast.AnnAssign) and isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)
+    }
 
 
 def for_all_joints(cls: type, key: str) -> bool:

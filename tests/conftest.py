@@ -1,7 +1,23 @@
 """What many tests start from."""
 
+import importlib.util
 import os
+import shutil
+import signal
+import site
+import subprocess
+import sys
+import sysconfig
 from pathlib import Path
+
+NEEDED = ("pinocchio", "distributed", "dask_jobqueue", "clarabel")
+"""Modules of the dependency group `test`, which `uv run idbench` does not install: 200 MB, robots of other people above all."""
+
+if any(importlib.util.find_spec(name) is None for name in NEEDED):
+    if not (uv := os.environ.get("UV") or shutil.which("uv")):
+        sys.exit("the tests need the dependency group test: uv sync --group test, or pip install --group test")
+    subprocess.run([uv, "sync", "--inexact", "--group", "test"], cwd=Path(__file__).parent.parent, check=True)
+    site.addsitedir(sysconfig.get_path("purelib"))  # what has come adds itself to the search path as at the start of Python
 
 os.environ.setdefault("RUST_LOG", "off")  # as on the command line: read when rerun is loaded, which tests do first
 
@@ -45,3 +61,24 @@ def log(table1: Table1) -> MotionLog:
 @pytest.fixture(scope="session")
 def root() -> Path:
     return Path(__file__).parent.parent
+
+
+@pytest.fixture
+def start():
+    """Give what starts a Python process with the signals of a shell's foreground; it ends with the test, whatever happens."""
+    processes = []
+
+    def popen(*words, **options):
+        options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True} | options
+        processes.append(subprocess.Popen([sys.executable, *words], preexec_fn=_foreground, **options))
+        return processes[-1]
+
+    yield popen
+    for process in processes:
+        process.kill()
+        process.communicate()
+
+
+def _foreground():
+    """Let Ctrl-C interrupt: a background job, and what it starts, ignores it."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from experiments.study.statistics import Cell
 from identify import Array
@@ -55,13 +55,13 @@ def _difference(a: Cell, b: Cell) -> Difference:
     both = sorted(one.keys() & other.keys())
     gap = np.array([one[run] - other[run] for run in both])
     better, worse = (a, b) if _signed_ranks(gap[gap != 0]) <= 0 else (b, a)
-    p = float(stats.wilcoxon(gap).pvalue) if np.any(gap) else 1.0
+    p = float(scipy.stats.wilcoxon(gap).pvalue) if np.any(gap) else 1.0
     return Difference(better, worse, float(np.exp(abs(_shift(gap)))) if both else 1.0, p, len(both))
 
 
 def _signed_ranks(gap: Array) -> float:
     """Return the sum of the ranks of positive gaps less that of negative ones (Wilcoxon)."""
-    return float(np.sign(gap) @ stats.rankdata(np.abs(gap)))
+    return float(np.sign(gap) @ scipy.stats.rankdata(np.abs(gap)))
 
 
 def _shift(gap: Array) -> float:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.text import Text
 
-from experiments.results import results_folder, tell_of, write_recording, write_summary
+from experiments.results import beside, tell_of, write_recording, write_summary
 from experiments.study.answer import answer, method, percent, short, value
 from experiments.study.report import report
 from experiments.study.shard_file import arrays
@@ -24,7 +24,7 @@ def write_results(page: Console, store: Store, recording: "StudyRecording | None
     """Write summary.json, report.html and the recording into the folder of a study, and print its answer."""
     study, seconds = store.study, store.seconds()
     found = cells(arrays(store.table()), study.varied, study.parameters)
-    with results_folder(store.folder) as folder:
+    with beside(store.folder) as folder:
         (folder / "report.html").write_text(report(study, found, seconds, store.folder), encoding="utf-8")
         write_summary(folder / "summary.json", _summary(store, found, seconds))
         lost = write_recording(folder, recording.finish(found)) if recording else ""

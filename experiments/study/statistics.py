@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from identify import Array
 
@@ -17,7 +17,7 @@ CONFIDENCE = 0.95
 SIGMAS = 2.0
 """Coverage is the share of truths inside this many sigma of the estimate."""
 
-RIGHT = float(2 * stats.norm.cdf(SIGMAS) - 1)
+RIGHT = float(2 * scipy.stats.norm.cdf(SIGMAS) - 1)
 """Coverage if sigma is right and errors are normal."""
 
 LEAST = 1e-16
@@ -80,7 +80,7 @@ class Cell:
     @property
     def bias_margin(self) -> Array:
         """Half the width of the confidence interval of the bias (Student's t), shape (p,)."""
-        t = stats.t.ppf((1 + CONFIDENCE) / 2, max(self.runs - 1, 1))
+        t = scipy.stats.t.ppf((1 + CONFIDENCE) / 2, max(self.runs - 1, 1))
         return t * self.deviation / np.sqrt(self.runs)
 
     @property
@@ -111,7 +111,7 @@ class Cell:
     def coverage_interval(self, sigma: Array) -> Array:
         """Return the confidence interval of the coverage (Wilson), shape (p, 2)."""
         pairs = zip(*(counts.tolist() for counts in self._inside(sigma)), strict=True)
-        found = [stats.binomtest(k, n).proportion_ci(CONFIDENCE, "wilson") if n else None for k, n in pairs]
+        found = [scipy.stats.binomtest(k, n).proportion_ci(CONFIDENCE, "wilson") if n else None for k, n in pairs]
         return np.array([(i.low, i.high) if i else (np.nan, np.nan) for i in found])
 
     def _inside(self, sigma: Array) -> tuple[np.typing.NDArray[np.int64], np.typing.NDArray[np.int64]]:

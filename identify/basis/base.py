@@ -3,7 +3,11 @@
 from abc import ABC, abstractmethod
 from typing import ClassVar, Protocol, final, runtime_checkable
 
+import numpy as np
+
 from identify.arrays import Array, Columns
+from identify.blame import expect
+from identify.errors import SettingError
 from identify.state import State
 
 
@@ -105,7 +109,7 @@ class AbstractFriction(AbstractBlock):
     @final
     def remainder(self, state: State) -> Columns:
         """Return the force columns: joint j's parameter in row j."""
-        force = self.force(state.q, state.qd)
+        force = self._checked(state)
         return {(j, name): force[..., j, :] for j, name in enumerate(self.names(state.n))}
 
     @final
@@ -117,5 +121,17 @@ class AbstractFriction(AbstractBlock):
     @final
     def dissipation(self, state: State) -> Columns:
         """Return qd_j times the force of joint j, in row 0."""
-        power = state.qd * self.force(state.q, state.qd)
+        power = state.qd * self._checked(state)
         return {(0, name): power[..., j, :] for j, name in enumerate(self.names(state.n))}
+
+    def _checked(self, state: State) -> Array:
+        """Return the force; raise SettingError if it is not finite, PluginError if it is no array like the velocities."""
+        force = expect(self, "force", self.force(state.q, state.qd), state.qd.shape)
+        if not np.isfinite(force).all():
+            k = np.argwhere(~np.isfinite(force))[0]
+            q, qd = state.q[tuple(k)], state.qd[tuple(k)]
+            raise SettingError(
+                f"friction law {type(self).__name__} gives {force[tuple(k)]} at q = {q:.4g}, qd = {qd:.4g}: let it be finite "
+                "for all of them, also at rest"
+            )
+        return force

@@ -1,14 +1,17 @@
 """A robot as identification sees it: a sum of column blocks."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self, final
 
-from identify.arrays import Columns
+import numpy as np
+
+from identify.arrays import Array, Columns
 from identify.basis.armature import Armature
 from identify.basis.base import AbstractBlock, AbstractFriction, Narrowing
-from identify.errors import SettingError
+from identify.blame import expect
+from identify.errors import PluginError, SettingError
 from identify.state import State
 
 LINEAR = {"N m": "N", "N m s/rad": "N s/m", "kg m^2": "kg"}
@@ -117,25 +120,36 @@ class Basis:
 
     def explicit(self, state: State) -> Columns:
         """Return the columns of the joint torques (Eq. 5, 6)."""
-        return self._sum(lambda block: block.explicit(state))
+        return self._sum(state, "explicit")
 
     def momentum(self, state: State) -> Columns:
         """Return the columns of the momenta (Eq. 9)."""
-        return self._sum(lambda block: block.momentum(state))
+        return self._sum(state, "momentum")
 
     def remainder(self, state: State) -> Columns:
         """Return the columns of the torques that are no derivative of a momentum (Eq. 8, 9)."""
-        return self._sum(lambda block: block.remainder(state))
+        return self._sum(state, "remainder")
 
     def energy(self, state: State) -> Columns:
         """Return the columns of the energy, in row 0 (Eq. 10)."""
-        return self._sum(lambda block: block.energy(state))
+        return self._sum(state, "energy")
 
     def dissipation(self, state: State) -> Columns:
         """Return the columns of the dissipated power, in row 0 (Eq. 10)."""
-        return self._sum(lambda block: block.dissipation(state))
+        return self._sum(state, "dissipation")
 
-    def _sum(self, columns: Callable[[AbstractBlock], Columns]) -> Columns:
-        names = self._names
-        found = (item for block in self.blocks for item in columns(block).items())
-        return {(row, names[name]): signal for (row, name), signal in found if name in names}
+    def _sum(self, state: State, function: str) -> Columns:
+        """Return what a column function of every block gives, together."""
+        names, shape, total = self._names, (*state.q.shape[:-2], state.q.shape[-1]), dict[tuple[int, str], Array]()
+        for block in self.blocks:
+            found = getattr(block, function)(state)
+            if not isinstance(found, Mapping):
+                raise PluginError(
+                    f"plug-in {type(block).__name__}.{function} returned {found!r:.60}, expected a mapping of columns"
+                )
+            for (row, name), signal in found.items():
+                if name in names:
+                    if np.shape(signal) != shape:
+                        expect(block, f"{function} for {name}", signal, shape)
+                    total[row, names[name]] = signal
+        return total

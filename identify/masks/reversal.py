@@ -5,7 +5,7 @@ from math import ceil
 from typing import final
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from identify.arrays import Array, require_not_negative, require_positive
 from identify.masks.base import AbstractMask
@@ -50,7 +50,7 @@ class ReversalMask(AbstractMask):
         half = self._half(fs)
         wide = _eroded(slides.astype(np.float64), self._reach(fs) + half)
         rise = np.hanning(2 * half + 3)[1:-1]
-        smooth = ndimage.convolve1d(wide, rise / rise.sum(), axis=-1, mode="nearest")
+        smooth = scipy.ndimage.convolve1d(wide, rise / rise.sum(), axis=-1, mode="nearest")
         # Sums of the weights leave some 1e-17 where all are zero, or not quite 1 where all are one.
         return np.where(smooth < 1e-12, 0.0, np.minimum(smooth, 1.0))
 
@@ -62,4 +62,4 @@ class ReversalMask(AbstractMask):
 
 
 def _eroded(weight: Array, reach: int) -> Array:
-    return ndimage.minimum_filter1d(weight, 2 * reach + 1, axis=-1, mode="nearest")
+    return scipy.ndimage.minimum_filter1d(weight, 2 * reach + 1, axis=-1, mode="nearest")

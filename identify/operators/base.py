@@ -8,6 +8,7 @@ import numpy as np
 from identify.arrays import Array
 from identify.balance import Balance
 from identify.carrier import Carrier
+from identify.errors import SettingError
 from identify.grid import Grid
 from identify.kernel import Kernel
 from identify.system import System
@@ -78,6 +79,7 @@ class AbstractOperator(ABC):
         """Return Y = W X + rho at the rows of `grid`, ordered by time, then row (Eq. 14)."""
         fs, (*runs, n, _) = balance.fs, balance.y.shape
         rows = self.apply(balance, grid)
+        _require_finite(rows, balance)
         valid, response = rows.valid, self.response(fs)
         kernel = Kernel(response, (len(response) - 1) // 2, grid)
         row = [address[0] for address in balance.addresses]
@@ -94,3 +96,13 @@ class AbstractOperator(ABC):
             parameters=balance.parameters,
             carriers=(Carrier(balance.B, rows.inside, rows.outside * valid, kernel, balance.transposed, balance.reach),),
         )
+
+
+def _require_finite(rows: Rows, balance: Balance) -> None:
+    """Raise SettingError that names the columns which are not finite."""
+    if np.isfinite(rows.columns).all():
+        return
+    finite = np.isfinite(rows.columns).reshape(-1, *rows.columns.shape[-2:])
+    lost = [name for i, (_, name) in enumerate(balance.addresses) if not finite[:, i].all()]
+    names = ", ".join(dict.fromkeys(lost))
+    raise SettingError(f"the columns of {names} are not finite on this motion: correct the block that makes them")

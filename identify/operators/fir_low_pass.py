@@ -5,7 +5,7 @@ from functools import lru_cache
 from math import ceil
 from typing import final
 
-from scipy import signal
+import scipy
 
 from identify.arrays import Array, frozen, require_below_nyquist, require_positive
 from identify.grid import Grid
@@ -58,4 +58,4 @@ class FirLowPass(AbstractLowPass):
 
 @lru_cache(maxsize=16)
 def _taps(half: int, cutoff: float, fs: float) -> Array:
-    return frozen(signal.firwin(2 * half + 1, cutoff, window="hamming", fs=fs))
+    return frozen(scipy.signal.firwin(2 * half + 1, cutoff, window="hamming", fs=fs))

@@ -5,7 +5,7 @@ from math import ceil
 from typing import final
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from identify.arrays import Array, require_below_nyquist, require_positive, require_whole
 from identify.grid import Grid
@@ -59,4 +59,4 @@ class IirLowPass(AbstractLowPass):
 
     def _sections(self, fs: float) -> Array:
         require_below_nyquist("operator cutoff", self.cutoff, fs)
-        return signal.cheby1(self.order, self.ripple, self.cutoff, fs=fs, output="sos")
+        return scipy.signal.cheby1(self.order, self.ripple, self.cutoff, fs=fs, output="sos")

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import final
 
-from scipy import signal
+import scipy
 
 from identify.arrays import Array, require_below_nyquist, require_positive, require_whole
 from identify.prefilters.base import AbstractPrefilter
@@ -41,4 +41,4 @@ class ButterworthPrefilter(AbstractPrefilter):
 
     def _sections(self, fs: float) -> Array:
         require_below_nyquist("prefilter cutoff", self.cutoff, fs)
-        return signal.butter(self.order, self.cutoff, fs=fs, output="sos")
+        return scipy.signal.butter(self.order, self.cutoff, fs=fs, output="sos")

@@ -1,4 +1,4 @@
-"""The entry point of the command line: everything slow to load is loaded here, guarded."""
+"""The command line. Its modules are light: what a command works with is loaded when it is called."""
 
 import os
 import signal
@@ -12,8 +12,9 @@ from experiments.interruption import importing
 def main(args: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit code: 0, 2 for wrong input, 130 when interrupted."""
     with importing():
-        from experiments.commands import run
-    return run(args)
+        from experiments.cli.app import run
+        from experiments.cli.commands import APP
+    return run(APP, args)
 
 
 def entry() -> NoReturn:

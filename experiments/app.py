@@ -1,5 +1,0 @@
-"""The application that commands register with."""
-
-import tyro
-
-app = tyro.extras.SubcommandApp()

@@ -1,0 +1,62 @@
+"""Running a command: its words, its errors, its end."""
+
+import os
+import sys
+from collections.abc import Sequence
+
+from tyro.extras import SubcommandApp
+
+from experiments.errors import ExperimentError
+from experiments.interruption import INTERRUPTED, importing, terminating
+
+DESCRIPTION = "A MuJoCo testbench for the dynamic identification of robots."
+
+os.environ.setdefault(
+    "MUJOCO_GL", "disable"
+)  # nothing is drawn by MuJoCo, and what would draw takes a tenth of a second to load
+
+
+def run(app: SubcommandApp, args: Sequence[str] | None = None) -> int:
+    """Run a command; return its exit code: 0, 2 for wrong input, 130 when interrupted."""
+    words = sys.argv[1:] if args is None else list(args)
+    try:
+        with terminating():
+            if words == ["--version"]:
+                _print_version()
+            else:
+                with importing():
+                    command = app.cli(prog="idbench", description=DESCRIPTION, args=words)
+                command()
+    except KeyboardInterrupt:
+        return _complain("interrupted", INTERRUPTED)
+    except BrokenPipeError:  # the reader of our output has gone, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except Exception as error:
+        if not _on_purpose(error):
+            raise
+        return _complain(str(error), 2)
+    return 0
+
+
+def _on_purpose(error: Exception) -> bool:
+    """Return whether an error is one of ours; packages that are not loaded have raised none."""
+    roots = [(ExperimentError,)]
+    for module, name in (("identify.errors", "IdentificationError"), ("sim.errors", "BenchError")):
+        if module in sys.modules:
+            roots.append((getattr(sys.modules[module], name),))
+    return any(isinstance(error, root) for root in roots)
+
+
+def _print_version() -> None:
+    from importlib.metadata import version
+
+    from experiments.page import new_page, show
+
+    page = new_page()
+    page.print(f"idbench {version('idbench')}")
+    show(page)
+
+
+def _complain(what: str, code: int) -> int:
+    sys.stderr.write(f"idbench: {what}\n")
+    return code

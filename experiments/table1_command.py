@@ -1,0 +1,56 @@
+"""The commands about Table 1: the comparison, and the search for its trajectory."""
+
+from rich.console import Console
+
+from experiments.cli.commands import Search as Searched
+from experiments.cli.commands import Table1 as Compared
+from experiments.errors import ExperimentError
+from experiments.page import new_page, show, shown
+from experiments.report import print_table1
+from experiments.results import Place, results_folder, tell_of, write_recording, write_summary, write_whole
+from experiments.search import Search
+from experiments.table1 import CHAINS_COMPARED, SCENARIO, Table1
+from identify.log_file import write_log
+from sim.robot import Robot
+from sim.scenario import Scenario
+from sim.scenario_file import load, to_toml
+
+
+def compare(asked: Compared) -> None:
+    """Reproduce the comparison."""
+    if asked.seed is not None and asked.scenario is not None:
+        raise ExperimentError(f"--seed {asked.seed} and --scenario {asked.scenario} name two trajectories: give one")
+    chains = CHAINS_COMPARED if asked.chain == "all" else (asked.chain,)
+    place = Place(asked.out, "table1", force=asked.force)
+    place.check()
+    page, lost = new_page(), ""
+    with asked.watching.audience() as audience, shown(page):
+        with results_folder(place) as folder:
+            table = Table1(load(asked.scenario or SCENARIO) if asked.seed is None else _searched(asked.seed), chains)
+            print_table1(page, table)
+            write_log(table.log, folder / "log.parquet")
+            write_summary(folder / "summary.json", table.summary())
+            if asked.watching.rerun:
+                from experiments.recording.table1 import record_table1
+
+                lost = write_recording(folder, record_table1(table, audience))
+        tell_of(lost, asked.out)
+        page.print(f"written to {asked.out}{asked.watching.hint(asked.out)}", soft_wrap=True)
+
+
+def search(asked: Searched) -> None:
+    """Search a trajectory."""
+    scenario, page = _searched(asked.seed), new_page()
+    text = to_toml(scenario)
+    if asked.out is not None:
+        write_whole(asked.out, text)
+    page.out(f"{asked.out}: {scenario.origin}" if asked.out is not None else text.rstrip("\n"))
+    show(page)
+
+
+def _searched(seed: int) -> Scenario:
+    with Console(stderr=True).status("searching a trajectory ...") as status:
+        return Search(seed=seed).run(
+            Robot.load("scara"),
+            lambda number, distance: status.update(f"searching: round {number}, {distance:.1%} from the paper's Cond(W)"),
+        )

@@ -1,0 +1,160 @@
+"""Is an identification any good? A word, the reasons for it, and what is most likely to mend it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, final
+
+import numpy as np
+
+from experiments.doubts import wrong_sign
+from experiments.errors import ExperimentError
+from experiments.identified import Identified
+from experiments.subject import Subject
+from experiments.validation import Validated
+from identify import ExplicitModel, IdentificationError, Validation, identify, validate
+from identify.delay import estimate_delay
+
+GOOD, FAIR = 2.0, 10.0
+"""Torque errors [% of the torque] beyond noise and sigma up to which a model is called good, or fair.
+
+docs/any-arm.md has the table of right and wrong models from which these come."""
+
+SURE = 4.0
+"""A delay that differs from the stated one by so many sigma is told."""
+
+WORTH = 0.7
+"""Options that bring the error below this share of what it was are told."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What to think of one model of a validated identification.
+
+    Parameters
+    ----------
+    validated : Validated
+        The identification and its validation.
+    model : str
+        Name of the model.
+    """
+
+    validated: Validated
+    model: str
+
+    @property
+    def told(self) -> Validation:
+        """Its errors."""
+        return self.validated.torques[self.model]
+
+    @cached_property
+    def word(self) -> str:
+        """good, fair or poor; unsure where noise or sigma would hide a poor model."""
+        if wrong_sign(self.validated.judged):
+            return "poor"
+        beyond, hidden = (np.nan_to_num(self.told.percent_of_level(x)).max() for x in (self.told.excess, self.told.expected))
+        if beyond > FAIR:
+            return "poor"
+        if hidden > FAIR:
+            return "unsure"
+        return "good" if beyond <= GOOD else "fair"
+
+    @property
+    def reasons(self) -> list[str]:
+        """Why, the worst joint first."""
+        wrong = [reason.partition(":")[0] for reason in wrong_sign(self.validated.judged)]
+        return [*wrong, *self._errors(), *self._left()]
+
+    def _errors(self) -> Iterator[str]:
+        told, joints = self.told, self.validated.found.subject.robot.joints
+        share = told.excess if self.word in ("fair", "poor") else told.rms
+        j = int(np.nan_to_num(told.percent_of_level(share)).argmax())
+        others = ", the others by less" if len(joints) > 1 else ""
+        yield f"the torque of {joints[j]} is off by {percent(told.percent[j])}{others}; {self._expected(j)}"
+        hidden = told.percent_of_level(told.expected)
+        worst = int(np.nan_to_num(hidden).argmax())
+        if self.word == "unsure":
+            yield f"noise and sigma make {percent(hidden[worst])} of the torque of {joints[worst]}: a wrong model could hide"
+
+    def _expected(self, j: int) -> str:
+        noise, sigma = (self.told.percent_of_level(x)[j] for x in (self.told.noise, self.told.open))
+        known = f"noise of this log makes {percent(noise)}" if np.isfinite(noise) else "the noise of this log is not known"
+        return f"{known}, sigma of the parameters {percent(sigma)}"
+
+    def _left(self) -> Iterator[str]:
+        told, joints = self.told, self.validated.found.subject.robot.joints
+        beyond = told.percent_of_level(told.excess) > GOOD
+        coloured = [joint for joint, white, far in zip(joints, told.white, beyond, strict=True) if far and not white]
+        if coloured:
+            yield f"what is left of {', '.join(coloured)} is no noise"
+        elif self.word == "good" and (told.rms <= 1.3 * np.maximum(told.expected, 0)).all():
+            yield "noise and sigma explain all of it"
+        if isinstance(self.validated.replays[self.model], str):
+            yield f"not simulated: {self.validated.replays[self.model]}"
+
+    def summary(self) -> dict[str, Any]:
+        """Return what a summary.json says of it."""
+        return {"verdict": self.word, "reasons": self.reasons}
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Remedies:
+    """What is most likely to mend an identification that is not good, tried out: the likely cause first.
+
+    Parameters
+    ----------
+    validated : Validated
+        The identification and its validation.
+    delay_given : bool
+        Whether the delay was estimated from the log already.
+    """
+
+    validated: Validated
+    delay_given: bool = False
+
+    def found(self) -> list[str]:
+        """Return what helps, by how much."""
+        return [*self._delay(), *self._options()]
+
+    def _delay(self) -> Iterator[str]:
+        found, stated = self.validated.found, self.validated.found.logs[0].torque.delay
+        if self.delay_given or wrong_sign(found):
+            return
+        try:
+            told = estimate_delay(list(found.logs), found.basis, found.processing)
+        except IdentificationError:
+            return
+        if abs(told.delay - stated) > SURE * told.sigma:
+            yield (
+                f"the log says a torque delay of {1e3 * told.delay:.3g} ms (sigma {1e3 * told.sigma:.1g}), where "
+                f"{1e3 * stated:.3g} ms is taken: --torque-delay estimate"
+            )
+
+    def _options(self) -> Iterator[str]:
+        subject = self.validated.found.subject
+        options = {}
+        if not all(joint.armature for joint in subject.tree.joints):
+            options["--armature all"] = replace(subject.asked, armature="all")
+        if "offset" not in subject.asked.add:
+            options["--add offset"] = replace(subject.asked, add=(*subject.asked.add, "offset"))
+        before = self._worst(self.validated.judged)
+        for option, asked in options.items():
+            try:
+                after = self._worst(replace(self.validated.judged, subject=Subject(subject.name, asked), truth=None))
+            except (IdentificationError, ExperimentError):
+                continue
+            if after < WORTH * before:
+                yield f"with {option} the worst joint's error falls from {percent(before)} to {percent(after)}"
+
+    def _worst(self, judged: Identified) -> float:
+        """Return the largest error [%] of the explicit model on the unseen motion."""
+        fit = judged.logs[0] if len(judged.logs) == 1 else list(judged.logs)
+        estimate = identify(fit, judged.basis, ExplicitModel(), judged.processing, judged.solver)
+        return float(np.nanmax(validate(self.validated.unseen, judged.basis, estimate.X, judged.processing).percent))
+
+
+def percent(share: float) -> str:
+    """Return a percentage to two digits, or to none from ten on; beyond a thousand it says no more."""
+    return f"{share:.2g} %" if share < 10 else f"{share:.0f} %" if share < 1000 else "more than 1000 %"

@@ -1,0 +1,55 @@
+"""Mistakes of plug-ins, told by the name of the plug-in: what it raised, or what it returned instead of what."""
+
+import sys
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.errors import PluginError
+
+OURS = ("identify", "sim", "models", "experiments")
+"""Packages whose mistakes are not those of a plug-in."""
+
+LIBRARIES = frozenset({"numpy", "scipy", "mujoco", "pyarrow", "ruckig", "pydantic", "clarabel"}) | sys.stdlib_module_names
+"""Packages that this project calls itself."""
+
+
+@contextmanager
+def blamed() -> Iterator[None]:
+    """Turn what the code of another package raises by mistake into a PluginError that names function, file and line.
+
+    Errors that this project raises on purpose pass, and so do its own mistakes.
+    """
+    try:
+        yield
+    except Exception as error:
+        frame = None if _root(type(error).__module__) in OURS else _foreign(error)
+        if frame is None:
+            raise
+        said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+        raise PluginError(f"plug-in {frame.name} raised {said} ({frame.filename}, line {frame.lineno})") from error
+
+
+def expect(plugin: object, method: str, value: object, *shapes: Sequence[int]) -> Array:
+    """Return what a method of a plug-in returned, an array of one of the shapes; raise PluginError otherwise."""
+    if isinstance(value, np.ndarray) and value.shape in shapes and value.dtype.kind in "fiub":
+        return value
+    given = f"an array of {value.dtype}, shape {value.shape}" if isinstance(value, np.ndarray) else f"{value!r:.60}"
+    wanted = " or ".join(str(tuple(shape)) for shape in dict.fromkeys(map(tuple, shapes)))
+    raise PluginError(
+        f"plug-in {type(plugin).__name__}.{method} returned {given}, expected an array of numbers, shape {wanted}"
+    )
+
+
+def _foreign(error: BaseException) -> traceback.FrameSummary | None:
+    """Return the outermost frame that is neither of this project nor of a library that it calls, None if there is none."""
+    roots = [_root(frame.f_globals.get("__name__", "")) for frame, _ in traceback.walk_tb(error.__traceback__)]
+    frames = zip(roots, traceback.extract_tb(error.__traceback__), strict=True)
+    return next((frame for root, frame in frames if root not in OURS and root not in LIBRARIES), None)
+
+
+def _root(module: str) -> str:
+    return module.split(".", maxsplit=1)[0]
