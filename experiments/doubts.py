@@ -5,11 +5,11 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from experiments.identified import Identified
-from experiments.log_doubts import resting
+from experiments.log_doubts import doubts_of_base, resting
 from experiments.subject import Subject
 from identify import Estimate, MotionLog, brisk_shares, showing_moves
 from sim.robot import Robot
-from sim.tree import unmodelled
+from sim.tree import kinematic_tree, unmodelled
 
 WELL_EXPLAINED = 0.95
 """Share of a torque's variance that a model of the right robot explains on any log that is worth identifying."""
@@ -92,7 +92,8 @@ def wrong_unit(found: Identified) -> list[str]:
 def doubts_of_robot(robot: Robot) -> list[str]:
     """Return what of a robot's file no parameter describes."""
     found = unmodelled(robot)
-    return [f"the file of robot {robot.name!r} has {', '.join(found)}, which no parameter describes"] if found else []
+    told = [f"the file of robot {robot.name!r} has {', '.join(found)}, which no parameter describes"] if found else []
+    return [*told, *doubts_of_base(kinematic_tree(robot))]
 
 
 def wrong_sign(found: Identified) -> list[str]:

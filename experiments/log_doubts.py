@@ -3,6 +3,7 @@
 import numpy as np
 
 from identify import Array, Joint, KinematicTree, MotionLog
+from identify.kinematics import GROUND
 
 SLACK = 0.05
 """Positions may be beyond a range by this share of it: ranges of files are rounded."""
@@ -37,6 +38,17 @@ def _reason(joint: Joint, ends: Array) -> str:
         order = "are joints in the order of the robot's file, and counted from its zero in its direction?"
         return f", out of its range, {low:.4g} to {high:.4g}: {order}"
     return ""
+
+
+def doubts_of_base(tree: KinematicTree) -> list[str]:
+    """Return whether a robot looks like one that does not stand fixed on the ground: legs and rotors start there."""
+    first = [joint.name for joint in tree.joints if joint.parent == GROUND]
+    if len(first) == 1:
+        return []
+    return [
+        f"{len(first)} chains of joints start at the ground ({', '.join(first[:4])}{', ...' if len(first) > 4 else ''}): the "
+        "robot is taken as fixed there; if it walks, drives or flies, its base makes torques that no parameter describes"
+    ]
 
 
 def resting(log: MotionLog, tree: KinematicTree) -> list[str]:

@@ -98,7 +98,8 @@ def beside(out: Path) -> Iterator[Path]:
     try:
         if out.exists() and not out.is_dir():
             raise ResultsError(f"{out} is a file, not a folder: choose another --out")
-        hidden = Path(tempfile.mkdtemp(prefix=".idbench-", dir=_nearest_folder(out)))
+        _clear(_nearest_folder(out))
+        hidden = Path(tempfile.mkdtemp(prefix=f".idbench-{os.getpid()}-", dir=_nearest_folder(out)))
     except OSError as error:
         raise ResultsError(f"cannot write to {out}: {error.strerror}; choose another --out") from error
     try:
@@ -171,6 +172,24 @@ def summarize(estimate: Estimate, truth: list[float] | None) -> dict[str, Any]:
 
 def _finite(x: float) -> float | None:
     return float(x) if isfinite(x) else None
+
+
+def _clear(folder: Path) -> None:
+    """Remove hidden folders that processes have left there which were killed."""
+    for left in folder.glob(".idbench-*-*"):
+        number = left.name.split("-")[1]
+        if number.isdigit() and not _is_running(int(number)):
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def _is_running(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # somebody else's
+        return True
+    return True
 
 
 def _nearest_folder(out: Path) -> Path:

@@ -41,7 +41,7 @@ def _print_joints(page: Console, subject: Subject) -> None:
         carrier = tree.joints[joint.parent].name if joint.parent >= 0 else "ground"
         ends = (f"{x:.4g}" if isfinite(x) else "" for x in joint.range)
         grid.add_row(f"{j + 1} {joint.name}", joint.kind, carrier, *ends, *(f"{x:g}" if x else "" for x in values))
-    print_titled(page, f"robot {tree.name}: {tree.n} joints", grid)
+    print_titled(page, f"robot {tree.name}: {tree.n} joints on a base that is fixed to the ground", grid)
     if not any(joint.armature for joint in tree.joints):
         page.print(Text("the file gives no joint an armature; behind gears rotors weigh more than links: --armature all"))
 

@@ -13,13 +13,16 @@ from identify.base_parameters import BaseParameters
 from identify.basis import joint_number
 from identify.errors import IdentificationError
 from identify.kinematics import INERTIAL
-from identify.pseudo_inertia import PSEUDO, pseudo_inertia
+from identify.pseudo_inertia import PSEUDO, inertial, pseudo_inertia
 
 NEAR = 1e-4
 """What a step to twice the given model costs, beside one sigma of the estimate: nothing, where the estimate knows anything."""
 
 MARGIN = 1e-6
 """Smallest eigenvalue of a link's pseudo-inertia, as a share of the given one: a body with some extent in every direction."""
+
+SOLVED = 1e-7
+"""Accuracy of the solver's matrices, as a share of their trace: no eigenvalue is asked to be, or left, below it."""
 
 FLAT = 1e-6
 """Share of the largest eigenvalue below which the least says that a body is flat."""
@@ -119,7 +122,7 @@ def consistent_parameters(grouping: BaseParameters, X: Array, covariance: Array,
             f"bodies that can exist come nowhere near these parameters (the solver ends with {found.status}): is the torque's "
             "sign, unit and delay right?"
         )
-    standard = start + T @ np.array(found.x)
+    standard = problem.projected(start + T @ np.array(found.x))
     base = grouping.base(standard)
     distance = float(np.linalg.norm(np.linalg.solve(root, base - X)))
     return Consistent(names, standard, base, (base - X) / np.sqrt(np.diagonal(covariance)), distance)
@@ -148,11 +151,24 @@ class _Problem:
         for S_given, link in zip(self._inertias, self._links, strict=True):
             weights = np.array([[S[i, j] * (1.0 if i == j else _ROOT2) for S in PSEUDO] for i, j in lower])
             block = np.zeros((len(lower), len(self._names)))
-            block[:, link] = -weights
+            size = np.trace(S_given)  # a gram of a wrist and a ton of a base are solved to the same share
+            block[:, link] = -weights / size
             rows.append(block)
-            smallest = MARGIN * np.linalg.eigvalsh(S_given)[0]
+            smallest = max(MARGIN * np.linalg.eigvalsh(S_given)[0] / size, SOLVED)
             limits.append(np.array([-smallest if i == j else 0.0 for i, j in lower]))
         return np.concatenate(rows), np.concatenate(limits), (len(self._signed), len(self._links))
+
+    def projected(self, standard: Array) -> Array:
+        """Return parameters whose cones are kept exactly: what the solver leaves outside is moved to their edge."""
+        inside = standard.copy()
+        inside[self._signed] = np.maximum(inside[self._signed], 0.0)
+        for link in self._links:
+            S = pseudo_inertia(inside[link])
+            values, axes = np.linalg.eigh(S)
+            least = SOLVED / 2 * np.trace(S)
+            if values[0] < least:
+                inside[link] = inertial((axes * np.maximum(values, least)) @ axes.T)
+        return inside
 
 
 def _thick(S: Array, number: int) -> Array:

@@ -5,14 +5,17 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pyarrow as pa
-from pyarrow import csv, parquet
 
 from identify.arrays import Array
 from identify.errors import LogError
 from identify.motion_log import MotionLog, TorqueChannel
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 _TORQUE = b"idbench.torque"
 
@@ -77,6 +80,9 @@ def write_log(log: MotionLog, path: Path, joints: Sequence[str] = ()) -> None:
     if log.q.ndim != 2:
         raise LogError(f"a file holds one run, the log has shape {log.q.shape}: write each run by itself")
     ends = [f"_{joint}" for joint in joints] or [str(j + 1) for j in range(log.n)]
+    pa = _arrow()
+    from pyarrow import csv, parquet
+
     columns = {"t": log.t}
     columns |= {f"q{end}": x for end, x in zip(ends, log.q.T, strict=True)}
     in_newton_metres = path.suffix.lower() == CSV
@@ -127,8 +133,8 @@ def read_columns(path: Path) -> Columns:
     Joints may have names instead of numbers: q_elbow, tau_elbow. Columns qd1, qd2, ... are allowed and not used: velocities
     come from the positions, by the chain's own differences.
     """
-    table = _table(Path(path))
-    names = [name.strip(' "') for name in table.column_names]
+    table, names = _table(Path(path))
+    _require_header(path, names)
     if not table.num_rows:
         raise LogError(f"{path} holds no samples")
     said, table = (table.schema.metadata or {}).get(_TORQUE), table.rename_columns(names)
@@ -148,24 +154,73 @@ def read_columns(path: Path) -> Columns:
     return Columns(numbers["t"], q, tau, None if said is None else _channel(path, said), joints)
 
 
-def _table(path: Path) -> pa.Table:
+def _arrow() -> ModuleType:
+    """Return pyarrow, which this file alone needs; raise LogError if it is not installed."""
+    try:
+        import pyarrow
+    except ImportError as error:
+        raise LogError(
+            "files of logs are read and written with pyarrow: pip install pyarrow; or make a MotionLog of your own arrays"
+        ) from error
+    return pyarrow
+
+
+def _table(path: Path) -> "tuple[pa.Table, list[str]]":
+    """Return a file's columns, and their names without quotes and spaces."""
+    pa = _arrow()
+    from pyarrow import csv, parquet
+
+    is_csv = path.suffix.lower() == CSV
     try:
         with path.open("rb") as file:
-            return csv.read_csv(file) if path.suffix.lower() == CSV else parquet.read_table(file)
+            table = csv.read_csv(file, **_dialect(path)) if is_csv else parquet.read_table(file)
+        return table, [name.strip(' "') for name in table.column_names]
     except OSError as error:
         raise LogError(f"cannot read the log {path}: {error.strerror or error}") from error
-    except (pa.ArrowException, UnicodeDecodeError) as error:
-        kind = "CSV" if path.suffix.lower() == CSV else "Parquet (a CSV file's name must end with .csv)"
+    except UnicodeDecodeError as error:
+        raise LogError(f"cannot read the log {path}: byte {error.start} of its header is no UTF-8; save it as UTF-8") from error
+    except pa.ArrowException as error:
+        kind = "CSV" if is_csv else "Parquet (a CSV file's name must end with .csv)"
         raise LogError(f"cannot read the log {path} as {kind}: {str(error).splitlines()[0]}") from error
 
 
-def _numbers(path: Path, table: pa.Table, name: str) -> Array:
+def _dialect(path: Path) -> "dict[str, Any]":
+    """Return how a CSV file separates columns and decimals, as its first lines show."""
+    from pyarrow import csv
+
+    with path.open("rb") as file:
+        header, first = file.readline(), file.readline()
+    separator = next((mark for mark in (b",", b";", b"\t") if mark in header), b",")
+    decimal = "," if separator != b"," and b"," in first and b"." not in first else "."
+    parse, convert = csv.ParseOptions(delimiter=separator.decode()), csv.ConvertOptions(decimal_point=decimal)
+    return {"parse_options": parse, "convert_options": convert}
+
+
+def _require_header(path: Path, names: Sequence[str]) -> None:
+    """Raise LogError if the first line of a file is one of numbers."""
+    if all(re.fullmatch(r"[-+.\deE]*\d[-+.\deE]*", name) for name in names):
+        joints = max(1, (len(names) - 1) // 2)
+        line = ",".join(["t", *(f"{x}{j + 1}" for x in ("q", "tau") for j in range(joints))])
+        raise LogError(f"{path} has no header, its first line is numbers: put a line of names before it, such as {line}")
+
+
+def _numbers(path: Path, table: "pa.Table", name: str) -> Array:
     """Return a column as numbers; an empty cell is NaN, which no log may have."""
-    column = table[name]
-    if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type)):
-        raise LogError(f"{path}: column {name} holds {column.type}, not numbers")
+    pa, column = _arrow(), table[name]
+    if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type) or pa.types.is_null(column.type)):
+        raise LogError(f"{path}: column {name} holds {column.type}, not numbers{_culprit(column)}")
     values: Array = column.cast(pa.float64()).to_numpy()
     return values
+
+
+def _culprit(column: "pa.ChunkedArray[Any]") -> str:
+    """Return the first cell of a column that is no number, and its line."""
+    for k, cell in enumerate(column.to_pylist()):
+        try:
+            float(cell if cell is not None else "nan")
+        except (TypeError, ValueError):
+            return f": {cell!r:.40} in line {k + 2}"
+    return ""
 
 
 def _channel(path: Path, said: bytes) -> TorqueChannel:

@@ -1,6 +1,6 @@
 """Plug-in tables: the names this package knows, and those that other packages add through entry points."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from difflib import get_close_matches
 from functools import cached_property
 from importlib.metadata import EntryPoint, entry_points
@@ -71,9 +71,7 @@ class PluginTable(Mapping[str, Callable[[], T]], Generic[T]):
             return self._builtin[name]
         if name in self._foreign:
             return self._load(name, self._foreign[name])
-        near = get_close_matches(str(name), list(self), 1)
-        hint = f" (did you mean {near[0]!r}?)" if near else ""
-        raise UnknownNameError(f"no {name!r} among the {self.point}{hint}; known: {', '.join(self)}")
+        raise UnknownNameError(f"no {name!r} among the {self.point}{did_you_mean(str(name), self)}; known: {', '.join(self)}")
 
     def create(self, name: str) -> T:
         """Return the plug-in `name` with its default settings.
@@ -111,6 +109,13 @@ class PluginTable(Mapping[str, Callable[[], T]], Generic[T]):
         except Exception as error:
             raise PluginError(f"plug-in {entry.name!r} ({entry.value}) cannot be loaded: {error}") from error
         return factory
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return the known name that is nearest to one that is not known, as a question; empty if none is near."""
+    by_small = {other.lower(): other for other in known}
+    near = get_close_matches(name.lower(), list(by_small), 1)
+    return f" (did you mean {by_small[near[0]]!r}?)" if near else ""
 
 
 def _places(entries: list[EntryPoint]) -> str:

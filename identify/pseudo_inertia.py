@@ -17,5 +17,12 @@ def pseudo_inertia(values: Array) -> Array:
     return S
 
 
+def inertial(S: Array) -> Array:
+    """Return XX XY XZ YY YZ ZZ MX MY MZ M of a pseudo-inertia, shape (10,)."""
+    second = S[:3, :3]
+    inertia = np.trace(second) * np.eye(3) - second
+    return np.array([*inertia[np.triu_indices(3)], *S[:3, 3], S[3, 3]])
+
+
 PSEUDO = np.array([pseudo_inertia(e) for e in np.eye(len(INERTIAL))])
 """What each inertial parameter adds to a pseudo-inertia, shape (10, 4, 4)."""

@@ -78,6 +78,8 @@ def _gain(impulse: Array, f: Array, fs: float) -> Array:
 
 def _levels(kinds: Array, S: Array) -> Array:
     """Return the levels, not negative, whose sum of kinds is nearest to S, in proportion to itself."""
+    if not S.max() > 0:
+        return np.zeros(len(kinds))
     model = np.maximum(S, FAINT * S.max())
     scale = kinds.max(axis=1)
     for _ in range(ROUNDS):

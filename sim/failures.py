@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from sim.motors import Array
 from sim.robot import Robot
@@ -46,14 +45,17 @@ class Bounds:
             np.where(self._limited, np.minimum(robot.ranges[:, 0], low), low - room),
             np.where(self._limited, np.maximum(robot.ranges[:, 1], high), high + room),
         )
-        self._low, self._high = (np.broadcast_to(end, (nsim, robot.n)) for end in ends)
+        low, high = (np.broadcast_to(end, (nsim, robot.n)) for end in ends)
+        self._middle, self._half = (low + high) / 2, (high - low) / 2
         self._fastest = FAST * np.maximum(np.abs(planned.qd).max(axis=0), LEAST)
 
     def broken(self, q: Array, qd: Array) -> dict[int, str]:
         """Return the simulations whose state, shape (nsim, joint), is none of a loop at work, and what their joint does."""
-        inside: npt.NDArray[np.bool_] = (q >= self._low) & (q <= self._high)  # False for NaN
-        wrong, found = np.logical_not(inside & (np.abs(qd) <= self._fastest)), dict[int, str]()
-        for sim, j in np.argwhere(wrong).tolist() if wrong.any() else ():
+        inside, slow = np.abs(q - self._middle) <= self._half, np.abs(qd) <= self._fastest  # both False for NaN
+        if inside.all() and slow.all():
+            return {}
+        found = dict[int, str]()
+        for sim, j in np.argwhere(~(inside & slow)).tolist():
             told = self._told(j, float(q[sim, j]), float(qd[sim, j]), bool(inside[sim, j]))
             found.setdefault(sim, f"joint {self._joints[j]} {told}")
         return found

@@ -1,9 +1,10 @@
 """A payload that the controller does not know."""
 
 from math import pi
-from typing import final
+from typing import Annotated, final
 
 import mujoco
+from pydantic import Field
 
 from sim.errors import ScenarioError
 from sim.settings import NotNegative, Number, settings
@@ -14,7 +15,7 @@ from sim.settings import NotNegative, Number, settings
 class Payload:
     """A mass bolted to the last link. It is part of the truth, and unknown to the controller."""
 
-    mass: NotNegative = 0.0
+    mass: Annotated[Number, Field(ge=0, le=1e5)] = 0.0
     """[kg]; 0 for no payload."""
     position: tuple[Number, Number, Number] = (0.3, 0.0, 0.0)
     """Centre of mass in the frame of the last link [m]."""

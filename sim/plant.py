@@ -86,6 +86,8 @@ class Plant:
     def troubles(self) -> dict[int, str]:
         """What MuJoCo has complained of, by the number of the simulation."""
         found = dict(self._errors)
+        if not self.batch.warning[..., 1].any():
+            return found
         for sim, kind in np.argwhere(self.batch.warning[..., 1]).tolist():
             found.setdefault(sim, mujoco.mju_warningText(kind, int(self.batch.warning[sim, kind, 0])))
         return found

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
 from typing import Self
@@ -13,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 import models
+from identify.plugins import did_you_mean
 from sim.errors import BenchError, RobotError
 from sim.motors import Array, Motors
 
@@ -60,7 +60,9 @@ class Robot:
         try:
             for edit in edits:
                 edit(spec)
-            return cls(Path(name).stem, spec.compile())
+            robot = cls(Path(name).stem, spec.compile())
+            robot.require_resisting()
+            return robot
         except BenchError:
             raise
         except ValueError as error:
@@ -72,8 +74,7 @@ class Robot:
         try:
             return Path(name) if Path(name).suffix in FILES else models.path(name)
         except KeyError as error:
-            near = get_close_matches(name, models.names(), 1)
-            hint = f" (did you mean {near[0]!r}?)" if near else ""
+            hint = did_you_mean(name, models.names())
             raise RobotError(f"{error.args[0]}{hint}, or give the path of an MJCF or URDF file ({', '.join(FILES)})") from None
 
     @staticmethod
@@ -98,6 +99,17 @@ class Robot:
             raise RobotError(f"cannot read robot {name!r}: {error.strerror}") from error
         except (ValueError, ElementTree.ParseError) as error:
             raise RobotError(f"MuJoCo cannot read {name!r}: {' '.join(str(error).split())}") from error
+
+    def require_resisting(self) -> None:
+        """Raise RobotError if a joint has a negative friction or rotor: it would drive itself."""
+        for field in ("damping", "frictionloss", "armature"):
+            values = getattr(self.model, f"dof_{field}")
+            if (values < 0).any():
+                j = int(np.argmin(values))
+                raise RobotError(
+                    f"robot {self.name!r}: joint {self.joints[j]} has {field} = {values[j]:g}, which must be 0 or above: "
+                    "correct the file"
+                )
 
     @property
     def n(self) -> int:

@@ -3,13 +3,12 @@
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
-from identify.plugins import PluginTable
+from identify.plugins import PluginTable, did_you_mean
 from sim.controllers import CONTROLLERS
 from sim.drives import DRIVES
 from sim.encoders import ENCODERS
@@ -58,8 +57,7 @@ def _content(name: str) -> dict[str, Any]:
     """Return the TOML document of a scenario."""
     path = Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
     if not name.endswith(".toml") and name not in names():
-        near = get_close_matches(name, names(), 1)
-        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        hint = did_you_mean(name, names())
         raise ScenarioError(f"no scenario {name!r}{hint}; known: {', '.join(names())}, or give the path of a TOML file (.toml)")
     try:
         return tomllib.loads(path.read_text())
@@ -74,11 +72,26 @@ def from_dict(content: Mapping[str, Any]) -> Scenario:
     made = dict(content)
     if isinstance(made.get("trajectory"), str):
         made["trajectory"] = _trajectory_of(made["trajectory"])
+    wrong = []
     for key, table in KINDS.items():
         if key in made and not isinstance(made[key], table.kind):
-            made[key] = _plugin(key, table, made[key])
-    scenario: Scenario = make(Scenario, made, "")
+            try:
+                made[key] = _plugin(key, table, made[key])
+            except ScenarioError as error:  # with whatever else is wrong
+                wrong.append(str(error))
+                made.pop(key)
+    try:
+        scenario: Scenario = make(Scenario, made, "")
+    except ScenarioError as error:
+        raise ScenarioError("; ".join([*wrong, *_besides(str(error), content)])) from error
+    if wrong:
+        raise ScenarioError("; ".join(wrong))
     return scenario
+
+
+def _besides(error: str, content: Mapping[str, Any]) -> list[str]:
+    """Return what is wrong, but for keys that are there and were taken out because they are wrong themselves."""
+    return [part for part in error.split("; ") if not any(part.startswith(f"key {key!r} is missing") for key in content)]
 
 
 def _trajectory_of(name: str) -> Any:
@@ -97,8 +110,7 @@ def _plugin(key: str, table: PluginTable[Any], content: Mapping[str, Any]) -> An
         raise ScenarioError(f"key '{key}.kind' is missing; known: {', '.join(table)}")
     kind, rest = content["kind"], {name: value for name, value in content.items() if name != "kind"}
     if not isinstance(kind, str) or kind not in table:
-        near = get_close_matches(str(kind), list(table), 1)
-        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        hint = did_you_mean(str(kind), list(table))
         raise ScenarioError(f"{key}.kind = {kind!r} is unknown{hint}; known: {', '.join(table)}")
     return make(table[kind], rest, key)  # type: ignore[arg-type]  # the factories of these tables are classes
 

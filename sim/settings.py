@@ -3,7 +3,6 @@
 import ast
 import inspect
 from collections.abc import Callable
-from difflib import get_close_matches
 from functools import cache, wraps
 from itertools import pairwise
 from textwrap import dedent
@@ -14,6 +13,7 @@ import numpy.typing as npt
 from pydantic import AllowInfNan, BeforeValidator, ConfigDict, Field, Strict, ValidationError
 from pydantic.dataclasses import dataclass
 
+from identify.plugins import did_you_mean
 from sim.errors import ScenarioError
 
 C = TypeVar("C", bound=type)
@@ -92,8 +92,7 @@ def _complaint(detail: Any, cls: type, where: str) -> str:
     told = description(owner, next((part for part in reversed(location) if isinstance(part, str)), ""))
     if kind in ("unexpected_keyword_argument", "unexpected_positional_argument"):
         known = list(fields_of(owner))
-        close = get_close_matches(str(location[-1]), known, 1)
-        hint = f" (did you mean {close[0]!r}?)" if close else ""
+        hint = did_you_mean(str(location[-1]), known)
         return f"unknown key {key!r}{hint}; " + (f"known: {', '.join(known)}" if known else "this kind has no settings")
     if kind in ("missing", "missing_argument"):
         return f"key {key!r} is missing" + (f": {told}" if told else "")

@@ -20,6 +20,12 @@ if any(importlib.util.find_spec(name) is None for name in NEEDED):
     site.addsitedir(sysconfig.get_path("purelib"))  # what has come adds itself to the search path as at the start of Python
 
 os.environ.setdefault("RUST_LOG", "off")  # as on the command line: read when rerun is loaded, which tests do first
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as there
+
+if (worker := os.environ.get("PYTEST_XDIST_WORKER")) and hasattr(os, "sched_setaffinity"):
+    # A processor for each process of tests, and for what it starts: threads of MuJoCo of two processes hinder each other.
+    every = sorted(os.sched_getaffinity(0))
+    os.sched_setaffinity(0, {every[int(worker.removeprefix("gw")) % len(every)]})
 
 import numpy as np
 import pytest

@@ -11,9 +11,15 @@ from experiments.interruption import INTERRUPTED, importing, terminating
 
 DESCRIPTION = "A MuJoCo testbench for the dynamic identification of robots."
 
-os.environ.setdefault(
-    "MUJOCO_GL", "disable"
-)  # nothing is drawn by MuJoCo, and what would draw takes a tenth of a second to load
+ENVIRONMENT = {
+    "MUJOCO_GL": "disable",  # nothing is drawn by MuJoCo, and what would draw takes a tenth of a second to load
+    "OPENBLAS_NUM_THREADS": "1",  # matrices are small here: threads of BLAS wait for each other longer than they work
+    "MKL_NUM_THREADS": "1",
+}
+"""Read when MuJoCo and NumPy are loaded, unless the user says otherwise."""
+
+for name, value in ENVIRONMENT.items():
+    os.environ.setdefault(name, value)
 
 
 def run(app: SubcommandApp, args: Sequence[str] | None = None) -> int:

@@ -1,14 +1,13 @@
 """What a study varies."""
 
 from dataclasses import dataclass, fields, replace
-from difflib import get_close_matches
 from typing import Any, Literal, final
 
 import numpy as np
 
 from experiments.errors import StudyError
 from identify import ALIGNMENTS, DIFFERENTIATORS, MASKS, OPERATORS, PREFILTERS, Chain, SettingError
-from identify.plugins import PluginTable
+from identify.plugins import PluginTable, did_you_mean
 from sim.settings import Number, Whole, settings
 
 STAGES: dict[str, PluginTable[Any]] = {
@@ -142,8 +141,7 @@ def _replaced(part: Any, path: list[str], value: Any, field: str) -> Any:
     """Return a frozen dataclass with the value of a field, or of a field of a field, replaced."""
     known = [f.name for f in fields(part)]
     if not path or path[0] not in known:
-        near = get_close_matches(path[0] if path else "", known, 1)
-        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        hint = did_you_mean(path[0] if path else "", known)
         raise StudyError(f"axis {field}: {type(part).__name__} has no such setting{hint}; known: {', '.join(known) or 'none'}")
     if len(path) > 1:
         value = _replaced(getattr(part, path[0]), path[1:], value, field)

@@ -1,5 +1,6 @@
 """What a finished study leaves: a summary, a report and a recording beside its shards."""
 
+from collections import Counter
 from collections.abc import Sequence
 from math import isfinite
 from typing import TYPE_CHECKING, Any
@@ -7,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from rich.console import Console
 from rich.text import Text
 
+from experiments.errors import ResultsError
 from experiments.results import beside, tell_of, write_recording, write_summary
 from experiments.study.answer import answer, method, percent, short, value
 from experiments.study.report import report
@@ -15,6 +17,9 @@ from experiments.study.statistics import Cell, cells
 from experiments.study.store import Store
 from experiments.study.versions import versions
 from experiments.tables import new_table
+
+MOST_REASONS = 3
+"""Reasons of failures that are printed; the report has all."""
 
 if TYPE_CHECKING:
     from experiments.recording.study import StudyRecording
@@ -30,6 +35,8 @@ def write_results(page: Console, store: Store, recording: "StudyRecording | None
         lost = write_recording(folder, recording.finish(found)) if recording else ""
     _print(page, store, found)
     tell_of(lost, store.folder)
+    if not any(cell.runs for cell in found):
+        raise ResultsError(f"no run of study {study.name} gave an estimate: {_reasons(found)[0]}")
     return found
 
 
@@ -44,7 +51,17 @@ def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:
     grid.columns[0].header = axes[0]
     page.print(grid)
     page.print(Text(answer(found)))
+    for reason in _reasons(found)[:MOST_REASONS]:
+        page.print(Text(f"failed: {reason}"), soft_wrap=True)
     page.print(Text(f"\nwritten to {store.folder}: open {store.folder / 'report.html'}"), soft_wrap=True)
+
+
+def _reasons(found: Sequence[Cell]) -> list[str]:
+    """Return why runs failed, the most frequent reason first."""
+    counts: Counter[str] = Counter()
+    for cell in found:
+        counts.update({reason: len(runs) for reason, runs in cell.failures.items()})
+    return [f"{count} times: {reason}" for reason, count in counts.most_common()]
 
 
 def _summary(store: Store, found: Sequence[Cell], seconds: dict[str, float]) -> dict[str, Any]:

@@ -2,12 +2,12 @@
 
 import json
 import tomllib
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from experiments.errors import StudyError
 from experiments.study.study import Study
+from identify.plugins import did_you_mean
 from sim.errors import ScenarioError
 from sim.scenario_file import from_dict, load, to_dict
 from sim.settings import fields_of, make
@@ -29,8 +29,7 @@ def load_study(name: str) -> Study:
         If there is none, it is not TOML, or what it says cannot be run.
     """
     if not name.endswith(".toml") and name not in names():
-        near = get_close_matches(name, names(), 1)
-        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        hint = did_you_mean(name, names())
         raise StudyError(f"no study {name!r}{hint}; known: {', '.join(names())}, or give the path of a TOML file (.toml)")
     path = Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
     return study_from(read_toml(path), f"study {name}")
@@ -52,8 +51,7 @@ def study_from(content: dict[str, Any], what: str) -> Study:
     try:
         for key in made:
             if key not in known:
-                near = get_close_matches(key, known, 1)
-                hint = f" (did you mean {near[0]!r}?)" if near else ""
+                hint = did_you_mean(key, known)
                 raise StudyError(f"unknown key {key!r}{hint}; known: {', '.join(known)}")
         if "scenario" not in made:
             raise StudyError("key 'scenario' is missing: the name of a scenario, a file (TOML), or a table")
