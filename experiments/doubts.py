@@ -18,6 +18,9 @@ USELESS = 0.5
 """Share of a torque that one sigma of the parameters may make before the estimate is said to tell too little; a fifth of it is
 asked of what is recommended instead."""
 
+ENOUGH = 4
+"""Rows for each parameter beyond which a large sigma is no matter of too few of them."""
+
 MUCH_LONGER = 100
 """Times from which on the length of a log is not what is wrong with it."""
 
@@ -44,7 +47,7 @@ def _too_little(found: Identified, name: str) -> Iterator[str]:
     """Yield why an estimate says nothing, where its sigma alone makes much of a torque, and what would help."""
     estimate, shares = found.estimates[name], found.left_open[name]
     worst = int(np.nan_to_num(shares, nan=np.inf).argmax())
-    if shares[worst] < USELESS:
+    if shares[worst] < USELESS or estimate.rows > ENOUGH * len(estimate.parameters):  # else it is the model that is wrong
         return
     others = [other for other, open_ in found.left_open.items() if np.nan_to_num(open_, nan=np.inf).max() < USELESS / 5]
     times = min(1000, int(np.ceil((shares[worst] / (USELESS / 5)) ** 2))) if np.isfinite(shares[worst]) else 1000

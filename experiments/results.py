@@ -46,13 +46,19 @@ class Place:
 
     def check(self) -> None:
         """Raise ResultsError if the folder holds results of another experiment, or files that nobody knows."""
+        try:
+            self._check()
+        except OSError as error:
+            raise ResultsError(f"cannot write to {self.out}: {error.strerror}; choose another --out") from error
+
+    def _check(self) -> None:
         if str(self.out) == "." and not self.force:
             raise ResultsError("--out is the folder that you are in, or empty: name a folder of its own for the results")
         if self.force or not self.out.is_dir():
             return
         theirs, ours = _experiment_of(self.out), " ".join(filter(None, (self.experiment, self.of)))
         if theirs is not None and theirs != ours:
-            raise ResultsError(f"{self.out} holds the results of {theirs}: choose another --out, or replace them with --force")
+            raise ResultsError(f"{self.out} holds {theirs}: choose another --out, or replace them with --force")
         taken = [name for name in WRITTEN if (self.out / name).is_file()]
         if theirs is None and taken:
             raise ResultsError(

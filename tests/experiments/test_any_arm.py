@@ -8,6 +8,7 @@ import pytest
 from experiments.identified import Identified
 from experiments.subject import Subject
 from experiments.validation import Validated
+from experiments.verdict import Verdict
 from experiments.written import Written
 from identify import MODELS
 from sim.engine import simulate
@@ -52,9 +53,9 @@ def test_torques_of_an_unseen_motion_are_foretold_within_1_percent(arm, model):
     assert told.percent.max() < 1
     assert told.R2.min() > 0.9999
     assert (told.standing > told.rms).all()  # where friction is not determined, and why it is told apart
-    word, reasons = arm.verdict(model)
-    assert word == "good"
-    assert "is off by" in reasons[0]
+    verdict = Verdict(arm, model)
+    assert verdict.word == "good"
+    assert "is off by" in verdict.reasons[0]
 
 
 def test_the_identified_robot_repeats_the_unseen_motion(arm):

@@ -1,8 +1,6 @@
 """The command line as a user meets it: answers and files."""
 
 import json
-import subprocess
-import sys
 
 from experiments.cli import main
 from experiments.table1 import SCENARIO
@@ -94,11 +92,9 @@ def test_version(capsys):
     assert capsys.readouterr().out.startswith("idbench 0.")
 
 
-def test_a_reader_that_goes_away_is_no_error(tmp_path):
+def test_a_reader_that_goes_away_is_no_error(tmp_path, start):
     code = "import sys; from experiments.cli import main; sys.exit(main(['list']))"
-    with subprocess.Popen(
-        [sys.executable, "-c", code], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        process.stdout.close()
-        assert process.stderr.read() == ""
-    assert process.returncode == 0
+    process = start("-c", code, cwd=tmp_path)
+    process.stdout.close()
+    assert process.stderr.read() == ""
+    assert process.wait() == 0

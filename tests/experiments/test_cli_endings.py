@@ -22,25 +22,23 @@ def test_interruption_is_quiet_and_leaves_nothing(out, capfd, monkeypatch):
     assert not list(out.parent.iterdir())
 
 
-def test_a_real_interrupt_ends_the_process_without_a_traceback(tmp_path):
+def test_a_real_interrupt_ends_the_process_without_a_traceback(tmp_path, start):
     """Ctrl-C at some instant of a long search."""
-    code = "import sys; from experiments.search import Search; from experiments import commands\n"
-    code += "commands.Search = lambda seed: print('searching') or Search(seed=seed, tolerance=0.0, rounds=10**6)\n"
-    code += "sys.exit(commands.run(['table1', '--seed', '1', '--out', 'results']))"
-    process = subprocess.Popen(
-        [sys.executable, "-uc", code], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    code = "import sys; from experiments.search import Search; from experiments import cli, table1_command\n"
+    code += "table1_command.Search = lambda seed: print('searching') or Search(seed=seed, tolerance=0.0, rounds=10**6)\n"
+    code += "sys.exit(cli.main(['table1', '--seed', '1', '--out', 'results']))"
+    process = start("-uc", code, cwd=tmp_path)
     assert process.stdout.readline()  # the search is under way
     time.sleep(0.2)
     process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=30)
+    _, err = process.communicate()
     assert process.returncode == 130
     assert err.strip() == "idbench: interrupted"
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("module", ["numpy", "scipy.signal", "mujoco", "rerun"])
-def test_an_interrupt_while_a_module_is_loaded_is_as_quiet(tmp_path, module):
+def test_an_interrupt_while_a_module_is_loaded_is_as_quiet(tmp_path, module, start):
     code = f"""if True:
         import sys, time
         class Slow:
@@ -52,26 +50,24 @@ def test_an_interrupt_while_a_module_is_loaded_is_as_quiet(tmp_path, module):
         from experiments.cli import main
         sys.exit(main(["table1", "--out", "x"]))
     """
-    with subprocess.Popen(
-        [sys.executable, "-c", code], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout.readline() == "loading\n"
-        process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=20)
+    process = start("-c", code, cwd=tmp_path)
+    assert process.stdout.readline() == "loading\n"
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate()
     assert (process.returncode, err) == (130, "idbench: interrupted\n")
     assert not list(tmp_path.iterdir())
 
 
-def test_termination_leaves_nothing_half_written(tmp_path):
+def test_termination_leaves_nothing_half_written(tmp_path, start):
     """SIGTERM while the recording is written: the hidden folder goes, too."""
-    code = "import sys; from experiments import commands; import experiments.recording.table1 as r\n"
-    code += "def slow(*args): print('recording', flush=True); import time; time.sleep(60)\n"
-    code += "r.record_table1 = slow\nsys.exit(commands.run(['table1', '--out', 'results']))"
-    with subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout.readline()
-        assert len(list(tmp_path.iterdir())) == 1
-        process.terminate()
-        assert process.wait(timeout=30) == 143
+    code = "import sys; from experiments import cli; import experiments.recording.table1 as r\n"
+    code += "def slow(*args): print('recording', flush=True); import time; time.sleep(600)\n"
+    code += "r.record_table1 = slow\nsys.exit(cli.main(['table1', '--out', 'results']))"
+    process = start("-c", code, cwd=tmp_path)
+    assert process.stdout.readline()
+    assert len(list(tmp_path.iterdir())) == 1
+    process.terminate()
+    assert process.wait() == 143
     assert not list(tmp_path.iterdir())
 
 

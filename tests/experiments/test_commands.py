@@ -117,7 +117,10 @@ def rewritten(csv, change):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda lines: lines[1:], "must have a header with the columns t"),
+        (
+            lambda lines: lines[1:],
+            "put a line of names before it, such as t,q1,q2,tau1,tau2",
+        ),
         (lambda lines: [lines[0].replace("tau2", "tau3"), *lines[1:]], "missing, left over or twice: tau2, tau3"),
         (lambda lines: [lines[0].replace("tau2", "tau1"), *lines[1:]], "missing, left over or twice: tau1, tau2"),
         (lambda lines: [*lines[:50], lines[50].rsplit(",", 1)[0] + ",nan", *lines[51:]], "tau is nan at sample 49 of joint 2"),

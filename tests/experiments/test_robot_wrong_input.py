@@ -53,10 +53,12 @@ def test_a_joint_that_stands_is_told_with_the_move_that_helps(told, changed):
     def hold(x):
         return np.where(np.arange(6) == 5, 0.0, x)
 
-    code, _, err = told("identify", changed(q=hold), "--robot", "puma560", "--model", "explicit")
-    assert code == 2
-    assert "the motion does not show" in err
-    assert "joint6 never moves in this log: move it" in err
+    code, out, err = told("identify", changed(q=hold), "--robot", "puma560", "--model", "explicit")
+    assert code == 0, err
+    assert "this log does not show" in out
+    assert "left out, as if zero (joint6 never moves in this log: move it)" in out
+    assert "\n Fv5 " in out
+    assert "\n Fv6 " not in out
 
 
 def test_files_are_not_written_where_they_would_be_lost(told, logs, tmp_path):

@@ -90,6 +90,11 @@ def test_stretches_are_a_tenth_of_a_second_as_it_passes(pace, every):
     assert Audience("", pace).every == pytest.approx(every)
 
 
+def said_of_viewers(err):
+    """Return what was said, but for how far the simulation is, which a slow machine says now and then."""
+    return [line for line in err.splitlines() if not line.startswith("simulating")]
+
+
 def test_a_viewer_that_goes_away_costs_nothing_but_itself(tmp_path, reading):
     """Somebody answers when it is asked whether a viewer is there, and has gone when the run begins."""
     with socket.socket() as server:
@@ -106,7 +111,7 @@ def test_a_viewer_that_goes_away_costs_nothing_but_itself(tmp_path, reading):
         code = f"import sys; from experiments.cli import main; sys.exit(main({words}))"
         done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0
-    assert done.stderr.splitlines() == [f"idbench: the viewer at {url} has gone; the work goes on without it"]
+    assert said_of_viewers(done.stderr) == [f"idbench: the viewer at {url} has gone; the work goes on without it"]
     assert "written to run" in done.stdout
     reading.verify(tmp_path / "run" / "recording.rrd")
 
@@ -119,11 +124,9 @@ def test_a_viewer_that_hangs_keeps_nothing_back(tmp_path, reading):
         url = NOBODY.format(port=server.getsockname()[1])
         words = ["run", "ideal", "--connect", url, "--out", "run"]
         code = f"import sys; sys.argv = ['idbench', *{words}]; from experiments.cli import entry; entry()"
-        done = subprocess.run(
-            [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120
-        )
+        done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0
-    assert done.stderr.splitlines() == [f"idbench: the viewer at {url} takes nothing; the work goes on without it"]
+    assert said_of_viewers(done.stderr) == [f"idbench: the viewer at {url} takes nothing; the work goes on without it"]
     assert "written to run" in done.stdout
     reading.verify(tmp_path / "run" / "recording.rrd")
 

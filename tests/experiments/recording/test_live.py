@@ -4,7 +4,6 @@ import os
 import re
 import socket
 import subprocess
-import sys
 import time
 import warnings
 from pathlib import Path
@@ -22,6 +21,9 @@ pytestmark = pytest.mark.skipif(
     not any(folder.glob("*.json") for folder in DRIVERS if folder.is_dir()),
     reason="the viewer needs a Vulkan driver, as in Debian's mesa-vulkan-drivers",
 )
+
+PATIENCE = 600.0
+"""Time [s] after which nothing more is expected, also on a busy machine."""
 
 PACE = 4.0
 """46 s of simulated time last longer than it takes to look twice."""
@@ -45,7 +47,7 @@ def viewer(tmp_path):
 
 
 def connected(url, process):
-    end = time.monotonic() + 60
+    end = time.monotonic() + PATIENCE
     while time.monotonic() < end and process.poll() is None:
         try:
             client = ViewerClient.connect(url)
@@ -64,27 +66,26 @@ def reached(client):
 
 
 def until(condition, process=None):
-    end = time.monotonic() + 60
+    end = time.monotonic() + PATIENCE
     while time.monotonic() < end and not condition() and (process is None or process.poll() is None):
         time.sleep(0.2)
     return condition()
 
 
-def run(client, out, *options):
+def run(start, client, out, *options):
     code = f"import sys; from experiments.cli import main; sys.exit(main({['run', 'saturation', *options]!r}))"
-    words = [sys.executable, "-c", code.replace("URL", client.url).replace("OUT", str(out))]
-    return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    return start("-c", code.replace("URL", client.url).replace("OUT", str(out)))
 
 
-def test_the_arm_moves_in_the_viewer_before_the_run_has_ended(viewer, tmp_path):
+def test_the_arm_moves_in_the_viewer_before_the_run_has_ended(viewer, tmp_path, start):
     client, out = viewer[0], tmp_path / "run"
-    with run(client, out, "--connect", "URL", "--out", "OUT", "--pace", f"{PACE}") as process:
-        assert until(lambda: reached(client) > 4, process)  # it rests for 3 s
-        arm = picture(client)
-        assert until(lambda: reached(client) > 12, process)
-        assert picture(client) != arm
-        assert process.poll() is None
-        assert process.wait(60) == 0
+    process = run(start, client, out, "--connect", "URL", "--out", "OUT", "--pace", f"{PACE}")
+    assert until(lambda: reached(client) > 4, process)  # it rests for 3 s
+    arm = picture(client)
+    assert until(lambda: reached(client) > 12, process)
+    assert picture(client) != arm
+    assert process.poll() is None
+    assert process.wait() == 0
     assert until(lambda: reached(client) > 45.9)
     shown = {view.name for view in client.get_state().views}
     assert {"arm", "joint1 [N m]", "residual power [W]", "ZZR1 [kg m²]"} <= shown  # the identification has come, too
@@ -98,14 +99,14 @@ def picture(client):
     return client.take_screenshot(arm.view_id)
 
 
-def test_a_viewer_closed_while_the_run_goes_on_is_told_once(viewer, tmp_path, reading):
+def test_a_viewer_closed_while_the_run_goes_on_is_told_once(viewer, tmp_path, reading, start):
     (client, window), out = viewer, tmp_path / "run"
-    with run(client, out, "--connect", "URL", "--out", "OUT", "--pace", f"{PACE}") as process:
-        assert until(lambda: reached(client) > 1, process)
-        window.terminate()
-        printed, said = process.communicate(timeout=60)
+    process = run(start, client, out, "--connect", "URL", "--out", "OUT", "--pace", f"{PACE}")
+    assert until(lambda: reached(client) > 1, process)
+    window.terminate()
+    printed, said = process.communicate()
     assert process.returncode == 0
-    assert len(said.splitlines()) == 1
+    assert len([line for line in said.splitlines() if not line.startswith("simulating")]) == 1
     assert "has gone; the work goes on without it" in said
     assert "written to" in printed
     reading.verify(out / "recording.rrd")
