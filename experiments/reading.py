@@ -85,6 +85,8 @@ def read(path: Path, question: Question, named: Identified) -> tuple[MotionLog, 
         )
     channel = question.otherwise or channel_of(stated, meaning, delay)
     _require_seconds(path, columns.t)
+    if not np.any(columns.tau):
+        raise ExperimentError(f"{path}: all torques are 0: there is nothing to identify")
     q = _turned(path, columns.q, named, question.unwrap)
     try:
         log = MotionLog.at_times(columns.t, q, columns.tau, channel)

@@ -74,8 +74,8 @@ def _cells(estimate: Estimate, found: Identified, i: int) -> tuple[str, str, str
     else:
         error = float(estimate.error_percent(list(found.truth.values()))[i])
         second = percent(error) if isfinite(error) else ""
-    share = 100 * estimate.corrected_sigma[i] / abs(estimate.X[i])
-    return number(estimate.X[i]), second, f"{share:.2g}" if share < WORTHLESS else f">{WORTHLESS:g}"
+    share = 100 * estimate.corrected_sigma[i] / abs(estimate.X[i]) if estimate.X[i] else float("inf")
+    return number(estimate.X[i]), second, _percentage(share) or f">{WORTHLESS:g}"
 
 
 def number(x: float) -> str:

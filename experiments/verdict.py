@@ -23,8 +23,8 @@ docs/any-arm.md has the table of right and wrong models from which these come.""
 SURE = 4.0
 """A delay that differs from the stated one by so many sigma is told."""
 
-WORTH = 0.7
-"""Options that bring the error below this share of what it was are told."""
+WORTH, TOLERABLE = 0.7, 20.0
+"""Options that bring the error below this share of what it was, and below these per cent, are told."""
 
 
 @final
@@ -145,7 +145,7 @@ class Remedies:
                 after = self._worst(replace(self.validated.judged, subject=Subject(subject.name, asked), truth=None))
             except (IdentificationError, ExperimentError):
                 continue
-            if after < WORTH * before:
+            if after < min(WORTH * before, TOLERABLE):
                 yield f"with {option} the worst joint's error falls from {percent(before)} to {percent(after)}"
 
     def _worst(self, judged: Identified) -> float:

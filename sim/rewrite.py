@@ -52,7 +52,7 @@ def rewritten(name: str, standard: Values, folder: Path | None = None) -> str:
     bodies, joints = _elements(root)
     for j, joint in enumerate(joints):
         for letters, attribute in (("Ia", "armature"), ("Fv", "damping"), ("Fs", "frictionloss")):
-            joint.set(attribute, repr(wanted[f"{letters}{j + 1}"]))
+            joint.set(attribute, repr(float(wanted[f"{letters}{j + 1}"])))
         if f"M{j + 1}" in wanted:
             _set_link(robot, bodies, j, wanted)
     home = Robot.path(name).absolute().parent

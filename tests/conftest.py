@@ -22,6 +22,10 @@ if any(importlib.util.find_spec(name) is None for name in NEEDED):
 os.environ.setdefault("RUST_LOG", "off")  # as on the command line: read when rerun is loaded, which tests do first
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as there
 
+# Python keeps what it has compiled: the tests start it a hundred times, on some machines with this switched off.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+os.environ.setdefault("PYTHONPYCACHEPREFIX", str(Path(__file__).parent.parent / ".pytest_cache" / "compiled"))
+
 if (worker := os.environ.get("PYTEST_XDIST_WORKER")) and hasattr(os, "sched_setaffinity"):
     # A processor for each process of tests, and for what it starts: threads of MuJoCo of two processes hinder each other.
     every = sorted(os.sched_getaffinity(0))

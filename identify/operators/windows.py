@@ -47,8 +47,9 @@ def _simpson(intervals: int) -> Array:
     """Return the weights of Simpson's rule over unit intervals; an odd number of them ends with the 3/8 rule."""
     weights = np.zeros(intervals + 1)
     paired = intervals - 3 * (intervals % 2)
-    for start in range(0, paired, 2):
-        weights[start : start + 3] += np.array([1, 4, 1]) / 3
+    weights[0:paired:2] += 1 / 3
+    weights[1:paired:2] += 4 / 3
+    weights[2 : paired + 1 : 2] += 1 / 3
     if intervals % 2:
         weights[-4:] += np.array([3, 9, 9, 3]) / 8
     return weights

@@ -159,7 +159,7 @@ def test_what_no_healthy_log_shows_is_said(csv, capsys):
     assert main(["identify", str(csv), "--torque", "held", "--model", "explicit"]) == 0
     printed = capsys.readouterr().out
     assert "doubtful: Fs2 below zero in the explicit model" in printed.replace("Fv2, ", "")
-    assert "% of tau2: are units, signs" in printed
+    assert "nothing of tau2: are units, signs" in printed
     assert "0 is assumed" in printed
 
 

@@ -4,12 +4,15 @@ import socket
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 
 import pytest
 
 from experiments.audience import Audience, Watching
 from experiments.cli import main
 from experiments.errors import ExperimentError
+from sim.scenario_file import load, to_toml
+from sim.trajectories import RandomMoves
 
 NOBODY = "rerun+http://127.0.0.1:{port}/proxy"
 
@@ -90,6 +93,13 @@ def test_stretches_are_a_tenth_of_a_second_as_it_passes(pace, every):
     assert Audience("", pace).every == pytest.approx(every)
 
 
+def brief(folder):
+    """Write a scenario of eight seconds; return its file."""
+    path = folder / "brief.toml"
+    path.write_text(to_toml(replace(load("ideal"), trajectory=RandomMoves(moves=4, rest=1.5))))
+    return str(path)
+
+
 def said_of_viewers(err):
     """Return what was said, but for how far the simulation is, which a slow machine says now and then."""
     return [line for line in err.splitlines() if not line.startswith("simulating")]
@@ -107,7 +117,7 @@ def test_a_viewer_that_goes_away_costs_nothing_but_itself(tmp_path, reading):
             server.close()
 
         threading.Thread(target=answer_once, daemon=True).start()
-        words = ["run", "ideal", "--connect", url, "--out", "run"]
+        words = ["run", brief(tmp_path), "--connect", url, "--out", "run"]
         code = f"import sys; from experiments.cli import main; sys.exit(main({words}))"
         done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0
@@ -122,8 +132,9 @@ def test_a_viewer_that_hangs_keeps_nothing_back(tmp_path, reading):
         server.bind(("127.0.0.1", 0))
         server.listen(64)
         url = NOBODY.format(port=server.getsockname()[1])
-        words = ["run", "ideal", "--connect", url, "--out", "run"]
-        code = f"import sys; sys.argv = ['idbench', *{words}]; from experiments.cli import entry; entry()"
+        words = ["run", brief(tmp_path), "--connect", url, "--out", "run"]
+        code = f"import sys; sys.argv = ['idbench', *{words}]; import experiments.audience as a; a.GOODBYE = 1.0\n"
+        code += "from experiments.cli import entry; entry()"
         done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0
     assert said_of_viewers(done.stderr) == [f"idbench: the viewer at {url} takes nothing; the work goes on without it"]

@@ -148,7 +148,8 @@ def test_a_scheduler_may_be_anywhere(file, tmp_path, undisturbed):
     assert Store.open(tmp_path / "out").table().equals(undisturbed)
 
 
-def test_an_unreachable_scheduler_leaves_nothing(file, tmp_path, complaint):
+def test_an_unreachable_scheduler_leaves_nothing(file, tmp_path, complaint, monkeypatch):
+    monkeypatch.setattr("experiments.study.cluster.PATIENCE", 1.0)
     said = complaint("study", str(file), "--scheduler", "tcp://127.0.0.1:9", "--out", str(tmp_path / "out"))
     assert "cannot reach the scheduler tcp://127.0.0.1:9" in said
     assert not (tmp_path / "out").exists()
@@ -214,8 +215,12 @@ rest = 0.6
 def test_odd_studies_end_in_a_report(tmp_path, axis, failed, capfd):
     """Values of several kinds, words that look like markup, runs that all fail, no sigma, a truth of 0."""
     (tmp_path / "odd.toml").write_text(f"{ODD}\n[[axes]]\n{axis}\n")
-    assert main(["study", str(tmp_path / "odd.toml"), "--out", str(tmp_path / "out")]) == 0
-    assert "Is [/b] [red]fine?" in capfd.readouterr().out
+    code = main(["study", str(tmp_path / "odd.toml"), "--out", str(tmp_path / "out")])
+    said = capfd.readouterr()
+    assert "Is [/b] [red]fine?" in said.out
+    assert ("failed: 2 times: " in said.out) == bool(failed)
+    assert code == (2 if failed == 4 else 0)
+    assert ("no run of study odd gave an estimate: 2 times" in said.err) == (failed == 4)
     cells = json.loads((tmp_path / "out" / "summary.json").read_text())["cells"]
     assert sum(sum(cell["failures"].values()) for cell in cells) == failed
     assert sum(cell["runs"] for cell in cells) + failed == 4
