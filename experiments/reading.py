@@ -85,7 +85,7 @@ def read(path: Path, question: Question, named: Identified) -> tuple[MotionLog, 
         )
     channel = question.otherwise or channel_of(stated, meaning, delay)
     _require_seconds(path, columns.t)
-    if not np.any(columns.tau):
+    if not np.any(columns.tau) and np.ptp(columns.q, axis=0).any():
         raise ExperimentError(f"{path}: all torques are 0: there is nothing to identify")
     q = _turned(path, columns.q, named, question.unwrap)
     try:

@@ -12,7 +12,7 @@ import numpy as np
 
 from experiments.errors import ExperimentError
 from experiments.table1 import PAPER
-from identify import MODELS, MotionLog, TorqueChannel, idbench_chain, scara
+from identify import CHAINS, MODELS, MotionLog, TorqueChannel, scara
 from sim.ideal import ideal_log
 from sim.motors import Array
 from sim.robot import Robot
@@ -26,7 +26,7 @@ PAPER_CONDITION = {MODELS.create(name): PAPER[name].condition_number for name in
 
 @dataclass(frozen=True)
 class Search:
-    """A random search for a motion with the paper's condition numbers in chain `idbench`, the same for the same seed.
+    """A random search for a motion with the paper's condition numbers, the same for the same seed.
 
     It draws a sequence of waypoints, then redraws one of them at a time and keeps what comes closer: first to the
     limits of speed and torque, then, within them, to the condition numbers.
@@ -42,7 +42,9 @@ class Search:
     motion : float
         Time from the first to the last move [s].
     moves : int
-        Number of moves, each within 15 % of motion / moves long.
+        Number of moves, each within 15 % of motion / moves long, in whole samples.
+    chain : str
+        Name of the chain in which the condition numbers are the paper's: its own steps, reversals left out.
     smallest_move : float
         Least change of every joint in every move [rad]: slower moves would be masked for whole rows.
     clearance : float
@@ -59,7 +61,8 @@ class Search:
     fs: float = 100.0
     rest: float = 3.0
     motion: float = 40.0
-    moves: int = 30
+    moves: int = 22
+    chain: str = "paper_masked"
     smallest_move: float = 0.4
     clearance: float = 0.2
     velocity: float = 7.0
@@ -83,8 +86,7 @@ class Search:
             If the rounds end before the tolerance is reached.
         """
         rng = np.random.default_rng(self.seed)
-        durations = rng.uniform(0.85, 1.15, self.moves)
-        durations *= self.motion / durations.sum()
+        durations = self._durations(rng)
         best, distance = self._scenario(robot, self._drawn(rng, robot), durations), inf
         excess = self.excess(robot, best)
         for number in range(self.rounds):
@@ -108,7 +110,7 @@ class Search:
         """Return the largest departure from the paper's condition numbers, as a share; infinite if a row would be void."""
         q = np.stack([scenario.quintic().points.sample(self.fs).q for scenario in scenarios])
         log = MotionLog(self.fs, q, np.zeros_like(q), TorqueChannel("instantaneous"))  # W holds no torque
-        systems = replace(idbench_chain(), trim=self.rest).build_each(log, scara(), list(PAPER_CONDITION))
+        systems = replace(CHAINS.create(self.chain), trim=self.rest).build_each(log, scara(), list(PAPER_CONDITION))
         worst = np.zeros(len(scenarios))
         for system, target in zip(systems, PAPER_CONDITION.values(), strict=True):
             share = np.abs(np.log(system.condition_number / target))
@@ -130,6 +132,12 @@ class Search:
         torque = np.abs(ideal_log(robot, scenario.quintic().points.sample(self.fs)).tau).max(axis=0)
         used = np.concatenate([scenario.quintic().points.peak_velocity / self.velocity, torque / robot.torque_limits])
         return float(used.max() - 1)
+
+    def _durations(self, rng: np.random.Generator) -> Array:
+        """Return the times of the moves: whole samples, as the paper's plan of 100 Hz has them; together the motion's."""
+        shares = rng.uniform(0.85, 1.15, self.moves)
+        ends = np.rint(np.cumsum(shares) / shares.sum() * self.motion * self.fs)
+        return np.diff(ends, prepend=0.0) / self.fs
 
     def _drawn(self, rng: np.random.Generator, robot: Robot) -> Array:
         points = np.zeros((self.moves + 1, robot.n))

@@ -30,7 +30,7 @@ from sim.scenario import Scenario
 from sim.scenario_file import to_dict
 from sim.trajectories import Reference
 
-CHAINS_COMPARED = ("paper", "idbench")
+CHAINS_COMPARED = ("paper", "paper_masked", "idbench")
 """Chains of the comparison."""
 
 SCENARIO = "table1"

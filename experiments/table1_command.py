@@ -1,11 +1,16 @@
 """The commands about Table 1: the comparison, and the search for its trajectory."""
 
+from pathlib import Path
+
 from rich.console import Console
 
 from experiments.cli.commands import Search as Searched
 from experiments.cli.commands import Table1 as Compared
 from experiments.errors import ExperimentError
+from experiments.motions import Table1Motions
+from experiments.motions_report import picture, print_motions
 from experiments.page import new_page, show, shown
+from experiments.progress import progress_of
 from experiments.report import print_table1
 from experiments.results import Place, results_folder, tell_of, write_recording, write_summary, write_whole
 from experiments.search import Search
@@ -20,8 +25,11 @@ def compare(asked: Compared) -> None:
     """Reproduce the comparison."""
     if asked.seed is not None and asked.scenario is not None:
         raise ExperimentError(f"--seed {asked.seed} and --scenario {asked.scenario} name two trajectories: give one")
+    if asked.motions is not None:
+        _over_motions(asked, asked.motions)
+        return
     chains = CHAINS_COMPARED if asked.chain == "all" else (asked.chain,)
-    place = Place(asked.out, "table1", force=asked.force)
+    place = Place(asked.out or Path("runs/table1"), "table1", force=asked.force)
     place.check()
     page, lost = new_page(), ""
     with asked.watching.audience() as audience, shown(page):
@@ -34,8 +42,25 @@ def compare(asked: Compared) -> None:
                 from experiments.recording.table1 import record_table1
 
                 lost = write_recording(folder, record_table1(table, audience))
-        tell_of(lost, asked.out)
-        page.print(f"written to {asked.out}{asked.watching.hint(asked.out)}", soft_wrap=True)
+        tell_of(lost, place.out)
+        page.print(f"written to {place.out}{asked.watching.hint(place.out)}", soft_wrap=True)
+
+
+def _over_motions(asked: Compared, motions: int) -> None:
+    """Lay the distribution of errors over random motions beside the paper's."""
+    if asked.scenario is not None or asked.chain != "all":
+        raise ExperimentError(
+            "--motions draws motions of its own and compares the paper's chains: leave --scenario and --chain out"
+        )
+    place, page = Place(asked.out or Path("runs/table1-motions"), "table1-motions", force=asked.force), new_page()
+    place.check()
+    with shown(page):
+        with results_folder(place) as folder, progress_of("drawing and identifying motions") as progress:
+            found = Table1Motions(motions, asked.seed or 0, progress=progress)
+            print_motions(page, found)
+            (folder / "motions.png").write_bytes(picture(found))
+            write_summary(folder / "summary.json", found.summary())
+        page.print(f"written to {place.out}: the picture is motions.png", soft_wrap=True)
 
 
 def search(asked: Searched) -> None:

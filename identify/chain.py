@@ -1,7 +1,7 @@
 """From a log to a linear system: every choice of signal processing, in Hz, s and rad/s."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil
 from typing import final
@@ -140,11 +140,17 @@ def idbench_chain() -> Chain:
     return Chain(NoPrefilter(), CentralDifference(6), ByChannel(), ReversalMask(), FirLowPass())
 
 
+def paper_masked_chain() -> Chain:
+    """The paper's own steps, with the instants near reversals and standstill left out, as its school does."""
+    return replace(paper_chain(), mask=ReversalMask())
+
+
 CHAINS: PluginTable[Chain] = PluginTable(
     "chains",
     Chain,
     {
         "paper": paper_chain,
+        "paper_masked": paper_masked_chain,
         "idbench": idbench_chain,
     },
 )

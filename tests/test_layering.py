@@ -30,6 +30,7 @@ ALLOWED_IN = {
     "experiments/study/statistics.py": {"scipy"},
     "experiments/study/comparison.py": {"scipy"},
     "experiments/study/figures.py": {"matplotlib"},
+    "experiments/motions_report.py": {"matplotlib"},
     "experiments/study/report.py": {"jinja2", "tomli_w"},
 }
 """Libraries that one file alone may use."""

@@ -62,7 +62,7 @@ def test_a_chopper_gives_the_parameters_of_its_average(robot):
     On three motions, simulated together.
     """
     scenario = replace(load("ideal"), encoder=IncrementalEncoder(lines=2**14))
-    moves = [RandomMoves(seed=seed, moves=10, durations=(1.32, 1.32), rest=2.4).sample(robot, 100.0) for seed in range(3)]
+    moves = [RandomMoves(seed=seed, moves=8, durations=(1.32, 1.32), rest=1.4).sample(robot, 100.0) for seed in range(3)]
     forms = {"explicit": ExplicitModel(), "power": PowerModel()}
     averaged, switched = (
         identify_each(simulate(replace(scenario, drive=drive), range(3), motions=moves).log, scara(), forms)
@@ -77,7 +77,7 @@ def foreign(fs=100.0, bits=18, noise=(0.0, 0.0), seed=0):
     """A log of another arm by other software: its own equations, its own Runge-Kutta with error control, its own PD loop."""
     X = np.array([2.9, 0.31, 0.9, 0.08, 0.16, 0.02, 0.06, 0.22])
     rng = np.random.default_rng(seed)
-    reference = load("table1").trajectory.points.sample(fs)
+    reference = load("brisk").trajectory.points.sample(fs)
 
     def rate(t, x, u):
         q2, v1, v2 = x[1], x[2], x[3]

@@ -7,12 +7,12 @@ from identify import ESTIMATORS, MODELS, MotionLog, TorqueChannel, identify_each
 from sim.ideal import ideal_log
 from sim.trajectories import RandomMoves
 
-RUNS, BATCH, FS = 2000, 250, 100.0
+RUNS, BATCH, FS = 1500, 250, 100.0
 
 
 @pytest.fixture(scope="module")
 def logs(robot):
-    """2000 motions of 17 s, each drawn anew, noise-free."""
+    """1500 motions of 17 s, each drawn anew, noise-free."""
     moves = (RandomMoves(moves=12, durations=(1.3, 1.3), rest=0.7, seed=seed) for seed in range(RUNS))
     exact = [ideal_log(robot, move.sample(robot, FS)) for move in moves]
     return np.stack([log.q for log in exact]), np.stack([log.tau for log in exact])
@@ -21,7 +21,7 @@ def logs(robot):
 @pytest.mark.parametrize("estimator", ESTIMATORS.builtin)
 @pytest.mark.parametrize("sigma", [(0.5, 0.025), (0.025, 0.5)], ids=["first", "second"])
 def test_two_corrected_sigma_hold_the_truth_in_93_to_97_percent(estimator, sigma, logs, truth):
-    """For every parameter and model; 95.4 % is right, and 2000 runs tell it to 0.5 %. The paper's sigma does not do that."""
+    """For every parameter and model; 95.4 % is right, and 1500 runs tell it to 0.5 %. The paper's sigma does not do that."""
     q, tau = logs
     noisy = tau + sigma * np.random.default_rng(11).standard_normal(tau.shape)
     models = {name: MODELS.create(name) for name in MODELS.builtin}
