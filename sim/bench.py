@@ -2,16 +2,21 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from identify.blame import expect
+from identify.errors import PluginError
 from identify.motion_log import MotionLog
 from sim.clock import Clock
-from sim.controllers import Task
-from sim.drives.base import every
+from sim.controllers.base import AbstractLaw, Task
+from sim.drives.base import AbstractAmplifier, every
+from sim.encoders.base import AbstractReader
 from sim.errors import ScenarioError
 from sim.failures import Failures
+from sim.frictions.base import AbstractContact
 from sim.history import History
 from sim.inverse_dynamics import inverse_dynamics
 from sim.measurement import CurrentSensor
@@ -22,6 +27,8 @@ from sim.run import Run
 from sim.scenario import Scenario
 from sim.trajectories import Reference
 from sim.watch import Step, Watcher
+
+T = TypeVar("T")
 
 BLOCK = 1e-3
 """Time [s] over which the motion of the rotors may be foretold, for their back-EMF and ripple: with a jerk of 1000 rad/s^3 they
@@ -47,11 +54,14 @@ class Bench:
         self._clock = clock = Clock(round(1 / fs / self._h), self._h, scenario.timing.delay)
         self._plant = Plant(robot, nsim, scenario.physics, self._h, vary, threads)
         self._plant.q[:] = planned.q[0]
-        self._law = scenario.controller.start(Task(scenario.nominal_robot, planned, nsim))
-        self._drive = scenario.drive.start(robot, nsim, self._h)
+        task = Task(scenario.nominal_robot, planned, nsim)
+        self._law = _started(scenario.controller, scenario.controller.start(task), AbstractLaw)
+        self._drive = _started(scenario.drive, scenario.drive.start(robot, nsim, self._h), AbstractAmplifier)
         self._ripple = scenario.ripple.start(robot)
-        self._friction = scenario.friction.start(self._plant.batch, self._plant.Fs, self._h)
-        self._encoder = scenario.encoder.start(n, samples, fs, _generators(seeds, 0))
+        friction, encoder = scenario.friction, scenario.encoder
+        self._friction = _started(friction, friction.start(self._plant.batch, self._plant.Fs, self._h), AbstractContact)
+        self._encoder = _started(encoder, encoder.start(n, samples, fs, _generators(seeds, 0)), AbstractReader)
+        self._each = nsim, n
         self._sensor = CurrentSensor(scenario.torque, nsim, n)
         self._jitter = self._drawn_jitter(samples)
         self._history = History(clock.late + clock.per_sample, nsim, n, self._h)
@@ -100,9 +110,11 @@ class Bench:
         self._qd, self._steps = qd.copy(), steps
         constant = 1 + self._ripple.commutation.at(mid_q)
         electric = self._drive.step(self._demand, mid_qd * constant, steps)
+        expect(self._drive, "step", electric, (1, *self._each), (steps, *self._each))
         self._sensor.take(electric, steps * self._h)
         tau = electric * constant + self._ripple.cogging.at(mid_q)
         resistance = self._friction.torque(mid_qd[0])
+        expect(self._friction, "torque", np.asarray(resistance), (), self._each)
         total = tau + resistance
         if not np.isfinite(total).all():
             self._stop_failed(step)
@@ -142,7 +154,8 @@ class Bench:
         clock, (k, after) = self._clock, self._clock.command(step)
         if after == 0 and k >= 0:
             q = self._encoder.read(k, self._history.at(step - clock.late + self._jitter[k]))
-            self._before, self._command = self._command, self._law.command(k, q)
+            expect(self._encoder, "read", q, self._each)
+            self._before, self._command = self._command, expect(self._law, "command", self._law.command(k, q), self._each)
             self._measured[k], self._commands[k] = q, self._command
             self._demand = clock.old * self._before + (1 - clock.old) * self._command
         elif after == 1:
@@ -183,6 +196,13 @@ class Bench:
             failed = list(failures.reasons)
             plant.q[failed], plant.qd[failed] = self._at_rest[failed], 0.0
             self._going = np.setdiff1d(np.arange(len(self._seeds)), failed)
+
+
+def _started(settings: object, made: T, kind: type) -> T:
+    """Return what a plug-in started; raise PluginError if that is something else."""
+    if not isinstance(made, kind):
+        raise PluginError(f"plug-in {type(settings).__name__}.start returned {made!r:.60}, expected an {kind.__name__}")
+    return made
 
 
 def _generators(seeds: Sequence[int], stream: int) -> list[np.random.Generator]:

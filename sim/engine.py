@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from identify.blame import blamed
 from sim.bench import Bench
 from sim.errors import ScenarioError
 from sim.robot import Robot
@@ -62,9 +63,11 @@ def simulate(  # noqa: PLR0913  # all but two by their names
     planned, skipped = _joined([_planned(scenario, robot, motion) for motion in motions or (None,)])
     h = scenario.drive.step_length(scenario.fs, scenario.physics.step)
     watcher = Watcher(watch, scenario.fs, h, skipped) if watch else None
-    bench = Bench(scenario, robot, planned, seeds, vary or {}, threads, watcher)
+    with blamed():
+        bench = Bench(scenario, robot, planned, seeds, vary or {}, threads, watcher)
     step, told, bearable = 0, -1, 0 if throw else len(seeds) - 1
-    with np.errstate(over="ignore", invalid="ignore"):  # of simulations that diverge: they are told, and end, alone
+    # Of simulations that diverge: they are told, and end, alone.
+    with np.errstate(over="ignore", invalid="ignore"), blamed():
         while step < bench.steps and len(bench.failures) <= bearable:
             step += bench.advance(step)
             if progress and 100 * step // bench.steps > told:

@@ -7,8 +7,8 @@ import pytest
 
 OURS = {"models", "sim", "identify", "experiments", "tests"}
 
-CONTRACT = {"identify.motion_log", "identify.plugins", "identify.kinematics"}
-"""What `sim` may know of `identify`: the contract types and the plug-in tables."""
+CONTRACT = {"identify.motion_log", "identify.plugins", "identify.kinematics", "identify.errors", "identify.blame"}
+"""What `sim` may know of `identify`: the contract types, the plug-in tables, and whose mistake it is if one goes wrong."""
 
 ALLOWED = {
     "models": set(),
