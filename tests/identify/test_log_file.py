@@ -1,3 +1,5 @@
+import sys
+
 import numpy as np
 import pyarrow as pa
 import pytest
@@ -65,3 +67,54 @@ def test_a_torque_channel_that_makes_no_sense_is_refused(tmp_path, said):
     parquet.write_table(table, tmp_path / "log.parquet")
     with pytest.raises(IdentificationError, match=r"torque|delay"):
         read_log(tmp_path / "log.parquet")
+
+
+ROWS = "0,0.1,0.2\n0.01,0.11,0.21\n0.02,0.12,0.22\n"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "t,q1,tau1\n" + ROWS,
+        "t;q1;tau1\n" + ROWS.replace(",", ";"),
+        "t;q1;tau1\n" + ROWS.replace(",", ";").replace(".", ","),
+        "t\tq1\ttau1\n" + ROWS.replace(",", "\t"),
+    ],
+    ids=["commas", "semicolons", "decimal commas", "tabs"],
+)
+def test_columns_may_be_separated_as_programs_do(tmp_path, text):
+    (tmp_path / "log.csv").write_text(text)
+    found = read_log(tmp_path / "log.csv", TorqueChannel("held"))
+    np.testing.assert_array_equal(found.q[:, 0], [0.1, 0.11, 0.12])
+    np.testing.assert_array_equal(found.tau[:, 0], [0.2, 0.21, 0.22])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (ROWS.encode(), r"has no header, .*: put a line of names before it, such as t,q1,tau1$"),
+        ("t,q1,tau1 [N·m]\n".encode("latin-1") + ROWS.encode(), "no UTF-8|invalid UTF8|must have a header"),
+        ("t,q1,tau1\n0,0.1,Müll\n".encode("latin-1"), "column tau1 holds .*, not numbers|invalid UTF8"),
+        (b"t,q1,tau1\n0,0.1,0.2\n0.01,0.1,off\n", r"column tau1 holds string, not numbers: 'off' in line 3"),
+        (b"t,q1,tau1\n0,0.1,1e300\n0.01,0.1,0.2\n", "tau is 1e.300 at some instant, where nothing beyond 1e.12 is believed"),
+    ],
+    ids=["no header", "latin-1 header", "latin-1 cell", "text", "1e300"],
+)
+def test_odd_files_are_told_in_one_line(tmp_path, text, message):
+    (tmp_path / "log.csv").write_bytes(text)
+    with pytest.raises(LogError, match=message) as told:
+        read_log(tmp_path / "log.csv", TorqueChannel("held"))
+    assert "\n" not in str(told.value)
+
+
+def test_without_pyarrow_it_says_what_is_missing(written, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(LogError, match="pip install pyarrow; or make a MotionLog of your own arrays"):
+        read_log(written[1])
+
+
+def test_masked_arrays_are_refused_where_something_is_masked():
+    q = np.ma.masked_greater(np.arange(6.0).reshape(3, 2), 4)
+    with pytest.raises(LogError, match="q is masked at 1 places"):
+        MotionLog(100, q, np.zeros((3, 2)), TorqueChannel("held"))
+    assert MotionLog(100, np.ma.array(np.zeros((3, 2))), np.zeros((3, 2)), TorqueChannel("held")).samples == 3

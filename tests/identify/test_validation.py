@@ -63,3 +63,37 @@ def test_the_end_of_a_log_is_held_out(log):
     assert first.samples + rest.samples == log.samples
     assert rest.samples == pytest.approx(0.25 * log.samples, abs=1)
     np.testing.assert_array_equal(np.concatenate([first.q, rest.q]), log.q)
+
+
+@pytest.mark.parametrize("sigma", [(0.5, 0.025), (0.05, 0.005)])
+def test_the_noise_of_a_log_is_read_off_above_its_band(log, truth, sigma):
+    """White noise of the torques, by another route: what a low-pass of unit gain and the mask leave of it, to a fifth."""
+    noise = sigma * np.random.default_rng(5).standard_normal(log.tau.shape)
+    told = validate(MotionLog(log.fs, log.q, log.tau + noise, CHANNEL), scara(), truth, idbench_chain())
+    np.testing.assert_allclose(told.noise, told.rms, rtol=0.2)  # the truth leaves nothing else
+    assert (told.excess == 0).all()
+
+
+def test_a_wrong_model_does_not_pass_for_noise(log, truth):
+    """LMX2 too small by a tenth, on the noisy log: what is beyond noise is what it is without any."""
+    wrong = truth * [1, 1, 1, 1, 0.9, 1, 1, 1]
+    noise = [0.05, 0.005] * np.random.default_rng(5).standard_normal(log.tau.shape)
+    noisy, exact = (
+        validate(MotionLog(log.fs, log.q, log.tau + x, CHANNEL), scara(), wrong, idbench_chain()) for x in (noise, 0 * noise)
+    )
+    np.testing.assert_allclose(noisy.excess, exact.rms, rtol=0.05)
+
+
+def test_sigma_of_the_parameters_is_expected_too(log, truth):
+    """A covariance of one parameter: the rms of its column times its sigma."""
+    C = np.zeros((8, 8))
+    C[4, 4] = 0.01**2
+    told = validate(log, scara(), truth, idbench_chain(), C)
+    off = validate(log, scara(), truth + 0.01 * np.eye(8)[4], idbench_chain())
+    np.testing.assert_allclose(told.open, off.rms, rtol=1e-3)
+
+
+def test_slow_sampling_leaves_the_noise_unknown(log, truth):
+    """At 12.5 Hz nothing lies above the band of 5 Hz."""
+    slow = MotionLog(12.5, log.q[::8], log.tau[::8], CHANNEL)
+    assert np.isnan(validate(slow, scara(), truth, idbench_chain()).noise).all()

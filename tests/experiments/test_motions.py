@@ -1,0 +1,78 @@
+"""Table 1 over random motions: their class, which are kept, and what is counted."""
+
+import json
+
+import numpy as np
+import pytest
+
+from experiments.cli import main
+from experiments.errors import ExperimentError
+from experiments.motions import COMPARED, Errors, Pace, Table1Motions
+from experiments.table1 import PAPER
+from identify import IirLowPass, ReversalMask
+from identify.chain import CHAINS
+
+
+@pytest.fixture(scope="module")
+def few():
+    return Table1Motions(60, seed=3, tolerance=0.6)
+
+
+def test_motions_are_of_the_papers_class(robot):
+    """40 s of fifth-order moves, each of whole samples and not shorter than the pace, inside the ranges."""
+    pace = Pace()
+    for seed in range(20):
+        plan = pace.draw(np.random.default_rng(seed), robot)
+        assert plan.durations.sum() == pytest.approx(40.0)
+        assert plan.durations.min() >= pace.shortest - 1e-9
+        np.testing.assert_allclose(plan.durations * 100, np.rint(plan.durations * 100), atol=1e-6)
+        assert pace.moves[0] <= len(plan.durations) <= pace.moves[1]
+        assert (np.abs(np.diff(plan.waypoints, axis=0)) >= pace.smallest_move).all()
+        assert (plan.waypoints >= robot.ranges[:, 0] + pace.clearance - 1e-9).all()
+        assert (plan.waypoints <= robot.ranges[:, 1] - pace.clearance + 1e-9).all()
+
+
+def test_the_masked_chain_is_the_papers_but_for_its_mask():
+    masked, paper = CHAINS.create("paper_masked"), CHAINS.create("paper")
+    assert isinstance(masked.mask, ReversalMask)
+    assert isinstance(masked.operator, IirLowPass)
+    assert {**vars(masked), "mask": paper.mask} == vars(paper)
+
+
+def test_kept_motions_have_the_papers_condition_numbers_and_reversals_make_the_friction(few):
+    for chain in COMPARED:
+        for model, column in PAPER.items():
+            share = few.errors[chain].condition[model] / column.condition_number
+            assert (np.abs(np.log(share)) <= np.log(1.6)).all()
+    friction = [few.errors[chain].percentiles("explicit", 50)[[1, 2, 6, 7]] for chain in COMPARED]
+    assert (friction[0] > 2 * friction[1]).all()
+
+
+def test_a_motion_does_not_depend_on_how_many_are_drawn(few):
+    more = Table1Motions(70, seed=3, tolerance=0.6)
+    for chain in COMPARED:
+        part = more.errors[chain].percent["power"][: few.errors[chain].kept]
+        np.testing.assert_array_equal(part, few.errors[chain].percent["power"])
+
+
+def test_the_papers_errors_count_to_the_digits_that_it_prints():
+    """0.003 may be 0.0025 to 0.0035."""
+    percent = np.tile(np.array(PAPER["explicit"].error) + 4e-4, (5, 1))
+    assert Errors(5, {}, {"explicit": percent}).explained("explicit").all()
+    assert not Errors(5, {}, {"explicit": percent + 4e-4}).explained("explicit").any()
+
+
+def test_the_command_writes_table_and_picture(tmp_path, capsys):
+    assert main(["table1", "--motions", "150", "--seed", "3", "--out", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().out
+    assert "of the paper's errors lie inside the band" in said
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert set(summary["chains"]) == set(COMPARED)
+    assert (tmp_path / "out" / "motions.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_makes_no_sense_is_told(complaint, tmp_path):
+    assert "--motions 0 must be at least 1" in complaint("table1", "--motions", "0", "--out", str(tmp_path / "out"))
+    assert "leave --scenario and --chain out" in complaint("table1", "--motions", "9", "--chain", "paper")
+    with pytest.raises(ExperimentError, match=r"none of \d motions has the paper's condition numbers"):
+        _ = Table1Motions(2, tolerance=1e-6).errors
