@@ -86,14 +86,17 @@ def _shown(found: Identified) -> tuple[Identified, list[str]]:
 
 
 def _advice(validated: Validated, asked: Identify) -> list[str]:
-    """Return what is most likely to mend a result that is not good, of models that have a verdict."""
+    """Return what is most likely to mend a result that is not good; of a delay that nobody stated, what the log says."""
     try:
-        words = {Verdict(validated, model).word for model in validated.torques}
+        good = "good" in {Verdict(validated, model).word for model in validated.torques}
     except IdentificationError:
         return []
-    if not words or "good" in words or is_long(validated.found.logs[0]):
+    if is_long(validated.found.logs[0]):
         return []
-    return Remedies(validated, asked.torque_delay == "estimate").found()
+    remedies, log = Remedies(validated), validated.found.logs[0]
+    assumed = asked.torque_delay is None and not log.torque.delay
+    delay = list(remedies.delay()) if assumed or (not good and asked.torque_delay != "estimate") else []
+    return delay + ([] if good else list(remedies.options()))
 
 
 def _add_layer(page: Console, folder: Path, found: Identified, watching: Watching, audience: Audience | None) -> None:

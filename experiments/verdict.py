@@ -107,20 +107,14 @@ class Remedies:
     ----------
     validated : Validated
         The identification and its validation.
-    delay_given : bool
-        Whether the delay was estimated from the log already.
     """
 
     validated: Validated
-    delay_given: bool = False
 
-    def found(self) -> list[str]:
-        """Return what helps, by how much."""
-        return [*self._delay(), *self._options()]
-
-    def _delay(self) -> Iterator[str]:
+    def delay(self) -> Iterator[str]:
+        """Yield the torque delay that the log itself says, where it is another than the one that is taken."""
         found, stated = self.validated.found, self.validated.found.logs[0].torque.delay
-        if self.delay_given or wrong_sign(found):
+        if wrong_sign(found):
             return
         try:
             told = estimate_delay(list(found.logs), found.basis, found.processing)
@@ -132,7 +126,8 @@ class Remedies:
                 f"{1e3 * stated:.3g} ms is taken: --torque-delay estimate"
             )
 
-    def _options(self) -> Iterator[str]:
+    def options(self) -> Iterator[str]:
+        """Yield options with which the error falls, and how far."""
         subject = self.validated.found.subject
         options = {}
         if not all(joint.armature for joint in subject.tree.joints):

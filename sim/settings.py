@@ -87,6 +87,8 @@ def complaints(error: ValidationError, cls: type, where: str = "") -> list[str]:
 
 def _complaint(detail: Any, cls: type, where: str) -> str:
     kind, location = detail["type"], list(detail["loc"])
+    if not where and location and isinstance(location[0], int):  # an argument by its place: its name says more
+        location[0] = [*fields_of(cls), *map(str, range(location[0] + 1))][location[0]]
     owner = _owner(cls, [part for part in location[:-1] if isinstance(part, str)])
     key = ".".join(filter(None, [where, _written(location)]))
     told = description(owner, next((part for part in reversed(location) if isinstance(part, str)), ""))

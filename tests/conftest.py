@@ -34,8 +34,9 @@ if (worker := os.environ.get("PYTEST_XDIST_WORKER")) and hasattr(os, "sched_seta
 import numpy as np
 import pytest
 
-from experiments.table1 import SCENARIO, Table1
+from experiments.table1 import CHAINS_COMPARED, SCENARIO, Table1
 from identify import MotionLog
+from sim.ideal import ideal_log
 from sim.robot import Robot
 from sim.scenario_file import load
 
@@ -60,12 +61,13 @@ def robot() -> Robot:
 
 @pytest.fixture(scope="session")
 def table1() -> Table1:
-    return Table1(load(SCENARIO), ("paper", "idbench"))
+    return Table1(load(SCENARIO), CHAINS_COMPARED)
 
 
 @pytest.fixture(scope="session")
-def log(table1: Table1) -> MotionLog:
-    return table1.log
+def log(robot: Robot) -> MotionLog:
+    """Ideal data of a motion at which every instant of some rows is masked, and torques are large."""
+    return ideal_log(robot, load("brisk").trajectory.sample(robot, 100.0))
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,7 @@
 """What a study varies."""
 
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import Any, Literal, final
 
 import numpy as np
@@ -59,7 +60,7 @@ class Axis:
         if len(kinds) > 1:
             raise ValueError(f"axis {self.field}: also = {list(self.also)} mixes settings of simulation and identification")
 
-    @property
+    @cached_property
     def points(self) -> tuple[Any, ...]:
         """The values, those inside a range to six digits."""
         if self.values:
@@ -68,7 +69,7 @@ class Axis:
         space = np.geomspace if self.spacing == "log" else np.linspace
         return (low, *(float(f"{x:.6g}") for x in space(low, high, self.count or 0)[1:-1]), high)
 
-    @property
+    @cached_property
     def numeric(self) -> bool:
         """Whether all values are numbers."""
         return all(isinstance(v, (int, float)) and not isinstance(v, bool) and v == v for v in self.points)  # noqa: PLR0124

@@ -21,6 +21,9 @@ from sim.scenario_file import from_dict
 from sim.settings import Seed, Whole, settings
 from sim.trajectories import RandomMoves
 
+MOST_POINTS = 1_000_000
+"""Combinations of settings of simulation, above which axes are taken for a slip: each is looked at before the first is run."""
+
 MOST_METHODS = 1000
 """Identifications of every run, above which axes are taken for a slip."""
 
@@ -75,6 +78,9 @@ class Study:
         methods = prod(len(axis.points) for axis in self.axes if axis.identification)
         if methods > MOST_METHODS:
             raise StudyError(f"{methods:,} combinations of identification settings are more than {MOST_METHODS:,}")
+        points = prod(len(axis.points) for axis in self.axes if not axis.identification)
+        if points > MOST_POINTS:
+            raise StudyError(f"the grid has {points:,} combinations, more than {MOST_POINTS:,}: give its axes fewer values")
         _ = self.methods, self.created_models
         self._require(next(self._points()))  # the whole grid is looked at when it is known not to be endless
 

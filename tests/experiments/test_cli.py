@@ -23,7 +23,7 @@ def test_table1_prints_and_writes_everything(out, capsys):
         "all three",
     ):
         assert text in printed
-    recording = ["recording.idbench-OLS.rrd", "recording.paper-OLS.rrd", "recording.rrd"]
+    recording = [f"recording.{name}-OLS.rrd" for name in ("idbench", "paper", "paper_masked")] + ["recording.rrd"]
     assert sorted(path.name for path in out.iterdir()) == ["log.parquet", *recording, "summary.json"]
     summary = json.loads((out / "summary.json").read_text())
     assert (summary["experiment"], summary["seed"], summary["chain"]) == ("table1", 0, "idbench")

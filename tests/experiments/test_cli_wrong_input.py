@@ -12,7 +12,7 @@ from sim.scenario_file import load, to_dict
 
 def test_an_unknown_chain_lists_the_known_and_leaves_nothing(out, complaint):
     line = complaint("table1", "--out", str(out), "--chain", "papre")
-    assert "no 'papre' among the chains (did you mean 'paper'?); known: paper, idbench" in line
+    assert "no 'papre' among the chains (did you mean 'paper'?); known: paper, paper_masked, idbench" in line
     assert not out.exists()
     assert not list(out.parent.iterdir())
 
@@ -49,7 +49,7 @@ def test_more_wrong_input_is_one_line(args, message, tmp_path, monkeypatch, comp
             {"waypoints": [[0.0, 0.0], [4.0, 1.0]], "durations": [1.0]},
             "joint1 would move from 0 to 4 rad, its range is -2.4 to 2.4",
         ),
-        ({"durations": [1.0]}, "31 waypoints need 30 durations, not 1"),
+        ({"durations": [1.0]}, "23 waypoints need 22 durations, not 1"),
         ({"fs": 1e9}, "fs = 1e+09 Hz makes 4.6e+10 samples of this motion; 1 to 1e+08 are allowed"),
         ({"rest": 1.0}, "rest = 1 s is shorter than the 2.81 s that chain paper looks: raise it"),
         ({"robot": "scora"}, "no robot 'scora'; known: panda, puma560, scara"),

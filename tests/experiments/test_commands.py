@@ -23,7 +23,7 @@ def shortened(name, tmp_path):
     """Write a scenario that ships to a file, on a motion of five seconds; a payload needs no other robot."""
     path = tmp_path / f"{name}.toml"
     moves = SHORT if load(name).robot == "scara" else replace(SHORT, velocity=(2.0,), durations=(0.8, 1.6), moves=12)
-    path.write_text(to_toml(replace(load(name), trajectory=moves)))
+    path.write_text(to_toml(replace(load(name), trajectory=moves, fs=min(load(name).fs, 250.0))))
     return path
 
 

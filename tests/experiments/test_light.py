@@ -5,7 +5,9 @@ import pytest
 HEAVY = {"numpy", "scipy", "mujoco", "pydantic", "pyarrow", "rerun", "matplotlib", "identify", "sim"}
 
 
-@pytest.mark.parametrize("words", [["--help"], ["identify", "--help"], ["tabel1"], ["run", "--sed", "3"], ["--version"]], ids=" ".join)
+@pytest.mark.parametrize(
+    "words", [["--help"], ["identify", "--help"], ["tabel1"], ["run", "--sed", "3"], ["--version"]], ids=" ".join
+)
 def test_help_and_wrong_words_load_nothing_heavy(start, words):
     code = "import sys; from experiments.cli import main\n"
     code += f"try: main({words})\nexcept SystemExit: pass\n"

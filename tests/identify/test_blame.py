@@ -49,8 +49,12 @@ class Solver(AbstractEstimator):
         (lambda qd: None, PluginError, r"Law\.force returned None, expected an array of numbers, shape \(2, 4600\)"),
         (lambda qd: qd[0], PluginError, r"Law\.force returned an array of float64, shape \(4600,\), expected"),
         (lambda qd: qd * np.nan, SettingError, "friction law Law gives nan at q = .*, qd = .*: let it be finite"),
-        (lambda qd: np.divide(1.0, qd, where=qd != 0, out=np.full(qd.shape, np.inf)), SettingError, "gives inf at .* also at rest"),
-        (lambda qd: qd.nothing, PluginError, r"plug-in <lambda> raised AttributeError: .* \(.*test_blame\.py, line \d+\)"),
+        (
+            lambda qd: np.divide(1.0, qd, where=qd != 0, out=np.full(qd.shape, np.inf)),
+            SettingError,
+            "gives inf at .* also at rest",
+        ),
+        (lambda qd: qd.nothing, PluginError, r"plug-in force raised AttributeError: .* \(.*test_blame\.py, line \d+\)"),
     ],
     ids=["None", "shape", "nan", "inf", "raises"],
 )

@@ -23,8 +23,8 @@ def untold(run):
     return MotionLog(log.fs, log.q, log.tau, TorqueChannel("held"))
 
 
-@pytest.mark.parametrize("delay", [0.0, 0.0017, 0.005, 0.0083, 0.012, 0.015])
-@pytest.mark.parametrize("seed", [None, 1, 2])
+@pytest.mark.parametrize("delay", [0.0, 0.0017, 0.0083, 0.015])
+@pytest.mark.parametrize("seed", [None, 1])
 def test_a_known_delay_is_found_with_16_bits(delay, seed):
     """Within 0.05 ms, a quarter of what is asked for, and within five of its own sigma."""
     scenario = load("ideal")

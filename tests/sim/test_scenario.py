@@ -80,7 +80,7 @@ def test_every_setting_is_described():
         ({"trajectory": {"kind": "random", "durations": [2.0, 1.0]}}, "the shortest is above the longest"),
         ({"trajectory": "tabel1"}, r"no scenario 'tabel1' \(did you mean 'table1'\?\)"),
         ({"name": "../x"}, r"name = '../x': must|name = '../x': String should match"),
-        ({"trajectory": "ideal"}, "that scenario has none of its own; name 'table1'"),
+        ({"trajectory": "ideal"}, "that scenario has none of its own; name 'brisk'"),
         ({"drive": {"kind": ["a"]}}, r"drive.kind = \['a'\] is unknown"),
         ({"ripple": {"cogging_harmonics": []}}, "ripple.cogging_harmonics"),
         ({"ripple": {"cogging_harmonics": [1.0, 2.0]}}, "cogging_harmonics say nothing without cogging"),

@@ -26,7 +26,7 @@ def test_signals_and_times_are_exact(folder, reading, path, table1):
     np.testing.assert_array_equal(values, expected)
 
 
-@pytest.mark.parametrize("chain", ["paper", "idbench"])
+@pytest.mark.parametrize("chain", ["paper", "paper_masked", "idbench"])
 def test_every_chain_is_a_layer_with_the_estimates_of_the_table(folder, reading, chain, table1):
     file, at = folder / f"recording.{chain}-OLS.rrd", f"identify/{chain}-OLS"
     for form in ("explicit", "implicit", "power"):
@@ -40,7 +40,8 @@ def test_every_chain_is_a_layer_with_the_estimates_of_the_table(folder, reading,
 
 def test_layers_belong_to_the_base(folder):
     files = sorted(folder.iterdir())
-    assert [path.name for path in files] == ["recording.idbench-OLS.rrd", "recording.paper-OLS.rrd", "recording.rrd"]
+    chains = [f"recording.{name}-OLS.rrd" for name in ("idbench", "paper", "paper_masked")]
+    assert [path.name for path in files] == [*chains, "recording.rrd"]
     assert len({RrdReader(path).recordings()[0].recording_id for path in files}) == 1
 
 
