@@ -92,14 +92,15 @@ def print_validated(console: Console, validated: Validated) -> None:
             raise
         console.print(Text(f"not validated on {validated.title}: {error}\n"), soft_wrap=True)
         return
-    heads = [f"{model}\n{what}" for model in torques for what in ("rms", "%", "noise %", "R2", "q rms")]
-    grid = new_table("", heads)
+    heads = [f"{model}\n{what}" for model in torques for what in ("rms", "%", "R2", "q rms")]
+    grid, first = new_table("", ["noise of\nthe log %", *heads]), next(iter(torques.values()))
     for j, joint in enumerate(validated.found.subject.robot.joints):
-        grid.add_row(joint, *(cell for model in torques for cell in _validation_cells(validated, model, j)))
+        noise = _percentage(first.percent_of_level(first.noise)[j])
+        grid.add_row(joint, noise, *(cell for model in torques for cell in _validation_cells(validated, model, j)))
     print_titled(
         console, f"{validated.title}: torque error while moving [N m, N], position error of the simulated robot [rad, m]", grid
     )
-    still = next(iter(torques.values())).standing
+    still = first.standing
     joints = validated.found.subject.robot.joints
     apart = [f"{joint} {rms:.2g}" for joint, rms in zip(joints, still, strict=True) if isfinite(rms)]
     if apart:
@@ -112,14 +113,10 @@ def print_validated(console: Console, validated: Validated) -> None:
     console.print()
 
 
-def _validation_cells(validated: Validated, model: str, j: int) -> tuple[str, str, str, str, str]:
+def _validation_cells(validated: Validated, model: str, j: int) -> tuple[str, str, str, str]:
     told, off = validated.torques[model], validated.position_error(model)
-    noise = told.percent_of_level(told.noise)[j]
-    error, hidden = (
-        f"{x:.2g}" if x < WORTHLESS else f">{WORTHLESS:g}" if isfinite(x) else "" for x in (told.percent[j], noise)
-    )
     R2 = f"{told.R2[j]:.5f}" if told.R2[j] > -WORTHLESS else f"<-{WORTHLESS:g}"
-    return f"{told.rms[j]:.2g}", error, hidden, R2, "" if off is None else f"{off[j]:.1e}"
+    return f"{told.rms[j]:.2g}", _percentage(told.percent[j]), R2, "" if off is None else f"{off[j]:.1e}"
 
 
 def _percentage(x: float) -> str:

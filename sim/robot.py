@@ -1,5 +1,6 @@
 """A robot: a compiled MuJoCo model of one arm and what the bench asks of it."""
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -60,7 +61,9 @@ class Robot:
         try:
             for edit in edits:
                 edit(spec)
-            robot = cls(Path(name).stem, spec.compile())
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # what it warns of ends a simulation, by name
+                robot = cls(Path(name).stem, spec.compile())
             robot.require_resisting()
             return robot
         except BenchError:

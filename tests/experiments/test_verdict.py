@@ -1,0 +1,115 @@
+"""Verdicts on right and wrong models: they compare with the noise of the log, torque first, and name the likely cause."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.cli.options import Parameters
+from experiments.doubts import doubts_of_result
+from experiments.identified import Identified
+from experiments.subject import Subject
+from experiments.validation import Validated
+from experiments.verdict import Remedies, Verdict
+from identify import MotionLog
+from identify.log_file import read_log
+
+PUMA = "puma560"
+
+
+def level(log):
+    return np.sqrt(np.mean(log.tau**2, axis=0))
+
+
+def late(log, ms):
+    return MotionLog(log.fs, log.q, log.tau, replace(log.torque, delay=log.torque.delay + 1e-3 * ms))
+
+
+def torques(log, change):
+    return MotionLog(log.fs, log.q, change(log.tau), log.torque)
+
+
+@pytest.fixture
+def pair(logs):
+    return [read_log(logs / f"{name}.parquet") for name in ("first", "second")]
+
+
+def validated(pair, asked=Parameters(), models=("explicit",)):  # noqa: B008  # frozen
+    first, second = pair
+    return Validated(Identified((first,), Subject(PUMA, asked), models=models), second, "second")
+
+
+def without(letters):
+    names = Subject(PUMA).basis.parameters
+    return Parameters(without=tuple(name for name in names if name.startswith(letters)))
+
+
+def test_the_right_model_is_good_and_noise_explains_all_of_it(pair):
+    verdict = Verdict(validated(pair), "explicit")
+    assert verdict.word == "good"
+    assert (verdict.told.excess == 0).all()
+
+
+def test_noise_of_the_log_is_no_fault_of_the_model(pair):
+    """White noise of a tenth of each torque: 2 % of it passes the filter."""
+    rng = np.random.default_rng(1)
+    noisy = [torques(log, lambda tau: tau + 0.1 * level(log) * rng.standard_normal(tau.shape)) for log in pair]  # noqa: B023
+    verdict = Verdict(validated(noisy), "explicit")
+    assert verdict.told.percent.max() > 1
+    assert verdict.word == "good"
+    assert any("noise and sigma explain all of it" in reason for reason in verdict.reasons)
+
+
+@pytest.mark.parametrize("letters", ["F", "Ia"])
+def test_models_without_friction_or_rotors_are_poor(pair, letters):
+    verdict = Verdict(validated(pair, without(letters)), "explicit")
+    assert verdict.word == "poor"
+    assert verdict.told.percent_of_level(verdict.told.excess).max() > 10
+
+
+def test_a_joint_of_the_wrong_sign_is_poor_by_its_torque(pair):
+    wrong = [torques(log, lambda tau: tau * [1, -1, 1, 1, 1, 1]) for log in pair]
+    verdict = Verdict(validated(wrong), "explicit")
+    assert verdict.word == "poor"
+    assert "joint2" in " ".join(verdict.reasons)
+
+
+def test_noise_that_could_hide_a_wrong_model_leaves_it_unsure(pair):
+    rng = np.random.default_rng(1)
+    loud = [torques(log, lambda tau: tau + 2 * level(log) * rng.standard_normal(tau.shape)) for log in pair]  # noqa: B023
+    verdict = Verdict(validated(loud), "explicit")
+    assert verdict.word == "unsure"
+    assert "a wrong model could hide" in " ".join(verdict.reasons)
+
+
+def test_a_wrong_delay_is_named_by_the_log_itself(pair):
+    """8 ms too late: small in the torque, not in friction."""
+    (told,) = Remedies(validated([late(log, 8) for log in pair])).delay()
+    assert "where 8.66 ms is taken: --torque-delay estimate" in told
+    assert "the log says a torque delay of 0.6" in told
+    assert not list(Remedies(validated(pair)).delay())
+
+
+def test_options_are_advised_that_help_and_by_how_much(pair):
+    moved = [torques(log, lambda tau: tau + 0.2 * level(pair[0])) for log in pair]
+    told = list(Remedies(validated(moved)).options())
+    assert [text.split()[1:3] for text in told] == [["--add", "offset"]]
+    assert not list(Remedies(validated(pair)).options())
+
+
+def test_a_starved_power_model_is_told_to_be_so_and_the_explicit_one_recommended(pair):
+    """A third of a log: hardly more rows than parameters in the power model; the explicit one has six times as many."""
+    part = pair[0].part(0, int(0.4 * pair[0].samples))
+    found = Identified((part,), Subject(PUMA), models=("explicit", "power"))
+    rows, p = int(found.estimates["power"].rows), len(found.basis.parameters)
+    assert p < rows < 4 * p
+    told = [doubt for doubt in doubts_of_result(found) if "tells too little" in doubt]
+    assert any(f"the power model tells too little: {rows} rows for {p} parameters" in doubt for doubt in told)
+    assert not any("units" in doubt for doubt in doubts_of_result(found))
+
+
+def test_torques_in_other_units_are_pointed_out(pair):
+    milli = [torques(log, lambda tau: 1000 * tau) for log in pair]
+    told = doubts_of_result(validated(milli).found)
+    assert any("are they in N m?" in doubt for doubt in told)
+    assert not any("are they in N m?" in doubt for doubt in doubts_of_result(validated(pair).found))
