@@ -1,4 +1,4 @@
-"""How well parameters foretell the torques of a motion that they were not fitted to."""
+"""How well parameters predict the torques of a motion that they were not fitted to."""
 
 from dataclasses import dataclass, replace
 from math import sqrt
@@ -39,16 +39,16 @@ HELD_OUT = 0.25
 @final
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """Torques measured and foretold at the rows of a chain, joint by joint; all arrays have the shape (joint,).
+    """Torques measured and predicted at the rows of a chain, joint by joint; all arrays have the shape (joint,).
 
     Parameters
     ----------
     rms : Array
-        Of measured - foretold torque while the joint moves [N m].
+        Of measured - predicted torque while the joint moves [N m].
     level : Array
         Rms of the measured torque there [N m].
     R2 : Array
-        Share of the measured torque's variance that is foretold there.
+        Share of the measured torque's variance that is predicted there.
     standing : Array
         Rms of the error where the joint stands or turns [N m], where friction is not determined; NaN if it never does.
     correlation : Array

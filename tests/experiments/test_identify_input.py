@@ -68,11 +68,11 @@ def test_names_in_another_case_are_guessed(told, logs):
 
 
 def test_one_models_failure_takes_nothing_from_the_others(told, logs, tmp_path):
-    """A fifth of the log leaves the power model fewer rows than parameters; the explicit one has six times as many."""
+    """A seventh of the log leaves the power model fewer rows than parameters; the explicit one has six times as many."""
     from identify.log_file import write_log
 
     log = read_log(logs / "first.parquet")
-    write_log(log.part(0, int(0.2 * log.samples)), tmp_path / "short.parquet")
+    write_log(log.part(0, int(0.14 * log.samples)), tmp_path / "short.parquet")
     code, out, err = told("identify", "short.parquet", "--robot", "puma560", "--out", "found", "--no-rerun")
     assert code == 0, err
     assert "power: no estimate: " in out
