@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.text import Text
 
 from experiments.audience import Audience, Watching
-from experiments.cli.commands import Identify
+from experiments.cli.logs import Identify
 from experiments.doubts import doubts_of_result, doubts_of_robot, helpful_moves
 from experiments.errors import ExperimentError, ResultsError
 from experiments.identified import Identified

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.cli.commands import Export, Resample
+from experiments.cli.logs import Export, Resample
 from experiments.errors import ExperimentError, ResultsError
 from experiments.page import new_page, show
 from experiments.reading import channel_of, told_by

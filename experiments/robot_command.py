@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.text import Text
 
 from experiments.budget import Budget
-from experiments.cli.commands import DescribeRobot
+from experiments.cli.logs import DescribeRobot
 from experiments.doubts import doubts_of_robot
 from experiments.page import new_page, show
 from experiments.subject import Subject, absolute

@@ -8,8 +8,8 @@ from rich.console import Console
 from rich.text import Text
 
 from experiments.audience import Audience, Watching
-from experiments.cli.commands import Run
-from experiments.cli.commands import Table2 as Repeated
+from experiments.cli.bench import Run
+from experiments.cli.paper import Table2 as Repeated
 from experiments.doubts import doubts_of_robot
 from experiments.errors import ExperimentError
 from experiments.page import new_page, shown

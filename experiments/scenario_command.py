@@ -1,6 +1,6 @@
 """The command that writes scenarios."""
 
-from experiments.cli.commands import WriteScenario
+from experiments.cli.bench import WriteScenario
 from experiments.errors import ExperimentError
 from experiments.page import new_page, show
 from experiments.results import write_whole

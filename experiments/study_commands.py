@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from experiments.audience import Audience
-from experiments.cli.commands import Study
+from experiments.cli.bench import Study
 from experiments.errors import StudyError
 from experiments.page import new_page, show, shown
 from experiments.study.engine import local_pool, run_missing

@@ -4,8 +4,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from experiments.cli.commands import Search as Searched
-from experiments.cli.commands import Table1 as Compared
+from experiments.cli.paper import Search as Searched
+from experiments.cli.paper import Table1 as Compared
 from experiments.errors import ExperimentError
 from experiments.motions import Table1Motions
 from experiments.motions_report import picture, print_motions

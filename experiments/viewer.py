@@ -4,7 +4,7 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from experiments.cli.commands import View
+from experiments.cli.looking import View
 from experiments.errors import ExperimentError, ResultsError
 from experiments.page import new_page, show
 from experiments.recording.folder import BASE, files, merge

@@ -12,9 +12,9 @@ from experiments.interruption import importing
 def main(args: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit code: 0, 2 for wrong input, 130 when interrupted."""
     with importing():
+        from experiments.cli import bench, logs, looking, paper  # noqa: F401  # all register their commands
         from experiments.cli.app import run
-        from experiments.cli.commands import APP
-    return run(APP, args)
+    return run(args)
 
 
 def entry() -> NoReturn:

@@ -11,6 +11,9 @@ from experiments.interruption import INTERRUPTED, importing, terminating
 
 DESCRIPTION = "A MuJoCo testbench for the dynamic identification of robots."
 
+APP = SubcommandApp()
+"""What the commands register with."""
+
 ENVIRONMENT = {
     "MUJOCO_GL": "disable",  # nothing is drawn by MuJoCo, and what would draw takes a tenth of a second to load
     "OPENBLAS_NUM_THREADS": "1",  # matrices are small here: threads of BLAS wait for each other longer than they work
@@ -22,7 +25,7 @@ for name, value in ENVIRONMENT.items():
     os.environ.setdefault(name, value)
 
 
-def run(app: SubcommandApp, args: Sequence[str] | None = None) -> int:
+def run(args: Sequence[str] | None = None) -> int:
     """Run a command; return its exit code: 0, 2 for wrong input, 130 when interrupted."""
     words = sys.argv[1:] if args is None else list(args)
     try:
@@ -31,7 +34,7 @@ def run(app: SubcommandApp, args: Sequence[str] | None = None) -> int:
                 _print_version()
             else:
                 with importing():
-                    command = app.cli(prog="idbench", description=DESCRIPTION, args=words)
+                    command = APP.cli(prog="idbench", description=DESCRIPTION, args=words)
                 command()
     except KeyboardInterrupt:
         return _complain("interrupted", INTERRUPTED)

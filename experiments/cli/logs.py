@@ -1,0 +1,122 @@
+"""Commands about logs and robots: their options, and the functions that do the work."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import final
+
+import tyro
+
+from experiments.audience import Watching
+from experiments.cli.app import APP
+from experiments.cli.options import Asked, Delay, File, Folder, Parameters, Robot, Torque, Watched
+from experiments.interruption import importing
+
+
+@APP.command(name="identify")
+@final
+@dataclass(frozen=True)
+class Identify:
+    """Identify a log: CSV or Parquet with the columns t, q1, q2, ..., tau1, tau2, ... in SI units."""
+
+    log: tyro.conf.Positional[Path]
+    """The file; its times uniform to 1 %. Or the folder of a run, whose recording gets a layer of this identification."""
+    robot: Robot = None
+    """Name of a robot that ships, or a file that describes it (MJCF or URDF); scara, or that of the run, by default."""
+    torque: Torque = None
+    """What a torque sample means: held from its sample on for a period (a controller's command), the torque at an instant
+    (a measurement), or the mean over a period. Asked for unless the file says it."""
+    torque_delay: Delay = None
+    """From a sample to the instant it speaks for, in seconds, or `estimate` to find it from the log."""
+    unwrap: bool = False
+    """Take jumps of a hinge by about a turn for a change of the turn that is counted, and undo them."""
+    chain: str = "idbench"
+    """Signal processing."""
+    model: str = "all"
+    """all, explicit, implicit or power."""
+    estimator: str = "WLS"
+    """OLS, WLS, ..."""
+    validate: File = None
+    """A second log, on which the result is judged; without it the last quarter of the first, by a fit of the rest."""
+    write_mjcf: File = None
+    """File to write: the robot's own with the inertias, armatures and frictions that were found, made physically consistent
+    (extra `consistent`); those of the first model."""
+    out: Folder = None
+    """Folder for summary.json, recording.rrd and log.parquet."""
+    force: bool = False
+    """Replace results of another experiment in the folder."""
+    label: str = ""
+    """What to call this identification in a recording; by default chain and estimator. One of that name is replaced."""
+    parameters: Asked = Parameters()  # noqa: RUF009  # frozen
+    """Which parameters are asked for."""
+    watching: Watched = Watching()  # noqa: RUF009  # frozen
+    """How it is watched."""
+
+    def __call__(self) -> None:
+        """Run it."""
+        with importing():
+            from experiments.identify_command import identify
+        identify(self)
+
+
+@APP.command(name="robot")
+@final
+@dataclass(frozen=True)
+class DescribeRobot:
+    """Tell what can be identified of a robot: its joints, its base parameters, what its torques are made of."""
+
+    name: tyro.conf.Positional[str]
+    """Name of a robot that ships, or a file that describes it (MJCF or URDF)."""
+    parameters: Asked = Parameters()  # noqa: RUF009  # frozen
+    """Which parameters are asked for."""
+
+    def __call__(self) -> None:
+        """Run it."""
+        with importing():
+            from experiments.robot_command import describe
+        describe(self)
+
+
+@APP.command(name="resample")
+@final
+@dataclass(frozen=True)
+class Resample:
+    """Write a log anew at a fixed sampling frequency."""
+
+    log: tyro.conf.Positional[Path]
+    """The file, CSV or Parquet, its times in any steps."""
+    fs: float
+    """Sampling frequency [Hz]."""
+    out: Path
+    """File to write, CSV or Parquet."""
+    torque: Torque = None
+    """What a torque sample means; asked for unless the file says it. A held torque comes out averaged."""
+    torque_delay: Delay = None
+    """From a sample to the instant it speaks for, in seconds."""
+    force: bool = False
+    """Replace a file that is there already."""
+
+    def __call__(self) -> None:
+        """Run it."""
+        with importing():
+            from experiments.log_commands import resample
+        resample(self)
+
+
+@APP.command(name="export")
+@final
+@dataclass(frozen=True)
+class Export:
+    """Write the logs of a results folder as CSV."""
+
+    folder: tyro.conf.Positional[Path]
+    """Results folder, such as runs/table2."""
+    out: Folder = None
+    """Folder to write to; the results folder itself by default."""
+    force: bool = False
+    """Replace files with other contents."""
+
+    def __call__(self) -> None:
+        """Run it."""
+        with importing():
+            from experiments.log_commands import export
+        export(self)
