@@ -85,10 +85,12 @@ def estimate_delay(
 
 class _Search:
     def __init__(self, logs: list[MotionLog], basis: Basis, chain: Chain, within: tuple[float, float]) -> None:
-        self._logs, self._basis, self._within = logs, basis, within
+        self._logs, self._within = logs, within
         halos = [chain.halo(log.fs, replace(log.torque, delay=delay)) for log in logs for delay in within]
         # The same rows at all delays, or their misfits could not be compared.
         self._chain = replace(chain, trim=max(*halos, chain.trim or 0.0))
+        self._rows = self._built(within[0], basis)
+        self._fewest = basis.renamed({basis.parameters[0]: basis.parameters[0]})
 
     def run(self) -> DelayEstimate:
         low, high = self._within
@@ -106,8 +108,12 @@ class _Search:
         return DelayEstimate(float(found.x), self._sigma(float(found.x)))
 
     def _system(self, delay: float) -> System:
+        """Return the rows at a delay, of which Y alone depends on it."""
+        return replace(self._rows, Y=self._built(delay, self._fewest).Y)
+
+    def _built(self, delay: float, basis: Basis) -> System:
         told = [MotionLog(log.fs, log.q, log.tau, replace(log.torque, delay=delay)) for log in self._logs]
-        return self._chain.build(told, self._basis, ExplicitModel())
+        return self._chain.build(told, basis, ExplicitModel())
 
     def _misfit(self, delay: float) -> float:
         system = self._system(delay)

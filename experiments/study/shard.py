@@ -10,7 +10,7 @@ import numpy as np
 
 from experiments.study.method import Method
 from experiments.study.study import Study
-from identify import Estimate, IdentificationError, Status, identify_each
+from identify import Estimate, IdentificationError, Status, attempt_each
 from sim.engine import Progress, simulate
 from sim.errors import BenchError
 from sim.run import Run
@@ -96,20 +96,29 @@ def _identify(
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for every run and model."""
     basis = study.subject.basis
+    found: dict[str, Estimate | IdentificationError]
     try:
-        found = identify_each(simulated.log, basis, study.created_models, method.chain, method.estimator, throw=False)
+        found = attempt_each(simulated.log, basis, study.created_models, method.chain, method.estimator, throw=False)
     except IdentificationError as error:
-        found, reason = {}, str(error)
+        found = dict.fromkeys(study.models, error)
     for model in study.models:
-        columns = _columns(found[model], truth) if found else {}
+        outcome = found[model]
+        columns = _columns(outcome, truth) if isinstance(outcome, Estimate) else {}
         for i, run in enumerate(runs):
             common = _common(study, method, run, model, simulated.seeds[i])
-            if i in simulated.failures or not found:
-                yield common | {"failure": simulated.failures.get(i) or reason}
-            elif found[model].system.status[i] != Status.OK:
-                yield common | {"failure": found[model].system.explain((i,))}
+            if reason := simulated.failures.get(i) or _failure(outcome, i):
+                yield common | {"failure": reason}
             else:
                 yield common | {name: values[i] for name, values in columns.items()}
+
+
+def _failure(outcome: Estimate | IdentificationError, i: int) -> str:
+    """Return why a run has no estimate; empty if it has one."""
+    if isinstance(outcome, IdentificationError):
+        return str(outcome)
+    if outcome.system.status[i] != Status.OK:
+        return outcome.system.explain((i,))
+    return "" if np.isfinite(outcome.X[i]).all() else "the estimator finds no finite value"
 
 
 def _columns(estimate: Estimate, truth: Mapping[str, float]) -> dict[str, list[Any]]:

@@ -16,7 +16,7 @@ from sim.drives import AveragedDrive
 from sim.scenario_file import from_dict, load, names, to_dict, to_toml
 from sim.trajectories import Quintic, RandomMoves
 
-SHORT = RandomMoves(moves=4, rest=0.6)
+SHORT = RandomMoves(moves=3, rest=0.6)
 
 
 def shortened(name, tmp_path):

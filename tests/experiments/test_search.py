@@ -22,9 +22,9 @@ def test_the_scenario_that_ships_is_what_its_command_finds(robot):
     np.testing.assert_allclose(found.trajectory.durations, shipped.trajectory.durations, atol=1e-9)
 
 
-@pytest.mark.parametrize("seed", [11, 12, 13, 14, 15])
+@pytest.mark.parametrize("seed", [11, 12, 13])
 def test_other_trajectories_of_the_search_are_identified_as_well(seed, robot, truth):
-    """Five seeds that nothing was chosen by: cond within 10 % of the paper's, all 24 errors within 0.01 %."""
+    """Three seeds that nothing was chosen by: cond within 10 % of the paper's, all 24 errors within 0.01 %."""
     scenario = Search(seed=seed).run(robot)
     estimates = Table1(scenario, ("idbench",)).estimates["idbench"]
     for form, cond, rows in (("explicit", 28, 800), ("implicit", 28, 800), ("power", 93, 400)):

@@ -5,7 +5,7 @@ import pytest
 
 from identify import ESTIMATORS, MODELS, MotionLog, TorqueChannel, identify_each, scara
 from sim.ideal import ideal_log
-from sim.trajectories import RandomMoves
+from sim.trajectories import RandomMoves, Reference
 
 RUNS, BATCH, FS = 1500, 250, 100.0
 
@@ -14,8 +14,10 @@ RUNS, BATCH, FS = 1500, 250, 100.0
 def logs(robot):
     """1500 motions of 17 s, each drawn anew, noise-free."""
     moves = (RandomMoves(moves=12, durations=(1.3, 1.3), rest=0.7, seed=seed) for seed in range(RUNS))
-    exact = [ideal_log(robot, move.sample(robot, FS)) for move in moves]
-    return np.stack([log.q for log in exact]), np.stack([log.tau for log in exact])
+    plans = [move.sample(robot, FS) for move in moves]
+    q, qd, qdd = (np.concatenate([getattr(plan, x) for plan in plans]) for x in ("q", "qd", "qdd"))
+    tau = ideal_log(robot, Reference(FS, q, qd, qdd)).tau
+    return q.reshape(RUNS, -1, 2), tau.reshape(RUNS, -1, 2)
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS.builtin)

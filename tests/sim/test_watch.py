@@ -7,7 +7,7 @@ from sim.engine import simulate
 from sim.scenario_file import from_dict
 from sim.watch import Watch
 
-MOTION = {"kind": "random", "moves": 2, "rest": 0.3}
+MOTION = {"kind": "random", "moves": 1, "rest": 0.3}
 
 
 def scenario(**settings):
