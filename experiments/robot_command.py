@@ -1,5 +1,6 @@
 """The command that tells what can be identified of a robot."""
 
+import sys
 from math import isfinite
 
 import numpy as np
@@ -15,10 +16,15 @@ from experiments.tables import new_table, print_titled
 from sim.errors import BenchError
 from sim.trajectories import RandomMoves
 
+MANY = 30
+"""Joints from which on it is said that grouping takes its time: it grows with their cube."""
+
 
 def describe(asked: DescribeRobot) -> None:
     """Tell what can be identified of a robot."""
     subject, page = Subject(absolute(asked.name), asked.parameters), new_page()
+    if subject.robot.n > MANY:
+        sys.stderr.write(f"idbench: grouping the parameters of {subject.robot.n} joints takes a while\n")
     truth = subject.truth(subject.robot)
     _print_joints(page, subject)
     _print_parameters(page, subject, truth)

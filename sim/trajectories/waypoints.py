@@ -34,7 +34,9 @@ def draw_waypoint(
         point = rng.uniform(low, high)
         if (np.abs(neighbours - point) >= smallest_move).all():
             return point
+    narrow = int(np.argmin(high - low))
     raise ScenarioError(
-        f"no waypoint is {np.max(smallest_move):g} rad from its neighbours and {np.max(clearance):g} rad inside the joints' "
-        f"ranges, {ranges.tolist()}: lower smallest_move or clearance"
+        f"no waypoint of {len(ranges)} joints is {np.max(smallest_move):g} rad from its neighbours and {np.max(clearance):g} rad "
+        f"inside the joints' ranges, the narrowest {ranges[narrow, 0]:.4g} to {ranges[narrow, 1]:.4g}: lower smallest_move or "
+        "clearance"
     )

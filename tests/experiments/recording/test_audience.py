@@ -119,7 +119,7 @@ def test_a_viewer_that_goes_away_costs_nothing_but_itself(tmp_path, reading):
         threading.Thread(target=answer_once, daemon=True).start()
         words = ["run", brief(tmp_path), "--connect", url, "--out", "run"]
         code = "import sys; import experiments.audience as a; a.GOODBYE = 1.0\n"
-        code += f"from experiments.cli import main; sys.exit(main({words}))"
+        code += f"sys.argv = ['idbench', *{words}]; from experiments.cli import entry; entry()"
         done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0
     assert said_of_viewers(done.stderr) == [f"idbench: the viewer at {url} has gone; the work goes on without it"]
