@@ -36,7 +36,6 @@ def draw_waypoint(
             return point
     narrow = int(np.argmin(high - low))
     raise ScenarioError(
-        f"no waypoint of {len(ranges)} joints is {np.max(smallest_move):g} rad from its neighbours and {np.max(clearance):g} rad "
-        f"inside the joints' ranges, the narrowest {ranges[narrow, 0]:.4g} to {ranges[narrow, 1]:.4g}: lower smallest_move or "
-        "clearance"
+        f"no waypoint is {np.max(smallest_move):g} rad from its neighbours and {np.max(clearance):g} rad inside the ranges of "
+        f"{len(ranges)} joints, the narrowest {ranges[narrow, 0]:.4g} to {ranges[narrow, 1]:.4g}: lower smallest_move or clearance"
     )
