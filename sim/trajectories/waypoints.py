@@ -37,5 +37,6 @@ def draw_waypoint(
     narrow = int(np.argmin(high - low))
     raise ScenarioError(
         f"no waypoint is {np.max(smallest_move):g} rad from its neighbours and {np.max(clearance):g} rad inside the ranges of "
-        f"{len(ranges)} joints, the narrowest {ranges[narrow, 0]:.4g} to {ranges[narrow, 1]:.4g}: lower smallest_move or clearance"
+        f"{len(ranges)} joints, the narrowest {ranges[narrow, 0]:.4g} to {ranges[narrow, 1]:.4g}: lower smallest_move or "
+        "clearance"
     )
