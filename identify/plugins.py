@@ -120,4 +120,4 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 def _places(entries: list[EntryPoint]) -> str:
     """Return where plug-ins come from: package and object."""
-    return " and ".join(f"{entry.dist.name if entry.dist else '?'} ({entry.value})" for entry in entries)
+    return " and ".join(sorted(f"{entry.dist.name if entry.dist else '?'} ({entry.value})" for entry in entries))

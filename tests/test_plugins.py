@@ -141,3 +141,22 @@ def test_what_is_built_in_cannot_be_replaced(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     builtin = dict.fromkeys(["OLS"], ESTIMATORS["OLS"])
     assert PluginTable("estimators", AbstractEstimator, builtin).create("OLS") == ESTIMATORS.create("OLS")
+
+
+def test_names_that_are_taken_are_told(tmp_path, monkeypatch):
+    """One named like a built-in is not used, two of one name cannot be told apart."""
+    for package, name in (("thief", "OLS"), ("one", "RIDGE"), ("two", "RIDGE")):
+        install(tmp_path, package, "class Own: pass\n", f"[idbench.estimators]\n{name} = {package}:Own\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    table = PluginTable("estimators", AbstractEstimator, {"OLS": ESTIMATORS["OLS"]})
+    taken, shared = table.conflicts
+    assert taken == "OLS is built in, thief (thief:Own) of the same name is not used: rename it"
+    assert shared == "RIDGE is provided by one (one:Own) and two (two:Own): rename or remove all but one"
+    with pytest.raises(PluginError, match=r"'RIDGE' is provided by one \(one:Own\) and two \(two:Own\)"):
+        table.create("RIDGE")
+
+
+def test_conflicts_are_listed(tmp_path, monkeypatch):
+    install(tmp_path, "thief", "class Own: pass\n", "[idbench.estimators]\nOLS = thief:Own\n")
+    listed = python("from experiments.cli import main; main(['list'])", tmp_path, monkeypatch)
+    assert "doubtful: estimators plug-in OLS is built in, thief (thief:Own) of the same name is not used" in listed
