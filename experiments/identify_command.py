@@ -43,7 +43,7 @@ def identify(asked: Identify) -> None:
     _require_label(asked.label)
     subject = Subject(said.get("robot", CLOSED_FORM) if asked.robot is None else absolute(asked.robot), asked.parameters)
     _require_target(asked.write_mjcf, subject)
-    place = None if out is None else Place(out, "identify", asked.log.name, asked.force)
+    place = None if out is None else Place(out, "identify", str(asked.log.absolute()), asked.force)
     if place:
         place.check()
     named = Identified(  # complains of names first
@@ -196,7 +196,13 @@ def _write_results(page: Console, place: Place, validated: Validated, watching: 
     lost, found = "", validated.found
     with results_folder(place) as folder:
         write_log(found.logs[0], folder / "log.parquet")
-        summary = {"experiment": "identify", "log": place.of, **found.summary(), "validation": _judged(validated)}
+        summary = {
+            "experiment": "identify",
+            "log": Path(place.of).name,
+            "path": place.of,
+            **found.summary(),
+            "validation": _judged(validated),
+        }
         write_summary(folder / "summary.json", summary)
         if is_long(found.logs[0]):
             page.print("not recorded: the rows of so long a log are not kept; identify a part of it to look inside")

@@ -23,7 +23,8 @@ def doubts_of_log(log: MotionLog, tree: KinematicTree) -> list[str]:
         reason = _reason(joint, ends)
         if reason:
             found.append(f"{joint.name} goes from {ends[0]:.4g} to {ends[1]:.4g}{reason}")
-    return found
+    dead = [joint.name for joint, tau in zip(tree.joints, log.tau.reshape(-1, log.n).T, strict=True) if not np.ptp(tau)]
+    return found + ([f"the torque of {', '.join(dead)} never changes: is it logged?"] if dead else [])
 
 
 def _reason(joint: Joint, ends: Array) -> str:

@@ -12,6 +12,9 @@ from experiments.motions import BAND, COMPARED, Errors, Table1Motions
 from experiments.table1 import PAPER
 from experiments.tables import new_table, print_titled
 
+FEW = 40
+"""Motions below which less than two lie outside of either end of the band."""
+
 COLORS = {"paper": "#b5651d", "paper_masked": "#2f6f9f"}
 
 NAMES = {"paper": "the paper's steps", "paper_masked": "the same, reversals left out"}
@@ -47,10 +50,11 @@ def _said(found: Table1Motions, chain: str) -> str:
     inside = sum(int(np.count_nonzero(errors.explained(model))) for model in PAPER)
     cells = len(PAPER) * len(found.truth)
     friction = _times(found, chain, "F")
+    few = f"; so few motions make no band, draw more than {found.motions}" if errors.kept < FEW else ""
     return (
         f"{NAMES[chain]} (chain {chain}): {errors.kept} of {errors.drawn} motions have the paper's Cond(W) within "
         f"{found.tolerance:.0%}; {inside} of {cells} of the paper's errors lie inside the band; the friction errors of the "
-        f"explicit model are {friction:.2g} times the paper's (geometric mean of the medians)"
+        f"explicit model are {friction:.2g} times the paper's (geometric mean of the medians){few}"
     )
 
 

@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import socket
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -18,6 +19,9 @@ from identify import Estimate
 if TYPE_CHECKING:
     from experiments.recording.stream import Stream
 
+
+HIDDEN = f".idbench-{socket.gethostname()}-"
+"""How the names of hidden folders begin; the number of their process follows. Other machines may share the disk."""
 
 WRITTEN = ("summary.json", "log.parquet", "scenario.toml", "recording.rrd")
 """Files of an experiment that others must not lose."""
@@ -75,7 +79,7 @@ def _experiment_of(folder: Path) -> str | None:
         return None
     try:
         said = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-        named = said["scenario"]["name"] if said["experiment"] == "run" else said.get("log", "")
+        named = said["scenario"]["name"] if said["experiment"] == "run" else said.get("path", said.get("log", ""))
         return " ".join(filter(None, (str(said["experiment"]), str(named))))
     except (OSError, ValueError, KeyError, TypeError):
         return "something whose summary.json cannot be read"
@@ -105,7 +109,7 @@ def beside(out: Path) -> Iterator[Path]:
         if out.exists() and not out.is_dir():
             raise ResultsError(f"{out} is a file, not a folder: choose another --out")
         _clear(_nearest_folder(out))
-        hidden = Path(tempfile.mkdtemp(prefix=f".idbench-{os.getpid()}-", dir=_nearest_folder(out)))
+        hidden = Path(tempfile.mkdtemp(prefix=f"{HIDDEN}{os.getpid()}-", dir=_nearest_folder(out)))
     except OSError as error:
         raise ResultsError(f"cannot write to {out}: {error.strerror}; choose another --out") from error
     try:
@@ -181,9 +185,9 @@ def _finite(x: float) -> float | None:
 
 
 def _clear(folder: Path) -> None:
-    """Remove hidden folders that processes have left there which were killed."""
-    for left in folder.glob(".idbench-*-*"):
-        number = left.name.split("-")[1]
+    """Remove hidden folders that processes of this machine have left there which were killed."""
+    for left in folder.glob(f"{HIDDEN}*-*"):
+        number = left.name.removeprefix(HIDDEN).split("-")[0]
         if number.isdigit() and not _is_running(int(number)):
             shutil.rmtree(left, ignore_errors=True)
 

@@ -120,7 +120,7 @@ def _validation_cells(validated: Validated, model: str, j: int) -> tuple[str, st
 
 
 def _percentage(x: float) -> str:
-    return f"{x:.2g}" if x < WORTHLESS else f">{WORTHLESS:g}" if isfinite(x) else ""
+    return f"{x:.2g}" if x < WORTHLESS else f">{WORTHLESS:g}" if x >= WORTHLESS else ""
 
 
 def percent(share: float) -> str:

@@ -45,6 +45,7 @@ from identify.errors import IdentificationError as IdentificationError
 from identify.errors import KinematicsError as KinematicsError
 from identify.errors import LogError as LogError
 from identify.errors import PluginError as PluginError
+from identify.errors import RangeError as RangeError
 from identify.errors import SettingError as SettingError
 from identify.errors import TimeError as TimeError
 from identify.errors import UnknownNameError as UnknownNameError

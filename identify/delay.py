@@ -10,7 +10,7 @@ import scipy
 from identify.arrays import Array
 from identify.basis import Basis
 from identify.chain import Chain, idbench_chain
-from identify.errors import LogError, SettingError
+from identify.errors import LogError, RangeError, SettingError
 from identify.estimators import Problem, WeightedLeastSquares
 from identify.long import manageable
 from identify.models import ExplicitModel
@@ -98,7 +98,7 @@ class _Search:
         grid = np.linspace(low, high, _COARSE)
         best = int(np.argmin([self._misfit(float(delay)) for delay in grid]))
         if best in (0, _COARSE - 1):
-            raise SettingError(
+            raise RangeError(
                 f"the torque fits best at an end of the range, {grid[best]:g} s: look further, or give the delay; "
                 "a chain that takes torques as logged does not read it at all"
             )

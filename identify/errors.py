@@ -17,6 +17,10 @@ class SettingError(IdentificationError):
     """A setting that is out of its range, or does not fit the log it meets."""
 
 
+class RangeError(SettingError):
+    """A search whose best value lies at an end of the range that it looks at."""
+
+
 class ExcitationError(IdentificationError):
     """A motion that does not show every parameter.
 

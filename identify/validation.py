@@ -32,6 +32,9 @@ WHITE = 0.95
 MARGIN = 1.3
 """Errors up to this multiple of what noise and sigma make are explained by them: levels of noise are known to some 20 %."""
 
+EXCUSED = 0.02
+"""Share of the torque up to which sigma of the parameters excuses an error: a misfit makes sigma large, too."""
+
 HELD_OUT = 0.25
 """Share of a log, at its end, that is held out where there is no second log."""
 
@@ -83,11 +86,14 @@ class Validation:
     @property
     def excess(self) -> Array:
         """Error that neither noise nor sigma explains, shape (joint,) [N m]: what the model is wrong by."""
-        return np.sqrt(np.maximum(self.rms**2 - (MARGIN * self.expected) ** 2, 0.0))
+        excused = np.minimum(self.open, EXCUSED * self.level)
+        squares = MARGIN**2 * (np.nan_to_num(self.noise) ** 2 + excused**2)
+        return np.sqrt(np.maximum(self.rms**2 - squares, 0.0))
 
     def percent_of_level(self, torque: Array) -> Array:
-        """Return 100 torque / level; NaN where there is no torque."""
-        return 100 * np.divide(torque, self.level, out=np.full(self.rms.shape, np.nan), where=self.level > 0)
+        """Return 100 torque / level; infinite where there is a torque and no level, 0 where there is neither."""
+        none = np.where(np.isnan(torque), np.nan, np.where(torque > 0, np.inf, 0.0))
+        return 100 * np.divide(torque, self.level, out=none, where=self.level > 0)
 
     @property
     def percent(self) -> Array:

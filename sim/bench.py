@@ -119,6 +119,7 @@ class Bench:
         if not np.isfinite(total).all():
             self._stop_failed(step)
             self._failures.finite({"the controller": self._demand, "the drive": tau, "the friction": resistance})
+            self._stop_failed(step)
         if self._watcher:
             self._watcher.take(Step(step, steps, tau, self._drive.trace))
         self._plant.step(total, steps, self._going)

@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import NoReturn
 
 from experiments.interruption import importing
@@ -19,9 +20,12 @@ def main(args: Sequence[str] | None = None) -> int:
 
 def entry() -> NoReturn:
     """Run the command line and end the process; an interruption after the work is done changes nothing."""
-    code = main()
+    try:
+        code = main()
+    except SystemExit as ended:  # of the parser, for help and wrong words
+        code = ended.code if isinstance(ended.code, int) else int(ended.code is not None)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if "experiments.audience" in sys.modules and sys.modules["experiments.audience"].left_behind():
-        sys.stdout.flush()
-        os._exit(code)
-    sys.exit(code)
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, AttributeError, ValueError):  # closed, or its reader has gone
+            stream.flush()
+    os._exit(code)  # everything is written; native threads of libraries, and viewers that hang, have no say any more

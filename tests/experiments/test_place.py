@@ -7,7 +7,7 @@ import pytest
 
 from experiments.cli import main
 from experiments.errors import ResultsError
-from experiments.results import Place, results_folder
+from experiments.results import HIDDEN, Place, results_folder
 from identify.log_file import read_log, write_log
 
 
@@ -23,7 +23,7 @@ def filled(out, **summary):
     [
         ({"experiment": "table2"}, "table2"),
         ({"experiment": "run", "scenario": {"name": "other"}}, "run other"),
-        ({"experiment": "identify", "log": "a.csv"}, "identify a.csv"),
+        ({"experiment": "identify", "log": "a.csv", "path": "/there/a.csv"}, "identify /there/a.csv"),
         ({"what": 1}, "something whose summary.json cannot be read"),
     ],
 )
@@ -73,8 +73,9 @@ def test_resample_and_export_replace_nothing(tmp_path, complaint, log):
 
 def test_folders_of_killed_processes_go_and_those_of_others_stay(tmp_path):
     dead = next(number for number in range(400_000, 500_000) if not os.path.exists(f"/proc/{number}"))  # noqa: PTH110
-    for name in (f".idbench-{dead}-abc", f".idbench-{os.getpid()}-abc", ".idbench-notes"):
+    kept = [f"{HIDDEN}{os.getpid()}-abc", ".idbench-notes", f".idbench-elsewhere-{dead}-abc"]
+    for name in (f"{HIDDEN}{dead}-abc", *kept):
         (tmp_path / name).mkdir()
     with results_folder(Place(tmp_path / "out", "run", "mine")):
         pass
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([f".idbench-{os.getpid()}-abc", ".idbench-notes", "out"])
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*kept, "out"])

@@ -8,6 +8,7 @@ import pytest
 from experiments.cli.options import Parameters
 from experiments.doubts import doubts_of_result
 from experiments.identified import Identified
+from experiments.log_doubts import doubts_of_log
 from experiments.subject import Subject
 from experiments.validation import Validated
 from experiments.verdict import Remedies, Verdict
@@ -113,3 +114,27 @@ def test_torques_in_other_units_are_pointed_out(pair):
     told = doubts_of_result(validated(milli).found)
     assert any("are they in N m?" in doubt for doubt in told)
     assert not any("are they in N m?" in doubt for doubt in doubts_of_result(validated(pair).found))
+
+
+def test_a_dead_torque_column_is_poor_and_named(pair):
+    dead = [torques(log, lambda tau: tau * [1, 0, 1, 1, 1, 1]) for log in pair]
+    made = validated(dead)
+    assert Verdict(made, "explicit").word == "poor"
+    assert doubts_of_log(dead[0], made.found.subject.tree) == ["the torque of joint2 never changes: is it logged?"]
+
+
+def test_a_delay_beyond_the_range_that_is_looked_at_is_told(pair):
+    """Torques logged 80 ms late: the best delay of the range lies at its end, and that is said."""
+    shifted = [torques(log, lambda tau: np.roll(tau, 20, axis=0)) for log in pair]
+    (told,) = Remedies(validated(shifted)).delay()
+    assert "the torque fits best at an end of the range" in told
+
+
+def test_a_single_wild_sample_does_not_excuse_itself_by_the_sigma_it_makes(pair):
+    def struck(tau):
+        wild = tau.copy()
+        wild[len(tau) // 3, 0] += 300 * np.abs(tau[:, 0]).max()
+        return wild
+
+    hit = [torques(pair[0], struck), pair[1]]
+    assert Verdict(validated(hit), "explicit").word in {"fair", "poor"}
