@@ -14,6 +14,7 @@ from experiments.subject import Subject
 from experiments.validation import Validated
 from identify import Array, ExplicitModel, IdentificationError, RangeError, Validation, identify, validate
 from identify.delay import estimate_delay
+from identify.validation import MARGIN
 
 GOOD, FAIR = 2.0, 10.0
 """Torque errors [% of the torque] beyond noise and sigma up to which a model is called good, or fair.
@@ -56,9 +57,7 @@ class Verdict:
         """good, fair or poor; unsure where noise or sigma would hide a poor model."""
         if wrong_sign(self.validated.judged):
             return "poor"
-        beyond, hidden = (
-            np.nan_to_num(self.told.percent_of_level(x), posinf=np.inf).max() for x in (self.told.excess, self.told.expected)
-        )
+        beyond, hidden = (_worst(self.told.percent_of_level(x)) for x in (self.told.excess, self.told.expected))
         if beyond > FAIR:
             return "poor"
         if hidden > FAIR:
@@ -94,7 +93,7 @@ class Verdict:
         coloured = [joint for joint, white, far in zip(joints, told.white, beyond, strict=True) if far and not white]
         if coloured:
             yield f"what is left of {', '.join(coloured)} is no noise"
-        elif self.word == "good" and (told.rms <= 1.3 * np.maximum(told.expected, 0)).all():
+        elif self.word == "good" and (told.rms <= MARGIN * told.expected).all():
             yield "noise and sigma explain all of it"
         if isinstance(self.validated.replays[self.model], str):
             yield f"not simulated: {self.validated.replays[self.model]}"
