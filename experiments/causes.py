@@ -71,7 +71,7 @@ def causes(table: Table1) -> Iterator[tuple[str, dict[str, Worst]]]:
 
 
 def _worst(table: Table1, estimate: Estimate) -> Worst:
-    errors = dict(zip(estimate.parameters, estimate.relative_error_percent(list(table.truth.values())), strict=True))
+    errors = dict(zip(estimate.names, estimate.relative_error_percent(list(table.truth.values())), strict=True))
     friction = [float(error) for name, error in errors.items() if name.startswith("F")]
     inertia = [float(error) for name, error in errors.items() if not name.startswith("F")]
     return Worst(max(inertia), max(friction))

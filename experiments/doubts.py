@@ -1,13 +1,14 @@
 """What is suspicious about what was identified from a log, and what would help."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from experiments.identified import Identified
 from experiments.log_doubts import doubts_of_base, resting
 from experiments.subject import Subject
-from identify import Estimate, MotionLog, brisk_shares, showing_moves
+from identify import MotionLog, brisk_shares, showing_moves
+from identify.basis.parameter import NOT_NEGATIVE
 from sim.robot import Robot
 from sim.tree import kinematic_tree, unmodelled
 
@@ -35,8 +36,8 @@ def doubts_of_result(found: Identified) -> list[str]:
     """Return what no healthy identification shows, and what the log leaves open."""
     told = [*wrong_sign(found), *wrong_unit(found)]
     for name, estimate in found.estimates.items():
-        friction = zip(found.basis.parameters, estimate.X, estimate.corrected_sigma, strict=True)
-        negative = [p for p, x, sigma in friction if p.startswith(("F", "Ia")) and x < -2 * sigma]
+        friction = zip(found.basis.parameters, estimate.X, estimate.best_sigma, strict=True)
+        negative = [p.name for p, x, sigma in friction if p.kind in NOT_NEGATIVE and _surely_negative(x, sigma)]
         if negative and not told:
             told.append(f"{', '.join(negative)} below zero in the {name} model: is the torque's meaning or delay wrong?")
         told += list(_too_little(found, name)) or list(_badly_explained(found, name))
@@ -47,13 +48,13 @@ def _too_little(found: Identified, name: str) -> Iterator[str]:
     """Yield why an estimate says nothing, where its sigma alone makes much of a torque, and what would help."""
     estimate, shares = found.estimates[name], found.left_open[name]
     worst = int(np.nan_to_num(shares, nan=np.inf).argmax())
-    if shares[worst] < USELESS or estimate.rows > ENOUGH * len(estimate.parameters):  # else it is the model that is wrong
+    if shares[worst] < USELESS or estimate.row_count > ENOUGH * len(estimate.names):  # else it is the model that is wrong
         return
     others = [other for other, open_ in found.left_open.items() if np.nan_to_num(open_, nan=np.inf).max() < USELESS / 5]
     times = min(1000, int(np.ceil((shares[worst] / (USELESS / 5)) ** 2))) if np.isfinite(shares[worst]) else 1000
     longer = f"a log {times} times as long" if times < MUCH_LONGER else "a log that moves all joints, and longer"
     yield (
-        f"the {name} model tells too little: {int(estimate.rows)} rows for {len(estimate.parameters)} parameters, Cond(W) "
+        f"the {name} model tells too little: {int(estimate.row_count)} rows for {len(estimate.names)} parameters, Cond(W) "
         f"{float(estimate.condition_number):.2g}, one sigma of its parameters makes {100 * shares[worst]:.0f} % of the torque "
         f"of {found.subject.robot.joints[worst]}: take {f'the {others[0]} model' if others else longer}"
         + (f", or {longer}" if others else "")
@@ -83,10 +84,10 @@ def _share(share: float) -> str:
 
 def wrong_unit(found: Identified) -> list[str]:
     """Return whether torques are far from what the robot's file says of the same motion, as those in other units are."""
-    subject, rows = found.subject, found.explicit_rows
-    filed = rows.W @ np.array(list(subject.truth(subject.robot).values()))
-    sizes = [[float(np.linalg.norm(x[rows.group == joint])) for x in (rows.Y, filed)] for joint in np.unique(rows.group)]
-    measured, expected = max(sizes, key=lambda pair: pair[1])  # the joint of which the file expects most
+    subject, R = found.subject, found.problem.factors.R
+    filed = R[..., :-1] @ np.array(list(subject.truth(subject.robot).values()))
+    sizes = zip(np.linalg.norm(R[..., -1], axis=-1), np.linalg.norm(filed, axis=-1), strict=True)
+    measured, expected = max(sizes, key=lambda pair: float(pair[1]))  # the joint of which the file expects most
     if not expected or 1 / FAR_OFF < measured / expected < FAR_OFF:
         return []
     return [f"the torques are {measured / expected:.2g} times what the robot's file says of this motion: are they in N m?"]
@@ -102,12 +103,13 @@ def doubts_of_robot(robot: Robot) -> list[str]:
 def wrong_sign(found: Identified) -> list[str]:
     """Return which torques have the wrong sign: those that drive their joint by friction."""
     model, estimate = next(iter(found.estimates.items()))
-    X, sigma = _named(estimate, estimate.X), _named(estimate, estimate.corrected_sigma)
-    joints = found.subject.robot.joints
+    values = zip(found.basis.parameters, estimate.X, estimate.best_sigma, strict=True)
+    known = {(p.kind, p.joint): (x, sigma) for p, x, sigma in values}
+    nothing = (0.0, 0.0)
     wrong = [
         joint
-        for j, joint in enumerate(joints, 1)
-        if X.get(f"Fv{j}", 0.0) < 0 and X.get(f"Fs{j}", 0.0) < -2 * sigma.get(f"Fs{j}", 0.0)
+        for j, joint in enumerate(found.subject.robot.joints)
+        if known.get(("viscous friction", j), nothing)[0] < 0 and _surely_negative(*known.get(("Coulomb friction", j), nothing))
     ]
     if not wrong:
         return []
@@ -119,8 +121,8 @@ def wrong_sign(found: Identified) -> list[str]:
     ]
 
 
-def _named(estimate: Estimate, values: np.ndarray) -> Mapping[str, float]:
-    return dict(zip(estimate.parameters, map(float, values), strict=True))
+def _surely_negative(x: float, sigma: float) -> bool:
+    return x < -2 * sigma
 
 
 def _work(log: MotionLog) -> float:
@@ -134,8 +136,8 @@ def _left_open(found: Identified) -> list[str]:
     subject, (model, estimate) = found.subject, next(iter(found.estimates.items()))
     if subject.base is None:
         return []
-    shares = brisk_shares(subject.tree, found.basis, estimate.X, estimate.corrected_sigma)
-    names = [name for name, share in zip(found.basis.parameters, shares, strict=True) if share > OPEN]
+    shares = brisk_shares(subject.tree, found.basis, estimate.X, estimate.best_sigma)
+    names = [name for name, share in zip(found.basis.names, shares, strict=True) if share > OPEN]
     if not names:
         return []
     return [f"one sigma of these parameters is above {100 * OPEN:g} % of a brisk motion's torque ({model} model): "

@@ -1,6 +1,6 @@
 """A log identified by some models: what every experiment prints, records and writes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -21,10 +21,9 @@ from identify import (
     ExplicitModel,
     IdentificationError,
     MotionLog,
-    System,
+    Problem,
     attempt_each,
 )
-from identify.long import build_long, is_long
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,10 +85,15 @@ class Identified:
         return self.method[1] if self.method else ESTIMATORS.create(self.estimator)
 
     @cached_property
+    def problem(self) -> Problem:
+        """Logs, robot and chain, by the explicit model."""
+        return Problem(self.logs, self.basis, ExplicitModel(), self.processing)
+
+    @cached_property
     def outcomes(self) -> dict[str, Estimate | IdentificationError]:
         """The estimate of every model, or why it has none."""
         models = {name: MODELS.create(name) for name in self.models}
-        return attempt_each(self._fit, self.basis, models, self.processing, self.solver)
+        return attempt_each(self.problem, models, self.solver)
 
     @cached_property
     def estimates(self) -> dict[str, Estimate]:
@@ -106,28 +110,29 @@ class Identified:
         return {name: str(outcome) for name, outcome in self.outcomes.items() if isinstance(outcome, IdentificationError)}
 
     @cached_property
-    def explicit_rows(self) -> System:
-        """Rows of the explicit model, by which the torque of every joint is judged."""
-        build = build_long if is_long(self._fit) else Chain.build_each
-        (system,) = build(self.processing, self._fit, self.basis, [ExplicitModel()])
-        return system
-
-    @cached_property
     def explained(self) -> dict[str, Array]:
         """How much of each joint's torque every estimate explains, shape (joint,).
 
         A share of its variance; of a log whose rows are not kept, of its squares.
         """
-        return {name: _explained(self.explicit_rows, e.X) for name, e in self.estimates.items()}
+        squares = self._torque_squares
+        if not self.problem.long:
+            rows = self.problem.rows
+            squares = squares - np.sum(rows.by_kind(rows.Y), axis=-1) ** 2 / rows.by_kind(rows.Y).shape[-1]
+        factors = self.problem.factors
+        return {name: 1 - factors.squares(e.X) / np.maximum(squares, 1e-300) for name, e in self.estimates.items()}
 
     @cached_property
     def left_open(self) -> dict[str, Array]:
         """Sigma of the torque that every estimate predicts on its own log, over that torque's rms, shape (joint,)."""
-        return {name: _left_open(self.explicit_rows, e) for name, e in self.estimates.items()}
+        W = self.problem.factors.R[..., :-1]
+        spread = {name: np.sum(W @ e.best_covariance * W, axis=(-2, -1)) for name, e in self.estimates.items()}
+        squares = np.maximum(self._torque_squares, 1e-300)
+        return {name: np.sqrt(np.maximum(found, 0.0) / squares) for name, found in spread.items()}
 
     @property
-    def _fit(self) -> MotionLog | Sequence[MotionLog]:
-        return self.logs[0] if len(self.logs) == 1 else list(self.logs)
+    def _torque_squares(self) -> Array:
+        return np.sum(self.problem.factors.R[..., -1] ** 2, axis=-1)
 
     def summary(self) -> dict[str, Any]:
         """Return what a summary.json says of it."""
@@ -138,7 +143,7 @@ class Identified:
         channel = self.logs[0].torque
         base = self.subject.base
         return {
-            "parameters": list(self.basis.parameters),
+            "parameters": list(self.basis.names),
             "units": list(self.basis.units),
             "made_of": None if base is None else dict(zip(base.names, map(base.grouping, range(len(base.names))), strict=True)),
             "truth": truth,
@@ -149,25 +154,3 @@ class Identified:
             "models": models,
             "failures": self.failures,
         }
-
-
-def _explained(system: System, X: Array) -> Array:
-    """Return the share of each joint's torque that W X explains: of its variance, of its squares where rows are compressed."""
-    shares = []
-    for joint in np.unique(system.group):
-        rows = system.group == joint
-        y, rest = system.Y[rows], system.Y[rows] - system.W[rows] @ X
-        middle = y.mean() if system.stands_for is None else 0.0
-        shares.append(1 - np.sum(rest**2) / max(np.sum((y - middle) ** 2), 1e-300))
-    return np.array(shares)
-
-
-def _left_open(system: System, estimate: Estimate) -> Array:
-    """Return the rms of w C w' over the rows w of every joint, over the rms of their torque; by the square roots of both."""
-    C = estimate.best_covariance
-    shares = []
-    for joint in np.unique(system.group):
-        rows = system.group == joint
-        open_squares = float(np.einsum("rp,pq,rq->", system.W[rows], C, system.W[rows], optimize=True))
-        shares.append(np.sqrt(max(open_squares, 0.0) / max(float(np.sum(system.Y[rows] ** 2)), 1e-300)))
-    return np.array(shares)

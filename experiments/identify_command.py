@@ -27,8 +27,8 @@ from experiments.validation import Validated
 from experiments.verdict import Remedies, Verdict
 from experiments.written import Written
 from identify import MODELS, ExcitationError, IdentificationError, LogError, MotionLog
-from identify.log_file import write_log
-from identify.long import is_long
+from identify.data.log_file import write_log
+from identify.rows.pieces import is_long
 from sim.errors import BenchError
 from sim.robot import Robot
 
@@ -62,9 +62,9 @@ def identify(asked: Identify) -> None:
             page.print(about_delay)
         if place is not None:
             _write_results(page, place, validated, asked.watching, audience)
-        elif asked.log.is_dir() and asked.watching.rerun and not is_long(known):
+        elif asked.log.is_dir() and asked.watching.rerun and not is_long([known]):
             _add_layer(page, asked.log, found, asked.watching, audience)
-        elif audience and not is_long(known):
+        elif audience and not is_long([known]):
             _show(found, audience)
         if asked.write_mjcf is not None:
             _write_mjcf(page, found, asked.write_mjcf)
@@ -74,12 +74,12 @@ def _shown(found: Identified) -> tuple[Identified, list[str]]:
     """Return the identification of what the log shows, and what is to be said of what it hides."""
     told = []
     leading = next(iter(found.outcomes.values()))
-    while isinstance(leading, ExcitationError) and leading.hidden and len(leading.hidden) < len(found.basis.parameters):
+    while isinstance(leading, ExcitationError) and leading.hidden and len(leading.hidden) < len(found.basis.names):
         moves = helpful_moves(found.subject, found.logs[0], leading.hidden)
         told.append(f"this log does not show {', '.join(leading.hidden)}: left out, as if zero{f' ({moves})' if moves else ''}")
         fewer = replace(found.subject.asked, without=(*found.subject.asked.without, *leading.hidden))
         subject = Subject(found.subject.name, fewer)
-        truth = None if found.truth is None else {name: found.truth[name] for name in subject.basis.parameters}
+        truth = None if found.truth is None else {name: found.truth[name] for name in subject.basis.names}
         found = replace(found, subject=subject, truth=truth)
         leading = next(iter(found.outcomes.values()))
     return found, told
@@ -91,7 +91,7 @@ def _advice(validated: Validated, asked: Identify) -> list[str]:
         good = "good" in {Verdict(validated, model).word for model in validated.torques}
     except IdentificationError:
         return []
-    if is_long(validated.found.logs[0]):
+    if is_long(validated.found.logs):
         return []
     remedies, log = Remedies(validated), validated.found.logs[0]
     assumed = asked.torque_delay is None and not log.torque.delay
@@ -142,7 +142,7 @@ def _doubts(validated: Validated) -> list[str]:
 def _truth(said: dict[str, Any], named: Identified) -> dict[str, float] | None:
     """Return the truth that the summary of a run states, if it is of the same parameters."""
     truth: dict[str, float] | None = said.get("truth")
-    return truth if truth and tuple(truth) == named.basis.parameters else None
+    return truth if truth and tuple(truth) == named.basis.names else None
 
 
 def _validated(found: Identified, asked: Identify, known: MotionLog) -> Validated:
@@ -204,7 +204,7 @@ def _write_results(page: Console, place: Place, validated: Validated, watching: 
             "validation": _judged(validated),
         }
         write_summary(folder / "summary.json", summary)
-        if is_long(found.logs[0]):
+        if is_long(found.logs):
             page.print("not recorded: the rows of so long a log are not kept; identify a part of it to look inside")
         elif watching.rerun:
             from experiments.recording.identified import record_log

@@ -12,8 +12,8 @@ from experiments.reading import channel_of, told_by
 from experiments.results import beside
 from experiments.subject import CLOSED_FORM
 from identify import MotionLog
-from identify.log_file import read_columns, read_log, write_log
-from identify.resample import resample as at
+from identify.data.log_file import read_columns, read_log, write_log
+from identify.data.resample import resample as at
 
 
 def resample(asked: Resample) -> None:

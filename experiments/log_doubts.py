@@ -3,7 +3,7 @@
 import numpy as np
 
 from identify import Array, Joint, KinematicTree, MotionLog
-from identify.kinematics import GROUND
+from identify.data.kinematics import GROUND
 
 SLACK = 0.05
 """Positions may be beyond a range by this share of it: ranges of files are rounded."""

@@ -12,7 +12,7 @@ from experiments.cli.options import Meaning
 from experiments.errors import ExperimentError
 from experiments.identified import Identified
 from identify import Array, LogError, MotionLog, TimeError, TorqueChannel
-from identify.log_file import read_columns
+from identify.data.log_file import read_columns
 
 SLOWEST = 0.5
 """Sampling period [s] that no robot's log has: its times are in another unit."""
@@ -100,7 +100,7 @@ def read(path: Path, question: Question, named: Identified) -> tuple[MotionLog, 
     if delay != "estimate":
         assumed = delay is None and stated is None
         return log, "no --torque-delay was given, 0 is assumed: `estimate` finds it" if assumed else ""
-    from identify.delay import estimate_delay
+    from identify.judge.delay import estimate_delay
 
     found = estimate_delay(log, named.basis, named.processing)
     told = MotionLog(log.fs, log.q, log.tau, replace(channel, delay=found.delay))

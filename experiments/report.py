@@ -55,7 +55,7 @@ def _model_table(table: Table1, form: str) -> Table:
     printed = (f"{paper.condition_number:g}", "") if paper else ()
     grid.add_row("Cond(W)", "", *printed, *(cell for e in estimates for cell in (f"{e.condition_number:.1f}", "")))
     printed = (f"{paper.rows}", "") if paper else ()
-    grid.add_row("rows", "", *printed, *(cell for e in estimates for cell in (f"{e.rows}", "")))
+    grid.add_row("rows", "", *printed, *(cell for e in estimates for cell in (f"{e.row_count}", "")))
     return grid
 
 
@@ -103,7 +103,7 @@ def markdown(table: Table1) -> str:
                 for i, (name, true) in enumerate(table.truth.items())
             ),
             row("Cond(W)", lambda form: (f"{e.condition_number:.1f}" for e in found[form])),
-            row("rows", lambda form: (f"{e.rows}" for e in found[form])),
+            row("rows", lambda form: (f"{e.row_count}" for e in found[form])),
         ]
     )
 

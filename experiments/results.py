@@ -175,7 +175,7 @@ def summarize(estimate: Estimate, truth: list[float] | None) -> dict[str, Any]:
         "corrected_sigma": [_finite(x) for x in estimate.corrected_sigma],
         "relative_sigma_percent": [_finite(x) for x in estimate.relative_sigma_percent],
         "condition_number": float(estimate.condition_number),
-        "rows": int(estimate.rows),
+        "rows": int(estimate.row_count),
         "residual_rms": float(estimate.residual_rms),
     }
 

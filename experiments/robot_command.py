@@ -58,11 +58,11 @@ def _print_parameters(page: Console, subject: Subject, truth: dict[str, float]) 
     if base is not None:
         grid.add_column("made of")
     made = dict(zip(base.names, map(base.grouping, range(len(base.names))), strict=True)) if base else {}
-    for parameter, unit in zip(basis.parameters, basis.units, strict=True):
+    for parameter, unit in zip(basis.names, basis.units, strict=True):
         grid.add_row(parameter, f"{truth[parameter]:.5g}", unit, *([made[parameter]] if made else []))
-    print_titled(page, f"{len(basis.parameters)} parameters that a motion can tell", grid)
-    if base is not None and base.unseen:
-        page.print(Text(f"no motion shows {', '.join(base.unseen)}"), soft_wrap=True)
+    print_titled(page, f"{len(basis.names)} parameters that a motion can tell", grid)
+    if base is not None and base.without_effect:
+        page.print(Text(f"no motion shows {', '.join(base.without_effect)}"), soft_wrap=True)
     page.print()
 
 

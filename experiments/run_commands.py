@@ -20,8 +20,8 @@ from experiments.run import ScenarioRun
 from experiments.subject import absolute
 from experiments.table2 import Table2
 from experiments.tables import print_identified, print_table2
-from identify.log_file import write_log
-from identify.long import is_long
+from identify.data.log_file import write_log
+from identify.rows.pieces import is_long
 from sim.drives import IdealDrive
 from sim.errors import RobotError
 from sim.ripple import Ripple
@@ -63,7 +63,7 @@ def run(asked: Run) -> None:
                 lost = write_recording(folder, recording.finish(ran))
         tell_of(lost, place.out)
         _doubt_window(page, inner, recording)
-        if recording and is_long(ran.run.alone()):
+        if recording and is_long([ran.run.alone()]):
             page.print("the identification is not recorded: the rows of so long a log are not kept")
         page.print(f"written to {place.out}{watching.hint(place.out)}", soft_wrap=True)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from experiments.errors import ExperimentError
 from experiments.table1 import PAPER
-from identify import CHAINS, MODELS, MotionLog, TorqueChannel, scara
+from identify import CHAINS, MODELS, ExplicitModel, MotionLog, Problem, TorqueChannel, scara
 from sim.ideal import ideal_log
 from sim.motors import Array
 from sim.robot import Robot
@@ -110,11 +110,12 @@ class Search:
         """Return the largest departure from the paper's condition numbers, as a share; infinite if a row would be void."""
         q = np.stack([scenario.quintic().points.sample(self.fs).q for scenario in scenarios])
         log = MotionLog(self.fs, q, np.zeros_like(q), TorqueChannel("instantaneous"))  # W holds no torque
-        systems = replace(CHAINS.create(self.chain), trim=self.rest).build_each(log, scara(), list(PAPER_CONDITION))
+        problem = Problem((log,), scara(), ExplicitModel(), replace(CHAINS.create(self.chain), trim=self.rest))
         worst = np.zeros(len(scenarios))
-        for system, target in zip(systems, PAPER_CONDITION.values(), strict=True):
-            share = np.abs(np.log(system.condition_number / target))
-            worst = np.maximum(worst, np.where(system.valid.all(axis=-1), share, inf))
+        for model, target in PAPER_CONDITION.items():
+            rows = problem.with_model(model).rows
+            share = np.abs(np.log(rows.factors.together.condition_number / target))
+            worst = np.maximum(worst, np.where(rows.valid.all(axis=-1), share, inf))
         return worst
 
     def _closest(self, robot: Robot, best: Scenario, distance: float, others: Sequence[Scenario]) -> tuple[Scenario, float]:

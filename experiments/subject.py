@@ -76,9 +76,9 @@ class Subject:
             known = scara_truth(robot)
         else:
             standard = standard_parameters(robot)
-            values = np.array([standard.get(name, 0.0) for name in self.base.standard.parameters])
+            values = np.array([standard.get(name, 0.0) for name in self.base.standard.names])
             known = dict(zip(self.base.names, map(float, self.base.base(values)), strict=True))
-        return {name: known.get(name, 0.0) for name in self.basis.parameters}
+        return {name: known.get(name, 0.0) for name in self.basis.names}
 
     def _with_laws(self, basis: Basis) -> Basis:
         for name in self.asked.add:

@@ -15,7 +15,7 @@ from experiments.report import print_table1
 from experiments.results import Place, results_folder, tell_of, write_recording, write_summary, write_whole
 from experiments.search import Search
 from experiments.table1 import CHAINS_COMPARED, SCENARIO, Table1
-from identify.log_file import write_log
+from identify.data.log_file import write_log
 from sim.robot import Robot
 from sim.scenario import Scenario
 from sim.scenario_file import load, to_toml

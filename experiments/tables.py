@@ -44,13 +44,13 @@ def print_identified(console: Console, found: Identified, title: str) -> None:
     what = ("X", "%e" if known else "sigma", "%sigma")
     heads = [f"{model}\n{w}" for model in found.estimates for w in what]
     grid = new_table("", [*(["true\nX"] if known else []), *heads])
-    for i, name in enumerate(found.basis.parameters):
+    for i, name in enumerate(found.basis.names):
         true = [f"{list(found.truth.values())[i]:g}"] if found.truth is not None else []
         grid.add_row(name, *true, *(cell for e in found.estimates.values() for cell in _cells(e, found, i)))
     grid.add_section()
     lead = [""] if known else []
     grid.add_row("Cond(W)", *lead, *(c for e in found.estimates.values() for c in (f"{e.condition_number:.1f}", "", "")))
-    grid.add_row("rows", *lead, *(c for e in found.estimates.values() for c in (f"{e.rows}", "", "")))
+    grid.add_row("rows", *lead, *(c for e in found.estimates.values() for c in (f"{e.row_count}", "", "")))
     for j in range(found.basis.n):
         shares = [_explained(share[j]) for share in found.explained.values()]
         grid.add_row(f"tau{j + 1} explained", *lead, *(c for share in shares for c in (share, "", "")))
@@ -70,11 +70,11 @@ def _explained(share: float) -> str:
 
 def _cells(estimate: Estimate, found: Identified, i: int) -> tuple[str, str, str]:
     if found.truth is None:
-        second = f"{estimate.corrected_sigma[i]:.2g}"
+        second = f"{estimate.best_sigma[i]:.2g}"
     else:
         error = float(estimate.error_percent(list(found.truth.values()))[i])
         second = percent(error) if isfinite(error) else ""
-    share = 100 * estimate.corrected_sigma[i] / abs(estimate.X[i]) if estimate.X[i] else float("inf")
+    share = 100 * estimate.best_sigma[i] / abs(estimate.X[i]) if estimate.X[i] else float("inf")
     return number(estimate.X[i]), second, _percentage(share) or f">{WORTHLESS:g}"
 
 
@@ -160,7 +160,7 @@ def _twin(table: Table2, model: str) -> Table:
     grid.add_section()
     conds = [c for e in estimates.values() for c in (f"{e.condition_number:.0f}", "", "", "")]
     grid.add_row("Cond(W)", "", f"{paper.condition_number:g}", "", "", *conds)
-    grid.add_row("rows", "", f"{PAPER_ROWS}", "", "", *(c for e in estimates.values() for c in (f"{e.rows}", "", "", "")))
+    grid.add_row("rows", "", f"{PAPER_ROWS}", "", "", *(c for e in estimates.values() for c in (f"{e.row_count}", "", "", "")))
     return grid
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from experiments.identified import Identified
 from experiments.written import Written
-from identify import Array, Basis, IdentificationError, MotionLog, State, Validation, split, validate
-from identify.long import manageable
+from identify import Array, Basis, ExplicitModel, IdentificationError, MotionLog, Problem, State, Validation, split, validate
+from identify.rows.pieces import manageable
 from sim.errors import BenchError
 from sim.replay import Replay, replay
 
@@ -59,10 +59,16 @@ class Validated:
     @cached_property
     def torques(self) -> dict[str, Validation]:
         """How well each model predicts the torques."""
-        basis, chain = self.judged.basis, self.judged.processing
-        return {
-            model: validate(self.unseen, basis, e.X, chain, e.best_covariance) for model, e in self.judged.estimates.items()
-        }
+        return {model: validate(self.problem, e.X, e.best_covariance) for model, e in self.judged.estimates.items()}
+
+    @cached_property
+    def problem(self) -> Problem:
+        """The unseen motion, by the robot and the chain of what is judged."""
+        return self.problem_of(self.judged)
+
+    def problem_of(self, judged: Identified) -> Problem:
+        """Return the unseen motion as a problem, by the robot and the chain of another identification."""
+        return Problem((self.unseen,), judged.basis, ExplicitModel(), judged.processing)
 
     @cached_property
     def replays(self) -> dict[str, Replay | str]:

@@ -12,9 +12,9 @@ from experiments.errors import ExperimentError
 from experiments.identified import Identified
 from experiments.subject import Subject
 from experiments.validation import Validated
-from identify import Array, ExplicitModel, IdentificationError, RangeError, Validation, identify, validate
-from identify.delay import estimate_delay
-from identify.validation import MARGIN
+from identify import Array, IdentificationError, RangeError, Validation, estimate, validate
+from identify.judge.delay import estimate_delay
+from identify.judge.validation import MARGIN
 
 GOOD, FAIR = 2.0, 10.0
 """Torque errors [% of the torque] beyond noise and sigma up to which a model is called good, or fair.
@@ -153,9 +153,8 @@ class Remedies:
 
     def _worst(self, judged: Identified) -> float:
         """Return the largest error [%] of the explicit model on the unseen motion."""
-        fit = judged.logs[0] if len(judged.logs) == 1 else list(judged.logs)
-        estimate = identify(fit, judged.basis, ExplicitModel(), judged.processing, judged.solver)
-        return float(np.nanmax(validate(self.validated.unseen, judged.basis, estimate.X, judged.processing).percent))
+        X = estimate(judged.problem, judged.solver).X
+        return float(np.nanmax(validate(self.validated.problem_of(judged), X).percent))
 
 
 def percent(share: float) -> str:

@@ -42,16 +42,16 @@ class Written:
         """Its standard parameters."""
         subject = self.found.subject
         given, grouping = standard_parameters(subject.robot), subject.grouping
-        values = np.array([given.get(name, 0.0) for name in grouping.standard.parameters])
+        values = np.array([given.get(name, 0.0) for name in grouping.standard.names])
         T = np.eye(len(grouping.names)) if subject.base else transfer(subject.tree, subject.whole, grouping.basis)
         X, C = self._of_all()
         return consistent_parameters(grouping, T @ X, T @ C @ T.T, values)
 
     def _of_all(self) -> tuple[Array, Array]:
         """Return estimate and covariance with the parameters that were left out: they are zero, and known to be."""
-        estimate, names = self.found.estimates[self.model], self.found.subject.whole.parameters
+        estimate, names = self.found.estimates[self.model], self.found.subject.whole.names
         C = estimate.best_covariance
-        place = [names.index(name) for name in estimate.parameters]
+        place = [names.index(name) for name in estimate.names]
         X, sure = np.zeros(len(names)), SURE * np.sqrt(np.diagonal(C).min())
         whole = sure**2 * np.eye(len(names))
         X[place], whole[np.ix_(place, place)] = estimate.X, C

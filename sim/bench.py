@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from identify.blame import expect
+from identify.data.motion_log import MotionLog
 from identify.errors import PluginError
-from identify.motion_log import MotionLog
 from sim.clock import Clock
 from sim.controllers.base import AbstractLaw, Task
 from sim.drives.base import AbstractAmplifier, every

@@ -1,6 +1,6 @@
 """Ideal data, as in section 7.2 of the paper: what filters and differences do, and nothing else."""
 
-from identify.motion_log import MotionLog, TorqueChannel
+from identify.data.motion_log import MotionLog, TorqueChannel
 from sim.inverse_dynamics import coulomb_torque, inverse_dynamics
 from sim.robot import Robot
 from sim.trajectories import Reference

@@ -5,7 +5,7 @@ from typing import Literal, final
 
 import numpy as np
 
-from identify.motion_log import TorqueChannel
+from identify.data.motion_log import TorqueChannel
 from sim.errors import ScenarioError
 from sim.motors import Array
 from sim.settings import EachNotNegative, EachNumber, EachShareError, Positive, per_joint, settings

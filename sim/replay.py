@@ -5,7 +5,7 @@ from typing import final
 
 import numpy as np
 
-from identify.motion_log import MotionLog
+from identify.data.motion_log import MotionLog
 from sim.errors import ScenarioError
 from sim.failures import Bounds
 from sim.inverse_dynamics import BLOCK, InverseDynamics

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from identify.kinematics import INERTIAL
+from identify.data.kinematics import INERTIAL
 from sim.errors import RobotError
 from sim.motors import Array
 from sim.robot import Robot

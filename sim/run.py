@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from identify.motion_log import MotionLog
+from identify.data.motion_log import MotionLog
 from sim.motors import Array
 from sim.robot import Robot
 from sim.scenario import Scenario

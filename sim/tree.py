@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
-from identify.kinematics import GROUND, INERTIAL, Joint, KinematicTree
+from identify.data.kinematics import GROUND, INERTIAL, Joint, KinematicTree
 from sim.errors import RobotError
 from sim.motors import Array
 from sim.robot import Robot

@@ -28,7 +28,7 @@ from identify import (
     identify,
     scara,
 )
-from identify.grid import Grid
+from identify.rows.grid import Grid
 from sim.controllers import CONTROLLERS, Task
 from sim.drives import DRIVES
 from sim.encoders import ENCODERS
@@ -99,8 +99,9 @@ def test_blocks_keep_their_identities(name):
     """Explicit = d/dt momentum + remainder, and its power = d/dt energy + dissipation, by complex steps."""
     block, n, eps = BLOCKS.create(name), 2, 1e-30
     q, qd, qdd = np.random.default_rng(3).uniform(-2, 2, (3, n, 50))
-    names = block.names(n)
-    assert len(set(names)) == len(names) == len(block.units(n))
+    names = [parameter.name for parameter in block.parameters(n)]
+    assert len(set(names)) == len(names)
+    assert all(parameter.unit and parameter.joint in range(n) for parameter in block.parameters(n))
 
     at, ahead = State(q, qd, lambda _: qdd), State(q + 1j * eps * qd, qd + 1j * eps * qdd, lambda _: None)
 
@@ -125,26 +126,26 @@ def test_blocks_keep_their_identities(name):
 def test_models_say_a_true_sentence(name, log, truth):
     """Where no joint turns, B tau - c X is the rate of e X, at every instant of ideal data."""
     signals = idbench_chain().signals(log)
-    balance = MODELS.create(name).balance(scara(), signals)
-    X = dict(zip(balance.parameters, truth, strict=True))
-    rest = balance.y.copy()
-    for address, c in balance.c.items():
+    equations = MODELS.create(name).equations(scara(), signals)
+    X = dict(zip(equations.names, truth, strict=True))
+    rest = equations.y.copy()
+    for address, c in equations.c.items():
         rest[address[0]] -= c * X[address[1]]
-    for address, e in balance.e.items():
-        rest[address[0]] -= balance.s(e) * X[address[1]]
+    for address, e in equations.e.items():
+        rest[address[0]] -= signals.s(e) * X[address[1]]
     # Masked instants aside; 6th-order differences leave (w/fs)^6 / 140 with w below 20 rad/s, 5e-7 of 250 W.
     sliding = signals.weight.prod(axis=-2, keepdims=True) > 0
-    assert np.abs(rest * balance.weight * sliding).max() < 2e-4
+    assert np.abs(rest * equations.weight * sliding).max() < 2e-4
 
 
 @pytest.mark.parametrize("name", OPERATORS.builtin)
 def test_operators_agree_with_their_step_and_halo(name, log):
     operator = OPERATORS.create(name)
     chain = idbench_chain()
-    balance = PowerModel().balance(scara(), chain.signals(log))
-    rows = operator.apply(balance, Grid.inside(log.samples, log.fs, 3.0, operator.step(log.fs)))
-    assert rows.y.shape[-1] == (log.samples - 600) // operator.step(log.fs)
-    assert rows.columns.shape[-2] == len(balance.addresses)
+    equations = PowerModel().equations(scara(), chain.signals(log))
+    rows = operator.rows(equations, Grid.inside(log.samples, log.fs, 3.0, operator.step(log.fs)))
+    assert len(rows.Y) == (log.samples - 600) // operator.step(log.fs)
+    assert rows.W.shape == (len(rows.Y), 8)
     assert rows.valid.dtype == bool
     assert operator.halo(log.fs) > 0
 
@@ -159,9 +160,7 @@ def test_chains_recover_ideal_data(name, model, log, truth):
 
 @pytest.mark.parametrize("name", ESTIMATORS.builtin)
 def test_estimators_recover_noiseless_systems(name, log, truth):
-    chain, basis = idbench_chain(), scara()
-    system = chain.build(log, basis, ExplicitModel())
-    problem = Problem(system, rebuild=lambda other: chain.build(other, basis, ExplicitModel()), simulate=lambda X: log)
+    problem = Problem((log,), scara(), ExplicitModel(), idbench_chain(), simulate=lambda X: log)
     X = ESTIMATORS.create(name).fit(problem).X
     np.testing.assert_array_equal(X, ESTIMATORS.create(name).fit(problem).X)
     np.testing.assert_allclose(X, truth, rtol=1e-5)
@@ -169,7 +168,7 @@ def test_estimators_recover_noiseless_systems(name, log, truth):
 
 def test_a_robot_is_the_sum_of_its_blocks():
     basis = Basis(2, tuple(BLOCKS.create(name) for name in BLOCKS.builtin))
-    assert len(basis.parameters) == sum(len(BLOCKS.create(name).names(2)) for name in BLOCKS.builtin)
+    assert len(basis.names) == sum(len(BLOCKS.create(name).parameters(2)) for name in BLOCKS.builtin)
 
 
 @pytest.mark.parametrize("name", ESTIMATORS.builtin)
@@ -190,10 +189,10 @@ def test_estimators_take_every_run_by_itself(name, log):
 def test_alignments_keep_shapes_and_constants(name, meaning):
     """A constant torque is itself, whatever its samples mean, and its power is it times the velocity."""
     torque = ALIGNMENTS.create(name).align(np.full(SIGNALS.shape, 2.0), TorqueChannel(meaning, 0.004), FS)
-    np.testing.assert_allclose(torque.mean(), 2.0, rtol=1e-12)
-    power = torque.power(np.broadcast_to(3 * T, SIGNALS.shape), np.full(SIGNALS.shape, 3.0))
-    np.testing.assert_allclose(power[..., 20:-20], 2 * 2.0 * 3.0, rtol=1e-9)
-    assert power.shape == (3, 1, len(T))
+    np.testing.assert_allclose(torque.mean, 2.0, rtol=1e-12)
+    power = torque.times(np.full((3, len(T)), 3.0), 1)
+    np.testing.assert_allclose(power[..., 20:-20], 2.0 * 3.0, rtol=1e-9)
+    assert power.shape == (3, len(T))
     np.testing.assert_allclose(torque.average(np.full(50, 7.0)), 7.0, rtol=1e-12)
     assert torque.halo() >= 0
 

@@ -7,7 +7,7 @@ import pytest
 
 OURS = {"models", "sim", "identify", "experiments", "tests"}
 
-CONTRACT = {"identify.motion_log", "identify.plugins", "identify.kinematics", "identify.errors", "identify.blame"}
+CONTRACT = {"identify.data.motion_log", "identify.plugins", "identify.data.kinematics", "identify.errors", "identify.blame"}
 """What `sim` may know of `identify`: the contract types, the plug-in tables, and whose mistake it is if one goes wrong."""
 
 ALLOWED = {
@@ -18,8 +18,8 @@ ALLOWED = {
 }
 
 ALLOWED_IN = {
-    "identify/log_file.py": {"pyarrow"},
-    "identify/consistent.py": {"clarabel"},
+    "identify/data/log_file.py": {"pyarrow"},
+    "identify/parameters/consistent.py": {"clarabel"},
     "sim/scenario_file.py": {"tomli_w"},
     "experiments/recording/columns.py": {"pyarrow"},
     "experiments/study/study.py": {"pydantic"},

@@ -20,7 +20,7 @@ table = Table1(replace(load(SCENARIO), fs=1000.0), ("paper", "idbench"))
 digest = hashlib.sha256(table.log.tau.tobytes())
 for estimates in table.estimates.values():
     for estimate in estimates.values():
-        for array in (estimate.system.Y, estimate.system.W, estimate.X, estimate.covariance):
+        for array in (estimate.rows.Y, estimate.rows.W, estimate.X, estimate.covariance):
             digest.update(array.tobytes())
 print(digest.hexdigest())
 """

@@ -16,7 +16,7 @@ from experiments.recording.report import about
 from experiments.recording.stream import Stream
 from experiments.run import ScenarioRun
 from identify import measured_state
-from identify.long import is_long
+from identify.rows.pieces import is_long
 from sim.run import Run
 from sim.scenario import Scenario
 from sim.scenario_file import to_toml
@@ -58,7 +58,7 @@ class RunRecording:
         """Add what only the end tells, and the identification; return the streams by the name of their file."""
         streams = self.end(ran.run)
         self.base.finish(about(ran.scenario.name, ran.scenario.origin, ROLES))
-        if is_long(ran.run.alone()):  # of which no rows are kept
+        if is_long([ran.run.alone()]):  # of which no rows are kept
             return streams
         there = set().union(*(stream.paths for _, stream in streams))
         return [*streams, layer(self.base.stream.name, ran.identified, ran.run.robots[0].joints, there, self._audience)]

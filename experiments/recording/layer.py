@@ -23,7 +23,7 @@ from identify import (
     filtered,
     instants,
     measured_state,
-    running_estimate,
+    recursive_least_squares,
     spectrum,
 )
 
@@ -68,6 +68,7 @@ class Layer:
         self._log, self._chain, self._at = found.logs[0], found.processing, f"identify/{found.label}"
         methods = {path.strip("/").split("/")[1] for path in known if path.strip("/").startswith("identify/")}
         self._shade = len(methods - {found.label})
+        self._signals = found.problem.prepared.signals[0]
         self._highest = 0.0
 
     def send(self) -> None:
@@ -102,56 +103,56 @@ class Layer:
 
     def _motion(self) -> None:
         """Send the motion as it was measured, and as the rows see it, and which instants are masked."""
-        log, rows = self._log, self._chain.rows(self._log)
-        raw, seen, inner = measured_state(log, self._chain), filtered(log, self._chain), slice(rows.first, -rows.first or None)
+        log, grid = self._log, self._chain.grid(self._log)
+        raw, seen = measured_state(log, self._chain), filtered(self._signals, self._chain)
+        inner = slice(grid.first, -grid.first or None)
         for name, values in seen.items():
-            kinds = {"filtered": (np.arange(log.samples)[rows.samples], values)}
+            kinds = {"filtered": (np.arange(log.samples)[grid.samples], values)}
             if name != "q":  # that is in the base
                 kinds["measured"] = np.arange(log.samples)[inner], getattr(raw, name)[:, inner]
             for kind, (samples, curves) in kinds.items():
                 path, colors = f"{self._at}/{name}/{kind}", kind_colors(kind, len(self._joints))
                 self.stream.style(path, [f"{kind} {joint}" for joint in self._joints], colors)
                 self.stream.curves(path, time_columns(samples / log.fs, log.fs), curves.T)
-        lanes, weight = Lanes(self.stream, log.fs), self._chain.signals(log).weight
+        lanes, weight = Lanes(self.stream, log.fs), self._signals.weight
         for joint, of_joint in zip(self._joints, weight, strict=True):
             lanes.send(f"{self._at}/mask/{joint}", log.t, mask_states(of_joint))
 
     def _rows(self, at: str, form: str, estimate: Estimate, color: Color) -> None:
         """Send what was measured, what is predicted, and the residual, an entity for each kind of row."""
-        system, label = estimate.system, self._found.label if self._shade else ""
-        groups = np.unique(system.group)
-        for group, row in zip(groups, self._names(form, len(groups)), strict=True):
-            rows = (system.group == group) & system.valid
-            times, named = [seconds(system.time[rows])], f"{form} {label}".strip()
-            self._curve(f"{at}/measured/{row}", times, system.Y[rows], "measured", GREY, 6.0)
+        found, label = estimate.rows, self._found.label if self._shade else ""
+        for kind, row in enumerate(self._names(form, found.kinds)):
+            rows = (found.group == kind) & found.valid
+            times, named = [seconds(found.time[rows])], f"{form} {label}".strip()
+            self._curve(f"{at}/measured/{row}", times, found.Y[rows], "measured", GREY, 6.0)
             width = FORM_WIDTHS.get(form, 1.5) / (1 + self._shade)  # so that what lies below shows
             self._curve(f"{at}/predicted/{row}", times, estimate.predicted[rows], named, color, width)
             self._curve(f"{at}/residual/{row}", times, estimate.residual[rows], named, color, width)
 
     def _columns(self, at: str, form: str, estimate: Estimate) -> None:
         """Send the columns of W, scaled to unit length, and its singular values."""
-        system = estimate.system
-        length = np.linalg.norm(system.W, axis=0)
-        W, groups = system.W / np.where(length > 0, length, 1.0), np.unique(system.group)
+        found = estimate.rows
+        length = np.linalg.norm(found.W, axis=0)
+        W = found.W / np.where(length > 0, length, 1.0)
         if form != "implicit":  # whose W is the explicit one's, but for the differences
-            for group, row in zip(groups, self._names(form, len(groups)), strict=True):
-                rows = (system.group == group) & system.valid
+            for kind, row in enumerate(self._names(form, found.kinds)):
+                rows = (found.group == kind) & found.valid
                 used = np.flatnonzero(np.abs(W[rows]).max(axis=0) > 0)
                 path, colors = f"{at}/columns/{row}", [JOINTS[p % len(JOINTS)] for p in used]
-                self.stream.style(path, [estimate.parameters[p] for p in used], colors)
-                self.stream.curves(path, [seconds(system.time[rows])], W[rows][:, used])
-        values = np.linalg.svd(system.R_W, compute_uv=False)
+                self.stream.style(path, [estimate.names[p] for p in used], colors)
+                self.stream.curves(path, [seconds(found.time[rows])], W[rows][:, used])
+        values = np.linalg.svd(found.factors.together.R_W, compute_uv=False)
         self._bars(f"{at}/singular_values", np.log10(values / values[-1]), form)
 
     def _running(self, at: str, form: str, estimate: Estimate, color: Color) -> None:
         """Send the estimate as it comes about, with its variance, once that is small enough to be worth a look."""
-        if estimate.solved is None:
+        if estimate.weights is None:
             return
         log = self._log
         t = np.append(np.arange(EVERY, log.t[-1], EVERY), log.t[-1] + self._chain.halo(log.fs, log.torque))
-        running = running_estimate(estimate, t, self._chain.halo(log.fs, log.torque))
+        running = recursive_least_squares(estimate, t, self._chain.halo(log.fs, log.torque))
         t = np.minimum(t, log.t[-1])
-        for p, name in enumerate(estimate.parameters):
+        for p, name in enumerate(estimate.names):
             settled = np.logical_or.accumulate(running.sigma[:, p] < WIDEST * np.abs(running.X[-1, p]))
             known = np.isfinite(running.X[:, p]) & (settled | (t > t[-1] / 2))
             path, variance = f"{at}/estimate/{name}", running.sigma[known, p] ** 2
@@ -162,7 +163,7 @@ class Layer:
     def _left_over(self, at: str, form: str, estimate: Estimate, color: Color) -> None:
         """Send the residual before the operator: over velocity and position, and its spectrum."""
         log = self._log
-        left = instants(log, self._found.basis, MODELS.create(form), self._chain, estimate.X)
+        left = instants(self._signals, self._found.basis, MODELS.create(form), self._chain, estimate.X)
         names = self._names(form, len(left.residual))
         if names is self._joints:
             self._over(at, form, left)

@@ -7,9 +7,8 @@ import rerun.blueprint as rrb
 
 from experiments.errors import ResultsError
 from experiments.recording.views import Part, Shelf, arm, bars, column, grid, lanes, plot, side_by_side, tabbed, text
-from identify import BLOCKS, joint_number
-from identify.basis.wrench import UNITS
-from identify.kinematics import INERTIAL
+from identify import BLOCKS
+from identify.basis.body_regressor import KINDS
 
 DIGITS = "0123456789"
 
@@ -19,11 +18,16 @@ def _letters(name: str) -> str:
     return name.rstrip(DIGITS).removesuffix("R")
 
 
+def _number(name: str) -> int:
+    """Return the number of the joint that ends a parameter's name, 0 without one: a recording holds names alone."""
+    return int(name[len(name.rstrip(DIGITS)) :] or 0)
+
+
 def _known_units() -> dict[str, str]:
     """Return the units of the parameters of links and of the blocks that are built in, by their letters."""
     blocks = [BLOCKS.create(name) for name in BLOCKS.builtin]
-    each = [pair for block in blocks for pair in zip(block.names(2), block.units(2), strict=True)]
-    return dict(zip(INERTIAL, UNITS, strict=True)) | {_letters(name): unit for name, unit in each}
+    each = [parameter for block in blocks for parameter in block.parameters(2)]
+    return {x: unit for x, (_, unit) in KINDS.items()} | {_letters(p.name): p.unit for p in each}
 
 
 ESTIMATES = 12
@@ -149,8 +153,8 @@ def _estimates(shelf: Shelf, names: Sequence[str]) -> Part:
     if len(names) <= ESTIMATES:
         return grid("estimates", [_estimate(shelf, name) for name in names], 2)
     by_joint: dict[int, list[str]] = {}
-    for name in sorted(names, key=joint_number):
-        by_joint.setdefault(joint_number(name), []).append(name)
+    for name in sorted(names, key=_number):
+        by_joint.setdefault(_number(name), []).append(name)
     return tabbed([grid(f"joint {j}", [_estimate(shelf, name) for name in of_joint], 3) for j, of_joint in by_joint.items()])
 
 

@@ -17,7 +17,7 @@ def estimates_table(found: Identified) -> str:
     what = "sigma" if found.truth is None else "error"
     lines = [f"Estimate and {what}, chain **{found.chain}**, {found.estimator}\n"]
     lines += [f"| | true | {' | '.join(forms)} |", "|---|---:|" + "---:|" * len(forms)]
-    for i, name in enumerate(found.basis.parameters):
+    for i, name in enumerate(found.basis.names):
         true = "" if found.truth is None else f"{list(found.truth.values())[i]:g}"
         lines.append(f"| {i + 1} {name} | {true} | {' | '.join(_cells(found, i))} |")
     conds = " | ".join(f"{e.condition_number:.1f}" for e in found.estimates.values())
@@ -32,7 +32,7 @@ def short_table(found: Identified) -> str:
         f"|{' | true' if known else ''} | {' | '.join(found.estimates)} |",
     ]
     lines.append("|---|" + "---:|" * (len(found.estimates) + known))
-    for i, name in enumerate(found.basis.parameters):
+    for i, name in enumerate(found.basis.names):
         true = f" {list(found.truth.values())[i]:g} |" if found.truth is not None else ""
         lines.append(f"| {name} |{true} {' | '.join(f'{e.X[i]:.4g}' for e in found.estimates.values())} |")
     return "\n".join(lines)
@@ -40,7 +40,7 @@ def short_table(found: Identified) -> str:
 
 def _cells(found: Identified, i: int) -> Iterator[str]:
     for estimate in found.estimates.values():
-        aside = f"{estimate.corrected_sigma[i]:.2g}" if found.truth is None else f"{judged(found, estimate)[i]:+.2g} %"
+        aside = f"{estimate.best_sigma[i]:.2g}" if found.truth is None else f"{judged(found, estimate)[i]:+.2g} %"
         yield f"{estimate.X[i]:.4g} ({aside})"
 
 

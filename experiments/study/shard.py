@@ -10,7 +10,7 @@ import numpy as np
 
 from experiments.study.method import Method
 from experiments.study.study import Study
-from identify import Estimate, IdentificationError, Status, attempt_each
+from identify import Estimate, ExplicitModel, IdentificationError, Problem, Status, attempt_each
 from sim.engine import Progress, simulate
 from sim.errors import BenchError
 from sim.run import Run
@@ -95,10 +95,10 @@ def _identify(
     study: Study, method: Method, simulated: Run, runs: Sequence[int], truth: Mapping[str, float]
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for every run and model."""
-    basis = study.subject.basis
     found: dict[str, Estimate | IdentificationError]
     try:
-        found = attempt_each(simulated.log, basis, study.created_models, method.chain, method.estimator, throw=False)
+        problem = Problem((simulated.log,), study.subject.basis, ExplicitModel(), method.chain)
+        found = attempt_each(problem, study.created_models, method.estimator, throw=False)
     except IdentificationError as error:
         found = dict.fromkeys(study.models, error)
     for model in study.models:
@@ -116,21 +116,21 @@ def _failure(outcome: Estimate | IdentificationError, i: int) -> str:
     """Return why a run has no estimate; empty if it has one."""
     if isinstance(outcome, IdentificationError):
         return str(outcome)
-    if outcome.system.status[i] != Status.OK:
-        return outcome.system.explain((i,))
+    if outcome.status[i] != Status.OK:
+        return outcome.problem.factors.together.explain((i,))
     return "" if np.isfinite(outcome.X[i]).all() else "the estimator finds no finite value"
 
 
 def _columns(estimate: Estimate, truth: Mapping[str, float]) -> dict[str, list[Any]]:
     """Return what an estimate of many runs found, a list with the value of each run."""
     runs = len(estimate.X)
-    parts = estimate.X, estimate.corrected_sigma, estimate.sigma, np.tile(list(truth.values()), (runs, 1))
+    parts = estimate.X, estimate.best_sigma, estimate.sigma, np.tile(list(truth.values()), (runs, 1))
     columns = {
         "condition_number": estimate.condition_number.tolist(),
-        "rows": estimate.rows.tolist(),
+        "rows": estimate.row_count.tolist(),
         "residual_rms": estimate.residual_rms.tolist(),
     }
-    for p, name in enumerate(estimate.parameters):
+    for p, name in enumerate(estimate.names):
         columns |= {name + part: x[:, p].tolist() for part, x in zip(PARTS, parts, strict=True)}
     return columns
 

@@ -135,7 +135,7 @@ class Study:
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the parameters that are identified."""
-        return self.subject.basis.parameters
+        return self.subject.basis.names
 
     @cached_property
     def subject(self) -> Subject:

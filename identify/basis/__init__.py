@@ -4,18 +4,18 @@
 """
 
 from identify.basis.armature import Armature as Armature
-from identify.basis.base import AbstractBlock as AbstractBlock
-from identify.basis.base import AbstractConservativeBlock as AbstractConservativeBlock
-from identify.basis.base import AbstractFriction as AbstractFriction
 from identify.basis.basis import Basis as Basis
-from identify.basis.basis import joint_number as joint_number
-from identify.basis.coulomb import CoulombFriction as CoulombFriction
+from identify.basis.block import AbstractBlock as AbstractBlock
+from identify.basis.block import AbstractConservativeBlock as AbstractConservativeBlock
+from identify.basis.block import AbstractFriction as AbstractFriction
+from identify.basis.coulomb_friction import CoulombFriction as CoulombFriction
 from identify.basis.offset import Offset as Offset
-from identify.basis.scara import ScaraLinks as ScaraLinks
-from identify.basis.scara import scara as scara
-from identify.basis.tree import tree_basis as tree_basis
+from identify.basis.parameter import Parameter as Parameter
+from identify.basis.scara_links import ScaraLinks as ScaraLinks
+from identify.basis.scara_links import scara as scara
+from identify.basis.tree_basis import tree_basis as tree_basis
 from identify.basis.tree_links import TreeLinks as TreeLinks
-from identify.basis.viscous import ViscousFriction as ViscousFriction
+from identify.basis.viscous_friction import ViscousFriction as ViscousFriction
 from identify.plugins import PluginTable
 
 BLOCKS: PluginTable[AbstractBlock] = PluginTable(

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 from typing import final
 
 from identify.arrays import Columns
-from identify.basis.base import AbstractConservativeBlock
-from identify.state import State
+from identify.basis.block import AbstractConservativeBlock
+from identify.basis.parameter import Parameter
+from identify.signals.state import State
 
 
 @final
@@ -23,13 +24,9 @@ class Armature(AbstractConservativeBlock):
 
     joints: tuple[int, ...] | None = None
 
-    def names(self, n: int) -> tuple[str, ...]:
-        """Return Ia and the number of each joint that has one."""
-        return tuple(f"Ia{j + 1}" for j in self._numbers(n))
-
-    def units(self, n: int) -> tuple[str, ...]:
-        """Return kg m^2."""
-        return ("kg m^2",) * len(self.names(n))
+    def parameters(self, n: int) -> tuple[Parameter, ...]:
+        """Return Ia of each joint that has one."""
+        return tuple(Parameter(f"Ia{j + 1}", j, "rotor inertia", "kg m^2") for j in self._numbers(n))
 
     def explicit(self, state: State) -> Columns:
         """Return qdd (Eq. 5, 6)."""

@@ -1,6 +1,6 @@
 """A robot as identification sees it: a sum of column blocks."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self, final
@@ -8,19 +8,11 @@ from typing import Self, final
 import numpy as np
 
 from identify.arrays import Array, Columns
-from identify.basis.armature import Armature
-from identify.basis.base import AbstractBlock, AbstractFriction, Narrowing
+from identify.basis.block import AbstractBlock, Narrowing
+from identify.basis.parameter import Parameter
 from identify.blame import expect
 from identify.errors import PluginError, SettingError
-from identify.state import State
-
-LINEAR = {"N m": "N", "N m s/rad": "N s/m", "kg m^2": "kg"}
-"""Units of what resists a hinge, for a slide."""
-
-
-def joint_number(parameter: str) -> int:
-    """Return the number of the joint, from 1, that ends the name of a parameter, such as 2 of ZZR2; 0 without one."""
-    return int(parameter[len(parameter.rstrip("0123456789")) :] or 0)
+from identify.signals.state import State
 
 
 @final
@@ -54,14 +46,15 @@ class Basis:
     slides: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
-        names = [name for block in self.blocks for name in block.names(self.n)]
-        if twice := sorted({name for name in names if names.count(name) > 1}):
+        names = list(self._own)
+        every = [parameter.name for block in self.blocks for parameter in block.parameters(self.n)]
+        if twice := sorted({name for name in every if every.count(name) > 1}):
             raise SettingError(f"parameters {', '.join(twice)} come from two blocks: leave one of them out")
         if unknown := [name for name in (*self.order, *(self.kept or ())) if name not in names]:
             raise SettingError(f"there is no parameter {', '.join(unknown)} in this basis; there are {', '.join(names)}")
 
     def __add__(self, block: AbstractBlock) -> Self:
-        kept = None if self.kept is None else {**self.kept, **{name: name for name in block.names(self.n)}}
+        kept = None if self.kept is None else {**self.kept, **{p.name: p.name for p in block.parameters(self.n)}}
         return replace(self, blocks=(*self.blocks, block), kept=kept)
 
     def renamed(self, kept: Mapping[str, str]) -> Self:
@@ -77,9 +70,9 @@ class Basis:
         SettingError
             If it names a parameter that there is not.
         """
-        if unknown := [name for name in kept if name not in self.parameters]:
-            raise SettingError(f"there is no parameter {', '.join(unknown)}; there are {', '.join(self.parameters)}")
-        own = {new: old for old, new in self._names.items()}
+        if unknown := [name for name in kept if name not in self.names]:
+            raise SettingError(f"there is no parameter {', '.join(unknown)}; there are {', '.join(self.names)}")
+        own = {new: old for old, new in self._renamed.items()}
         names = frozenset(own[name] for name in kept)
         blocks = tuple(block.narrowed(names) if isinstance(block, Narrowing) else block for block in self.blocks)
         return replace(self, blocks=blocks, order=(), kept={own[name]: new for name, new in kept.items()})
@@ -87,36 +80,36 @@ class Basis:
     def without(self, *names: str) -> Self:
         """Return the basis without some of its parameters, which then count as zero."""
         self.renamed({name: name for name in names})  # complains of those that there are not
-        if not set(self.parameters) - set(names):
+        if not set(self.names) - set(names):
             raise SettingError(f"without {', '.join(names)} there is no parameter left")
-        return self.renamed({name: name for name in self.parameters if name not in names})
+        return self.renamed({name: name for name in self.names if name not in names})
 
     @cached_property
-    def _units(self) -> dict[str, str]:
-        units = {name: unit for block in self.blocks for name, unit in self._units_of(block)}
-        return {new: units[name] for name, new in self._names.items()}
-
-    def _units_of(self, block: AbstractBlock) -> Iterator[tuple[str, str]]:
-        sliding = self.slides if isinstance(block, (AbstractFriction, Armature)) else ()
-        for name, unit in zip(block.names(self.n), block.units(self.n), strict=True):
-            yield name, LINEAR.get(unit, unit) if joint_number(name) - 1 in sliding else unit
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The p parameters, in the order of X."""
+        return tuple(replace(self._own[name], name=new) for name, new in self._renamed.items())
 
     @cached_property
-    def _names(self) -> dict[str, str]:
-        """What each parameter of the blocks is called here, in the order of X."""
-        own = [name for block in self.blocks for name in block.names(self.n)]
-        kept = {name: name for name in dict.fromkeys((*self.order, *own))} if self.kept is None else self.kept
-        return {name: kept[name] for name in dict.fromkeys((*self.order, *kept)) if name in kept}
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
+    def names(self) -> tuple[str, ...]:
         """Names of the p parameters, in the order of X."""
-        return tuple(self._units)
+        return tuple(self._renamed.values())
 
     @property
     def units(self) -> tuple[str, ...]:
         """Units of the p parameters."""
-        return tuple(self._units.values())
+        return tuple(parameter.unit for parameter in self.parameters)
+
+    @cached_property
+    def _own(self) -> dict[str, Parameter]:
+        """The parameters of the blocks, by their names there."""
+        every = [parameter for block in self.blocks for parameter in block.parameters(self.n)]
+        return {p.name: p.of_a_slide() if p.joint in self.slides else p for p in every}
+
+    @cached_property
+    def _renamed(self) -> dict[str, str]:
+        """What each parameter of the blocks is called here, in the order of X."""
+        kept = {name: name for name in dict.fromkeys((*self.order, *self._own))} if self.kept is None else self.kept
+        return {name: kept[name] for name in dict.fromkeys((*self.order, *kept)) if name in kept}
 
     def explicit(self, state: State) -> Columns:
         """Return the columns of the joint torques (Eq. 5, 6)."""
@@ -140,7 +133,7 @@ class Basis:
 
     def _sum(self, state: State, function: str) -> Columns:
         """Return what a column function of every block gives, together."""
-        names, shape, total = self._names, (*state.q.shape[:-2], state.q.shape[-1]), dict[tuple[int, str], Array]()
+        names, shape, total = self._renamed, (*state.q.shape[:-2], state.q.shape[-1]), dict[tuple[int, str], Array]()
         for block in self.blocks:
             found = getattr(block, function)(state)
             if not isinstance(found, Mapping):

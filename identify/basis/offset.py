@@ -6,7 +6,8 @@ from typing import ClassVar, final
 import numpy as np
 
 from identify.arrays import Array
-from identify.basis.base import AbstractFriction
+from identify.basis.block import AbstractFriction
+from identify.basis.parameter import Kind
 
 
 @final
@@ -16,6 +17,7 @@ class Offset(AbstractFriction):
 
     symbol: ClassVar[str] = "off"
     unit: ClassVar[str] = "N m"
+    kind: ClassVar[Kind] = "offset"
 
     def force(self, q: Array, qd: Array) -> Array:
         """Return ones."""

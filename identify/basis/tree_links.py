@@ -7,13 +7,14 @@ from typing import Self, final
 import numpy as np
 
 from identify.arrays import Columns
-from identify.basis.base import AbstractConservativeBlock
+from identify.basis.block import AbstractConservativeBlock
+from identify.basis.body_regressor import KINDS, Wrench, energy
+from identify.basis.parameter import Parameter
 from identify.basis.terms import Term, is_zero, minus
 from identify.basis.twists import Twists
-from identify.basis.wrench import UNITS, Wrench, energy
+from identify.data.kinematics import INERTIAL, KinematicTree
 from identify.errors import SettingError
-from identify.kinematics import INERTIAL, KinematicTree
-from identify.state import State
+from identify.signals.state import State
 
 
 @final
@@ -37,15 +38,11 @@ class TreeLinks(AbstractConservativeBlock):
     tree: KinematicTree
     only: frozenset[str] | None = None
 
-    def names(self, n: int) -> tuple[str, ...]:
-        """Return ten parameters a link that has mass; raise SettingError unless the tree has `n` joints."""
+    def parameters(self, n: int) -> tuple[Parameter, ...]:
+        """Return ten parameters for each link that has mass; raise SettingError unless the tree has `n` joints."""
         if n != self.tree.n:
             raise SettingError(f"robot {self.tree.name!r} has {self.tree.n} joints, not {n}")
-        return tuple(f"{x}{j + 1}" for j in self._massive for x in INERTIAL)
-
-    def units(self, n: int) -> tuple[str, ...]:
-        """Return kg m^2, kg m and kg."""
-        return UNITS * (len(self.names(n)) // len(UNITS))
+        return tuple(Parameter(f"{x}{j + 1}", j, *what) for j in self._massive for x, what in KINDS.items())
 
     def narrowed(self, names: frozenset[str]) -> Self:
         """Return this block without the work for other parameters."""

@@ -20,8 +20,8 @@ from identify.basis.terms import (
     transposed,
     vector,
 )
-from identify.kinematics import GROUND, Joint, KinematicTree
-from identify.state import State
+from identify.data.kinematics import GROUND, Joint, KinematicTree
+from identify.signals.state import State
 
 
 class Twist(NamedTuple):

@@ -1,10 +1,11 @@
 """Estimators, and their table."""
 
-from identify.estimators.base import AbstractEstimator as AbstractEstimator
-from identify.estimators.base import Problem as Problem
+from identify.estimators.estimate import Estimate as Estimate
+from identify.estimators.estimator import AbstractEstimator as AbstractEstimator
 from identify.estimators.ordinary_least_squares import (
     OrdinaryLeastSquares as OrdinaryLeastSquares,
 )
+from identify.estimators.problem import Problem as Problem
 from identify.estimators.weighted_least_squares import (
     WeightedLeastSquares as WeightedLeastSquares,
 )

@@ -1,15 +1,13 @@
 """The explicit dynamic model."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import final
 
-import numpy as np
-
-from identify.arrays import Array, Columns
+from identify.arrays import Columns
 from identify.basis import Basis
-from identify.models.base import AbstractModel
-from identify.signals import Signals
+from identify.models.equations import Factors
+from identify.models.model import AbstractModel, each_joint
+from identify.signals.state import State
 
 
 @final
@@ -17,27 +15,15 @@ from identify.signals import Signals
 class ExplicitModel(AbstractModel):
     """Explicit dynamic model, tau = D(q, qd, qdd) X (Eq. 5, 6)."""
 
-    def y(self, signals: Signals) -> Array:
-        """Return tau."""
-        return signals.torque.mean()
+    def B(self, state: State) -> Factors:
+        """Return ones: a row for each joint."""
+        return each_joint(state)
 
-    def c(self, basis: Basis, signals: Signals) -> Columns:
+    def c(self, basis: Basis, state: State) -> Columns:
         """Return D(q, qd, qdd)."""
-        return basis.explicit(signals.state)
+        return basis.explicit(state)
 
-    def e(self, basis: Basis, signals: Signals) -> Columns:
+    def e(self, basis: Basis, state: State) -> Columns:
         """Return no columns."""
-        del basis, signals
+        del basis, state
         return {}
-
-    def B(self, signals: Signals) -> Mapping[tuple[int, int], Array]:
-        """Return ones: a row a joint."""
-        return {(j, j): np.ones(1) for j in range(signals.state.n)}
-
-    def weight(self, signals: Signals) -> Array:
-        """Return the weight of each joint for its own row."""
-        return signals.weight
-
-    def noise(self, signals: Signals) -> Array:
-        """Return ones: torque noise reaches all rows of a joint alike."""
-        return np.ones_like(signals.weight)

@@ -1,15 +1,13 @@
 """The implicit dynamic model."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import final
 
-import numpy as np
-
-from identify.arrays import Array, Columns
+from identify.arrays import Columns
 from identify.basis import Basis
-from identify.models.base import AbstractModel
-from identify.signals import Signals
+from identify.models.equations import Factors
+from identify.models.model import AbstractModel, each_joint
+from identify.signals.state import State
 
 
 @final
@@ -17,26 +15,14 @@ from identify.signals import Signals
 class ImplicitModel(AbstractModel):
     """Implicit dynamic model, tau = [R(q, qd) + s M_i(q) qd] X (Eq. 7-9)."""
 
-    def y(self, signals: Signals) -> Array:
-        """Return tau."""
-        return signals.torque.mean()
+    def B(self, state: State) -> Factors:
+        """Return ones: a row for each joint."""
+        return each_joint(state)
 
-    def c(self, basis: Basis, signals: Signals) -> Columns:
+    def c(self, basis: Basis, state: State) -> Columns:
         """Return R(q, qd)."""
-        return basis.remainder(signals.state)
+        return basis.remainder(state)
 
-    def e(self, basis: Basis, signals: Signals) -> Columns:
+    def e(self, basis: Basis, state: State) -> Columns:
         """Return M_i(q) qd."""
-        return basis.momentum(signals.state)
-
-    def B(self, signals: Signals) -> Mapping[tuple[int, int], Array]:
-        """Return ones: a row a joint."""
-        return {(j, j): np.ones(1) for j in range(signals.state.n)}
-
-    def weight(self, signals: Signals) -> Array:
-        """Return the weight of each joint for its own row."""
-        return signals.weight
-
-    def noise(self, signals: Signals) -> Array:
-        """Return ones: torque noise reaches all rows of a joint alike."""
-        return np.ones_like(signals.weight)
+        return basis.momentum(state)

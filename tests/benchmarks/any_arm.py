@@ -85,7 +85,7 @@ def hour():
     watcher.join()
     short = log.part(0, 100_000)
     each = best(lambda: identify_each(short, basis, models)) / short.samples
-    print(f"{long.samples} samples x 7 joints, {len(basis.parameters)} parameters, three models: {took:.0f} s,")
+    print(f"{long.samples} samples x 7 joints, {len(basis.names)} parameters, three models: {took:.0f} s,")
     print(f"{most[0] - before:.2f} GB above the log, itself {2 * long.q.nbytes / 1e9:.2f} GB;")
     print(f"cost of a sample against a log of 100 000: {took / long.samples / each:.2f}")
 

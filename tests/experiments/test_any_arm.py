@@ -74,7 +74,7 @@ def test_round_trip_from_file_to_file(arm, tmp_path):
     Written(arm.found, "explicit").write(path)
     made = Robot.load(str(path))
     truth, written = standard_parameters(subject.robot), standard_parameters(made)
-    base = [subject.base.base(np.array([x[n] for n in subject.base.standard.parameters])) for x in (truth, written)]
+    base = [subject.base.base(np.array([x[n] for n in subject.base.standard.names])) for x in (truth, written)]
     sigma = arm.found.estimates["explicit"].corrected_sigma
     assert np.abs((base[1] - base[0]) / sigma).max() < 4
     again = replace(scenario(subject.name, 6, 7), robot=str(path))
@@ -91,8 +91,8 @@ def test_the_scara_as_a_tree_says_what_its_closed_form_says(log):
     by_file = Identified((log,), Subject(str(Robot.path("scara"))))
     by_name = Identified((log,), Subject("scara"))
     for model in MODELS.builtin:
-        tree = dict(zip(by_file.basis.parameters, by_file.estimates[model].X, strict=True))
-        form = dict(zip(by_name.basis.parameters, by_name.estimates[model].X, strict=True))
+        tree = dict(zip(by_file.basis.names, by_file.estimates[model].X, strict=True))
+        form = dict(zip(by_name.basis.names, by_name.estimates[model].X, strict=True))
         for name in ("ZZR1", "Fv1", "Fs1", "ZZ2", "Fv2", "Fs2"):
             assert tree[name] == pytest.approx(form[name], rel=1e-9)
         assert 0.5 * tree["MX2"] == pytest.approx(form["LMX2"], rel=1e-9)

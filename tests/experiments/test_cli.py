@@ -4,7 +4,7 @@ import json
 
 from experiments.cli import main
 from experiments.table1 import SCENARIO
-from identify.log_file import read_log
+from identify.data.log_file import read_log
 from sim.scenario_file import from_dict, load
 
 

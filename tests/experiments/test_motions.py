@@ -10,7 +10,7 @@ from experiments.errors import ExperimentError
 from experiments.motions import COMPARED, Errors, Pace, Table1Motions
 from experiments.table1 import PAPER
 from identify import IirLowPass, ReversalMask
-from identify.chain import CHAINS
+from identify.rows.chain import CHAINS
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import pytest
 from experiments.cli import main
 from experiments.errors import ResultsError
 from experiments.results import HIDDEN, Place, results_folder
-from identify.log_file import read_log, write_log
+from identify.data.log_file import read_log, write_log
 
 
 def filled(out, **summary):

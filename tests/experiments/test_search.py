@@ -29,7 +29,7 @@ def test_other_trajectories_of_the_search_are_identified_as_well(seed, robot, tr
     estimates = Table1(scenario, ("idbench",)).estimates["idbench"]
     for form, cond, rows in (("explicit", 28, 800), ("implicit", 28, 800), ("power", 93, 400)):
         assert estimates[form].condition_number == pytest.approx(cond, rel=0.1)
-        assert estimates[form].rows == rows
+        assert estimates[form].row_count == rows
         assert estimates[form].relative_error_percent(truth).max() < 0.01
     assert estimates["energy"].relative_error_percent(truth).max() < 0.01
 

@@ -23,7 +23,7 @@ def test_chain_idbench_is_at_most_the_papers_error_and_a_thousandth_of_a_percent
 @pytest.mark.parametrize("chain", ["paper", "idbench"])
 @pytest.mark.parametrize("form", FORMS)
 def test_rows_are_the_papers(chain, form, table1):
-    assert table1.estimates[chain][form].rows == PAPER[form].rows
+    assert table1.estimates[chain][form].row_count == PAPER[form].rows
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -82,5 +82,5 @@ def test_the_summary_has_what_its_readers_expect(table1, truth):
         np.testing.assert_array_equal(entry["relative_sigma_percent"], estimate.relative_sigma_percent)
         np.testing.assert_array_equal(entry["relative_error_percent"], estimate.relative_error_percent(truth))
         assert entry["condition_number"] == estimate.condition_number
-        assert entry["rows"] == estimate.rows
+        assert entry["rows"] == estimate.row_count
         assert entry["residual_rms"] == estimate.residual_rms

@@ -13,7 +13,7 @@ from experiments.subject import Subject
 from experiments.validation import Validated
 from experiments.verdict import Remedies, Verdict
 from identify import MotionLog
-from identify.log_file import read_log
+from identify.data.log_file import read_log
 
 PUMA = "puma560"
 
@@ -41,7 +41,7 @@ def validated(pair, asked=Parameters(), models=("explicit",)):  # noqa: B008  # 
 
 
 def without(letters):
-    names = Subject(PUMA).basis.parameters
+    names = Subject(PUMA).basis.names
     return Parameters(without=tuple(name for name in names if name.startswith(letters)))
 
 
@@ -102,7 +102,7 @@ def test_a_starved_power_model_is_told_to_be_so_and_the_explicit_one_recommended
     """A third of a log: hardly more rows than parameters in the power model; the explicit one has six times as many."""
     part = pair[0].part(0, int(0.4 * pair[0].samples))
     found = Identified((part,), Subject(PUMA), models=("explicit", "power"))
-    rows, p = int(found.estimates["power"].rows), len(found.basis.parameters)
+    rows, p = int(found.estimates["power"].row_count), len(found.basis.names)
     assert p < rows < 4 * p
     told = [doubt for doubt in doubts_of_result(found) if "tells too little" in doubt]
     assert any(f"the power model tells too little: {rows} rows for {p} parameters" in doubt for doubt in told)

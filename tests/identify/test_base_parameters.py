@@ -7,7 +7,7 @@ from importlib.metadata import files
 import numpy as np
 import pytest
 
-import identify.base_parameters
+import identify.parameters.base_parameters
 from identify import (
     MODELS,
     Armature,
@@ -17,6 +17,7 @@ from identify import (
     Joint,
     KinematicTree,
     Offset,
+    Problem,
     SettingError,
     State,
     TreeLinks,
@@ -26,7 +27,7 @@ from identify import (
     scara,
     tree_basis,
 )
-from identify.motion_log import MotionLog, TorqueChannel
+from identify.data.motion_log import MotionLog, TorqueChannel
 from sim.ideal import ideal_log
 from sim.robot import Robot
 from sim.trajectories import RandomMoves
@@ -39,10 +40,10 @@ def inertial(tree):
 
 
 def columns(basis, q, qd, qdd):
-    W = np.zeros((basis.n, q.shape[-1], len(basis.parameters)))
+    W = np.zeros((basis.n, q.shape[-1], len(basis.names)))
     for (row, name), signal in basis.explicit(State(q, qd, lambda _: qdd)).items():
-        W[row, :, basis.parameters.index(name)] = signal
-    return W.reshape(-1, len(basis.parameters))
+        W[row, :, basis.names.index(name)] = signal
+    return W.reshape(-1, len(basis.names))
 
 
 def planar(count, gravity):
@@ -81,7 +82,7 @@ def test_base_parameters_make_the_same_torques_and_map_both_ways(robot, rng):
     tree = kinematic_tree(Robot.load(robot))
     found = BaseParameters.of(tree, tree_basis(tree))
     states = rng.uniform(-3, 3, (3, tree.n, 50))
-    X = rng.normal(size=len(found.standard.parameters))
+    X = rng.normal(size=len(found.standard.names))
     torques = columns(found.standard, *states) @ X
     np.testing.assert_allclose(columns(found.basis, *states) @ found.base(X), torques, atol=1e-10 * np.abs(torques).max())
     wanted, scale = rng.normal(size=len(found.names)), rng.uniform(0.1, 2, len(X))
@@ -98,8 +99,8 @@ def test_names_show_the_grouping():
     assert found.names == ("ZZR1", "Fv1", "Fs1", "ZZ2", "MX2", "MY2", "Fv2", "Fs2")
     assert found.grouping(0) == "ZZ1 + Ia1 + 0.25 M2"
     assert found.grouping(4) == "MX2"
-    assert "M1" in found.unseen
-    assert "ZZ1" not in found.unseen
+    assert "M1" in found.without_effect
+    assert "ZZ1" not in found.without_effect
 
 
 def test_the_offset_of_a_vertical_slide_is_grouped_with_its_weight():
@@ -138,10 +139,10 @@ def test_ideal_data_give_every_base_parameter_in_all_models(robot):
     moves = RandomMoves(moves=25, durations=(0.9, 1.5), velocity=(2.0,), rest=1.0)
     log = ideal_log(arm, moves.sample(arm, 200.0))
     truth = standard_parameters(arm)
-    X = found.base(np.array([truth[name] for name in found.standard.parameters]))
+    X = found.base(np.array([truth[name] for name in found.standard.names]))
     models = {name: MODELS.create(name) for name in MODELS.builtin}
     for name, estimate in identify_each(log, found.basis, models, idbench_chain()).items():
-        weight = np.linalg.norm(estimate.system.W, axis=0) / np.linalg.norm(estimate.system.Y)
+        weight = np.linalg.norm(estimate.rows.W, axis=0) / np.linalg.norm(estimate.rows.Y)
         assert np.abs((estimate.X - X) * weight).max() < 1e-5, name  # shares of the torque that errors make
 
 
@@ -150,9 +151,9 @@ def test_a_motion_that_hides_parameters_is_told_from_a_robot_that_does(log):
     tree = kinematic_tree(Robot.load("scara"))
     found = BaseParameters.of(tree, tree_basis(tree))
     still = MotionLog(log.fs, log.q * [1, 0], log.tau, TorqueChannel("instantaneous"))
-    system = idbench_chain().build(still, found.basis, MODELS.create("power"))
-    assert set(system.unseen()) >= {"Fv2", "Fs2"}
-    assert "Fv1" not in system.unseen()
+    factor = Problem((still,), found.basis, MODELS.create("power"), idbench_chain()).factors.together
+    assert set(factor.not_shown()) >= {"Fv2", "Fs2"}
+    assert "Fv1" not in factor.not_shown()
     assert len(found.names) == 8
 
 
@@ -160,8 +161,8 @@ def test_parameters_can_be_left_out_and_unknown_ones_are_refused():
     tree = kinematic_tree(Robot.load("panda"))
     basis = BaseParameters.of(tree, tree_basis(tree)).basis
     fewer = basis.without("Fs1", "ZZR1")
-    assert set(basis.parameters) - set(fewer.parameters) == {"Fs1", "ZZR1"}
-    assert len(fewer.units) == len(fewer.parameters)
+    assert set(basis.names) - set(fewer.names) == {"Fs1", "ZZR1"}
+    assert len(fewer.units) == len(fewer.names)
     with pytest.raises(SettingError, match="no parameter Fs9"):
         basis.without("Fs9")
 
@@ -169,7 +170,7 @@ def test_parameters_can_be_left_out_and_unknown_ones_are_refused():
 def test_the_grouping_does_not_depend_on_the_states_that_were_drawn(monkeypatch):
     tree = kinematic_tree(Robot.load("panda"))
     one = BaseParameters.of(tree, tree_basis(tree))
-    monkeypatch.setattr(identify.base_parameters, "SEED", 7)
+    monkeypatch.setattr(identify.parameters.base_parameters, "SEED", 7)
     two = BaseParameters.of(tree, tree_basis(tree))
     assert one.names == two.names
     np.testing.assert_allclose(one.K, two.K, atol=1e-9)

@@ -54,7 +54,7 @@ def rate(columns):
 
 def defects(block):
     """Return by how much the two identities between the five column functions fail at the random states."""
-    names = list(block.names(2))
+    names = [p.name for p in block.parameters(2)]
     D = matrix(block.explicit(AT), 2, names)
     implicit = matrix(rate(block.momentum), 2, names) + matrix(block.remainder(AT), 2, names)
     power = matrix(rate(block.energy), 1, names) + matrix(block.dissipation(AT), 1, names)
@@ -65,7 +65,7 @@ def mujoco_defect(basis, robot, truth):
     """Return by how much D X differs from MuJoCo's inverse dynamics plus the friction law."""
     q, qd, qdd = (x.T for x in STATES)
     tau = inverse_dynamics(robot, q, qd, qdd) + coulomb_torque(robot, qd)
-    D = matrix(basis.explicit(AT), 2, list(basis.parameters))
+    D = matrix(basis.explicit(AT), 2, list(basis.names))
     return np.abs(D @ truth - tau).max()
 
 
@@ -75,7 +75,7 @@ def test_explicit_is_rate_of_momentum_plus_remainder_and_power_is_rate_of_energy
 
 
 def test_explicit_times_truth_is_mujocos_inverse_dynamics(robot, truth):
-    assert scara().parameters == tuple(PAPER_ORDER)
+    assert scara().names == tuple(PAPER_ORDER)
     assert mujoco_defect(scara(), robot, truth) < 1e-10
 
 
@@ -104,11 +104,8 @@ class Mutant(AbstractBlock):
         columns = getattr(scara(), function)(state)
         return self.change(columns, state.qd) if function == self.function else columns
 
-    def names(self, n):
+    def parameters(self, n):
         return scara().parameters
-
-    def units(self, n):
-        return scara().units
 
     def explicit(self, state):
         return self._columns("explicit", state)
@@ -175,7 +172,7 @@ def test_a_block_adds_its_parameters_behind_the_papers_order():
             return qd * np.abs(qd)
 
     basis = scara() + Drag()
-    assert basis.parameters == (*PAPER_ORDER, "Fq1", "Fq2")
+    assert basis.names == (*PAPER_ORDER, "Fq1", "Fq2")
     assert basis.units[-1] == "N m s^2/rad^2"
     assert max(defects(Drag())) < 1e-10
 

@@ -40,7 +40,7 @@ class Solver(AbstractEstimator):
     do: object = None
 
     def solve(self, problem):
-        return self.do(problem.system)
+        return self.do(problem)
 
 
 @pytest.mark.parametrize(
@@ -66,10 +66,14 @@ def test_a_friction_law_that_goes_wrong(log, do, error, message):
 @pytest.mark.parametrize(
     ("do", "error", "message"),
     [
-        (lambda system: None, PluginError, r"Solver\.solve returned None, expected an Estimate"),
-        (lambda system: Estimate.judge(system, np.zeros(8))._replace, PluginError, "raised AttributeError"),
-        (lambda system: Estimate(system, np.zeros(3), np.eye(3), None), PluginError, r"shape \(3,\), expected .* shape \(8,\)"),
-        (lambda system: Estimate(system, np.r_[np.nan, np.ones(7)], np.eye(8), None), IdentificationError, "value for ZZR1$"),
+        (lambda problem: None, PluginError, r"Solver\.solve returned None, expected an Estimate"),
+        (lambda problem: Estimate.judge(problem, np.zeros(8))._replace, PluginError, "raised AttributeError"),
+        (
+            lambda problem: Estimate(problem, np.zeros(3), np.eye(3), None),
+            PluginError,
+            r"shape \(3,\), expected .* shape \(8,\)",
+        ),
+        (lambda problem: Estimate(problem, np.r_[np.nan, np.ones(7)], np.eye(8), None), IdentificationError, "value for ZZR1$"),
     ],
     ids=["None", "raises", "shape", "nan"],
 )

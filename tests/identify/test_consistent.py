@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from identify import BaseParameters, IdentificationError, consistent_parameters, tree_basis
-from identify.kinematics import INERTIAL
-from identify.pseudo_inertia import inertial, pseudo_inertia
+from identify.data.kinematics import INERTIAL
+from identify.parameters.pseudo_inertia import inertial, pseudo_inertia
 from sim.rewrite import rewritten
 from sim.robot import Robot
 from sim.tree import kinematic_tree, standard_parameters
@@ -19,11 +19,11 @@ def arm(request):
     tree = kinematic_tree(robot)
     grouping = BaseParameters.of(tree, tree_basis(tree))
     truth = standard_parameters(robot)
-    return grouping, np.array([truth[name] for name in grouping.standard.parameters])
+    return grouping, np.array([truth[name] for name in grouping.standard.names])
 
 
 def links(grouping, values):
-    names = grouping.standard.parameters
+    names = grouping.standard.names
     for j in range(grouping.standard.n):
         yield pseudo_inertia(values[[names.index(f"{x}{j + 1}") for x in INERTIAL]])
 
@@ -49,7 +49,7 @@ def test_another_given_model_changes_what_no_motion_shows_and_nothing_else(arm, 
     sigma = 1e-3 * np.maximum(np.abs(base), 0.01)
     other = X.copy()
     for j in range(grouping.standard.n):
-        mine = [grouping.standard.parameters.index(f"{x}{j + 1}") for x in INERTIAL]
+        mine = [grouping.standard.names.index(f"{x}{j + 1}") for x in INERTIAL]
         other[mine] *= rng.uniform(0.8, 1.25)
     found = consistent_parameters(grouping, base, np.diag(sigma**2), other)
     assert found.agrees
@@ -77,7 +77,7 @@ def test_a_link_too_slender_for_its_inertia_is_moved_as_little_as_its_sigma_asks
     tree = kinematic_tree(robot)
     grouping = BaseParameters.of(tree, tree_basis(tree))
     truth = standard_parameters(robot)
-    X = np.array([truth[name] for name in grouping.standard.parameters])
+    X = np.array([truth[name] for name in grouping.standard.names])
     base, sigma = grouping.base(X), np.full(8, 1e-3)
     slender = base.copy()
     slender[grouping.names.index("ZZ2")] = 0.005  # below 0.0289 of 2 kg there
@@ -96,7 +96,7 @@ def test_what_cannot_be_used_is_refused(arm, monkeypatch):
     with pytest.raises(IdentificationError, match="covariance of the estimate is not positive definite"):
         consistent_parameters(grouping, base, C - 2 * np.eye(len(C)), X)
     wrong = X.copy()
-    wrong[grouping.standard.parameters.index("XX1")] = -1.0
+    wrong[grouping.standard.names.index("XX1")] = -1.0
     with pytest.raises(IdentificationError, match="link 1 of the given model cannot exist"):
         consistent_parameters(grouping, base, C, wrong)
     monkeypatch.setitem(sys.modules, "clarabel", None)
@@ -110,9 +110,9 @@ def test_a_link_of_a_needle_is_left_with_room_for_the_solver(rng):
     tree = kinematic_tree(robot)
     grouping = BaseParameters.of(tree, tree_basis(tree))
     truth = standard_parameters(robot)
-    X = np.array([truth[name] for name in grouping.standard.parameters])
+    X = np.array([truth[name] for name in grouping.standard.names])
     for j in (2, 6):
-        mine = [grouping.standard.parameters.index(f"{x}{j}") for x in INERTIAL]
+        mine = [grouping.standard.names.index(f"{x}{j}") for x in INERTIAL]
         values, axes = np.linalg.eigh(pseudo_inertia(X[mine]))
         X[mine] = inertial((axes * np.maximum(values, [1e-9 * values.sum(), 0, 0, 0])) @ axes.T)
     for _ in range(5):
@@ -131,7 +131,7 @@ def test_a_plate_is_given_some_thickness():
     grouping = BaseParameters.of(tree, tree_basis(tree))
     plate = {"XX1": 0.1, "YY1": 0.1, "ZZ1": 0.2, "MX1": 0.0, "XY1": 0.0, "XZ1": 0.0, "YZ1": 0.0}
     truth = standard_parameters(robot) | plate
-    X = np.array([truth[name] for name in grouping.standard.parameters])
+    X = np.array([truth[name] for name in grouping.standard.names])
     found = consistent_parameters(grouping, grouping.base(X), 1e-6 * np.eye(8), X)
     assert found.agrees
     assert min(np.linalg.eigvalsh(S)[0] for S in links(grouping, found.standard)) > -1e-9

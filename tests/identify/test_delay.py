@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identify import ExcitationError, LogError, MotionLog, SettingError, TorqueChannel, idbench_chain, paper_chain, scara
-from identify.delay import estimate_delay
+from identify.judge.delay import estimate_delay
 from sim.drives import AveragedDrive
 from sim.encoders import IncrementalEncoder
 from sim.engine import simulate

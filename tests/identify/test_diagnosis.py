@@ -22,7 +22,7 @@ from identify import (
 @pytest.mark.parametrize("model", MODELS)
 def test_the_true_parameters_leave_nothing_over(log, truth, model):
     """A fifth-order move is differentiated exactly, but where the difference looks across the end of a move or a reversal."""
-    left = instants(log, scara(), MODELS.create(model), idbench_chain(), truth)
+    left = instants(idbench_chain().signals(log), scara(), MODELS.create(model), idbench_chain(), truth)
     scale = np.abs(log.tau).max() * (np.abs(measured_state(log, idbench_chain()).qd).max() if model == "power" else 1.0)
     inside = (left.weight == 1) if model != "power" else np.ones_like(left.weight, dtype=bool)
     assert np.quantile(np.abs(left.residual[inside]), 0.9) < 1e-6 * scale
@@ -33,7 +33,7 @@ def test_a_wrong_parameter_leaves_its_column(log, truth):
     short = truth.copy()
     short[7] *= 0.95
     chain = idbench_chain()
-    left = instants(log, scara(), MODELS.create("explicit"), chain, short)
+    left = instants(chain.signals(log), scara(), MODELS.create("explicit"), chain, short)
     part = slice(left.first, left.first + left.residual.shape[-1])
     sign, used = np.sign(measured_state(log, chain).qd[1, part]), left.weight[1] == 1
     assert np.median(np.abs(left.residual[1] - 0.005 * sign)[used]) < 1e-8
@@ -70,8 +70,8 @@ def test_cutoffs_are_those_of_the_settings(fs):
 def test_slow_motion_passes_the_filters_unchanged(chain):
     t = np.arange(4000) / 100
     q = np.stack([np.sin(0.5 * t), np.cos(0.3 * t)], axis=1)
-    seen = filtered(MotionLog(100.0, q, np.zeros_like(q), TorqueChannel("instantaneous")), CHAINS.create(chain))
-    rows = t[CHAINS.create(chain).rows(MotionLog(100.0, q, q, TorqueChannel("instantaneous"))).samples]
+    log, made = MotionLog(100.0, q, np.zeros_like(q), TorqueChannel("instantaneous")), CHAINS.create(chain)
+    seen, rows = filtered(made.signals(log), made), t[made.grid(log).samples]
     np.testing.assert_allclose(seen["q"][0], np.sin(0.5 * rows), atol=2e-3)
     np.testing.assert_allclose(seen["qd"][0], 0.5 * np.cos(0.5 * rows), atol=2e-3)
     np.testing.assert_allclose(seen["qdd"][1], -0.09 * np.cos(0.3 * rows), atol=2e-3)

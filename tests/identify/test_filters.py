@@ -5,7 +5,7 @@ import pytest
 from scipy.special import eval_chebyt
 
 from identify import ButterworthPrefilter, FirLowPass, IirLowPass, LogError, SettingError
-from identify.grid import Grid
+from identify.rows.grid import Grid
 
 FS = 100.0
 T = np.arange(4000) / FS
@@ -35,7 +35,7 @@ def test_butterworth_forward_backward_has_its_gain_squared_and_no_phase(f):
 def test_iir_low_pass_is_matlabs_chebyshev_forward_backward(f):
     epsilon_squared = 10 ** (0.05 / 10) - 1
     expected = 1 / (1 + epsilon_squared * eval_chebyt(8, warped(f) / warped(4.0)) ** 2)
-    out = IirLowPass(4.0).decimate(np.sin(2 * np.pi * f * T), FS, Grid(0, 1, 4000))
+    out = IirLowPass(4.0).window(FS, Grid(0, 1, 4000)).apply(np.sin(2 * np.pi * f * T))
     assert gain_and_phase(out, f) == pytest.approx(expected, abs=1e-6)
 
 
@@ -46,7 +46,7 @@ def test_iir_low_pass_is_matlabs_chebyshev_forward_backward(f):
 def test_fir_low_pass_has_its_cutoff_and_transition_in_hertz(fs, f, low, high):
     """Flat to -50 dB below cutoff - transition/2, half at the cut-off, below -50 dB above, whatever fs."""
     t = np.arange(int(10 * fs)) / fs
-    out = FirLowPass(5.0, 5.0).decimate(np.cos(2 * np.pi * f * (t - 5.0)), fs, Grid(int(5 * fs), 1, 1))
+    out = FirLowPass(5.0, 5.0).window(fs, Grid(int(5 * fs), 1, 1)).apply(np.cos(2 * np.pi * f * (t - 5.0)))
     assert low < out[0] < high
 
 

@@ -32,6 +32,6 @@ def test_so_it_is_by_the_energy_form_and_the_weak_form(operator, log, truth):
 @pytest.mark.parametrize("model", MODELS.builtin)
 def test_unaligned_it_shows_the_negative_friction_of_the_papers_table_2(model, log):
     unaligned = identify(log, scara(), MODELS.create(model), replace(idbench_chain(), alignment=AsLogged()))
-    X = dict(zip(unaligned.parameters, unaligned.X, strict=True))
+    X = dict(zip(unaligned.names, unaligned.X, strict=True))
     assert X["Fv1"] < 0
     assert X["Fs1"] > 0.5

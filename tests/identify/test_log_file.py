@@ -6,7 +6,7 @@ import pytest
 from pyarrow import parquet
 
 from identify import IdentificationError, LogError, MotionLog, TorqueChannel
-from identify.log_file import read_log, write_log
+from identify.data.log_file import read_log, write_log
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Noise of the torques, carried to the parameters: the corrected sigma."""
+"""Noise of torques and positions, propagated to rows and parameters: the corrected sigma."""
 
 from dataclasses import replace
 
@@ -13,7 +13,9 @@ from identify import (
     ButterworthPrefilter,
     Estimate,
     MotionLog,
+    NoiseLevels,
     NoPrefilter,
+    Problem,
     TorqueChannel,
     idbench_chain,
     identify,
@@ -21,46 +23,139 @@ from identify import (
     paper_chain,
     scara,
 )
+from identify.rows.noise_propagation import Linearization, covariance, position_variance, torque_variance
+
+TRUTH = (3.5, 0.05, 0.5, 0.06, 0.12, 0.005, 0.01, 0.1)
 
 CHANNELS = [TorqueChannel("instantaneous"), TorqueChannel("held", 0.003), TorqueChannel("averaged", -0.004)]
 EVERY = {name: MODELS.create(name) for name in MODELS.builtin}
 DRAWS = 300
 
 
+def rows_of(log, model, chain):
+    return Problem((log,), scara(), EVERY[model], chain).rows
+
+
 @pytest.mark.parametrize("operator", OPERATORS.builtin)
 @pytest.mark.parametrize("model", MODELS.builtin)
 @pytest.mark.parametrize("channel", CHANNELS, ids=lambda channel: channel.meaning)
-def test_what_is_carried_is_what_the_chain_does(operator, model, channel, log, rng):
-    """Sums of rows that noise makes = sums of the noise with the carried weights, noise by noise: Y is linear in tau.
+def test_noise_of_the_torque_in_rows_out(operator, model, channel, log, rng):
+    """Sums of rows that noise makes, noise by noise: Y is linear in tau, so its covariance is that of the linear map.
 
-    Exact to rounding, but for the recursive operator, whose kernel ends where it has decayed to 1 %, and for the power of an
-    averaged torque, whose covariance of torque and velocity over a period is left out.
+    Exact to what 400 draws leave, 3.5 % each, four of those; more for the power of an averaged torque, whose covariance of
+    torque and velocity over a period is left out, and for the recursive operator, whose prefix of the log it remembers.
     """
     chain = replace(idbench_chain(), operator=OPERATORS.create(operator))
-    e = rng.standard_normal(log.tau.shape)
-    plain, noisy = (
-        chain.build(MotionLog(log.fs, log.q, tau, channel), scara(), MODELS.create(model)) for tau in (log.tau, log.tau + e)
-    )
-    G = rng.standard_normal((*plain.Y.shape, 3))
-    made = G.T @ (noisy.Y - plain.Y)
-    carried = plain.carriers[0].pull(G)
-    told = sum(H @ e[:, j] for j, H in carried.items())
-    scale = np.sqrt(sum(np.sum(H**2, axis=-1) for H in carried.values()))
-    rough = operator == "iir" or (model == "power" and channel.meaning == "averaged")
-    assert (np.abs(made - told) < (0.03 if rough else 1e-9) * scale).all()
+    draws = rng.standard_normal((400, *log.tau.shape)) * [0.3, 0.1]
+    plain = rows_of(replace(log, torque=channel), model, chain)
+    noisy = rows_of(MotionLog(log.fs, np.broadcast_to(log.q, draws.shape), log.tau + draws, channel), model, chain)
+    G = rng.standard_normal((len(plain.Y), 3))
+    levels = NoiseLevels(np.array([0.3, 0.1]), np.zeros(2))
+    predicted = covariance(plain.maps[0], G, levels, linear(plain))
+    made = (noisy.Y - plain.Y) @ G
+    np.testing.assert_allclose(np.sqrt(np.diag(predicted)), np.std(made, axis=0), rtol=0.15)
+    variance = np.swapaxes(torque_variance(plain.maps[0], levels.torque), -1, -2).reshape(-1)
+    seen = plain.valid & (variance > 0.01 * variance.max())
+    assert np.mean(np.var(noisy.Y - plain.Y, axis=0)[seen] / variance[seen]) == pytest.approx(1, abs=0.05)
 
 
-def test_a_prefilter_is_carried_too(log, rng):
-    """A symmetric filter is its own transpose, away from the ends."""
+@pytest.mark.parametrize("operator", OPERATORS.builtin)
+@pytest.mark.parametrize("model", MODELS.builtin)
+@pytest.mark.parametrize("channel", CHANNELS, ids=lambda channel: channel.meaning)
+def test_noise_of_the_positions_in_rows_out(operator, model, channel, log, truth, rng):
+    """Noise of 1e-7 rad, small enough to be linear, put into the log: sums of the rows' errors, and each row's variance.
+
+    The unmasked end of a move apart, where qdd jumps and the reversal's friction is none of the linear map's. To 400 draws,
+    and to the product rule of differences that span six samples.
+    """
+    chain = replace(idbench_chain(), operator=OPERATORS.create(operator))
+    level = np.array([1e-7, 3e-7])
+    draws = log.q + level * rng.standard_normal((400, *log.q.shape))
+    plain = rows_of(replace(log, torque=channel), model, chain)
+    noisy = rows_of(MotionLog(log.fs, draws, np.broadcast_to(log.tau, draws.shape), channel), model, chain)
+    error = noisy.Y - noisy.W @ truth - (plain.Y - plain.W @ truth)
+    G = rng.standard_normal((len(plain.Y), 3))
+    levels = NoiseLevels(np.zeros(2), level)
+    predicted = covariance(plain.maps[0], G, levels, linear(plain))
+    np.testing.assert_allclose(np.sqrt(np.diag(predicted)), np.std(error @ G, axis=0), rtol=0.17)
+    variance = np.swapaxes(position_variance(plain.maps[0], level, linear(plain)), -1, -2).reshape(-1)
+    seen = plain.valid & (variance > 0.01 * variance.max())
+    assert np.median(np.var(error, axis=0)[seen] / variance[seen]) == pytest.approx(1, abs=0.2)
+
+
+def linear(rows):
+    return Linearization(rows.maps[0].signals, scara(), np.array(TRUTH))
+
+
+def test_a_prefilter_is_counted_too(log, rng):
+    """A symmetric filter is its own adjoint, away from the ends."""
     chain = replace(idbench_chain(), prefilter=ButterworthPrefilter(8.0), trim=2.0)
-    e = rng.standard_normal(log.tau.shape)
-    plain, noisy = (
-        chain.build(MotionLog(log.fs, log.q, tau, log.torque), scara(), EVERY["explicit"]) for tau in (log.tau, log.tau + e)
-    )
-    g = rng.standard_normal((*plain.Y.shape, 1))
-    carried = plain.carriers[0].pull(g)
-    told = sum(H @ e[:, j] for j, H in carried.items())
-    assert pytest.approx(told, abs=1e-3 * np.sqrt(sum(np.sum(H**2) for H in carried.values()))) == g.T @ (noisy.Y - plain.Y)
+    draws = rng.standard_normal((400, *log.tau.shape))
+    plain = rows_of(log, "explicit", chain)
+    noisy = rows_of(MotionLog(log.fs, np.broadcast_to(log.q, draws.shape), log.tau + draws, log.torque), "explicit", chain)
+    G = rng.standard_normal((len(plain.Y), 3))
+    predicted = covariance(plain.maps[0], G, NoiseLevels(np.ones(2), np.zeros(2)), linear(plain))
+    np.testing.assert_allclose(np.sqrt(np.diag(predicted)), np.std((noisy.Y - plain.Y) @ G, axis=0), rtol=0.15)
+
+
+@pytest.mark.parametrize("operator", OPERATORS.builtin)
+@pytest.mark.parametrize("model", MODELS.builtin)
+def test_the_adjoint_is_that_of_the_map(operator, model, log, rng):
+    """<K x, g> = <x, K' g>, by the rows of B tau, which are linear in it, away from the ends of the log."""
+    rows = rows_of(log, model, replace(idbench_chain(), operator=OPERATORS.create(operator))).maps[0]
+    kinds, samples = rows.inside.shape
+    inner = np.zeros(samples)
+    inner[700:-700] = 1.0
+    y, g = inner * rng.standard_normal((kinds, samples)), rng.standard_normal((rows.rows, 1))
+    left, right = rows.measurement(y) @ g[:, 0], np.sum(rows.adjoint(g)[0][0] * y)
+    assert left == pytest.approx(right, rel=1e-9)
+
+
+@pytest.mark.parametrize("bits", [12, 14, 16])
+def test_the_noise_of_an_encoder_is_found(bits, log):
+    """Counts of a moving joint are uniform within a step: step / sqrt(12). Those of a smooth slow motion repeat themselves, and
+    so leave less in the rows, by up to a fifth at 16 bits, than white noise does."""
+    step = 2 * np.pi / 2**bits
+    counted = MotionLog(log.fs, np.round(log.q / step) * step, log.tau, log.torque)
+    found = Problem((counted,), scara(), EVERY["explicit"], idbench_chain()).noise.position
+    np.testing.assert_allclose(found, step / np.sqrt(12), rtol=0.2)
+
+
+def test_a_log_without_noise_of_its_positions_has_none(log):
+    """What is left of a motion after six differences is below a thousandth of a 16-bit encoder's noise."""
+    found = Problem((log,), scara(), EVERY["explicit"], idbench_chain()).noise.position
+    assert (found < 1e-3 * 2 * np.pi / 2**16 / np.sqrt(12)).all()
+
+
+def test_encoder_noise_makes_no_more_of_sigma_than_it_should(log, truth):
+    """16 bits, positions alone noisy: sigma is the scatter, to 200 draws. White rows would make it three times as large."""
+    draws = log.q + 2.77e-5 * np.random.default_rng(7).standard_normal((200, *log.q.shape))
+    noisy = MotionLog(log.fs, draws, np.broadcast_to(log.tau, draws.shape), log.torque)
+    for name, found in identify_each(noisy, scara(), EVERY).items():
+        z = (found.X - truth) / found.corrected_sigma
+        assert np.sqrt(np.mean(z**2)) == pytest.approx(1, abs=0.3), name
+
+
+@pytest.mark.parametrize(("sigma", "share"), [((0.5, 0.005), 0.75), ((0.02, 0.3), 0.75)])
+def test_the_power_models_weights_know_that_joints_differ(sigma, share, log):
+    """Against weights that take the noises of all joints as equal, sqrt(|qd|^2 + 1.5^2): Fv1 scatters at most 3/4 of that."""
+    draws = noisy(log, sigma, 200)
+    found = identify(draws, scara(), EVERY["power"])
+    qd = idbench_chain().signals(log).state.qd
+    rows = rows_of(log, "power", idbench_chain())
+    k = np.rint(rows.time * log.fs).astype(int)
+    weight = 1 / np.sqrt(np.sum(qd**2, axis=0)[k] + 1.5**2)
+    other = np.linalg.lstsq(rows.W * weight[:, None], (found.rows.Y * weight).T, rcond=None)[0].T
+    assert found.X[:, 1].std() < share * other[:, 1].std()
+
+
+def test_weighting_does_not_undo_the_mask(log, rng):
+    """Rows of modulating functions that the mask takes a part of stay as small as it makes them."""
+    chain = replace(idbench_chain(), operator=OPERATORS.create("modulating"))
+    found = identify(noisy(log, (0.5, 0.025), 1).part(0, log.samples), scara(), EVERY["explicit"], chain)
+    weights = found.weights(found.rows)
+    for kind in (0, 1):
+        assert np.ptp(weights[..., found.rows.group == kind]) == 0
 
 
 def noisy(log, sigma, draws=DRAWS):
@@ -78,7 +173,7 @@ def test_the_corrected_sigma_is_the_scatter(sigma, estimator, log):
         rms = np.sqrt(np.mean(found.corrected_sigma**2, axis=0))
         np.testing.assert_allclose(rms, scatter, rtol=0.16, err_msg=name)
         off.append(found.sigma.mean(axis=0) / scatter)
-    assert np.min(off) < 0.75
+    assert np.min(off) < 0.85
     assert estimator == "WLS" or np.max(off) > 2
 
 
@@ -86,7 +181,7 @@ def test_the_corrected_sigma_is_the_scatter(sigma, estimator, log):
 def test_the_level_of_each_joint_is_found(log, mask):
     """From some 280 rows a level is known to 4 %; the mean of 300 to 0.3 %, 1 % is left to the leverage of correlated rows."""
     chain = replace(idbench_chain(), mask=MASKS.create(mask))
-    levels = identify(noisy(log, (0.5, 0.025)), scara(), EVERY["power"], chain).system.levels
+    levels = identify(noisy(log, (0.5, 0.025)), scara(), EVERY["power"], chain).problem.noise.torque
     np.testing.assert_allclose(np.sqrt(np.mean(levels**2, axis=0)), (0.5, 0.025), rtol=0.013)
     assert levels.std(axis=0) / levels.mean(axis=0) == pytest.approx(0.045, abs=0.015)
 
@@ -104,7 +199,7 @@ def test_what_comes_before_the_operator_is_not_counted_twice(log, operator, pref
     """
     chain = replace(idbench_chain(), prefilter=prefilter, operator=OPERATORS.create(operator))
     found = identify(noisy(replace(log, torque=channel), (300.0, 300.0), 100), scara(), EVERY["explicit"], chain)
-    np.testing.assert_allclose(np.sqrt(np.mean(found.system.levels**2, axis=0)), 300.0, rtol=0.04)
+    np.testing.assert_allclose(np.sqrt(np.mean(found.problem.noise.torque**2, axis=0)), 300.0, rtol=0.04)
     rms = np.sqrt(np.mean(found.corrected_sigma**2, axis=0))
     np.testing.assert_allclose(rms, found.X.std(axis=0), rtol=0.28)  # four times what 100 draws leave
 
@@ -113,13 +208,23 @@ def test_two_logs_are_worth_two(log):
     """Of one fit: half the variance, where noise levels are the same."""
     one = noisy(log, (0.1, 0.1), 1)
     single, double = (identify(x, scara(), EVERY["power"]) for x in (one, [one, one]))
-    same = replace(double, solved=replace(double.solved, levels=single.system.levels))
-    np.testing.assert_allclose(same.corrected_covariance, single.corrected_covariance / 2, rtol=1e-9)
+    influence = double.influence(double.rows)  # of weights that the noise of both logs made
+    parts = [influence[..., double.rows.of_log(k), :] for k in (0, 1)]
+    np.testing.assert_array_equal(*parts)
+    whole = double.problem.noise_covariance(double.influence)
+    half = sum(
+        covariance(rows, G, double.problem.noise, double.problem.prepared.linear(rows.signals))
+        for rows, G in zip(double.rows.maps[:1], parts[:1], strict=True)
+    )
+    np.testing.assert_allclose(whole, 2 * half, rtol=1e-9)
+    np.testing.assert_allclose(2 * double.corrected_covariance, single.corrected_covariance, rtol=0.1)
 
 
-def test_without_noise_levels_nothing_is_said(log):
-    system = paper_chain().build(log, scara(), EVERY["explicit"])
-    assert np.isnan(Estimate.judge(system, np.ones(8)).corrected_sigma).all()
+def test_without_an_influence_nothing_is_said(log):
+    """But the estimator's own sigma is there to be shown."""
+    estimate = Estimate.judge(Problem((log,), scara(), EVERY["explicit"], paper_chain()), np.ones(8))
+    assert np.isnan(estimate.corrected_sigma).all()
+    np.testing.assert_array_equal(estimate.best_sigma, estimate.sigma)
 
 
 def test_a_run_that_cannot_be_solved_has_none(log, rng):

@@ -1,14 +1,14 @@
 """Every operator keeps the sentence B tau = [c + s e] X true, looks no further than its halo, and honours the weights."""
 
-from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
 from identify import CentralDifference, FirLowPass, IirLowPass, LogError, ModulatingFunctions, SettingError, Windows
-from identify.balance import Balance
-from identify.operators import OPERATORS
+from identify.models.equations import Equations
+from identify.rows.operators import OPERATORS
 
 FS = 100.0
 T = np.arange(1500) / FS
@@ -16,31 +16,31 @@ X = np.array([2.0, -0.7])
 TRIM = 3.0
 
 
-def balance(y=None, weight=None, t=T):
+def sentence(y=None, weight=None, t=T):
     """A sentence of two rows that is true for X: y = c X_a + (d/dt e) X_b, with smooth signals known in closed form."""
     c = {(0, "a"): np.cos(3 * t), (1, "a"): np.sin(2 * t)}
     e = {(0, "b"): np.sin(4 * t), (1, "b"): np.cos(t), (1, "a"): np.sin(t)}
     rate = {(0, "b"): 4 * np.cos(4 * t), (1, "b"): -np.sin(t), (1, "a"): np.cos(t)}
     exact = np.stack([X[0] * c[0, "a"] + X[1] * rate[0, "b"], X[0] * (c[1, "a"] + rate[1, "a"]) + X[1] * rate[1, "b"]])
+    return equations(exact if y is None else y, c, e, np.ones((2, len(t))) if weight is None else weight, t)
+
+
+def equations(y, c, e, weight, t=T):
+    """Equations of two rows that take the torques of two joints as they are."""
     fs = 1 / (t[1] - t[0])
-    return Balance(
-        y=exact if y is None else y,
-        c=c,
-        e=e,
-        weight=np.ones((2, len(t))) if weight is None else weight,
-        noise=np.ones((2, len(t))),
-        s=lambda x: CentralDifference(6).derivative(x, fs),
+    signals = SimpleNamespace(
         fs=fs,
-        B={},
-        transposed=lambda x: x,
-        reach=0,
-        parameters=("a", "b"),
+        s=lambda x: CentralDifference(6).derivative(x, fs),
+        state=SimpleNamespace(q=np.zeros_like(y)),
+        torque=SimpleNamespace(times=lambda _, joint: y[..., joint, :]),
+        weight=weight,
     )
+    return Equations(signals, {(0, 0): 1.0, (1, 1): 1.0}, c, e, ("a", "b"))
 
 
-def at(operator, balance):
-    """Return the system of a balance, its rows TRIM away from both ends."""
-    return operator.system(balance, operator.grid(balance.y.shape[-1], balance.fs, TRIM))
+def at(operator, sentence):
+    """Return the rows of equations, TRIM away from both ends."""
+    return operator.rows(sentence, operator.grid(sentence.y.shape[-1], sentence.signals.fs, TRIM))
 
 
 def precision(operator):
@@ -58,34 +58,34 @@ def operator(request):
 
 
 def test_a_true_sentence_stays_true(operator):
-    system = at(operator, balance())
-    residual = system.Y - system.W @ X
-    assert np.abs(residual).max() < precision(operator) * np.abs(system.Y).max()
-    assert system.valid.all()
-    assert system.W.shape == (len(system.Y), 2)
+    found = at(operator, sentence())
+    residual = found.Y - found.W @ X
+    assert np.abs(residual).max() < precision(operator) * np.abs(found.Y).max()
+    assert found.valid.all()
+    assert found.W.shape == (len(found.Y), 2)
 
 
 def test_the_mask_leaves_true_sentences_and_voids_what_sees_nothing(operator):
     """Nonsense at masked instants changes nothing, and rows with nothing else to see are void and zero."""
     weight = np.ones((2, len(T)))
     weight[0, 600:900] = 0
-    nonsense = balance().y.copy()
+    nonsense = sentence().y.copy()
     nonsense[0, 600:900] = 1e3
-    system = at(operator, balance(nonsense, weight))
-    residual = system.Y - system.W @ X
-    assert np.abs(residual).max() < precision(operator) * np.abs(system.Y).max()
-    middle = (system.group == 0) & (np.abs(system.time - 7.5) < 1.5 - operator.halo(FS))
-    assert not system.valid[middle].any()
-    assert system.valid[system.group == 1].all()
-    assert not system.Y[~system.valid].any()
-    assert not system.W[~system.valid].any()
+    found = at(operator, sentence(nonsense, weight))
+    residual = found.Y - found.W @ X
+    assert np.abs(residual).max() < precision(operator) * np.abs(found.Y).max()
+    middle = (found.group == 0) & (np.abs(found.time - 7.5) < 1.5 - operator.halo(FS))
+    assert not found.valid[middle].any()
+    assert found.valid[found.group == 1].all()
+    assert not found.Y[~found.valid].any()
+    assert not found.W[~found.valid].any()
 
 
 def test_rows_look_no_further_than_the_halo(operator):
     """Samples outside the halo of a row, and of the differences of e, do not reach it."""
     change = np.zeros((2, len(T)))
     change[:, 1000] = 1.0
-    before, after = (at(operator, balance(balance().y + d)) for d in (0 * change, change))
+    before, after = (at(operator, sentence(sentence().y + d)) for d in (0 * change, change))
     reach = np.abs(before.time - T[1000]) > operator.halo(FS) + 1e-9
     changed = np.abs(after.Y - before.Y)
     assert changed[~reach].max() > 0
@@ -94,31 +94,30 @@ def test_rows_look_no_further_than_the_halo(operator):
 
 
 def test_rows_are_ordered_by_time_then_row(operator):
-    system = at(operator, balance())
-    assert list(system.group[:4]) == [0, 1, 0, 1]
-    assert (np.diff(system.time.reshape(-1, 2), axis=0) > 0).all()
-    assert system.time[0] >= TRIM - 1e-9
+    found = at(operator, sentence())
+    assert list(found.group[:4]) == [0, 1, 0, 1]
+    assert (np.diff(found.time.reshape(-1, 2), axis=0) > 0).all()
+    assert found.time[0] >= TRIM - 1e-9
 
 
 def test_leading_axes_are_independent_runs_with_the_same_bits(operator, rng):
     y = rng.normal(size=(3, 2, len(T)))
-    one, weight = balance(), (rng.uniform(size=(3, 2, len(T))) > 0.02).astype(float)
+    one, weight = sentence(), (rng.uniform(size=(3, 2, len(T))) > 0.02).astype(float)
 
     def spread(columns):
         return {address: np.broadcast_to(signal, (3, len(T))) for address, signal in columns.items()}
 
-    many = replace(one, y=y, c=spread(one.c), e=spread(one.e), weight=weight, noise=np.ones_like(weight))
-    together = at(operator, many)
+    together = at(operator, equations(y, spread(one.c), spread(one.e), weight))
     for run in range(3):
-        alone = at(operator, balance(y[run], weight[run]))
+        alone = at(operator, sentence(y[run], weight[run]))
         np.testing.assert_array_equal(together.Y[run], alone.Y)
         np.testing.assert_array_equal(together.W[run], alone.W)
         np.testing.assert_array_equal(together.valid[run], alone.valid)
 
 
 def test_the_same_settings_give_the_same_rows_at_another_frequency(operator):
-    slow = at(operator, balance())
-    fast = at(operator, balance(t=np.arange(15000) / 1000))
+    slow = at(operator, sentence())
+    fast = at(operator, sentence(t=np.arange(15000) / 1000))
     assert slow.Y.shape == fast.Y.shape
     # IIR: the bilinear transform bends the pass band by (f/fs)^2; others: sampled kernels differ from their integrals.
     np.testing.assert_allclose(slow.Y, fast.Y, atol=5e-3 * np.abs(slow.Y).max())
@@ -127,24 +126,24 @@ def test_the_same_settings_give_the_same_rows_at_another_frequency(operator):
 @pytest.mark.parametrize("length", [0.1, 0.07])
 def test_windows_are_integrals(length):
     """Even and odd numbers of intervals; each window begins where the last one ends."""
-    system = at(Windows(length), balance())
-    rows = system.group == 0
-    centre = system.time[rows]
+    found = at(Windows(length), sentence())
+    rows = found.group == 0
+    centre = found.time[rows]
     np.testing.assert_allclose(np.diff(centre), length, atol=1e-12)
     for i in (0, 17):
         exact = quad(lambda t: X[0] * np.cos(3 * t) + X[1] * 4 * np.cos(4 * t), centre[i] - length / 2, centre[i] + length / 2)[
             0
         ]
-        assert system.Y[rows][i] == pytest.approx(exact, abs=1e-7)
+        assert found.Y[rows][i] == pytest.approx(exact, abs=1e-7)
 
 
 def test_a_window_that_touches_a_masked_instant_is_void_and_its_neighbours_are_not():
     for length in (0.1, 0.07):
         weight = np.ones((2, len(T)))
         weight[:, 700] = 0
-        system = at(Windows(length), balance(weight=weight))
-        touches = np.abs(system.time - T[700]) <= length / 2 + 1e-9
-        np.testing.assert_array_equal(system.valid, ~touches)
+        found = at(Windows(length), sentence(weight=weight))
+        touches = np.abs(found.time - T[700]) <= length / 2 + 1e-9
+        np.testing.assert_array_equal(found.valid, ~touches)
 
 
 @pytest.mark.parametrize(
@@ -163,7 +162,7 @@ def test_settings_that_do_not_fit_are_refused(make, message):
 
 def test_a_log_that_leaves_no_row_is_refused(operator):
     with pytest.raises(LogError, match=r"the log has 600 samples .* it needs at least 6"):
-        at(operator, balance(t=T[:600]))
+        at(operator, sentence(t=T[:600]))
 
 
 def test_fir_computes_what_a_full_convolution_gives(rng):
@@ -171,9 +170,9 @@ def test_fir_computes_what_a_full_convolution_gives(rng):
     from scipy.signal import firwin
 
     y = rng.normal(size=(2, len(T)))
-    system = at(FirLowPass(5.0, 5.0), balance(y))
+    found = at(FirLowPass(5.0, 5.0), sentence(y))
     full = np.stack([np.convolve(row, firwin(67, 5.0, fs=FS), mode="same") for row in y])
-    np.testing.assert_allclose(system.Y.reshape(-1, 2).T, full[:, 300:1200:10], atol=1e-14)
+    np.testing.assert_allclose(found.Y.reshape(-1, 2).T, full[:, 300:1200:10], atol=1e-14)
 
 
 @pytest.mark.parametrize("intervals", range(2, 13))

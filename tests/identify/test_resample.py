@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identify import LogError, MotionLog, PowerModel, TimeError, TorqueChannel, identify, scara
-from identify.resample import resample
+from identify.data.resample import resample
 from sim.engine import simulate
 from sim.scenario_file import load
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identify import CentralDifference, SettingError
-from identify.stencils import CELL, shift, slide
+from identify.signals.stencils import CELL, shift, slide
 
 FS = 50.0
 T = np.arange(40) / FS

@@ -12,7 +12,7 @@ import pytest
 
 import identify.basis.tree_links
 from identify import Joint, KinematicTree, State, TreeLinks
-from identify.kinematics import INERTIAL
+from identify.data.kinematics import INERTIAL
 
 TIMES = 25
 EPS = 1e-30
@@ -96,7 +96,7 @@ def defects(block):
     """Return by how much explicit = s momentum + remainder and qd' explicit = s energy + dissipation fail."""
     n = block.tree.n
     q, qd, qdd = states(n)
-    state, names = at(q, qd, qdd), list(block.names(n))
+    state, names = at(q, qd, qdd), [p.name for p in block.parameters(n)]
     D = matrix(block.explicit(state), n, names)
     implicit = matrix(rate(block.momentum, q, qd, qdd), n, names) + matrix(block.remainder(state), n, names)
     power = matrix(rate(block.energy, q, qd, qdd), 1, names)
@@ -134,7 +134,7 @@ def test_what_is_zero_at_all_times_has_no_column():
     assert {name for row, name in columns if row == 1} == {"M2"}
 
 
-MODULES = ("terms", "twists", "wrench", "tree_links")
+MODULES = ("terms", "twists", "body_regressor", "tree_links")
 
 
 def sites(tree):

@@ -3,20 +3,24 @@
 import numpy as np
 import pytest
 
-from identify import LogError, MotionLog, TorqueChannel, idbench_chain, scara, split, validate
+from identify import ExplicitModel, LogError, MotionLog, Problem, TorqueChannel, idbench_chain, scara, split, validate
 
 CHANNEL = TorqueChannel("instantaneous")
 
 
+def judged(log, X, covariance=None):
+    return validate(Problem((log,), scara(), ExplicitModel(), idbench_chain()), X, covariance)
+
+
 def test_the_truth_foretells_ideal_data(log, truth):
-    told = validate(log, scara(), truth, idbench_chain())
+    told = judged(log, truth)
     assert (told.percent < 1e-3).all()
     assert (1 - told.R2 < 1e-9).all()
     assert np.isfinite(told.standing).all()
 
 
 def test_a_gain_error_is_told_in_percent(log, truth):
-    told = validate(log, scara(), 1.05 * truth, idbench_chain())
+    told = judged(log, 1.05 * truth)
     np.testing.assert_allclose(told.percent, 5, rtol=1e-3)
     assert not told.white.any()
 
@@ -26,7 +30,7 @@ def test_noise_is_told_by_its_rms_and_is_white(log, truth, rng):
     sigma = np.array([0.5, 0.025])
     noisy = MotionLog(log.fs, log.q, log.tau + sigma * rng.standard_normal(log.tau.shape), CHANNEL)
     chain = idbench_chain()
-    told = validate(noisy, scara(), truth, chain)
+    told = judged(noisy, truth)
     passed = np.sqrt(np.sum(chain.operator.response(log.fs) ** 2))
     # Rows of which the mask takes a part are smaller: at most as large as those of all.
     assert (told.rms < 1.1 * sigma * passed).all()
@@ -35,10 +39,10 @@ def test_noise_is_told_by_its_rms_and_is_white(log, truth, rng):
 
 def test_white_noise_is_mostly_called_white(log, truth):
     """In 95 % without a mask; rows beside masked ones correlate, which leaves 90 % (200 seeds), here of 80 to 3 %."""
-    chain, white = idbench_chain(), []
+    white = []
     for seed in range(40):
         noise = [0.5, 0.025] * np.random.default_rng(seed).standard_normal(log.tau.shape)
-        white += list(validate(MotionLog(log.fs, log.q, log.tau + noise, CHANNEL), scara(), truth, chain).white)
+        white += list(judged(MotionLog(log.fs, log.q, log.tau + noise, CHANNEL), truth).white)
     assert 0.8 < np.mean(white) < 1
 
 
@@ -47,7 +51,7 @@ def test_what_stands_is_judged_apart(log, truth):
     chain = idbench_chain()
     standing = chain.mask.weight(chain.signals(log).state.qd, log.fs).T == 0
     wrong = MotionLog(log.fs, log.q, log.tau + standing * [0.4, 0.08], CHANNEL)
-    told = validate(wrong, scara(), truth, chain)
+    told = judged(wrong, truth)
     assert (told.percent < 1e-3).all()
     assert (told.standing > [0.05, 0.01]).all()
 
@@ -55,7 +59,7 @@ def test_what_stands_is_judged_apart(log, truth):
 def test_a_joint_that_never_moves_is_named(log, truth):
     still = MotionLog(log.fs, log.q * [1, 0], log.tau, CHANNEL)
     with pytest.raises(LogError, match="joint 2 never moves in this log"):
-        validate(still, scara(), truth, idbench_chain())
+        judged(still, truth)
 
 
 def test_the_end_of_a_log_is_held_out(log):
@@ -69,7 +73,7 @@ def test_the_end_of_a_log_is_held_out(log):
 def test_the_noise_of_a_log_is_read_off_above_its_band(log, truth, sigma):
     """White noise of the torques, by another route: what a low-pass of unit gain and the mask leave of it, to a fifth."""
     noise = sigma * np.random.default_rng(5).standard_normal(log.tau.shape)
-    told = validate(MotionLog(log.fs, log.q, log.tau + noise, CHANNEL), scara(), truth, idbench_chain())
+    told = judged(MotionLog(log.fs, log.q, log.tau + noise, CHANNEL), truth)
     np.testing.assert_allclose(told.noise, told.rms, rtol=0.2)  # the truth leaves nothing else
     assert (told.excess == 0).all()
 
@@ -78,9 +82,7 @@ def test_a_wrong_model_does_not_pass_for_noise(log, truth):
     """LMX2 too small by a tenth, on the noisy log: what is beyond noise is what it is without any."""
     wrong = truth * [1, 1, 1, 1, 0.9, 1, 1, 1]
     noise = [0.05, 0.005] * np.random.default_rng(5).standard_normal(log.tau.shape)
-    noisy, exact = (
-        validate(MotionLog(log.fs, log.q, log.tau + x, CHANNEL), scara(), wrong, idbench_chain()) for x in (noise, 0 * noise)
-    )
+    noisy, exact = (judged(MotionLog(log.fs, log.q, log.tau + x, CHANNEL), wrong) for x in (noise, 0 * noise))
     np.testing.assert_allclose(noisy.excess, exact.rms, rtol=0.05)
 
 
@@ -88,12 +90,12 @@ def test_sigma_of_the_parameters_is_expected_too(log, truth):
     """A covariance of one parameter: the rms of its column times its sigma."""
     C = np.zeros((8, 8))
     C[4, 4] = 0.01**2
-    told = validate(log, scara(), truth, idbench_chain(), C)
-    off = validate(log, scara(), truth + 0.01 * np.eye(8)[4], idbench_chain())
+    told = judged(log, truth, C)
+    off = judged(log, truth + 0.01 * np.eye(8)[4])
     np.testing.assert_allclose(told.open, off.rms, rtol=1e-3)
 
 
 def test_slow_sampling_leaves_the_noise_unknown(log, truth):
     """At 12.5 Hz nothing lies above the band of 5 Hz."""
     slow = MotionLog(12.5, log.q[::8], log.tau[::8], CHANNEL)
-    assert np.isnan(validate(slow, scara(), truth, idbench_chain()).noise).all()
+    assert np.isnan(judged(slow, truth).noise).all()

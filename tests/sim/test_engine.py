@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identify import scara
-from identify.delay import estimate_delay
+from identify.judge.delay import estimate_delay
 from sim.controllers import CONTROLLERS, ComputedTorque, PDFeedforward
 from sim.drives import AveragedDrive, SwitchedDrive
 from sim.encoders import IncrementalEncoder

@@ -54,7 +54,7 @@ def torques(robot, basis, X, states):
     q, qd, qdd = states
     found = np.zeros(q.shape)
     for (row, name), signal in basis.explicit(State(q, qd, lambda _: qdd)).items():
-        found[row] += signal * X[basis.parameters.index(name)]
+        found[row] += signal * X[basis.names.index(name)]
     return found
 
 
@@ -63,7 +63,7 @@ def test_columns_times_truth_are_mujocos_inverse_dynamics(name, written, rng):
     robot = Robot.load(written(CROOKED) if name == "crooked" else name)
     tree, truth = kinematic_tree(robot), standard_parameters(robot)
     found = BaseParameters.of(tree, tree_basis(tree))
-    X = np.array([truth[p] for p in found.standard.parameters])
+    X = np.array([truth[p] for p in found.standard.names])
     states = rng.uniform(-3, 3, (3, robot.n, 200))
     q, qd, qdd = (x.T for x in states)
     tau = (inverse_dynamics(robot, q, qd, qdd) + coulomb_torque(robot, qd)).T

@@ -15,7 +15,7 @@ from experiments.recording.folder import files, known, merge
 def copied(recorded, tmp_path):
     """Return a results folder that may be changed."""
     folder = shutil.copytree(recorded.folder, tmp_path / "run")
-    from identify.log_file import write_log
+    from identify.data.log_file import write_log
 
     write_log(recorded.ran.run.alone(), folder / "log.parquet")
     from experiments.results import write_summary

@@ -100,13 +100,13 @@ def test_the_drive_is_recorded_at_the_samples_and_inside_the_loop_at_its_own_rat
 def test_measured_predicted_and_residual_are_those_of_the_estimate(recorded):
     for form, rows in {"explicit": ("joint1", "joint2"), "implicit": ("joint1", "joint2"), "power": ("power",)}.items():
         estimate = recorded.ran.identified.estimates[form]
-        parts = {"measured": estimate.system.Y, "predicted": estimate.predicted, "residual": estimate.residual}
+        parts = {"measured": estimate.rows.Y, "predicted": estimate.predicted, "residual": estimate.residual}
         for group, row in enumerate(rows):
-            mine = (estimate.system.group == group) & estimate.system.valid
+            mine = (estimate.rows.group == group) & estimate.rows.valid
             for kind, values in parts.items():
                 ns, found = layer(recorded, f"{form}/{kind}/{row}")
                 np.testing.assert_array_equal(found[:, 0], values[mine])
-                np.testing.assert_allclose(ns, estimate.system.time[mine] * 1e9, atol=1)
+                np.testing.assert_allclose(ns, estimate.rows.time[mine] * 1e9, atol=1)
 
 
 def layer(recorded, path, component="Scalars:scalars"):
@@ -115,7 +115,7 @@ def layer(recorded, path, component="Scalars:scalars"):
 
 def test_running_estimates_end_at_the_estimate_with_its_sigma(recorded):
     for form, estimate in recorded.ran.identified.estimates.items():
-        for p, name in enumerate(estimate.parameters):
+        for p, name in enumerate(estimate.names):
             _, X = layer(recorded, f"{form}/estimate/{name}", "Measurements:values")
             _, variance = layer(recorded, f"{form}/estimate/{name}", "Measurements:variances")
             # The factor takes in rows in another order than the estimate did: rounding, times the condition of W squared.
@@ -125,7 +125,7 @@ def test_running_estimates_end_at_the_estimate_with_its_sigma(recorded):
 
 def test_velocities_are_shown_as_measured_and_as_the_rows_see_them(recorded):
     found, log = recorded.ran.identified, recorded.ran.run.alone()
-    rows = found.processing.rows(log)
+    rows = found.processing.grid(log)
     ns, measured = layer(recorded, "qd/measured")
     np.testing.assert_array_equal(measured, measured_state(log, found.processing).qd.T[ns // TICK])
     ns, seen = layer(recorded, "qd/filtered")

@@ -1,0 +1,1 @@
+"""What identification is given: logs, and the kinematics of a robot."""

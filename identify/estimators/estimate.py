@@ -1,0 +1,191 @@
+"""What comes out of an identification, and how good it is."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from identify.arrays import Array, frozen
+from identify.estimators.problem import Influence, Problem
+from identify.rows.factors import Factor, Fit, Status
+from identify.rows.rows import Rows
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Estimate:
+    """Parameters with their uncertainty, judged on the rows they came from. Leading axes are independent runs.
+
+    Parameters
+    ----------
+    problem : Problem
+        Logs, robot, model and rows.
+    X : Array, shape (..., p)
+        Estimated parameters; NaN where the rows cannot be solved.
+    covariance : Array, shape (..., p, p)
+        Covariance of the error of X, as the estimator has it: as if rows were independent.
+    influence : callable, optional
+        Returns G of rows, shape (..., rows, p), with which X = G' Y to first order; without it there is no corrected sigma.
+    weights : callable, optional
+        Returns what rows were multiplied by, shape (..., rows), where X is a least-squares solution.
+    """
+
+    problem: Problem
+    X: Array
+    covariance: Array
+    influence: Influence | None = None
+    weights: Callable[[Rows], Array] | None = None
+
+    @classmethod
+    def judge(
+        cls,
+        problem: Problem,
+        X: npt.ArrayLike,
+        covariance: npt.ArrayLike | None = None,
+        *,
+        influence: Influence | Array | None = None,
+    ) -> Self:
+        """Return the estimate X of a problem.
+
+        Parameters
+        ----------
+        problem : Problem
+            As it was given to the estimator.
+        X : array_like, shape (..., p)
+            The estimate.
+        covariance : array_like, shape (..., p, p), optional
+            That of section 7.3 by default: sigma_rho^2 (W' W)^-1 with sigma_rho^2 = |Y - W X|^2 / (r - p).
+        influence : Array, shape (..., r, p), or callable, optional
+            G with which X = G' Y to first order: what the estimate changes by if a row of Y, or the error of a row, does. A
+            function returns that of any rows of the problem. It is what an honest sigma is computed from.
+        """
+        x, given = frozen(X), influence
+        function = given if given is None or callable(given) else (lambda _: given)
+        own = _paper_covariance(problem.factors.together, x) if covariance is None else covariance
+        return cls(problem, x, frozen(own), function)
+
+    @classmethod
+    def of_fit(cls, problem: Problem, fit: Fit, *, scaled: bool) -> Self:
+        """Return the estimate of a least-squares solution; `scaled` if its rows were divided by what their noise makes."""
+        inverse = fit.factor.inverse(problem.factors.together.status == Status.OK)
+
+        def weights(rows: Rows) -> Array:
+            weight, scale = np.tile(fit.weight, len(rows.time) // rows.kinds), problem.row_scale(rows) if scaled else None
+            return weight if scale is None else weight * scale
+
+        def influence(rows: Rows) -> Array:
+            return np.matmul(rows.W * (weights(rows) ** 2)[..., None], inverse)
+
+        return cls(problem, frozen(fit.X), frozen(_paper_covariance(fit.factor, fit.X, inverse)), influence, weights)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of X."""
+        return self.problem.names
+
+    @property
+    def rows(self) -> Rows:
+        """The rows it came from; raise IdentificationError if they were too many to be kept."""
+        return self.problem.rows
+
+    @property
+    def sigma(self) -> Array:
+        """Standard deviation of every parameter, as the estimator has it, shape (..., p)."""
+        return _roots(self.covariance)
+
+    @cached_property
+    def corrected_covariance(self) -> Array:
+        """Covariance of the error of X that the noise of the logs makes, shape (..., p, p); NaN if it is not known.
+
+        X = G' Y, and each row is a linear function of the samples of a log, whose torques and positions are noisy. So X is such
+        a function, too: rows may overlap, be weighted or multiplied by velocities, and joints may differ.
+        """
+        if self.influence is None:
+            return np.full(self.covariance.shape, np.nan)
+        found = self.problem.noise_covariance(self.influence)
+        if self.weights is not None:
+            found = found * self.problem.excess(self.X, self.weights)[..., None, None]
+        return np.where((self.status == Status.OK)[..., None, None], found, np.nan)
+
+    @property
+    def corrected_sigma(self) -> Array:
+        """Standard deviation of every parameter, from `corrected_covariance`, shape (..., p)."""
+        return _roots(self.corrected_covariance)
+
+    @property
+    def best_covariance(self) -> Array:
+        """The corrected covariance, or the estimator's own where that is not known, shape (..., p, p)."""
+        known = np.isfinite(self.corrected_covariance).all(axis=(-2, -1), keepdims=True)
+        return np.where(known, self.corrected_covariance, self.covariance)
+
+    @property
+    def best_sigma(self) -> Array:
+        """Standard deviation of every parameter, from `best_covariance`, shape (..., p)."""
+        return _roots(self.best_covariance)
+
+    @property
+    def relative_sigma_percent(self) -> Array:
+        """%sigma of section 7.3, 100 sigma / |X|, shape (..., p)."""
+        return 100 * self.sigma / np.abs(self.X)
+
+    @property
+    def status(self) -> npt.NDArray[np.intp]:
+        """Whether the rows of every run can be solved for X, shape (...)."""
+        return self.problem.factors.together.status
+
+    @property
+    def row_count(self) -> npt.NDArray[np.intp]:
+        """Number of rows that are not void, r, shape (...)."""
+        return self.problem.factors.together.rows
+
+    @property
+    def condition_number(self) -> Array:
+        """Cond(W), shape (...)."""
+        return self.problem.factors.together.condition_number
+
+    @cached_property
+    def predicted(self) -> Array:
+        """W X, shape (..., r)."""
+        return self.rows.predicted(self.X)
+
+    @property
+    def residual(self) -> Array:
+        """rho = Y - W X, shape (..., r)."""
+        return self.rows.Y - self.predicted
+
+    @property
+    def residual_rms(self) -> Array:
+        """Root mean square of the residual over the rows that are not void, shape (...)."""
+        return np.sqrt(self.problem.factors.together.squares(self.X) / np.maximum(self.row_count, 1))
+
+    def __str__(self) -> str:
+        if self.X.ndim > 1:
+            return f"estimates of {', '.join(self.names)} in {self.X.shape[:-1]} runs"
+        lines = [f"{'':8}{'X':>12}{'sigma':>12}{'%sigma':>9}"]
+        values = zip(self.names, self.X, self.sigma, self.relative_sigma_percent, strict=True)
+        lines += [f"{name:8}{x:12.5g}{s:12.2g}{percent:9.2g}" for name, x, s, percent in values]
+        return "\n".join(
+            [*lines, f"Cond(W) = {self.condition_number:.1f}, {self.row_count} rows, residual rms {self.residual_rms:.3g}"]
+        )
+
+    def error_percent(self, truth: npt.ArrayLike) -> Array:
+        """Return 100 (X - truth) / |truth|, shape (..., p); NaN where the truth is 0."""
+        true = np.asarray(truth, dtype=np.float64)
+        return 100 * (self.X - true) / np.where(true == 0, np.nan, np.abs(true))
+
+    def relative_error_percent(self, truth: npt.ArrayLike) -> Array:
+        """Return 100 |X - truth| / |truth|, shape (..., p), the paper's %e; NaN where the truth is 0."""
+        return np.abs(self.error_percent(truth))
+
+
+def _paper_covariance(factor: Factor, X: Array, inverse: Array | None = None) -> Array:
+    """Return sigma_rho^2 (W' W)^-1 (section 7.3), NaN where the rows cannot be solved."""
+    inverse = factor.inverse(factor.status == Status.OK) if inverse is None else inverse
+    freedom = np.maximum(factor.rows - factor.p, 1)
+    return (factor.squares(X) / freedom)[..., None, None] * inverse
+
+
+def _roots(covariance: Array) -> Array:
+    return np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))

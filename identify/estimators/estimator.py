@@ -1,0 +1,57 @@
+"""What an estimator is."""
+
+from abc import ABC, abstractmethod
+from typing import ClassVar, Literal, final
+
+import numpy as np
+
+from identify.blame import expect
+from identify.errors import IdentificationError, PluginError
+from identify.estimators.estimate import Estimate
+from identify.estimators.problem import Problem
+from identify.rows.factors import Status
+
+Need = Literal["factors", "rows", "logs", "simulate"]
+
+
+class AbstractEstimator(ABC):
+    """Turns a problem into an estimate of X."""
+
+    needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
+    """What it uses of a problem: `factors` of its rows, which every log has; its `rows`, which are not kept of logs that are
+    too long; its `logs`; or `simulate`, which the caller may give."""
+
+    full_rank: ClassVar[bool] = True
+    """Whether it needs a motion that shows every parameter; one with a prior or a penalty does not."""
+
+    @abstractmethod
+    def solve(self, problem: Problem) -> Estimate:
+        """Return the estimate of `problem`, every run by itself."""
+
+    @final
+    def fit(self, problem: Problem, *, throw: bool = True) -> Estimate:
+        """Return the estimate of `problem`, checked.
+
+        Raises
+        ------
+        IdentificationError
+            If the problem lacks what this estimator needs; with `throw`, if it finds no finite value for a parameter.
+        PluginError
+            If it returns something else than an estimate of all parameters.
+        """
+        self._require(problem)
+        estimate, status = self.solve(problem), problem.factors.together.status
+        if not isinstance(estimate, Estimate):
+            raise PluginError(f"plug-in {type(self).__name__}.solve returned {estimate!r:.60}, expected an Estimate")
+        expect(self, "solve", estimate.X, (*status.shape, len(problem.names)))
+        lost = ~np.isfinite(estimate.X) & (status == Status.OK)[..., None]
+        if throw and lost.any():
+            names = ", ".join(np.array(problem.names)[lost.reshape(-1, len(problem.names)).any(axis=0)])
+            raise IdentificationError(f"{type(self).__name__} finds no finite value for {names}")
+        return estimate
+
+    def _require(self, problem: Problem) -> None:
+        if "simulate" in self.needs and problem.simulate is None:
+            raise IdentificationError(f"{type(self).__name__} needs a way to simulate the robot, which the caller did not give")
+        if "rows" in self.needs:
+            problem.require_rows(f"{type(self).__name__} needs rows, and ")

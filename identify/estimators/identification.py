@@ -1,0 +1,155 @@
+"""From logs to estimates: what users call."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+from identify.arrays import Array
+from identify.basis import Basis
+from identify.blame import blamed
+from identify.data.motion_log import MotionLog
+from identify.errors import IdentificationError
+from identify.estimators.estimate import Estimate
+from identify.estimators.estimator import AbstractEstimator
+from identify.estimators.problem import Problem
+from identify.estimators.weighted_least_squares import WeightedLeastSquares
+from identify.models import AbstractModel, ExplicitModel
+from identify.rows.chain import Chain, idbench_chain
+
+
+def identify(
+    log: MotionLog | Sequence[MotionLog],
+    basis: Basis,
+    model: AbstractModel,
+    chain: Chain | None = None,
+    estimator: AbstractEstimator | None = None,
+    *,
+    simulate: Callable[[Array], MotionLog] | None = None,
+    throw: bool = True,
+) -> Estimate:
+    """Identify the parameters of a robot.
+
+    Parameters
+    ----------
+    log : MotionLog or sequence of MotionLog
+        What the robot logged. Leading axes are identified run by run; a sequence is one fit.
+    basis : Basis
+        The robot, linear in its parameters.
+    model : AbstractModel
+        Explicit, implicit or power.
+    chain : Chain, optional
+        Signal processing; chain `idbench` by default.
+    estimator : AbstractEstimator, optional
+        Weighted least squares by default.
+    simulate : callable, optional
+        Simulates the robot with given parameters, for estimators that need it.
+    throw : bool
+        Raise if a run cannot be solved; otherwise the estimate's `status` says it.
+
+    Returns
+    -------
+    Estimate
+        Parameters, their uncertainty and the quality of the fit.
+
+    Raises
+    ------
+    IdentificationError
+        If the log, a setting, or the motion does not allow an estimate; the message says what to try.
+    """
+    _require(model, AbstractModel, 'a model, such as MODELS.create("power")')
+    problem = _problem(log, basis, model, chain, simulate)
+    return estimate(problem, estimator or WeightedLeastSquares(), throw=throw)
+
+
+def identify_each(
+    log: MotionLog | Sequence[MotionLog],
+    basis: Basis,
+    models: Mapping[str, AbstractModel],
+    chain: Chain | None = None,
+    estimator: AbstractEstimator | None = None,
+    *,
+    throw: bool = True,
+) -> dict[str, Estimate]:
+    """Identify with several models, by name, from the same signals; otherwise as `identify`."""
+    found = attempt_each(_problem(log, basis, ExplicitModel(), chain, None), models, estimator, throw=throw)
+    for outcome in found.values():
+        if isinstance(outcome, IdentificationError):
+            raise outcome
+    return {name: outcome for name, outcome in found.items() if isinstance(outcome, Estimate)}
+
+
+def attempt_each(
+    problem: Problem, models: Mapping[str, AbstractModel], estimator: AbstractEstimator | None = None, *, throw: bool = True
+) -> dict[str, Estimate | IdentificationError]:
+    """Identify with several models; return the estimate of each, or why it has none: one does not take the others' away.
+
+    Parameters
+    ----------
+    problem : Problem
+        Logs, robot and chain, of any model.
+    models : mapping of str to AbstractModel
+        The models, by name.
+    estimator : AbstractEstimator, optional
+        Weighted least squares by default.
+    throw : bool
+        Raise if a run cannot be solved; otherwise the estimates' `status` says it.
+
+    Raises
+    ------
+    IdentificationError
+        If the log or a setting allows no model an estimate.
+    """
+    estimator = estimator or WeightedLeastSquares()
+    _require(estimator, AbstractEstimator, 'an estimator, such as ESTIMATORS.create("OLS")')
+    for model in models.values():
+        _require(model, AbstractModel, 'a model, such as MODELS.create("power")')
+    problems = {name: problem.with_model(model) for name, model in models.items()}
+    with blamed():  # what one model's rows lack, such as the joints of the basis, all lack
+        for each in problems.values():
+            _ = each.parts
+    return {name: _outcome(each, estimator, throw) for name, each in problems.items()}
+
+
+def estimate(problem: Problem, estimator: AbstractEstimator, *, throw: bool = True) -> Estimate:
+    """Return the estimate of a problem.
+
+    Parameters
+    ----------
+    problem : Problem
+        Logs, robot, model.
+    estimator : AbstractEstimator
+        How it is solved.
+    throw : bool
+        Raise if a run cannot be solved; otherwise the estimate's `status` says it.
+    """
+    _require(estimator, AbstractEstimator, 'an estimator, such as ESTIMATORS.create("OLS")')
+    with blamed():
+        if throw and estimator.full_rank:
+            problem.factors.together.check()
+        return estimator.fit(problem, throw=throw)
+
+
+def _outcome(problem: Problem, estimator: AbstractEstimator, throw: bool) -> Estimate | IdentificationError:
+    try:
+        return estimate(problem, estimator, throw=throw)
+    except IdentificationError as error:
+        return error
+
+
+def _problem(
+    log: MotionLog | Sequence[MotionLog],
+    basis: Basis,
+    model: AbstractModel,
+    chain: Chain | None,
+    simulate: Callable[[Array], MotionLog] | None,
+) -> Problem:
+    chain = chain or idbench_chain()
+    _require(log, Sequence, "a MotionLog or a sequence of them, such as read_log(path)", MotionLog)
+    _require(basis, Basis, "a Basis, such as scara()")
+    _require(chain, Chain, 'a Chain, such as CHAINS.create("paper")')
+    with blamed():
+        return Problem((log,) if isinstance(log, MotionLog) else tuple(log), basis, model, chain, simulate)
+
+
+def _require(given: object, kind: type, wanted: str, *others: type) -> None:
+    """Raise IdentificationError unless `given` is an object of the kind: names, paths and classes are likely slips."""
+    if not isinstance(given, (kind, *others)) or isinstance(given, (str, bytes)):
+        raise IdentificationError(f"{given!r:.60} is given where {wanted} is needed")

@@ -1,0 +1,77 @@
+"""Recursive least squares: the estimate as the rows come in."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.errors import IdentificationError
+from identify.estimators.estimate import Estimate
+from identify.rows.factors import UNSEEN
+
+
+@dataclass(frozen=True, eq=False)
+class Recursive:
+    """An estimate over time; NaN as long as the rows do not determine every parameter.
+
+    Parameters
+    ----------
+    t : Array, shape (instant,)
+        [s].
+    X, sigma : Array, shape (instant, p)
+        Parameters and their standard deviation, as far as the rows that are final at `t` determine them.
+    """
+
+    t: Array
+    X: Array
+    sigma: Array
+
+
+def recursive_least_squares(estimate: Estimate, t: Array, halo: float = 0.0) -> Recursive:
+    """Return the estimate from the rows that were final at each instant, by one triangular factor that takes in row by row.
+
+    The rows are weighted as for the estimate itself, so that the last of it is that estimate. Sigma is that of section 7.3 for
+    the rows so far, corrected in the ratio in which that of all rows is corrected.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        A least-squares estimate of a single run.
+    t : Array, shape (instant,)
+        Increasing [s].
+    halo : float
+        How long after its time a row is final [s], such as `Chain.halo`.
+
+    Raises
+    ------
+    IdentificationError
+        If the estimate is not that of a single run, or no least-squares solution.
+    """
+    if estimate.weights is None or estimate.X.ndim > 1:
+        raise IdentificationError("recursive least squares needs the rows of a least-squares estimate of one run")
+    given, weights = estimate.rows, estimate.weights(estimate.rows)
+    order = np.argsort(given.time, kind="stable")
+    rows = (np.concatenate([given.W, given.Y[:, None]], axis=1) * weights[:, None])[order]
+    valid = np.cumsum(given.valid[order])
+    until = np.searchsorted(given.time[order] + halo, t, side="right")
+    p = len(estimate.names)
+    R, X, sigma, before = np.zeros((p + 1, p + 1)), *np.full((2, len(t), p), np.nan), 0
+    for k, now in enumerate(until):
+        R = np.linalg.qr(np.concatenate([R, rows[before:now]]), mode="r")  # type: ignore[assignment]  # R alone
+        X[k], sigma[k] = _solution(R, int(valid[now - 1]) if now else 0)
+        before = int(now)
+    return Recursive(t, X, sigma * estimate.best_sigma / estimate.sigma)
+
+
+def _solution(R: Array, rows: int) -> tuple[Array, Array]:
+    """Return X and sigma of a triangular factor of [W Y], NaN if it does not determine them."""
+    p = len(R) - 1
+    length = np.linalg.norm(R[:p, :p], axis=0)
+    if rows <= p or not length.all():
+        return np.full(p, np.nan), np.full(p, np.nan)
+    values = np.linalg.svd(R[:p, :p] / length, compute_uv=False)
+    if values[-1] <= UNSEEN * values[0]:
+        return np.full(p, np.nan), np.full(p, np.nan)
+    inverse = np.linalg.inv(R[:p, :p])
+    variance = R[p, p] ** 2 / (rows - p)
+    return inverse @ R[:p, p], np.sqrt(variance * np.sum(inverse**2, axis=1))

@@ -1,0 +1,135 @@
+"""Looking into an identification: what is left over at every sample, where it lies, and what the filters let through."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from identify.arrays import Array
+from identify.basis import Basis
+from identify.data.motion_log import MotionLog
+from identify.models import AbstractModel, Equations
+from identify.rows.chain import Chain
+from identify.rows.kernel import Kernel
+from identify.signals.signals import Signals
+from identify.signals.state import State
+
+HALF = 0.5
+"""A filter's cut-off is where its gain has fallen to this share: -6 dB."""
+
+
+@dataclass(frozen=True, eq=False)
+class Instants:
+    """What a model leaves unexplained before the operator.
+
+    Parameters
+    ----------
+    equations : Equations
+        The model's.
+    everywhere : Array, shape (row, time)
+        B tau - (c + s e) X [N m], or [W], at all samples.
+    inner : slice
+        The samples between the first row and the last.
+    """
+
+    equations: Equations
+    everywhere: Array
+    inner: slice
+
+    @property
+    def first(self) -> int:
+        """Number of the first of the inner samples."""
+        return int(self.inner.start)
+
+    @property
+    def residual(self) -> Array:
+        """What is left at the inner samples, shape (row, time)."""
+        return self.everywhere[..., self.inner]
+
+    @property
+    def weight(self) -> Array:
+        """Weights of the mask there, shape (row, time)."""
+        return self.equations.weight[..., self.inner]
+
+
+def instants(signals: Signals, basis: Basis, model: AbstractModel, chain: Chain, X: Array) -> Instants:
+    """Return what `model` with the parameters `X` leaves unexplained at every sample of one log.
+
+    Raises
+    ------
+    LogError
+        If the log does not fit the basis, or is too short for the chain.
+    """
+    grid, equations = chain.grid(signals.log), model.equations(basis, signals)
+    inner = slice(grid.first, grid.first + grid.step * (grid.count - 1) + 1)
+    return Instants(equations, equations.y - equations.predicted(X), inner)
+
+
+def measured_state(log: MotionLog, chain: Chain) -> State:
+    """Return positions as they were logged, and what the differentiator of the chain alone makes of them."""
+    q = np.ascontiguousarray(np.swapaxes(log.q, -1, -2))
+
+    def s(x: Array) -> Array:
+        return chain.differentiator.derivative(x, log.fs)
+
+    return State(q, s(q), s)
+
+
+def filtered(signals: Signals, chain: Chain) -> dict[str, Array]:
+    """Return q, qd and qdd of the rows, shape (joint, row): prefiltered, differentiated, and seen through the operator.
+
+    The weights of the operator are divided by their sum, so that windows give means.
+    """
+    response = chain.operator.response(signals.fs)
+    mean = Kernel(response / response.sum(), (len(response) - 1) // 2, chain.grid(signals.log))
+    return {name: mean.apply(getattr(signals.state, name)) for name in ("q", "qd", "qdd")}
+
+
+def binned(x: Array, y: Array, weight: Array, edges: Array) -> Array:
+    """Return the weighted mean of `y` in each bin of `x`, NaN where there is none.
+
+    Parameters
+    ----------
+    x, y, weight : Array, shape (time,)
+        What is binned, averaged and weighted.
+    edges : Array, shape (bins + 1,)
+        Ends of the bins.
+    """
+    total, _ = np.histogram(x, edges, weights=weight)
+    summed, _ = np.histogram(x, edges, weights=weight * y)
+    return np.divide(summed, total, out=np.full(len(total), np.nan), where=total > 0)
+
+
+def spectrum(y: Array, fs: float, resolution: float) -> tuple[Array, Array]:
+    """Return frequencies [Hz] and the amplitude density of `y`, shape (time,), in its unit per sqrt(Hz) (Welch).
+
+    Parameters
+    ----------
+    y : Array, shape (time,)
+        Sampled at `fs` [Hz].
+    resolution : float
+        Distance of the frequencies [Hz]; wider if `y` is shorter than its inverse.
+    """
+    f, density = scipy.signal.welch(y, fs, nperseg=min(len(y), round(fs / resolution)), detrend="constant")
+    return f, np.sqrt(density)
+
+
+def cutoffs(chain: Chain, fs: float) -> Mapping[str, float]:
+    """Return the cut-offs [Hz] of prefilter and operator at -6 dB, as far as they have one below the Nyquist frequency.
+
+    They are read from impulse responses, so that they hold for any filter.
+    """
+    reach = 1 + int(np.ceil(chain.prefilter.halo(fs) * fs))
+    impulse = np.zeros(6 * reach + 101)
+    impulse[len(impulse) // 2] = 1.0
+    found = {"prefilter": chain.prefilter.apply(impulse, fs), "operator": chain.operator.response(fs)}
+    each = {name: _cutoff(response, fs) for name, response in found.items()}
+    return {name: f for name, f in each.items() if f is not None}
+
+
+def _cutoff(response: Array, fs: float) -> float | None:
+    size = 1 << int(np.ceil(np.log2(max(8192, 8 * len(response)))))
+    gain = np.abs(np.fft.rfft(response, size))
+    below = np.flatnonzero(gain < HALF * gain[0])
+    return float(below[0] * fs / size) if len(below) else None

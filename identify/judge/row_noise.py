@@ -1,0 +1,87 @@
+"""The noise of a log, read off above the band of its rows, where no motion is."""
+
+import numpy as np
+import scipy
+
+from identify.arrays import Array
+from identify.data.motion_log import MotionLog
+from identify.judge.diagnosis import Instants
+from identify.rows.chain import Chain
+from identify.signals.signals import Signals
+
+RESOLUTION = 0.5
+"""Distance of the frequencies that are looked at [Hz]."""
+
+QUIET = 0.02
+"""Gain of the operator, as a share of that at rest, below which a frequency is above its band."""
+
+LEAST = 8
+"""Frequencies above the band that it takes to tell two kinds of noise."""
+
+FAINT = 1e-6
+"""Frequencies at which a kind of noise is below this share of its largest say nothing of it."""
+
+ROUNDS = 10
+
+
+def row_noise(left: Instants, signals: Signals, chain: Chain) -> Array:
+    """Return the rms of the noise in the rows of the explicit model, joint by joint [N m], shape (joint,).
+
+    What the model leaves over above the band of the operator is noise, S(f) = a |A(f)|^2 + b |D(f)|^2: of the torque, white
+    before alignment and prefilter (A), and of the position, white before prefilter and two differentiations (D), a and b fitted
+    with errors in proportion to S. The rows have what of S passes the operator.
+
+    Parameters
+    ----------
+    left : Instants
+        What the explicit model leaves over of one run; what it does not explain of the motion lies inside the band.
+    signals : Signals
+        Of the same log.
+    chain : Chain
+        Signal processing.
+
+    Returns
+    -------
+    Array
+        NaN where too little lies above the band: sampling is slow, or the operator is no low-pass.
+    """
+    log, fs = signals.log, signals.fs
+    length = min(left.residual.shape[-1], round(fs / RESOLUTION))
+    f, S = scipy.signal.welch(left.residual * left.weight, fs, nperseg=length, detrend="constant")
+    S = S / np.maximum(np.mean(left.weight**2, axis=-1, keepdims=True), 1e-300)
+    passed = _gain(chain.operator.response(fs), f, fs)
+    kinds = np.stack([_gain(impulse, f, fs) ** 2 for impulse in _impulses(log, chain)])
+    above = (passed < QUIET * passed[0]) & (f > f[np.argmax(passed < QUIET * passed[0])]) & (f < 0.95 * fs / 2)
+    above &= (kinds > FAINT * kinds.max(axis=1, keepdims=True)).any(axis=0)
+    if np.count_nonzero(above) < LEAST:
+        return np.full(len(S), np.nan)
+    levels = np.array([_levels(kinds[:, above], s[above]) for s in S])
+    return np.sqrt(scipy.integrate.trapezoid(levels @ kinds * passed**2, f, axis=-1))
+
+
+def _impulses(log: MotionLog, chain: Chain) -> tuple[Array, Array]:
+    """Return what an impulse of the torque, and one of the position, leave in the torque's balance."""
+    fs = log.fs
+    x = np.zeros(2 * int(np.ceil(chain.halo(fs, log.torque) * fs)) + 101)
+    x[len(x) // 2] = 1.0
+    x = chain.prefilter.apply(x, fs)
+    position = chain.differentiator.derivative(chain.differentiator.derivative(x, fs), fs)
+    return chain.alignment.align(x[None], log.torque, fs).mean[0], position
+
+
+def _gain(impulse: Array, f: Array, fs: float) -> Array:
+    """Return the size of the frequency response of an impulse response."""
+    _, response = scipy.signal.freqz(impulse, worN=f, fs=fs)
+    return np.abs(response)
+
+
+def _levels(kinds: Array, S: Array) -> Array:
+    """Return the levels, not negative, whose sum of kinds is nearest to S, in proportion to itself."""
+    if not S.max() > 0:
+        return np.zeros(len(kinds))
+    model = np.maximum(S, FAINT * S.max())
+    scale = kinds.max(axis=1)
+    for _ in range(ROUNDS):
+        found, _ = scipy.optimize.nnls((kinds / scale[:, None] / model).T, S / model)
+        model = np.maximum(found @ (kinds / scale[:, None]), FAINT * S.max())
+    return np.asarray(found / scale)

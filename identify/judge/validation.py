@@ -1,0 +1,218 @@
+"""How well parameters predict the torques of a motion that they were not fitted to."""
+
+from dataclasses import dataclass
+from math import sqrt
+from typing import final
+
+import numpy as np
+import numpy.typing as npt
+import scipy
+
+from identify.arrays import Array
+from identify.data.motion_log import MotionLog
+from identify.errors import LogError
+from identify.estimators.problem import Problem
+from identify.judge.diagnosis import instants
+from identify.judge.row_noise import row_noise
+from identify.models import ExplicitModel
+from identify.rows.noise_propagation import torque_variance
+from identify.rows.operators import AbstractOperator
+from identify.rows.rows import Rows
+
+LAGS = 10
+"""Rows over which residuals are compared with themselves."""
+
+FAINT = 0.5
+"""Rows of which the mask leaves less than this share say little, and are not compared."""
+
+WHITE = 0.95
+"""Share of white residuals that are called white."""
+
+MARGIN = 1.3
+"""Errors up to this multiple of what noise and sigma make are explained by them: levels of noise are known to some 20 %."""
+
+EXCUSED = 0.02
+"""Share of the torque up to which sigma of the parameters excuses an error: a misfit makes sigma large, too."""
+
+HELD_OUT = 0.25
+"""Share of a log, at its end, that is held out where there is no second log."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """Torques measured and predicted at the rows of a chain, joint by joint; all arrays have the shape (joint,).
+
+    Parameters
+    ----------
+    rms : Array
+        Of measured - predicted torque while the joint moves [N m].
+    level : Array
+        Rms of the measured torque there [N m].
+    R2 : Array
+        Share of the measured torque's variance that is predicted there.
+    standing : Array
+        Rms of the error where the joint stands or turns [N m], where friction is not determined; NaN if it never does.
+    correlation : Array
+        Largest correlation of the error with itself, by size, 2 to `LAGS` rows later. (Noise of differentiated positions
+        alternates from row to row: what is one row later says nothing of the model.)
+    bound : Array
+        What the correlation of noise that was white before the operator stays below in 95 % of joints; in 90 % where a mask
+        takes part of many rows.
+    rows : int array
+        How many rows move.
+    noise : Array
+        Rms of the noise of these rows, as what lies above their band tells it [N m] (`row_noise`); NaN if it does not.
+    open : Array
+        Rms of what sigma of the parameters makes of the torque there [N m]; 0 if their covariance is not given.
+    """
+
+    rms: Array
+    level: Array
+    R2: Array
+    standing: Array
+    correlation: Array
+    bound: Array
+    rows: npt.NDArray[np.intp]
+    noise: Array
+    open: Array
+
+    @property
+    def expected(self) -> Array:
+        """Rms error of the right model [N m], with these parameters' sigma, on a log as noisy as this."""
+        return np.sqrt(np.nan_to_num(self.noise) ** 2 + self.open**2)
+
+    @property
+    def excess(self) -> Array:
+        """Error that neither noise nor sigma explains, shape (joint,) [N m]: what the model is wrong by."""
+        excused = np.minimum(self.open, EXCUSED * self.level)
+        squares = MARGIN**2 * (np.nan_to_num(self.noise) ** 2 + excused**2)
+        return np.sqrt(np.maximum(self.rms**2 - squares, 0.0))
+
+    def percent_of_level(self, torque: Array) -> Array:
+        """Return 100 torque / level; infinite where there is a torque and no level, 0 where there is neither."""
+        none = np.where(np.isnan(torque), np.nan, np.where(torque > 0, np.inf, 0.0))
+        return 100 * np.divide(torque, self.level, out=none, where=self.level > 0)
+
+    @property
+    def percent(self) -> Array:
+        """100 rms / level."""
+        return self.percent_of_level(self.rms)
+
+    @property
+    def white(self) -> npt.NDArray[np.bool_]:
+        """Whether the error is not to be told from noise."""
+        return np.abs(self.correlation) <= self.bound
+
+
+def validate(unseen: Problem, X: Array, covariance: Array | None = None) -> Validation:
+    """Return how well the parameters `X`, with their `covariance`, predict the torques of a log, by the explicit model.
+
+    Both sides go through the same chain. What its mask leaves out is judged apart.
+
+    Parameters
+    ----------
+    unseen : Problem
+        One log, with the robot and the chain by which it is judged.
+    X : Array, shape (p,)
+        Parameters of its basis.
+    covariance : Array, shape (p, p), optional
+        Theirs.
+
+    Raises
+    ------
+    LogError
+        If the log holds several runs, does not fit the basis, is too short for the chain, or a joint of it never moves.
+    """
+    if len(unseen.logs) > 1 or unseen.logs[0].q.ndim != 2:
+        raise LogError(
+            f"a motion is judged by itself, not {len(unseen.logs)} of shape {unseen.logs[0].q.shape}: give them one by one"
+        )
+    signals, chain, basis = unseen.prepared.signals[0], unseen.chain, unseen.basis
+    rows = unseen.with_model(ExplicitModel()).parts[0]
+    left = instants(signals, basis, ExplicitModel(), chain, X)
+    moving = [_Joint.of(rows, X, j) for j in range(basis.n)]
+    standing = chain.operator.map(left.equations, left.equations.weighted_as(1.0 - signals.weight), chain.grid(signals.log))
+    still = np.where(standing.outside > 0, rows.by_kind(standing.measurement(left.everywhere)), np.nan)
+    rms, level, R2, correlation, count = zip(*(joint.judged() for joint in moving), strict=True)
+    if 0 in count:
+        raise LogError(
+            f"joint {count.index(0) + 1} never moves in this log, as far as the mask of the chain sees: use a motion in which "
+            "all joints do"
+        )
+    bound = _bound(chain.operator, signals.fs) / np.sqrt(count)
+    noise = row_noise(left, signals, chain) * [joint.unmasked for joint in moving]
+    left_open = [joint.open(covariance) for joint in moving]
+    still_rms = [_rms(x[np.isfinite(x)]) for x in still]
+    return Validation(*map(np.array, (rms, level, R2, still_rms, correlation, bound, count, noise, left_open)))
+
+
+def split(log: MotionLog, share: float = HELD_OUT) -> tuple[MotionLog, MotionLog]:
+    """Return the beginning of a log, and the `share` at its end that is held out."""
+    cut = round((1 - share) * log.samples)
+    return log.part(0, cut), log.part(cut, log.samples)
+
+
+def _bound(operator: AbstractOperator, fs: float) -> float:
+    """Return what the correlation of rows that an operator makes of white noise stays below, times the root of their number.
+
+    It is the largest of LAGS - 1 normal ones, whose variance is the sum of squares of the rows' own correlations (Bartlett).
+    """
+    h, step = operator.response(fs), operator.step(fs)
+    own = np.array([h[lag:] @ h[: len(h) - lag] for lag in range(0, len(h), step)]) / (h @ h)
+    largest = scipy.stats.norm.ppf((1 + WHITE ** (1 / (LAGS - 1))) / 2)
+    return float(largest * np.sqrt(1 + 2 * np.sum(own[1:] ** 2)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Joint:
+    """The rows of a joint: torque, residual, W, whether they are valid, and the spread that white noise would have in them."""
+
+    y: Array
+    rho: Array
+    W: Array
+    valid: npt.NDArray[np.bool_]
+    spread: Array
+
+    @classmethod
+    def of(cls, rows: Rows, X: Array, joint: int) -> "_Joint":
+        own = rows.group == joint
+        spread = np.sqrt(torque_variance(rows.maps[0], np.ones(rows.kinds))[joint])
+        return cls(rows.Y[own], (rows.Y - rows.predicted(X))[own], rows.W[own], rows.valid[own], spread)
+
+    def judged(self) -> tuple[float, float, float, float, int]:
+        """Return the rms of residual and torque, R2, correlation, and the number of valid rows."""
+        rho, y = self.rho[self.valid], self.y[self.valid]
+        if not len(rho):
+            return np.nan, np.nan, np.nan, np.nan, 0
+        spread = float(np.sum((y - y.mean()) ** 2))
+        return _rms(rho), _rms(y), 1 - float(rho @ rho) / max(spread, 1e-300), self._correlation(), len(rho)
+
+    @property
+    def unmasked(self) -> float:
+        """The rms of rows of white noise over that of rows of which the mask takes nothing."""
+        return float(np.sqrt((self.spread[self.valid] ** 2).mean()) / self.spread.max())
+
+    def open(self, covariance: Array | None) -> float:
+        """Return the rms over the rows of the sigma of W X."""
+        W = self.W[self.valid]
+        return 0.0 if covariance is None else float(np.sqrt(np.mean(np.sum(W @ covariance * W, axis=1))))
+
+    def _correlation(self) -> float:
+        """Return the sum of products of residuals with later ones that departs most from that of noise, as a correlation.
+
+        Rows that the mask takes part of are smaller: each is divided by what white noise would leave of it.
+        """
+        valid = self.valid & (self.spread > FAINT * self.spread.max(initial=0.0))
+        rho = np.divide(self.rho, self.spread, out=np.zeros(len(self.spread)), where=valid)
+        rho[valid] -= rho[valid].mean()
+        variance = max(float(np.mean(rho[valid] ** 2)), 1e-300)
+        departures = [0.0]
+        for lag in range(2, min(LAGS, len(rho) - 1) + 1):
+            pairs = int(np.count_nonzero(valid[lag:] & valid[:-lag]))
+            departures.append(float(rho[lag:] @ rho[:-lag]) / variance / sqrt(max(pairs, 1)))
+        return max(departures, key=abs) / sqrt(max(int(np.count_nonzero(self.valid)), 1))
+
+
+def _rms(x: Array) -> float:
+    return float(np.sqrt(np.mean(x**2))) if len(x) else np.nan

@@ -1,0 +1,88 @@
+"""A model's equations at every sample of a log."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from identify.arrays import Array, Columns
+from identify.signals.signals import Signals
+
+Factors = Mapping[tuple[int, int], Array | float]
+"""(row of an instant, joint) -> what the row multiplies the torque of the joint by: a signal (..., time), or a constant."""
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """B tau = [c + s e] X at every sample of a log, with s = d/dt.
+
+    Parameters
+    ----------
+    signals : Signals
+        The log's.
+    B : mapping of (int, int) to Array or float
+        (row of an instant, joint) -> what the row multiplies the torque of the joint by.
+    c, e : mapping of (int, str) to Array
+        (row, parameter) -> column that is used as it is, and column that is still to be differentiated, shape (..., time).
+    names : tuple of str
+        Names of the parameters X.
+    """
+
+    signals: Signals
+    B: Factors
+    c: Columns
+    e: Columns
+    names: tuple[str, ...]
+
+    @property
+    def kinds(self) -> int:
+        """Number of rows at an instant."""
+        return 1 + max(row for row, _ in self.B)
+
+    @cached_property
+    def y(self) -> Array:
+        """B tau, shape (..., row, time): torques [N m] or power [W]."""
+        q = self.signals.state.q
+        total = np.zeros((*q.shape[:-2], self.kinds, q.shape[-1]))
+        for (row, joint), B in self.B.items():
+            total[..., row, :] += self.signals.torque.times(B, joint)
+        return total
+
+    @cached_property
+    def weight(self) -> Array:
+        """Weight of every row at every sample, shape (..., row, time)."""
+        return self.weighted_as(self.signals.weight)
+
+    def weighted_as(self, joints: Array) -> Array:
+        """Return the weight of every row, shape (..., row, time), from weights of the joints, shape (..., joint, time).
+
+        A row that takes a torque as it is has the weight of its joint, since friction jumps where the joint turns. A row that
+        multiplies it by the velocity has weight 1: the product is continuous there.
+        """
+        weight = np.ones((*joints.shape[:-2], self.kinds, joints.shape[-1]))
+        for (row, joint), B in self.B.items():
+            if isinstance(B, float):
+                weight[..., row, :] *= joints[..., joint, :]
+        return weight
+
+    @cached_property
+    def addresses(self) -> tuple[tuple[int, str], ...]:
+        """(row, parameter) of every column of c + s e that is not zero at all times; k of them."""
+        return tuple(dict.fromkeys((*self.c, *self.e)))
+
+    @cached_property
+    def rates(self) -> Columns:
+        """The columns s e."""
+        if not self.e:
+            return {}
+        rates = self.signals.s(np.stack(list(self.e.values()), axis=-2))
+        return {address: rates[..., i, :] for i, address in enumerate(self.e)}
+
+    def predicted(self, X: Array) -> Array:
+        """Return (c + s e) X at every sample, shape (..., row, time), for parameters of shape (..., p)."""
+        total = np.zeros(self.y.shape)
+        for columns in (self.c, self.rates):
+            for (row, name), column in columns.items():
+                total[..., row, :] += column * X[..., self.names.index(name), None]
+        return total

@@ -1,0 +1,43 @@
+"""What a model is."""
+
+from abc import ABC, abstractmethod
+from typing import final
+
+from identify.arrays import Array, Columns
+from identify.basis import Basis
+from identify.models.equations import Equations, Factors
+from identify.signals.signals import Signals
+from identify.signals.state import State
+
+
+class AbstractModel(ABC):
+    """An identification model B tau = [c + s e] X with s = d/dt: it takes B, c and e from a basis, and never filters."""
+
+    @abstractmethod
+    def B(self, state: State) -> Factors:
+        """Return what torques are multiplied by, (row of an instant, joint) -> (..., time) or a constant, where it is not 0."""
+
+    @abstractmethod
+    def c(self, basis: Basis, state: State) -> Columns:
+        """Return the columns that are used as they are."""
+
+    @abstractmethod
+    def e(self, basis: Basis, state: State) -> Columns:
+        """Return the columns that are still to be differentiated."""
+
+    @final
+    def equations(self, basis: Basis, signals: Signals) -> Equations:
+        """Return the model's equations at every sample, their columns averaged over the same windows as the torque."""
+        state, average = signals.state, signals.torque.average
+        return Equations(
+            signals,
+            self.B(state),
+            {address: average(column) for address, column in self.c(basis, state).items()},
+            {address: average(column) for address, column in self.e(basis, state).items()},
+            basis.names,
+        )
+
+
+def each_joint(state: State) -> dict[tuple[int, int], Array | float]:
+    """Return B of a model that has the torque of every joint in a row of its own."""
+    return {(j, j): 1.0 for j in range(state.n)}

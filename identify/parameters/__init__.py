@@ -1,0 +1,1 @@
+"""Which parameters a motion can identify, and which of them bodies can have."""

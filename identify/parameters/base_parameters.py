@@ -1,0 +1,197 @@
+"""Base parameters: the combinations of standard parameters that a motion can tell at all."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self, final
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.basis import Basis
+from identify.data.kinematics import KinematicTree
+from identify.errors import SettingError
+from identify.signals.state import State
+
+STATES = 56
+"""Random states for each joint: four for each of its fourteen standard parameters, with a rotor and three laws of friction."""
+
+ENOUGH = 4
+"""Joints beyond which more of them need no more states."""
+
+SEED = 0
+"""Of the random states: any others give the same grouping, up to rounding."""
+
+DEPENDENT = 1e-3
+"""A column counts as a combination of those before it when what is left over is below this share of a long column of its unit.
+
+Descriptions round angles: of the arms of example-robot-data, columns that are dependent in the robot leave up to 3e-6 where
+angles have four digits after the point (1.5708), up to 6e-4 with two (1.57); none that is independent leaves less than 0.09."""
+
+ALIKE = 1e-6
+"""Two bases make the same torques if they differ by less than this share of the largest."""
+
+SHOWN = 1e-5
+"""Coefficients below this share of the first are left out where a grouping is printed: they come from rounded angles."""
+
+NEGLIGIBLE = 1e-8
+"""Coefficients below this share of the largest of their grouping are rounding."""
+
+ROUNDING = 1e-13
+"""Sums below this share of their terms are zero but for rounding."""
+
+SPEED, ACCELERATION = 5.0, 25.0
+"""Largest rates of the random states [rad/s, rad/s^2]: as heavy as gravity, so that no kind of column drowns."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class BaseParameters:
+    """The grouping of a basis: X_base = K X_standard, from the columns of the explicit model at random states.
+
+    A parameter whose column depends on those before it is grouped with them; one without effect has no part. So parameters stay
+    that come first in the order of the basis (W. Khalil and E. Dombre, "Modeling, Identification and Control of Robots", 2002,
+    chapter 9; numerically M. Gautier, "Numerical calculation of the base inertial parameters of robots", J. Robotic Systems 8
+    (1991) 485-506).
+
+    Parameters
+    ----------
+    standard : Basis
+        Links, armatures, frictions.
+    kept : tuple of int
+        Numbers of the parameters that stay, from 0.
+    K : Array, shape (b, p)
+        What each base parameter is made of.
+    """
+
+    standard: Basis
+    kept: tuple[int, ...]
+    K: Array
+
+    @classmethod
+    def of(cls, tree: KinematicTree, standard: Basis) -> Self:
+        """Return the grouping of a robot's standard parameters."""
+        W = _explicit_columns(tree, standard)
+        large = _large(tree, standard, np.linalg.norm(W, axis=0))
+        R: Array = np.linalg.qr(W / large, mode="r")  # type: ignore[assignment]  # mode "r" gives R alone
+        kept = _independent(R)
+        K: Array = np.linalg.lstsq(R[:, kept], R, rcond=None)[0] * large / large[kept][:, None]
+        K[np.abs(K) < NEGLIGIBLE * np.abs(K).max(axis=1, keepdims=True)] = 0.0
+        K[:, np.linalg.norm(R, axis=0) <= DEPENDENT] = 0.0
+        K[:, kept] = np.eye(len(kept))
+        return cls(standard, tuple(kept), K)
+
+    @property
+    def basis(self) -> Basis:
+        """The basis of the base parameters, whose columns are those of the parameters that stay."""
+        names = self.standard.names
+        return self.standard.renamed({names[k]: name for k, name in zip(self.kept, self.names, strict=True)})
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the base parameters: ZZ1 becomes ZZR1 where others are grouped with it."""
+        parameters = [self.standard.parameters[k] for k in self.kept]
+        grouped = np.count_nonzero(self.K, axis=1) > 1
+        return tuple((p.regrouped() if more else p).name for p, more in zip(parameters, grouped, strict=True))
+
+    @property
+    def without_effect(self) -> tuple[str, ...]:
+        """Standard parameters that no motion shows."""
+        return tuple(name for name, used in zip(self.standard.names, np.any(self.K, axis=0), strict=True) if not used)
+
+    def grouping(self, i: int) -> str:
+        """Return what base parameter `i` is made of, such as ZZ1 + Ia1 + 0.25 M2."""
+        shown = np.flatnonzero(np.abs(self.K[i]) > SHOWN * np.abs(self.K[i]).max())
+        first, *others = [self.kept[i], *(k for k in shown if k != self.kept[i])]
+        terms = [self.standard.names[first]]
+        for k in others:
+            c = self.K[i, k]
+            size = "" if np.isclose(abs(c), 1, rtol=1e-6) else f"{abs(c):.6g} "
+            terms.append(f"{'-' if c < 0 else '+'} {size}{self.standard.names[k]}")
+        return " ".join(terms)
+
+    def base(self, standard: Array) -> Array:
+        """Return the base values of standard values, shape (..., p); sums that are rounding alone are zero."""
+        values = np.asarray(standard, dtype=np.float64)
+        total, size = values @ self.K.T, np.abs(values) @ np.abs(self.K.T)
+        return np.where(np.abs(total) > ROUNDING * size, total, 0.0)
+
+    def nearest(self, base: Array, standard: Array, scale: Array) -> Array:
+        """Return the standard values with the base values `base` that lie nearest to `standard`, in units of `scale`.
+
+        Parameters
+        ----------
+        base : Array, shape (b,)
+            What they shall give.
+        standard, scale : Array, shape (p,)
+            Where to stay near, and what counts as far.
+        """
+        K = self.K * scale
+        return np.asarray(standard) + scale * np.linalg.lstsq(K, base - self.base(standard), rcond=None)[0]
+
+
+def transfer(tree: KinematicTree, start: Basis, end: Basis) -> Array:
+    """Return T so that T X are the parameters of the basis `end` that make the torques of X in the basis `start`.
+
+    Raises
+    ------
+    SettingError
+        If the columns of one do not span those of the other.
+    """
+    A, B = _explicit_columns(tree, end), _explicit_columns(tree, start)
+    T: Array = np.asarray(np.linalg.lstsq(A, B, rcond=None)[0], dtype=np.float64)
+    if np.abs(A @ T - B).max() > ALIKE * np.abs(B).max():
+        raise SettingError(f"the parameters {', '.join(start.names)} do not describe robot {tree.name!r} as its links do")
+    return T
+
+
+def _explicit_columns(tree: KinematicTree, basis: Basis) -> Array:
+    """Return the columns of the explicit model at random states, shape (joint x state, p)."""
+    return np.moveaxis(columns_at(basis, random_states(tree, _count(tree))), 1, -1).reshape(-1, len(basis.names))
+
+
+def columns_at(basis: Basis, states: Array) -> Array:
+    """Return the columns of the explicit model at q, qd, qdd, shape (3, joint, state), as (joint, p, state)."""
+    q, qd, qdd = states
+    W = np.zeros((basis.n, len(basis.names), q.shape[-1]))
+    for (row, name), signal in basis.explicit(State(q, qd, lambda _: qdd)).items():
+        W[row, basis.names.index(name)] = signal
+    return W
+
+
+def random_states(tree: KinematicTree, count: int) -> Array:
+    """Return random positions inside the joints' ranges, or a turn, velocities and accelerations, shape (3, joint, count)."""
+    rng = np.random.default_rng(SEED)
+    low, high = np.array([joint.range for joint in tree.joints]).T
+    zero = np.array([joint.zero for joint in tree.joints])
+    low, high = np.where(np.isfinite(low), low, zero - np.pi), np.where(np.isfinite(high), high, zero + np.pi)
+    ends = np.array([[low, high], [-SPEED * np.ones(tree.n), SPEED * np.ones(tree.n)], [-ACCELERATION * np.ones(tree.n)] * 2])
+    ends[2, 1] = ACCELERATION
+    return ends[:, 0, :, None] + rng.random((3, tree.n, count)) * (ends[:, 1] - ends[:, 0])[..., None]
+
+
+def _independent(R: Array) -> list[int]:
+    """Return the columns that depend on none before them: their part off those that stay is no rounding of the file."""
+    kept: list[int] = []
+    Q = np.zeros((len(R), 0))
+    for k in range(R.shape[1]):
+        rest = R[:, k] - Q @ (Q.T @ R[:, k])
+        rest -= Q @ (Q.T @ rest)
+        if (size := np.linalg.norm(rest)) > DEPENDENT:
+            kept.append(k)
+            Q = np.column_stack([Q, rest / size])
+    return kept
+
+
+def _count(tree: KinematicTree) -> int:
+    """Return how many random states group a robot's parameters; every state has a row for each joint."""
+    return STATES * min(tree.n, ENOUGH)
+
+
+def _large(tree: KinematicTree, standard: Basis, length: Array) -> Array:
+    """Return how long a column of each parameter may be: the longest of its unit, that of a first moment against gravity."""
+    units, kinds = np.array(standard.units), np.array([parameter.kind for parameter in standard.parameters])
+    large = np.array([length[units == unit].max() for unit in units])
+    weight = np.linalg.norm(tree.gravity) * np.sqrt(_count(tree))
+    moments = kinds == "first moment"
+    large[moments] = np.maximum(large[moments], weight)
+    return np.maximum(large, ROUNDING * length.max() / DEPENDENT)

@@ -1,0 +1,1 @@
+"""Rows Y = W X + rho: operators, chains, triangular factors, and how noise reaches them."""

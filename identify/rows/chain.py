@@ -1,0 +1,124 @@
+"""From a log to a linear system: every choice of signal processing, in Hz, s and rad/s."""
+
+from dataclasses import dataclass, replace
+from typing import final
+
+import numpy as np
+
+from identify.arrays import require_not_negative
+from identify.basis import Basis
+from identify.data.motion_log import MotionLog, TorqueChannel
+from identify.errors import LogError, SettingError
+from identify.models import AbstractModel
+from identify.plugins import PluginTable
+from identify.rows.grid import Grid
+from identify.rows.operators import AbstractOperator, FirLowPass, IirLowPass
+from identify.rows.rows import Rows
+from identify.signals.differentiators import AbstractDifferentiator, CentralDifference
+from identify.signals.masks import AbstractMask, NoMask, ReversalMask
+from identify.signals.prefilters import AbstractPrefilter, ButterworthPrefilter, NoPrefilter
+from identify.signals.signals import Signals
+from identify.signals.torques import AbstractAlignment, AsLogged, ByChannel
+
+
+@final
+@dataclass(frozen=True)
+class Chain:
+    """The stages between a log and Y = W X + rho; the same chain serves every sampling frequency.
+
+    Parameters
+    ----------
+    prefilter : AbstractPrefilter
+        Applied to positions and torques.
+    differentiator : AbstractDifferentiator
+        The operator s, for velocities, accelerations and the columns e.
+    alignment : AbstractAlignment
+        Puts the torque on the time of the columns.
+    mask : AbstractMask
+        Weights of the instants.
+    operator : AbstractOperator
+        Makes the rows.
+    trim : float, optional
+        Time [s] at either end of a log that makes no rows, only feeds the filters. By default as much as the stages look
+        to either side; less than that is refused.
+    """
+
+    prefilter: AbstractPrefilter
+    differentiator: AbstractDifferentiator
+    alignment: AbstractAlignment
+    mask: AbstractMask
+    operator: AbstractOperator
+    trim: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.trim is not None:
+            require_not_negative(trim=self.trim)
+
+    def signals(self, log: MotionLog, weights_of: Signals | None = None) -> Signals:
+        """Return the signals of `log`, with the mask's weights of other signals if they are given."""
+        return Signals(log, self.prefilter, self.differentiator, self.alignment, self.mask, weights_of)
+
+    def grid(self, log: MotionLog) -> Grid:
+        """Return where the rows of `log` lie; raise LogError if it leaves none, SettingError if a setting does not fit it."""
+        return self.operator.grid(log.samples, log.fs, self.margin(log))
+
+    def rows(self, signals: Signals, basis: Basis, model: AbstractModel) -> Rows:
+        """Return the rows of a model from the signals of one log.
+
+        Raises
+        ------
+        LogError
+            If the log does not have the joints of the basis, or is too short.
+        SettingError
+            If a setting does not fit the log's sampling frequency.
+        """
+        log = signals.log
+        if log.n != basis.n:
+            hint = "; its axes are (time, joint), is it transposed?" if log.samples == basis.n else ""
+            raise LogError(f"the log has {log.n} joints, the basis {basis.n}{hint}")
+        grid = self.grid(log)
+        return self.operator.rows(model.equations(basis, signals), grid)
+
+    def halo(self, fs: float, channel: TorqueChannel) -> float:
+        """Return how far [s] a row looks to either side of its instant, in a log at `fs` [Hz] with this torque channel."""
+        torque = self.alignment.align(np.empty((0, 0)), channel, fs)  # how far it looks does not depend on the values
+        derivatives = 2 * self.differentiator.halo(fs)  # of q, and of qd or e
+        stages = self.prefilter.halo(fs), derivatives, self.mask.halo(fs), torque.halo(), self.operator.halo(fs)
+        return sum(stages)
+
+    def margin(self, log: MotionLog) -> float:
+        """Return the time at either end of `log` that makes no rows [s]; raise SettingError if `trim` is too short."""
+        halo = self.halo(log.fs, log.torque)
+        if self.trim is None:
+            return halo
+        if self.trim < halo:
+            raise SettingError(
+                f"trim = {self.trim:g} s is shorter than the {halo:.3g} s that this chain looks: raise it, or leave it out"
+            )
+        return self.trim
+
+
+def paper_chain() -> Chain:
+    """The paper's own steps: Butterworth on q and tau, 2-point differences, Matlab's IIR decimate (sections 6.2, 7.2)."""
+    return Chain(ButterworthPrefilter(8.0), CentralDifference(2), AsLogged(), NoMask(), IirLowPass(4.0))
+
+
+def idbench_chain() -> Chain:
+    """No prefilter, 6th-order differences, torque aligned by its channel, reversals masked, FIR low-pass."""
+    return Chain(NoPrefilter(), CentralDifference(6), ByChannel(), ReversalMask(), FirLowPass())
+
+
+def paper_masked_chain() -> Chain:
+    """The paper's own steps, with the instants near reversals and standstill left out, as its school does."""
+    return replace(paper_chain(), mask=ReversalMask())
+
+
+CHAINS: PluginTable[Chain] = PluginTable(
+    "chains",
+    Chain,
+    {
+        "paper": paper_chain,
+        "paper_masked": paper_masked_chain,
+        "idbench": idbench_chain,
+    },
+)

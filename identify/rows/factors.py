@@ -1,0 +1,247 @@
+"""Triangular factors: all that least squares needs to know of rows, however many there are."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from functools import cached_property
+from typing import NamedTuple, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from identify.arrays import Array
+from identify.errors import ExcitationError, IdentificationError
+
+UNSEEN = 1e-6
+"""A direction of the parameters, in columns scaled to unit length, is not shown when its singular value is below this share of
+the largest: it would take columns known to seven digits to identify it to 10 %, and no log gives those."""
+
+
+class Status(IntEnum):
+    """Whether rows can be solved for X."""
+
+    OK = 0
+    TOO_FEW_ROWS = 1
+    RANK_DEFICIENT = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Factor:
+    """The triangular factor R of [W Y], which has the least-squares solutions of all rows. Leading axes are runs.
+
+    Parameters
+    ----------
+    R : Array, shape (..., p + 1, p + 1)
+        Q R = [W Y].
+    rows : int array, shape (...)
+        Number of rows that are not void, r.
+    names : tuple of str
+        Names of X.
+    """
+
+    R: Array
+    rows: npt.NDArray[np.intp]
+    names: tuple[str, ...]
+
+    @property
+    def p(self) -> int:
+        """Number of parameters."""
+        return len(self.names)
+
+    @property
+    def R_W(self) -> Array:
+        """Triangular factor of W, shape (..., p, p)."""
+        return self.R[..., : self.p, : self.p]
+
+    @cached_property
+    def condition_number(self) -> Array:
+        """Cond(W), the ratio of its extreme singular values, shape (...)."""
+        values = self._singular_values[..., 0, :]
+        return np.divide(values[..., 0], values[..., -1], out=np.full(values.shape[:-1], np.inf), where=values[..., -1] > 0)
+
+    @cached_property
+    def rank(self) -> npt.NDArray[np.intp]:
+        """Numerical rank of W with its columns scaled to unit length, shape (...)."""
+        values = self._singular_values[..., 1, :]
+        return np.count_nonzero(values > UNSEEN * values[..., :1], axis=-1)
+
+    @cached_property
+    def status(self) -> npt.NDArray[np.intp]:
+        """Status of every run, shape (...)."""
+        deficient = np.where(self.rank < self.p, Status.RANK_DEFICIENT, Status.OK)
+        return np.where(self.rows <= self.p, Status.TOO_FEW_ROWS, deficient)
+
+    def solution(self, solvable: npt.NDArray[np.bool_]) -> Array:
+        """Return the least-squares solution X, shape (..., p); NaN in runs that are not `solvable`, shape (...)."""
+        R = np.where(solvable[..., None, None], self.R_W, np.eye(self.p))
+        X = np.linalg.solve(R, self.R[..., : self.p, self.p :])[..., 0]
+        return np.where(solvable[..., None], X, np.nan)
+
+    def inverse(self, solvable: npt.NDArray[np.bool_]) -> Array:
+        """Return (W' W)^-1, shape (..., p, p); NaN in runs that are not `solvable`, shape (...)."""
+        root = np.linalg.inv(np.where(solvable[..., None, None], self.R_W, np.eye(self.p)))
+        return np.where(solvable[..., None, None], np.matmul(root, np.swapaxes(root, -1, -2)), np.nan)
+
+    def squares(self, X: Array) -> Array:
+        """Return |Y - W X|^2, shape (...)."""
+        rest = self.R[..., -1] - np.matmul(self.R[..., :-1], X[..., None])[..., 0]
+        return np.sum(rest**2, axis=-1)
+
+    def not_shown(self, run: tuple[int, ...] = ()) -> tuple[str, ...]:
+        """Return the parameters of `run` that the motion does not show, alone or in some combination."""
+        _, values, directions = np.linalg.svd(self._scaled[run])
+        null = directions[values <= UNSEEN * values.max()]
+        share = np.abs(null).max(axis=0, initial=0.0)
+        return tuple(name for name, s in zip(self.names, share, strict=True) if s > 1e-3)
+
+    def hidden(self, run: tuple[int, ...] = ()) -> tuple[str, ...]:
+        """Return parameters of `run` without which W has full rank: of each combination that is not shown the last in order."""
+        W, left = self._scaled[run], list(range(self.p))
+        while left:
+            _, values, directions = np.linalg.svd(W[:, left])
+            if values[-1] > UNSEEN * values[0]:
+                break
+            share = np.abs(directions[-1])
+            left.pop(int(np.flatnonzero(share > 0.1 * share.max())[-1]))
+        return tuple(name for k, name in enumerate(self.names) if k not in left)
+
+    def check(self) -> None:
+        """Raise unless every run can be solved.
+
+        Raises
+        ------
+        IdentificationError
+            If there are no more rows than parameters.
+        ExcitationError
+            If the motion does not show every parameter; the message names those it does not show.
+        """
+        failed = np.argwhere(self.status != Status.OK)
+        if not len(failed):
+            return
+        run = tuple(int(i) for i in failed[0])
+        where = f" (run {run}, and {len(failed) - 1} more)" if run else ""
+        if self.status[run] == Status.TOO_FEW_ROWS:
+            raise IdentificationError(self.explain(run) + where)
+        raise ExcitationError(self.explain(run) + where, self.hidden(run))
+
+    def explain(self, run: tuple[int, ...] = ()) -> str:
+        """Return why a run whose status is not OK cannot be solved, and what to do."""
+        if self.status[run] == Status.TOO_FEW_ROWS:
+            return (
+                f"{self.rows[run]} rows are left by the mask for {self.p} parameters: use a longer motion, in which every "
+                "joint moves; in the power model all must move at once"
+            )
+        if self.rows[run] < 2 * self.p:
+            rows = f"{self.rows[run]} rows for {self.p} parameters identify {self.rank[run]} of them"
+            return f"{rows}: use a longer log, in which all joints move"
+        return (
+            f"the motion does not show {', '.join(self.not_shown(run))}: W has rank {self.rank[run]} of {self.p}; "
+            "move every joint, with others standing and moving, or leave these parameters out of the basis"
+        )
+
+    @cached_property
+    def _singular_values(self) -> Array:
+        """Singular values of W as it is, and with its columns scaled to unit length, shape (..., 2, p)."""
+        return np.linalg.svd(np.stack([self.R_W, self._scaled], axis=-3), compute_uv=False)
+
+    @property
+    def _scaled(self) -> Array:
+        """Triangular factor of W with its columns scaled to unit length, shape (..., p, p)."""
+        length = np.linalg.norm(self.R_W, axis=-2, keepdims=True)
+        return self.R_W / np.where(length > 0, length, 1.0)
+
+
+class Fit(NamedTuple):
+    """A weighted least-squares solution."""
+
+    X: Array
+    """Parameters, shape (..., p); NaN in runs that cannot be solved."""
+
+    weight: Array
+    """What the rows of every kind were multiplied by, shape (..., kind)."""
+
+    factor: Factor
+    """The factor of the weighted rows."""
+
+
+@dataclass(frozen=True, eq=False)
+class Factors:
+    """Triangular factors of [W Y], one for each kind of row: joints, or the one kind of the power model.
+
+    Parameters
+    ----------
+    R : Array, shape (..., kind, p + 1, p + 1)
+        The factors.
+    rows : int array, shape (..., kind)
+        Numbers of rows that are not void.
+    names : tuple of str
+        Names of X.
+    """
+
+    R: Array
+    rows: npt.NDArray[np.intp]
+    names: tuple[str, ...]
+    _fits: list[Fit] = field(default_factory=list, repr=False)
+
+    @classmethod
+    def of(cls, joined: Array, rows: npt.NDArray[np.intp], names: tuple[str, ...]) -> Self:
+        """Return the factors of [W Y], shape (..., kind, count, p + 1)."""
+        return cls(triangular(joined), rows, names)
+
+    @classmethod
+    def merged(cls, parts: Sequence[Self]) -> Self:
+        """Return the factors of the rows of all parts together."""
+        if len(parts) == 1:
+            return parts[0]
+        R = triangular(np.concatenate([part.R for part in parts], axis=-2))
+        return cls(R, np.sum([part.rows for part in parts], axis=0), parts[0].names)
+
+    @cached_property
+    def together(self) -> Factor:
+        """The factor of all rows as they are."""
+        return self.weighted(np.ones(self.rows.shape))
+
+    def weighted(self, weight: Array) -> Factor:
+        """Return the factor of all rows, those of each kind multiplied by its weight, shape (..., kind)."""
+        if weight.shape[-1] == 1:
+            return Factor(self.R[..., 0, :, :] * weight[..., None], self.rows[..., 0], self.names)
+        stacked = (self.R * weight[..., None, None]).reshape(*self.R.shape[:-3], -1, self.R.shape[-1])
+        return Factor(triangular(stacked), np.sum(self.rows, axis=-1), self.names)
+
+    def squares(self, X: Array) -> Array:
+        """Return |Y - W X|^2 of every kind, shape (..., kind)."""
+        return Factor(self.R, self.rows, self.names).squares(X[..., None, :])
+
+    def fit(self, rounds: int = 0) -> Fit:
+        """Return the least-squares solution, with rows divided by the rms of their kind's residuals after the first round.
+
+        Parameters
+        ----------
+        rounds : int
+            How often weights are taken from the residuals of the solution before.
+        """
+        if not self._fits:
+            one = np.ones(self.rows.shape)
+            self._fits.append(Fit(self.together.solution(self.together.status == Status.OK), one, self.together))
+        while len(self._fits) <= rounds:
+            weight = 1 / self._rms(self._fits[-1].X)
+            factor = self.weighted(weight)
+            self._fits.append(Fit(factor.solution(self.together.status == Status.OK), weight, factor))
+        return self._fits[rounds]
+
+    def _rms(self, X: Array) -> Array:
+        """Return the rms of every kind's residuals, shape (..., kind); 1 where there are none."""
+        level = np.sqrt(self.squares(X) / np.maximum(self.rows, 1))
+        # Noise-free rows leave residuals of rounding; weights below 1e-12 of the measurements would mean nothing.
+        mean = np.sum(self.R[..., -1] ** 2, axis=(-2, -1)) / np.maximum(np.sum(self.rows, axis=-1), 1)
+        floor = 1e-12 * np.sqrt(mean)[..., None]
+        return np.where(np.isfinite(level), np.maximum(level, np.maximum(floor, 1e-300)), 1.0)
+
+
+def triangular(joined: Array) -> Array:
+    """Return R of Q R = `joined`, shape (..., rows, q), as a square matrix, padded with zeros where rows are few."""
+    short = joined.shape[-1] - joined.shape[-2]
+    if short > 0:
+        joined = np.concatenate([joined, np.zeros((*joined.shape[:-2], short, joined.shape[-1]))], axis=-2)
+    R: Array = np.linalg.qr(joined, mode="r")  # type: ignore[assignment]  # mode "r" gives R alone
+    return R

@@ -1,0 +1,1 @@
+"""Signals of a log: motion, torque, mask weights, and what makes them."""

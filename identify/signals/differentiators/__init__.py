@@ -1,0 +1,15 @@
+"""Differentiators, and their table."""
+
+from identify.plugins import PluginTable
+from identify.signals.differentiators.central import CentralDifference as CentralDifference
+from identify.signals.differentiators.differentiator import (
+    AbstractDifferentiator as AbstractDifferentiator,
+)
+
+DIFFERENTIATORS: PluginTable[AbstractDifferentiator] = PluginTable(
+    "differentiators",
+    AbstractDifferentiator,  # type: ignore[type-abstract]  # only asked whether an instance is one
+    {
+        "central": CentralDifference,
+    },
+)

@@ -1,0 +1,53 @@
+"""Central differences."""
+
+from dataclasses import dataclass
+from typing import Literal, final
+
+import numpy as np
+
+from identify.arrays import Array, require_positive
+from identify.errors import SettingError
+from identify.signals.differentiators.differentiator import AbstractDifferentiator
+from identify.signals.stencils import slide
+
+_WEIGHTS = {
+    2: np.array([-1.0, 0.0, 1.0]) / 2,
+    6: np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60,
+}
+"""Weights that are exact for polynomials of degree 2 and 6."""
+
+
+@final
+@dataclass(frozen=True)
+class CentralDifference(AbstractDifferentiator):
+    """Central difference of order 2 (the paper's) or 6.
+
+    Parameters
+    ----------
+    order : {2, 6}
+        Order of accuracy. At the angular frequency w the derivative is too small by (w h)^2 / 6 (order 2) or
+        (w h)^6 / 140 (order 6), with h the time between the samples it takes.
+    spacing : float
+        Least time h [s] between the samples it takes, to the nearest whole number of sampling periods: a log at a higher
+        frequency does not make it noisier.
+    """
+
+    order: Literal[2, 6] = 6
+    spacing: float = 0.01
+
+    def __post_init__(self) -> None:
+        require_positive(spacing=self.spacing)
+        if self.order not in _WEIGHTS:
+            raise SettingError(f"central difference of order {self.order} is unknown; known orders: 2, 6")
+
+    def halo(self, fs: float) -> float:
+        """Return half the time the difference spans."""
+        return self.order / 2 * self._samples(fs) / fs
+
+    def derivative(self, x: Array, fs: float) -> Array:
+        """Return the central difference of `x` over h."""
+        samples = self._samples(fs)
+        return slide(x, _WEIGHTS[self.order] * (fs / samples), samples)
+
+    def _samples(self, fs: float) -> int:
+        return max(1, round(self.spacing * fs))

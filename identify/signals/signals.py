@@ -1,0 +1,107 @@
+"""The signals that identification models are made of: motion, torque and mask weights of one log."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import ceil
+from typing import Self
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.blame import expect
+from identify.data.motion_log import MotionLog
+from identify.signals.differentiators import AbstractDifferentiator
+from identify.signals.masks import AbstractMask
+from identify.signals.prefilters import AbstractPrefilter
+from identify.signals.state import State
+from identify.signals.torques import AbstractAlignment, AbstractTorque
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """The signals of one log, each computed once, when it is first asked for; time is the last axis.
+
+    Parameters
+    ----------
+    log : MotionLog
+        One log; leading axes are independent runs.
+    prefilter : AbstractPrefilter
+        Applied to positions and torques.
+    differentiator : AbstractDifferentiator
+        The operator s.
+    alignment : AbstractAlignment
+        Puts the torque on the time of the positions.
+    mask : AbstractMask
+        Gives the weights of the instants.
+    weights_of : Signals, optional
+        Signals whose weights are taken instead of those of the mask.
+    """
+
+    log: MotionLog
+    prefilter: AbstractPrefilter
+    differentiator: AbstractDifferentiator
+    alignment: AbstractAlignment
+    mask: AbstractMask
+    weights_of: "Signals | None" = None
+
+    @property
+    def fs(self) -> float:
+        """Sampling frequency [Hz]."""
+        return self.log.fs
+
+    @cached_property
+    def state(self) -> State:
+        """Prefiltered positions and their derivatives."""
+        q = self._prefiltered(self.log.q)
+        expect(self.differentiator, "derivative", self.s(q), q.shape)
+        return State.of(q, self.s)
+
+    @cached_property
+    def torque(self) -> AbstractTorque:
+        """The prefiltered torque, aligned."""
+        tau = self._prefiltered(self.log.tau * np.asarray(self.log.torque.gain))
+        return self.alignment.align(tau, self.log.torque, self.fs)
+
+    @cached_property
+    def weight(self) -> Array:
+        """Weights of the instants, between 0 and 1, shape (..., joint, time)."""
+        if self.weights_of is not None:
+            return self.weights_of.weight
+        return expect(self.mask, "weight", self.mask.weight(self.state.qd, self.fs), self.state.q.shape)
+
+    def s(self, x: Array) -> Array:
+        """Return dx/dt of `x`, shape (..., time)."""
+        return self.differentiator.derivative(x, self.fs)
+
+    @cached_property
+    def gain(self) -> float:
+        """Standard deviation of ds/dt over that of s, for white noise s [1/s]."""
+        impulse = np.zeros(2 * ceil(self.differentiator.halo(self.fs) * self.fs - 1e-9) + 1)
+        impulse[len(impulse) // 2] = 1.0
+        return float(np.linalg.norm(self.s(impulse)))
+
+    def part(self, first: int, end: int) -> Self:
+        """Return the signals of the samples from `first` to before `end` alone."""
+        return replace(self, log=self.log.part(first, end))
+
+    @property
+    def reach(self) -> int:
+        """Samples to either side that prefilter and alignment of the torque look at."""
+        return ceil((self.prefilter.halo(self.fs) + self.torque.halo()) * self.fs - 1e-9)
+
+    def torque_adjoint(self, z: Array) -> Array:
+        """Return the adjoint of prefilter and alignment at `z`, shape (..., time).
+
+        Both act alike at all times, so that their adjoint is what they do in reversed time (away from the ends of the log).
+        """
+        back = self.prefilter.apply(z[..., ::-1], self.fs)
+        return self.alignment.align(back, self.log.torque, self.fs).mean[..., ::-1]
+
+    def position_adjoint(self, z: tuple[Array, Array, Array]) -> Array:
+        """Return the adjoint of q -> (q, s q, s^2 q), prefilter included, at three signals of shape (..., time)."""
+        back = [x[..., ::-1] for x in z]
+        return self.prefilter.apply(back[0] + self.s(back[1] + self.s(back[2])), self.fs)[..., ::-1]
+
+    def _prefiltered(self, x: Array) -> Array:
+        signal = np.ascontiguousarray(np.swapaxes(x, -1, -2))
+        return expect(self.prefilter, "apply", self.prefilter.apply(signal, self.fs), signal.shape)

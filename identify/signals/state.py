@@ -1,0 +1,67 @@
+"""How the joints move: what the column functions of a basis are functions of."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Self, TypeVar
+
+import numpy as np
+
+from identify.arrays import Array
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Positions, velocities and accelerations of n joints, with time as the last axis.
+
+    What several column functions need of it is computed once, when the first of them asks.
+
+    Parameters
+    ----------
+    q, qd : Array, shape (..., joint, time)
+        [rad], [rad/s].
+    s : callable
+        d/dt along the last axis; only asked for accelerations.
+    """
+
+    q: Array
+    qd: Array
+    s: Callable[[Array], Array]
+
+    @classmethod
+    def of(cls, q: Array, s: Callable[[Array], Array]) -> Self:
+        """Return the state of positions [rad], shape (..., joint, time)."""
+        return cls(q, s(q), s)
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return int(self.q.shape[-2])
+
+    @cached_property
+    def qdd(self) -> Array:
+        """Joint accelerations [rad/s^2], shape (..., joint, time); only the explicit model asks for them."""
+        return self.s(self.qd)
+
+    def cos_sin(self, joint: int) -> tuple[Array, Array]:
+        """Return cosine and sine of the position of `joint`, from 0, shape (..., time) each."""
+        if joint not in self._turned:
+            angle = self.q[..., joint, :]
+            self._turned[joint] = np.cos(angle), np.sin(angle)
+        return self._turned[joint]
+
+    @cached_property
+    def _turned(self) -> dict[int, tuple[Array, Array]]:
+        return {}
+
+    def shared(self, key: object, make: Callable[[Self], T]) -> T:
+        """Return `make(self)`, computed once for all that ask with the same `key`."""
+        if key not in self._shared:
+            self._shared[key] = make(self)
+        return self._shared[key]
+
+    @cached_property
+    def _shared(self) -> dict[object, Any]:
+        return {}

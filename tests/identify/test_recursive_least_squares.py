@@ -1,0 +1,49 @@
+"""Recursive least squares, against least squares of the rows so far."""
+
+import numpy as np
+import pytest
+
+from identify import CHAINS, ESTIMATORS, MODELS, IdentificationError, MotionLog, identify, recursive_least_squares, scara
+
+
+@pytest.fixture(scope="module")
+def noisy(log):
+    rng = np.random.default_rng(1)
+    return MotionLog(log.fs, log.q, log.tau + 0.1 * rng.standard_normal(log.tau.shape), log.torque)
+
+
+@pytest.mark.parametrize("estimator", ["OLS", "WLS"])
+@pytest.mark.parametrize("model", ["explicit", "power"])
+def test_it_is_least_squares_of_the_rows_so_far(noisy, model, estimator):
+    """By another route: SciPy-free normal least squares, anew for every instant."""
+    estimate = identify(noisy, scara(), MODELS.create(model), estimator=ESTIMATORS.create(estimator))
+    t, halo, given, weights = np.arange(8.0, 47.0, 3.0), 0.7, estimate.rows, estimate.weights(estimate.rows)
+    W, Y = given.W * weights[:, None], given.Y * weights
+    running = recursive_least_squares(estimate, t, halo)
+    ratio = estimate.corrected_sigma / estimate.sigma
+    for k, now in enumerate(t):
+        rows = (given.time + halo <= now) & given.valid
+        X, squares, *_ = np.linalg.lstsq(W[rows], Y[rows], rcond=None)
+        np.testing.assert_allclose(running.X[k], X, rtol=1e-9)
+        variance = squares[0] / (rows.sum() - 8) * np.diag(np.linalg.inv(W[rows].T @ W[rows]))
+        np.testing.assert_allclose(running.sigma[k], np.sqrt(variance) * ratio, rtol=1e-8)
+
+
+def test_it_ends_at_the_estimate(noisy):
+    estimate = identify(noisy, scara(), MODELS.create("implicit"), CHAINS.create("paper"))
+    running = recursive_least_squares(estimate, np.array([1e9]))
+    np.testing.assert_allclose(running.X[-1], estimate.X, rtol=1e-9)
+    np.testing.assert_allclose(running.sigma[-1], estimate.corrected_sigma, rtol=1e-7)
+
+
+def test_it_is_silent_until_every_parameter_is_told(noisy):
+    running = recursive_least_squares(identify(noisy, scara(), MODELS.create("explicit")), np.array([0.0, 1.0, 2.9, 20.0]))
+    assert np.isnan(running.X[:3]).all()
+    assert np.isnan(running.sigma[:3]).all()
+    assert np.isfinite(running.X[3]).all()
+
+
+def test_it_needs_rows_of_a_single_run(noisy):
+    two = MotionLog(noisy.fs, np.stack([noisy.q] * 2), np.stack([noisy.tau] * 2), noisy.torque)
+    with pytest.raises(IdentificationError, match="one run"):
+        recursive_least_squares(identify(two, scara(), MODELS.create("explicit")), np.array([1.0]))
