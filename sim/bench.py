@@ -70,7 +70,7 @@ class Bench:
         at_rest = every(planned.q[0], nsim) if planned.q.ndim == 2 else planned.q[0]
         self._at_rest, still = at_rest, np.zeros((nsim, n))
         self._before = self._command = self._demand = inverse_dynamics(robot, at_rest, still, still)
-        self._qd, self._steps = np.zeros((nsim, n)), 1
+        self._qd, self._steps, self._instants = np.zeros((nsim, n)), 1, dict[int, Array]()
         self._steady = scenario.drive.steady and scenario.ripple.steady
         watched = scenario.timing.jitter or scenario.torque.source == "current"
         one_by_one = watched or not scenario.friction.steady
@@ -147,8 +147,10 @@ class Bench:
 
     def _middles(self, steps: int) -> Array:
         """Return the middle of each of the steps to come [s], shape (steps, 1, 1), or of all of them for steady parts."""
-        count = 1 if self._steady else steps
-        return np.linspace(0.5, count - 0.5, count)[:, None, None] * (steps / count * self._h)
+        if steps not in self._instants:
+            count = 1 if self._steady else steps
+            self._instants[steps] = np.linspace(0.5, count - 0.5, count)[:, None, None] * (steps / count * self._h)
+        return self._instants[steps]
 
     def _listen(self, step: int) -> int:
         """Let the command whose turn it is act; return for how many steps nothing changes."""

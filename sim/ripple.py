@@ -1,6 +1,7 @@
 """Torque ripple of a motor: cogging and commutation."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, final
 
 import numpy as np
@@ -71,8 +72,13 @@ class _Series:
     phase: Array
     harmonics: tuple[float, ...]
 
+    @cached_property
+    def still(self) -> bool:
+        """Whether it is zero everywhere."""
+        return not self.amplitude.any()
+
     def at(self, q: Array) -> Array | float:
-        if not self.amplitude.any():
+        if self.still:
             return 0.0
         angle = self.order * q + self.phase
         parts = [share * np.sin(k * angle) for k, share in enumerate(self.harmonics, 1)]

@@ -8,12 +8,17 @@ from pydantic import Field
 from sim.drives.averaged import limits
 from sim.drives.base import AbstractAmplifier, AbstractDrive, Trace, every
 from sim.drives.electric import Electric
+from sim.drives.one_winding import Loop, OneWinding
+from sim.drives.passages import TabulatedPassages, passages
 from sim.drives.pwm import Modulation, Modulator
-from sim.drives.winding import Winding, pass_period
+from sim.drives.winding import Winding
 from sim.errors import ScenarioError
 from sim.motors import Array, Motors
 from sim.robot import Robot
 from sim.settings import EachPositiveOrNone, NotNegative, Number, Positive, Share, settings
+
+FEW = 8
+"""Windings up to which they are faster one by one than in arrays."""
 
 
 @final
@@ -92,29 +97,52 @@ class SwitchedAmplifier(AbstractAmplifier):
     def __init__(self, settings: SwitchedDrive, motors: Motors, V: Array, I: Array, nsim: int, h: float) -> None:  # noqa: E741
         R, L, K, V, self._I = (every(x, nsim) for x in (motors.R, motors.L, motors.K, V, I))
         self._K, self._h, self._winding = K, h, Winding(V, R, L)
-        self._modulator = Modulator(settings.modulation, h, settings.dead_time)
         lost = -np.expm1(-h * R / L)
         self._kp = R / lost * -np.expm1(-2 * np.pi * settings.bandwidth * h)
         self._ki = self._kp * lost
         self._least = settings.duty_resolution * (1 if settings.modulation == "sign_magnitude" else 2)
+        self._passages = passages(self._winding, Modulator(settings.modulation, h, settings.dead_time), self._least)
         most = 1 - 4 * settings.dead_time / h
         self._most = (np.floor(most / self._least) * self._least if self._least else most) * V
         self._known = settings.emf_compensation
         self.i, self._sum, self.electrical, self.mechanical = np.zeros((4, *V.shape))
+        self._single = self._one_by_one()
+
+    def _one_by_one(self) -> dict[tuple[int, int], OneWinding]:
+        """Return the windings one by one, where they are few and have a table."""
+        if not isinstance(self._passages, TabulatedPassages) or self.i.size > FEW:
+            return {}
+        gains = np.broadcast_arrays(self._kp, self._ki, self._most)
+        each = {at: Loop(*(float(x[at]) for x in gains), self._known) for at in np.ndindex(self.i.shape)}
+        return {(sim, joint): OneWinding(self._passages, joint, loop) for (sim, joint), loop in each.items()}
 
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
         """Advance by PWM periods; return the mean torque in each."""
         wanted = np.minimum(np.maximum(demand / self._K, -self._I), self._I)
         e = self._K * speed
-        charge, before, after, index = np.empty((4, steps, *demand.shape))
-        for k in range(steps):
-            index[k], before[k] = self._index(wanted, self._known * e[k]), self.i
-            self.i, charge[k], electrical = pass_period(self.i, index[k], e[k], self._winding, self._modulator)
-            self.electrical += electrical
-            after[k] = self.i
+        charge, before, after, index = self._each(wanted, e) if self._single else self._together(wanted, e)
         self.trace = wanted, charge, before, after, e, index
         self.mechanical += (e * charge).sum(axis=0)
         return charge * (self._K / self._h)
+
+    def _each(self, wanted: Array, e: Array) -> Array:
+        """Advance one winding after the other; return charge, currents before and after, and modulation index."""
+        done = np.empty((4, *e.shape))
+        for at, winding in self._single.items():
+            done[(slice(None), slice(None), *at)] = winding.advance(float(wanted[at]), e[(slice(None), *at)].tolist())
+            self.i[at], self.electrical[at] = winding.i, winding.electrical
+        return done
+
+    def _together(self, wanted: Array, e: Array) -> Array:
+        """Advance all windings, period by period; return charge, currents before and after, and modulation index."""
+        done = np.empty((4, *e.shape))
+        charge, before, after, index = done
+        for k in range(len(e)):
+            index[k], before[k] = self._index(wanted, self._known * e[k]), self.i
+            self.i, charge[k], electrical = self._passages.through(self.i, index[k], e[k])
+            self.electrical += electrical
+            after[k] = self.i
+        return done
 
     def electric(self, trace: Trace, dt: Array) -> Electric:
         """Return currents and voltages of PWM periods."""

@@ -52,17 +52,17 @@ def pass_period(i: Array, m: Array, e: Array, winding: Winding, modulator: Modul
     modulator : Modulator
     """
     forward = (i > 0).astype(np.float64)
-    passage, edges = _straight(i, e, winding, modulator.pattern(m, forward), modulator.period)
+    passage, edges = straight(i, e, winding, modulator.pattern(m, forward), modulator.period)
     turning = (edges * i <= 0).any(axis=0)
     if modulator.dead_time and turning.any():
         some = Winding(*(x[turning] for x in winding))
-        careful = _step_by_step(i[turning], e[turning], some, pieces(modulator, m[turning]))
+        careful = step_by_step(i[turning], e[turning], some, pieces(modulator, m[turning]))
         for whole, part in zip(passage, careful, strict=True):
             whole[turning] = part
     return passage
 
 
-def _straight(i: Array, e: Array, winding: Winding, pattern: Pattern, period: float) -> tuple[Passage, Array]:
+def straight(i: Array, e: Array, winding: Winding, pattern: Pattern, period: float) -> tuple[Passage, Array]:
     """Return the passage of a current that keeps its sign, and the current at every edge."""
     V, R, L = winding
     rate, now, edges = R / L, i, []
@@ -90,7 +90,7 @@ class _Stretch(NamedTuple):
     dt: Array
 
 
-def _step_by_step(i: Array, e: Array, winding: Winding, period: Pieces) -> Passage:
+def step_by_step(i: Array, e: Array, winding: Winding, period: Pieces) -> Passage:
     """Return the passage of a current that may change its sign; all arrays have the shape (winding,)."""
     V, R, L = winding
     ahead, behind = (period.forward * V - e) / R, (period.backward * V - e) / R

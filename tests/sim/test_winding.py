@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from sim.drives import switched
+from sim.drives.passages import ExactPassages, TabulatedPassages
 from sim.drives.pwm import Modulator, pieces
 from sim.drives.winding import Winding, pass_period
 
@@ -137,3 +139,38 @@ def test_a_window_of_a_batch_gives_the_same_bits(rng):
         alone = pass_period(i[rows], m[rows], e[rows], winding((len(rows), 2)), modulator)
         for part, whole in zip(alone, together, strict=True):
             np.testing.assert_array_equal(part, whole[rows])
+
+
+@pytest.mark.parametrize("modulation", ["unipolar", "bipolar", "sign_magnitude"])
+def test_one_winding_at_a_time_has_the_bits_of_all_together(modulation, monkeypatch):
+    """Through reversals of the current and dead times, with commands and speeds drawn at random."""
+    robot, rng = Robot.load("scara"), np.random.default_rng(4)
+    drive = SwitchedDrive(modulation=modulation)
+    demands, speeds = rng.uniform(-8, 8, (60, 2, 2)) * [1.0, 0.1], rng.uniform(-4, 4, (60, 5, 2, 2))
+    done = []
+    for few in (0, 8):
+        monkeypatch.setattr(switched, "FEW", few)
+        amplifier = drive.start(robot, 2, 2e-4)
+        done.append(
+            [(amplifier.step(u, w, 5), *amplifier.trace, amplifier.copper) for u, w in zip(demands, speeds, strict=True)]
+        )
+    for together, alone in zip(*done, strict=True):
+        for x, y in zip(together, alone, strict=True):
+            np.testing.assert_array_equal(x, y)
+    assert any((trace[3] * trace[4] < 0).any() for trace in done[0])  # currents do reverse
+
+
+@pytest.mark.parametrize("modulation", ["unipolar", "bipolar", "sign_magnitude"])
+def test_the_table_has_the_passages_that_are_computed(modulation):
+    """To rounding, of coefficients that are differences of currents up to V/R."""
+    rng, shape, h = np.random.default_rng(5), (40, 2), 2e-4
+    winding = Winding(*(np.broadcast_to(x, shape).copy() for x in ([100.0, 60.0], [1.5, 3.0], [2e-3, 5e-3])))
+    modulator = Modulator(modulation, h, 520e-9)
+    for _ in range(5):
+        i, e = rng.uniform(-1, 1, shape) * rng.choice([0.01, 1.0, 20.0], shape), rng.uniform(-30, 30, shape)
+        m = rng.integers(-480, 481, shape) * 0.002
+        made = [
+            kind.through(i, m, e) for kind in (ExactPassages(winding, modulator), TabulatedPassages(winding, modulator, 0.002))
+        ]
+        for exact, tabulated in zip(*made, strict=True):
+            np.testing.assert_allclose(tabulated, exact, atol=1e-12 * max(1.0, np.abs(exact).max()))
