@@ -32,7 +32,7 @@ class Periods(NamedTuple):
     charge: list[float]
     before: list[float]
     after: list[float]
-    index: list[float]
+    m: list[float]
 
 
 class OneWinding:
@@ -69,7 +69,7 @@ class OneWinding:
                 self.sum += ki * error
             value = round(v / V / least)
             done.before.append(i)
-            done.index.append(value * least)
+            done.m.append(value * least)
             after, charge, electrical = self._passage(i, value + self._highest, e)
             self.electrical += electrical
             done.charge.append(charge)

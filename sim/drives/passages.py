@@ -108,9 +108,9 @@ class TabulatedPassages:
     @cached_property
     def _table(self) -> Array:
         """Charge, electrical energy and the currents at edges, (sign, value, joint) -> (constant, by i, by e) x quantity."""
-        V, R, L = (x[0] for x in self.winding)
+        V: Array = self.winding.V[0]
         shape = 2, self._values, len(V)
-        winding = Winding(*(np.broadcast_to(x, shape) for x in (V, R, L)))
+        winding = Winding(*(np.broadcast_to(x[0], shape) for x in self.winding))
         m = np.broadcast_to(self._indices[:, None], shape)
         pattern = self.modulator.pattern(m, np.broadcast_to(np.array([0.0, 1.0])[:, None, None], shape))
         made = []
@@ -118,7 +118,8 @@ class TabulatedPassages:
             passage, edges = straight(np.full(shape, i), np.full(shape, e), winding, pattern, self.modulator.period)
             made.append(np.stack([passage.charge, passage.electrical, *edges], axis=-1))
         constant, by_i, by_e = made
-        return np.stack([constant, by_i - constant, by_e - constant], axis=-2).reshape(-1, 3, constant.shape[-1])
+        table: Array = np.stack([constant, by_i - constant, by_e - constant], axis=-2)
+        return table.reshape(-1, 3, constant.shape[-1])
 
 
 def passages(winding: Winding, modulator: Modulator, least: float) -> ExactPassages | TabulatedPassages:

@@ -113,11 +113,15 @@ class SwitchedAmplifier(AbstractAmplifier):
         if not isinstance(self._passages, TabulatedPassages) or self.i.size > FEW:
             return {}
         gains = np.broadcast_arrays(self._kp, self._ki, self._most)
-        each = {at: Loop(*(float(x[at]) for x in gains), self._known) for at in np.ndindex(self.i.shape)}
+        each = {}
+        for at in np.ndindex(self.i.shape):
+            kp, ki, most = (float(x[at]) for x in gains)
+            each[at] = Loop(kp, ki, most, self._known)
         return {(sim, joint): OneWinding(self._passages, joint, loop) for (sim, joint), loop in each.items()}
 
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
         """Advance by PWM periods; return the mean torque in each."""
+        del steps
         wanted = np.minimum(np.maximum(demand / self._K, -self._I), self._I)
         e = self._K * speed
         charge, before, after, index = self._each(wanted, e) if self._single else self._together(wanted, e)

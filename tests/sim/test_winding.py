@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sim.drives import switched
+from sim.drives import SwitchedDrive, switched
 from sim.drives.passages import ExactPassages, TabulatedPassages
 from sim.drives.pwm import Modulator, pieces
 from sim.drives.winding import Winding, pass_period
+from sim.robot import Robot
 
 V, R, L, T = 160.0, 3.0, 0.012, 2e-4
 INDEX = np.linspace(-0.96, 0.96, 49)
@@ -151,9 +152,8 @@ def test_one_winding_at_a_time_has_the_bits_of_all_together(modulation, monkeypa
     for few in (0, 8):
         monkeypatch.setattr(switched, "FEW", few)
         amplifier = drive.start(robot, 2, 2e-4)
-        done.append(
-            [(amplifier.step(u, w, 5), *amplifier.trace, amplifier.copper) for u, w in zip(demands, speeds, strict=True)]
-        )
+        steps = zip(demands, speeds, strict=True)
+        done.append([(amplifier.step(u, w, 5), *amplifier.trace, amplifier.copper) for u, w in steps])
     for together, alone in zip(*done, strict=True):
         for x, y in zip(together, alone, strict=True):
             np.testing.assert_array_equal(x, y)
@@ -169,8 +169,7 @@ def test_the_table_has_the_passages_that_are_computed(modulation):
     for _ in range(5):
         i, e = rng.uniform(-1, 1, shape) * rng.choice([0.01, 1.0, 20.0], shape), rng.uniform(-30, 30, shape)
         m = rng.integers(-480, 481, shape) * 0.002
-        made = [
-            kind.through(i, m, e) for kind in (ExactPassages(winding, modulator), TabulatedPassages(winding, modulator, 0.002))
-        ]
+        kinds = ExactPassages(winding, modulator), TabulatedPassages(winding, modulator, 0.002)
+        made = [kind.through(i, m, e) for kind in kinds]
         for exact, tabulated in zip(*made, strict=True):
             np.testing.assert_allclose(tabulated, exact, atol=1e-12 * max(1.0, np.abs(exact).max()))
