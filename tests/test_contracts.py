@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mujoco.batch import Batch
 
-from experiments.plugins import TABLES
+from experiments.cli.plugins import TABLES
 from identify import (
     ALIGNMENTS,
     BLOCKS,

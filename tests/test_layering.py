@@ -20,18 +20,18 @@ ALLOWED = {
 ALLOWED_IN = {
     "identify/data/log_file.py": {"pyarrow"},
     "identify/parameters/consistent.py": {"clarabel"},
-    "sim/scenario_file.py": {"tomli_w"},
+    "sim/scenario/scenario_file.py": {"tomli_w"},
     "experiments/recording/columns.py": {"pyarrow"},
     "experiments/study/study.py": {"pydantic"},
     "experiments/study/shard_file.py": {"pyarrow"},
     "experiments/study/store.py": {"pyarrow", "tomli_w"},
-    "experiments/study/engine.py": {"threadpoolctl"},
+    "experiments/study/run_study.py": {"threadpoolctl"},
     "experiments/study/cluster.py": {"threadpoolctl", "dask", "distributed"},
     "experiments/study/statistics.py": {"scipy"},
     "experiments/study/comparison.py": {"scipy"},
     "experiments/study/figures.py": {"matplotlib"},
-    "experiments/motions_report.py": {"matplotlib"},
-    "experiments/study/report.py": {"jinja2", "tomli_w"},
+    "experiments/paper/motions_report.py": {"matplotlib"},
+    "experiments/study/study_report.py": {"jinja2", "tomli_w"},
 }
 """Libraries that one file alone may use."""
 

@@ -59,9 +59,9 @@ def test_the_readmes_friction_is_identified_by_all_models_with_its_estimator(rea
     out = python(
         """
         import numpy as np
-        from experiments.table1 import SCENARIO, Table1
+        from experiments.paper.table1 import SCENARIO, Table1
         from identify import BLOCKS, ESTIMATORS, MODELS, MotionLog, identify, scara
-        from sim.scenario_file import load
+        from sim.scenario.scenario_file import load
         table = Table1(load(SCENARIO), ("idbench",))
         log, qd = table.log, table.reference.qd
         dragged = MotionLog(log.fs, log.q, log.tau + [0.03, 0.004] * qd * abs(qd), log.torque)
@@ -80,9 +80,9 @@ def test_the_readmes_estimator_identifies_every_run_by_itself(readme_package, mo
     out = python(
         """
         import numpy as np
-        from experiments.table1 import SCENARIO, Table1
+        from experiments.paper.table1 import SCENARIO, Table1
         from identify import ESTIMATORS, ExplicitModel, MotionLog, identify, scara
-        from sim.scenario_file import load
+        from sim.scenario.scenario_file import load
         log = Table1(load(SCENARIO), ()).log
         noise = np.random.default_rng(1).normal(size=(3, *log.tau.shape)) * [[[0.0]], [[1.0]], [[2.0]]]
         noisy = MotionLog(log.fs, np.broadcast_to(log.q, noise.shape), log.tau + noise, log.torque)

@@ -55,7 +55,7 @@ def test_every_file_it_links_to_is_there(root):
 
 
 def test_every_plugin_is_in_its_table(readme):
-    from experiments.plugins import TABLES
+    from experiments.cli.plugins import TABLES
 
     for table in TABLES:
         (row,) = re.findall(rf"^\| `{table.point}` \| (.*?) \|", readme, re.MULTILINE)
@@ -63,7 +63,7 @@ def test_every_plugin_is_in_its_table(readme):
 
 
 def test_the_causes_in_the_docs_are_those_computed(root, table1):
-    from experiments.causes import causes
+    from experiments.paper.causes import causes
 
     text = (root / "docs" / "table1.md").read_text()
     for name, worst in causes(table1):

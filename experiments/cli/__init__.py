@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import NoReturn
 
-from experiments.interruption import importing
+from experiments.cli.interruption import importing
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from tyro.extras import SubcommandApp
 
+from experiments.cli.interruption import INTERRUPTED, importing, terminating
 from experiments.errors import ExperimentError
-from experiments.interruption import INTERRUPTED, importing, terminating
 
 DESCRIPTION = "A MuJoCo testbench for the dynamic identification of robots."
 
@@ -59,7 +59,7 @@ def _on_purpose(error: Exception) -> bool:
 def _print_version() -> None:
     from importlib.metadata import version
 
-    from experiments.page import new_page, show
+    from experiments.cli.page import new_page, show
 
     page = new_page()
     page.print(f"idbench {version('idbench')}")

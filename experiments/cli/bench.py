@@ -6,10 +6,11 @@ from typing import Annotated, final
 
 import tyro
 
-from experiments.audience import Watching
 from experiments.cli.app import APP
-from experiments.cli.options import Asked, Count, File, Folder, Number, Parameters, Robot, Scenario, Watched, Window
-from experiments.interruption import importing
+from experiments.cli.interruption import importing
+from experiments.cli.options import Asked, Count, File, Folder, Number, Robot, Scenario, Watched, Window
+from experiments.identification.parameters import Parameters
+from experiments.recording.audience import Watching
 
 
 @APP.command(name="run")
@@ -49,7 +50,7 @@ class Run:
     def __call__(self) -> None:
         """Run it."""
         with importing():
-            from experiments.run_commands import run
+            from experiments.cli.run_commands import run
         run(self)
 
 
@@ -83,7 +84,7 @@ class Study:
     def __call__(self) -> None:
         """Run it."""
         with importing():
-            from experiments.study_commands import study
+            from experiments.cli.study_commands import study
         study(self)
 
 
@@ -101,5 +102,5 @@ class WriteScenario:
     def __call__(self) -> None:
         """Run it."""
         with importing():
-            from experiments.scenario_command import write
+            from experiments.cli.scenario_command import write
         write(self)

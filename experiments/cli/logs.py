@@ -6,10 +6,11 @@ from typing import final
 
 import tyro
 
-from experiments.audience import Watching
 from experiments.cli.app import APP
-from experiments.cli.options import Asked, Delay, File, Folder, Parameters, Robot, Torque, Watched
-from experiments.interruption import importing
+from experiments.cli.interruption import importing
+from experiments.cli.options import Asked, Delay, File, Folder, Robot, Torque, Watched
+from experiments.identification.parameters import Parameters
+from experiments.recording.audience import Watching
 
 
 @APP.command(name="identify")
@@ -54,7 +55,7 @@ class Identify:
     def __call__(self) -> None:
         """Run it."""
         with importing():
-            from experiments.identify_command import identify
+            from experiments.cli.identify_command import identify
         identify(self)
 
 
@@ -72,7 +73,7 @@ class DescribeRobot:
     def __call__(self) -> None:
         """Run it."""
         with importing():
-            from experiments.robot_command import describe
+            from experiments.cli.robot_command import describe
         describe(self)
 
 
@@ -98,7 +99,7 @@ class Resample:
     def __call__(self) -> None:
         """Run it."""
         with importing():
-            from experiments.log_commands import resample
+            from experiments.cli.log_commands import resample
         resample(self)
 
 
@@ -118,5 +119,5 @@ class Export:
     def __call__(self) -> None:
         """Run it."""
         with importing():
-            from experiments.log_commands import export
+            from experiments.cli.log_commands import export
         export(self)

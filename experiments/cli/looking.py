@@ -7,8 +7,8 @@ from typing import final
 import tyro
 
 from experiments.cli.app import APP
+from experiments.cli.interruption import importing
 from experiments.cli.options import File
-from experiments.interruption import importing
 
 
 @APP.command(name="list")
@@ -20,7 +20,7 @@ class List:
     def __call__(self) -> None:
         """Run it."""
         with importing():
-            from experiments.plugins import list_plugins
+            from experiments.cli.plugins import list_plugins
         list_plugins()
 
 
@@ -40,5 +40,5 @@ class View:
     def __call__(self) -> None:
         """Run it."""
         with importing():
-            from experiments.viewer import view
+            from experiments.cli.viewer import view
         view(self)

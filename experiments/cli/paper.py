@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import final
 
-from experiments.audience import Watching
 from experiments.cli.app import APP
+from experiments.cli.interruption import importing
 from experiments.cli.options import Count, File, Folder, Scenario, Watched, Window
-from experiments.interruption import importing
+from experiments.recording.audience import Watching
 
 
 @APP.command(name="table1")
@@ -35,7 +35,7 @@ class Table1:
     def __call__(self) -> None:
         """Run it."""
         with importing():
-            from experiments.table1_command import compare
+            from experiments.cli.table1_command import compare
         compare(self)
 
 
@@ -53,7 +53,7 @@ class Search:
     def __call__(self) -> None:
         """Run it."""
         with importing():
-            from experiments.table1_command import search
+            from experiments.cli.table1_command import search
         search(self)
 
 
@@ -77,5 +77,5 @@ class Table2:
     def __call__(self) -> None:
         """Run it."""
         with importing():
-            from experiments.run_commands import table2
+            from experiments.cli.run_commands import table2
         table2(self)

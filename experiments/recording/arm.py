@@ -10,8 +10,8 @@ from experiments.recording.columns import Times, part, poses
 from experiments.recording.stream import Stream
 from experiments.recording.style import MEASURED, PLANNED, Color
 from identify import Array
-from sim.robot import Robot
-from sim.scene import Mover, Shape, motion, shapes
+from sim.robot.robot import Robot
+from sim.robot.scene import Mover, Shape, motion, shapes
 
 ROLES: dict[str, Color | None] = {"true": None, "measured": MEASURED, "planned": PLANNED}
 """Arms that may be shown, and the colour of those that are drawn as wires around the first."""

@@ -8,8 +8,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import Chunk, RrdReader
 
-from experiments.audience import Audience
 from experiments.errors import ResultsError
+from experiments.recording.audience import Audience
 from experiments.recording.columns import Times, scalars
 from experiments.recording.style import STATES, Color
 from identify import Array

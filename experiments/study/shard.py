@@ -11,10 +11,10 @@ import numpy as np
 from experiments.study.method import Method
 from experiments.study.study import Study
 from identify import Estimate, ExplicitModel, IdentificationError, Problem, Status, attempt_each
-from sim.engine import Progress, simulate
+from sim.engine.run import Run
+from sim.engine.simulation import Progress, simulate
 from sim.errors import BenchError
-from sim.run import Run
-from sim.scenario import Scenario
+from sim.scenario.scenario import Scenario
 from sim.trajectories import Reference
 
 PARTS = ("", ".sigma", ".paper_sigma", ".truth")

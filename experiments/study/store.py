@@ -12,7 +12,7 @@ import pyarrow as pa
 import tomli_w
 
 from experiments.errors import ResultsError, StudyError
-from experiments.results import write_whole
+from experiments.identification.results import write_whole
 from experiments.study.shard import Shard
 from experiments.study.shard_file import read_shard, require_of, runs_of, said_by, write_shard
 from experiments.study.study import Study

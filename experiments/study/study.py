@@ -12,12 +12,12 @@ import numpy as np
 from pydantic import Field
 
 from experiments.errors import StudyError
+from experiments.identification.subject import Subject
 from experiments.study.axis import Axis, Setting
 from experiments.study.method import Method, combinations, methods_of, whole_first
-from experiments.subject import Subject
 from identify import MODELS, AbstractModel
-from sim.scenario import Scenario
-from sim.scenario_file import from_dict
+from sim.scenario.scenario import Scenario
+from sim.scenario.scenario_file import from_dict
 from sim.settings import Seed, Whole, settings
 from sim.trajectories import RandomMoves
 

@@ -9,7 +9,7 @@ from experiments.errors import StudyError
 from experiments.study.study import Study
 from identify.plugins import did_you_mean
 from sim.errors import ScenarioError
-from sim.scenario_file import from_dict, load, to_dict
+from sim.scenario.scenario_file import from_dict, load, to_dict
 from sim.settings import fields_of, make
 
 FOLDER = Path(__file__).parent.parent / "studies"

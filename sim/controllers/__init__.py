@@ -1,10 +1,10 @@
 """Controllers, and their table."""
 
 from identify.plugins import PluginTable
-from sim.controllers.base import AbstractController as AbstractController
-from sim.controllers.base import AbstractLaw as AbstractLaw
-from sim.controllers.base import Task as Task
 from sim.controllers.computed_torque import ComputedTorque as ComputedTorque
+from sim.controllers.controller import AbstractController as AbstractController
+from sim.controllers.controller import AbstractLaw as AbstractLaw
+from sim.controllers.controller import Task as Task
 from sim.controllers.pd import PDFeedforward as PDFeedforward
 from sim.controllers.pid import PID as PID
 

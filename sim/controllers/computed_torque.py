@@ -2,9 +2,9 @@
 
 from typing import final
 
-from sim.controllers.base import AbstractController, AbstractLaw, Error, Task
-from sim.inverse_dynamics import InverseDynamics
-from sim.motors import Array
+from sim.controllers.controller import AbstractController, AbstractLaw, Error, Task
+from sim.robot.inverse_dynamics import InverseDynamics
+from sim.robot.motors import Array
 from sim.settings import EachPositive, Number, Positive, per_joint, settings
 
 

@@ -2,8 +2,8 @@
 
 from typing import final
 
-from sim.controllers.base import AbstractController, AbstractLaw, Error, Task
-from sim.motors import Array
+from sim.controllers.controller import AbstractController, AbstractLaw, Error, Task
+from sim.robot.motors import Array
 from sim.settings import EachPositive, Number, Positive, per_joint, settings
 
 

@@ -4,8 +4,8 @@ from typing import final
 
 import numpy as np
 
-from sim.controllers.base import AbstractController, AbstractLaw, Error, Task
-from sim.motors import Array
+from sim.controllers.controller import AbstractController, AbstractLaw, Error, Task
+from sim.robot.motors import Array
 from sim.settings import EachPositive, Positive, per_joint, settings
 
 

@@ -1,11 +1,11 @@
 """Drives, and their table."""
 
 from identify.plugins import PluginTable
-from sim.drives.averaged import AveragedDrive as AveragedDrive
-from sim.drives.base import AbstractAmplifier as AbstractAmplifier
-from sim.drives.base import AbstractDrive as AbstractDrive
-from sim.drives.ideal import IdealDrive as IdealDrive
-from sim.drives.switched import SwitchedDrive as SwitchedDrive
+from sim.drives.averaged_drive import AveragedDrive as AveragedDrive
+from sim.drives.drive import AbstractAmplifier as AbstractAmplifier
+from sim.drives.drive import AbstractDrive as AbstractDrive
+from sim.drives.ideal_drive import IdealDrive as IdealDrive
+from sim.drives.switched_drive import SwitchedDrive as SwitchedDrive
 
 DRIVES: PluginTable[AbstractDrive] = PluginTable(
     "drives",

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from sim.motors import Array
+from sim.robot.motors import Array
 
 
 class Electric(NamedTuple):

@@ -7,7 +7,7 @@ import numpy as np
 
 from sim.drives.pwm import Modulator, Pieces, pieces
 from sim.drives.winding import Passage, Winding, pass_period, step_by_step, straight
-from sim.motors import Array
+from sim.robot.motors import Array
 
 MOST = 20_000
 """Values of the modulation index beyond which no table is made."""
@@ -99,7 +99,7 @@ class TabulatedPassages:
     @cached_property
     def _indices(self) -> Array:
         """Every value of the modulation index."""
-        return np.arange(-self.highest, self.highest + 1) * self.least
+        return np.arange(-self.highest, self.highest + 1, dtype=np.float64) * self.least
 
     @cached_property
     def _pieces(self) -> Pieces:
@@ -117,9 +117,9 @@ class TabulatedPassages:
         for i, e in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)):
             passage, edges = straight(np.full(shape, i), np.full(shape, e), winding, pattern, self.modulator.period)
             made.append(np.stack([passage.charge, passage.electrical, *edges], axis=-1))
-        constant, by_i, by_e = made
-        table: Array = np.stack([constant, by_i - constant, by_e - constant], axis=-2)
-        return table.reshape(-1, 3, constant.shape[-1])
+        constant, by_i, by_e = (np.asarray(each, dtype=np.float64) for each in made)
+        table: Array = np.array([constant, by_i - constant, by_e - constant])
+        return np.moveaxis(table, 0, -2).reshape(-1, 3, constant.shape[-1])
 
 
 def passages(winding: Winding, modulator: Modulator, least: float) -> ExactPassages | TabulatedPassages:

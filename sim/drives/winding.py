@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.drives.pwm import Modulator, Pattern, Pieces, pieces
-from sim.motors import Array
+from sim.robot.motors import Array
 
 
 class Winding(NamedTuple):

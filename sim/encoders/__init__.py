@@ -1,10 +1,10 @@
 """Encoders, and their table."""
 
 from identify.plugins import PluginTable
-from sim.encoders.base import AbstractEncoder as AbstractEncoder
-from sim.encoders.base import AbstractReader as AbstractReader
-from sim.encoders.exact import ExactEncoder as ExactEncoder
-from sim.encoders.incremental import IncrementalEncoder as IncrementalEncoder
+from sim.encoders.encoder import AbstractEncoder as AbstractEncoder
+from sim.encoders.encoder import AbstractReader as AbstractReader
+from sim.encoders.exact_encoder import ExactEncoder as ExactEncoder
+from sim.encoders.incremental_encoder import IncrementalEncoder as IncrementalEncoder
 
 ENCODERS: PluginTable[AbstractEncoder] = PluginTable(
     "encoders",

@@ -1,9 +1,9 @@
 """Frictions, and their table."""
 
 from identify.plugins import PluginTable
-from sim.frictions.base import AbstractContact as AbstractContact
-from sim.frictions.base import AbstractFrictionLaw as AbstractFrictionLaw
-from sim.frictions.coulomb import CoulombViscous as CoulombViscous
+from sim.frictions.coulomb_law import CoulombViscous as CoulombViscous
+from sim.frictions.friction_law import AbstractContact as AbstractContact
+from sim.frictions.friction_law import AbstractFrictionLaw as AbstractFrictionLaw
 from sim.frictions.lugre import LuGre as LuGre
 from sim.frictions.stribeck import Stribeck as Stribeck
 

@@ -7,8 +7,8 @@ from mujoco.batch import Batch
 from pydantic import Field
 
 from sim.errors import ScenarioError
-from sim.frictions.base import AbstractContact, AbstractFrictionLaw
-from sim.motors import Array
+from sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
+from sim.robot.motors import Array
 from sim.settings import EachNotNegativeOrNone, Number, Positive, settings
 
 

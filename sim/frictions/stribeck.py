@@ -6,8 +6,8 @@ import numpy as np
 from mujoco.batch import Batch
 from pydantic import Field
 
-from sim.frictions.base import AbstractContact, AbstractFrictionLaw
-from sim.motors import Array
+from sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
+from sim.robot.motors import Array
 from sim.settings import EachNotNegativeOrNone, Number, Positive, settings
 
 

@@ -1,12 +1,12 @@
 """Trajectories, and their table."""
 
 from identify.plugins import PluginTable
-from sim.trajectories.base import AbstractTrajectory as AbstractTrajectory
 from sim.trajectories.point_to_point import PointToPoint as PointToPoint
 from sim.trajectories.quintic import Quintic as Quintic
 from sim.trajectories.random_moves import RandomMoves as RandomMoves
 from sim.trajectories.reference import Reference as Reference
 from sim.trajectories.time_optimal import TimeOptimal as TimeOptimal
+from sim.trajectories.trajectory import AbstractTrajectory as AbstractTrajectory
 
 TRAJECTORIES: PluginTable[AbstractTrajectory] = PluginTable(
     "trajectories",

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.errors import ScenarioError
-from sim.motors import Array
+from sim.robot.motors import Array
 from sim.trajectories.reference import AbstractMotion, Reference
 
 PEAK_VELOCITY = 15 / 8

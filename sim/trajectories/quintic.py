@@ -5,10 +5,10 @@ from typing import final
 import numpy as np
 
 from sim.errors import ScenarioError
-from sim.robot import Robot
+from sim.robot.robot import Robot
 from sim.settings import NotNegative, Positions, Positive, settings
-from sim.trajectories.base import AbstractTrajectory
 from sim.trajectories.point_to_point import PointToPoint, at_rest
+from sim.trajectories.trajectory import AbstractTrajectory
 
 
 @final

@@ -6,11 +6,11 @@ import numpy as np
 from pydantic import Field
 
 from sim.errors import ScenarioError
-from sim.motors import Array
-from sim.robot import Robot
+from sim.robot.motors import Array
+from sim.robot.robot import Robot
 from sim.settings import EachPositive, NotNegative, Positive, Seed, Whole, per_joint, settings
-from sim.trajectories.base import AbstractTrajectory
 from sim.trajectories.point_to_point import PEAK_VELOCITY, PointToPoint, at_rest
+from sim.trajectories.trajectory import AbstractTrajectory
 from sim.trajectories.waypoints import draw_waypoint
 
 

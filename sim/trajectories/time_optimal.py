@@ -8,11 +8,11 @@ import numpy as np
 from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 
 from sim.errors import ScenarioError
-from sim.motors import Array
-from sim.robot import Robot
+from sim.robot.motors import Array
+from sim.robot.robot import Robot
 from sim.settings import EachPositive, NotNegative, Positions, per_joint, settings
-from sim.trajectories.base import AbstractTrajectory
 from sim.trajectories.reference import AbstractMotion, Reference
+from sim.trajectories.trajectory import AbstractTrajectory
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from sim.errors import ScenarioError
-from sim.motors import Array
+from sim.robot.motors import Array
 
 DRAWS = 10000
 """Draws after which no waypoint is believed to exist."""

@@ -12,10 +12,10 @@ import numpy as np
 import pinocchio as pin
 
 from identify import MODELS, BaseParameters, Joint, KinematicTree, MotionLog, State, TreeLinks, identify_each, tree_basis
-from sim.ideal import ideal_log
-from sim.robot import Robot
+from sim.engine.ideal_log import ideal_log
+from sim.robot.robot import Robot
+from sim.robot.tree import kinematic_tree
 from sim.trajectories import RandomMoves
-from sim.tree import kinematic_tree
 
 SAMPLES, ROUNDS = 4000, 7
 

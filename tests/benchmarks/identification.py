@@ -11,9 +11,9 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 
-from experiments.table1 import SCENARIO, Table1
+from experiments.paper.table1 import SCENARIO, Table1
 from identify import CHAINS, MODELS, Chain, MotionLog, identify_each, scara
-from sim.scenario_file import load
+from sim.scenario.scenario_file import load
 
 SAMPLES, RUNS = 4000, 60
 

@@ -18,9 +18,9 @@ import models
 from identify import Array, MotionLog, identify_each, scara
 from identify.models import ExplicitModel, ImplicitModel, PowerModel
 from sim.encoders import IncrementalEncoder
-from sim.engine import simulate
-from sim.scara import scara_truth
-from sim.scenario_file import load
+from sim.engine.simulation import simulate
+from sim.robot.scara import scara_truth
+from sim.scenario.scenario_file import load
 
 STEP, WINDOW, GUESS = 0.002, 2.0, 0.7
 NAMES = ("ZZR1", "Fv1", "Fs1", "ZZ2", "LMX2", "LMY2", "Fv2", "Fs2")

@@ -16,17 +16,17 @@ from pathlib import Path
 
 import rerun as rr
 
-from experiments.audience import Audience
-from experiments.recording.base import Base
-from experiments.recording.identified import RunRecording
-from experiments.results import write_recording
-from experiments.run import ScenarioRun
-from experiments.viewers import served
+from experiments.identification.results import write_recording
+from experiments.identification.scenario_run import ScenarioRun
+from experiments.recording.audience import Audience
+from experiments.recording.identification_recording import RunRecording
+from experiments.recording.motion_layer import Base
+from experiments.recording.viewers import served
 from identify import MotionLog
-from sim.engine import simulate
-from sim.scenario import Scenario
-from sim.scenario_file import from_dict, load
-from sim.watch import Inner, Stretch, Watch
+from sim.engine.simulation import simulate
+from sim.engine.watch import Inner, Stretch, Watch
+from sim.scenario.scenario import Scenario
+from sim.scenario.scenario_file import from_dict, load
 
 TIMES = 7
 """Repetitions."""

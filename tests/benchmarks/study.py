@@ -17,13 +17,13 @@ from pathlib import Path
 import mujoco
 from mujoco.batch import Batch
 
-from experiments.page import new_page
+from experiments.cli.page import new_page
 from experiments.study.cluster import cluster_pool
-from experiments.study.engine import local_pool, run_missing
-from experiments.study.results import write_results
+from experiments.study.run_study import local_pool, run_missing
 from experiments.study.store import Store
 from experiments.study.study import Study
 from experiments.study.study_file import study_from
+from experiments.study.study_results import write_results
 
 RUNS = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
 MOVES = int(sys.argv[2]) if len(sys.argv) > 2 else 29

@@ -16,9 +16,9 @@ from mujoco.batch import Batch
 
 from sim.drives import AbstractDrive, AveragedDrive, IdealDrive, SwitchedDrive
 from sim.encoders import IncrementalEncoder
-from sim.engine import simulate
-from sim.scenario import Scenario
-from sim.scenario_file import load
+from sim.engine.simulation import simulate
+from sim.scenario.scenario import Scenario
+from sim.scenario.scenario_file import load
 from sim.trajectories import RandomMoves
 
 NSIM, RUNS = 64, 7

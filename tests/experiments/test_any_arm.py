@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.identified import Identified
-from experiments.subject import Subject
-from experiments.validation import Validated
-from experiments.verdict import Verdict
-from experiments.written import Written
+from experiments.identification.consistent_robot import Written
+from experiments.identification.identified import Identified
+from experiments.identification.subject import Subject
+from experiments.identification.validated import Validated
+from experiments.identification.verdict import Verdict
 from identify import MODELS
-from sim.engine import simulate
-from sim.robot import Robot
-from sim.scenario_file import load
-from sim.tree import standard_parameters
+from sim.engine.simulation import simulate
+from sim.robot.robot import Robot
+from sim.robot.tree import standard_parameters
+from sim.scenario.scenario_file import load
 
 ARMS = "puma560", "panda"
 

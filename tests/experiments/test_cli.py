@@ -3,9 +3,9 @@
 import json
 
 from experiments.cli import main
-from experiments.table1 import SCENARIO
+from experiments.paper.table1 import SCENARIO
 from identify.data.log_file import read_log
-from sim.scenario_file import from_dict, load
+from sim.scenario.scenario_file import from_dict, load
 
 
 def test_table1_prints_and_writes_everything(out, capsys):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-import experiments.recording.table1
+import experiments.recording.table1_recording
 from experiments.cli import main
 
 
@@ -16,7 +16,7 @@ def test_interruption_is_quiet_and_leaves_nothing(out, capfd, monkeypatch):
     def interrupted(*args):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(experiments.recording.table1, "record_table1", interrupted)
+    monkeypatch.setattr(experiments.recording.table1_recording, "record_table1", interrupted)
     assert main(["table1", "--out", str(out)]) == 130
     assert "interrupted" in capfd.readouterr().err
     assert not list(out.parent.iterdir())
@@ -24,7 +24,8 @@ def test_interruption_is_quiet_and_leaves_nothing(out, capfd, monkeypatch):
 
 def test_a_real_interrupt_ends_the_process_without_a_traceback(tmp_path, start):
     """Ctrl-C at some instant of a long search."""
-    code = "import sys; from experiments.search import Search; from experiments import cli, table1_command\n"
+    code = "import sys; from experiments.paper.search import Search; from experiments import cli\n"
+    code += "from experiments.cli import table1_command\n"
     code += "table1_command.Search = lambda seed: print('searching') or Search(seed=seed, tolerance=0.0, rounds=10**6)\n"
     code += "sys.exit(cli.main(['table1', '--seed', '1', '--out', 'results']))"
     process = start("-uc", code, cwd=tmp_path)
@@ -60,7 +61,7 @@ def test_an_interrupt_while_a_module_is_loaded_is_as_quiet(tmp_path, module, sta
 
 def test_termination_leaves_nothing_half_written(tmp_path, start):
     """SIGTERM while the recording is written: the hidden folder goes, too."""
-    code = "import sys; from experiments import cli; import experiments.recording.table1 as r\n"
+    code = "import sys; from experiments import cli; import experiments.recording.table1_recording as r\n"
     code += "def slow(*args): print('recording', flush=True); import time; time.sleep(600)\n"
     code += "r.record_table1 = slow\nsys.exit(cli.main(['table1', '--out', 'results']))"
     process = start("-c", code, cwd=tmp_path)
@@ -92,7 +93,7 @@ def test_a_failure_half_way_leaves_earlier_results_whole(out, monkeypatch, capfd
     def full(*args):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(experiments.recording.table1, "record_table1", full)
+    monkeypatch.setattr(experiments.recording.table1_recording, "record_table1", full)
     capfd.readouterr()
     assert "No space left on device" in complaint("table1", "--out", str(out))
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before

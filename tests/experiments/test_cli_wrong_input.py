@@ -6,8 +6,8 @@ import pytest
 import tomli_w
 
 from experiments.cli import main
-from experiments.table1 import SCENARIO
-from sim.scenario_file import load, to_dict
+from experiments.paper.table1 import SCENARIO
+from sim.scenario.scenario_file import load, to_dict
 
 
 def test_an_unknown_chain_lists_the_known_and_leaves_nothing(out, complaint):

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import tomli_w
 
-from experiments import table2
-from experiments.attribution import imperfections
 from experiments.cli import main
-from experiments.table2 import PAPER, Table2
+from experiments.paper import table2
+from experiments.paper.attribution import imperfections
+from experiments.paper.table2 import PAPER, Table2
 from identify.data.log_file import read_log
 from sim.drives import AveragedDrive
-from sim.scenario_file import from_dict, load, names, to_dict, to_toml
+from sim.scenario.scenario_file import from_dict, load, names, to_dict, to_toml
 from sim.trajectories import Quintic, RandomMoves
 
 SHORT = RandomMoves(moves=3, rest=0.6)
@@ -200,7 +200,7 @@ def test_table2_on_a_short_motion(tmp_path, capsys, monkeypatch):
     path, out = tmp_path / "twin.toml", tmp_path / "out"
     path.write_text(to_toml(scenario))
     few = [i for i in imperfections(scenario) if i.name in ("nothing", "hold, not told", "gain error of 2 %")]
-    monkeypatch.setattr("experiments.attribution.imperfections", lambda _: few)
+    monkeypatch.setattr("experiments.paper.attribution.imperfections", lambda _: few)
     assert main(["table2", "--scenario", str(path), "--out", str(out)]) == 0
     printed = capsys.readouterr().out
     assert "explicit model, 2 realizations" in printed

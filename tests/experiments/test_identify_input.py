@@ -86,7 +86,7 @@ def test_a_file_that_cannot_be_written_costs_nothing_else(told, logs, monkeypatc
     def impossible(*args):
         raise IdentificationError("link 2 cannot exist")
 
-    monkeypatch.setattr("experiments.written.consistent_parameters", impossible)
+    monkeypatch.setattr("experiments.identification.consistent_robot.consistent_parameters", impossible)
     words = "--write-mjcf", "out.xml", "--out", "found", "--no-rerun"
     code, out, err = told("identify", logs / "first.parquet", *NEEDED, *words)
     assert code == 2

@@ -7,8 +7,8 @@ import pytest
 
 from experiments.cli import main
 from experiments.errors import ExperimentError
-from experiments.motions import COMPARED, Errors, Pace, Table1Motions
-from experiments.table1 import PAPER
+from experiments.paper.motions import COMPARED, Errors, Pace, Table1Motions
+from experiments.paper.table1 import PAPER
 from identify import IirLowPass, ReversalMask
 from identify.rows.chain import CHAINS
 

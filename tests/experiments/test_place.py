@@ -7,7 +7,7 @@ import pytest
 
 from experiments.cli import main
 from experiments.errors import ResultsError
-from experiments.results import HIDDEN, Place, results_folder
+from experiments.identification.results import HIDDEN, Place, results_folder
 from identify.data.log_file import read_log, write_log
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from identify import MotionLog
 from identify.data.log_file import read_log, write_log
-from sim.robot import Robot
+from sim.robot.robot import Robot
 
 
 @pytest.mark.parametrize(

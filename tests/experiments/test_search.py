@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from experiments.errors import ExperimentError
-from experiments.search import Search
-from experiments.table1 import SCENARIO, Table1
+from experiments.paper.search import Search
+from experiments.paper.table1 import SCENARIO, Table1
 from sim.errors import ScenarioError
-from sim.scenario_file import load
+from sim.scenario.scenario_file import load
 
 
 def test_the_scenario_that_ships_is_what_its_command_finds(robot):
@@ -60,7 +60,7 @@ def test_it_never_sees_an_error_of_identification(robot):
     import mujoco
 
     import models
-    from sim.robot import Robot
+    from sim.robot.robot import Robot
 
     spec = mujoco.MjSpec.from_file(str(models.path("scara")))
     spec.joint("joint1").damping, spec.joint("joint1").armature = [0.1, 0, 0], 0.5

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.cli.options import Parameters
-from experiments.doubts import doubts_of_result
-from experiments.identified import Identified
-from experiments.log_doubts import doubts_of_log
-from experiments.subject import Subject
-from experiments.validation import Validated
-from experiments.verdict import Remedies, Verdict
+from experiments.identification.identified import Identified
+from experiments.identification.log_warnings import doubts_of_log
+from experiments.identification.parameters import Parameters
+from experiments.identification.subject import Subject
+from experiments.identification.validated import Validated
+from experiments.identification.verdict import Remedies, Verdict
+from experiments.identification.warnings import doubts_of_result
 from identify import MotionLog
 from identify.data.log_file import read_log
 

@@ -28,10 +28,10 @@ from identify import (
     tree_basis,
 )
 from identify.data.motion_log import MotionLog, TorqueChannel
-from sim.ideal import ideal_log
-from sim.robot import Robot
+from sim.engine.ideal_log import ideal_log
+from sim.robot.robot import Robot
+from sim.robot.tree import kinematic_tree, standard_parameters
 from sim.trajectories import RandomMoves
-from sim.tree import kinematic_tree, standard_parameters
 
 
 def inertial(tree):

@@ -21,7 +21,7 @@ from identify import (
     scara,
 )
 from identify.errors import SettingError
-from sim.inverse_dynamics import coulomb_torque, inverse_dynamics
+from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 
 STATES = np.random.default_rng(5).uniform(-3, 3, (3, 2, 300))
 """q, qd, qdd of 300 random instants, shape (joint, time) each."""

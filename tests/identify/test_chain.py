@@ -30,7 +30,7 @@ from identify import (
     paper_chain,
     scara,
 )
-from sim.ideal import ideal_log
+from sim.engine.ideal_log import ideal_log
 
 CHANNELS = [
     TorqueChannel("instantaneous"),

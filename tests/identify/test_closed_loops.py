@@ -10,9 +10,9 @@ from identify import AsLogged, MotionLog, TorqueChannel, idbench_chain, identify
 from identify.models import ExplicitModel, ImplicitModel, PowerModel
 from sim.drives import AveragedDrive, SwitchedDrive
 from sim.encoders import IncrementalEncoder
-from sim.engine import simulate
-from sim.measurement import TorqueMeasurement
-from sim.scenario_file import load
+from sim.engine.simulation import simulate
+from sim.scenario.measurement import TorqueMeasurement
+from sim.scenario.scenario_file import load
 from sim.trajectories import RandomMoves
 
 FORMS = {"explicit": ExplicitModel(), "implicit": ImplicitModel(), "power": PowerModel()}

@@ -8,9 +8,9 @@ import pytest
 from identify import BaseParameters, IdentificationError, consistent_parameters, tree_basis
 from identify.data.kinematics import INERTIAL
 from identify.parameters.pseudo_inertia import inertial, pseudo_inertia
-from sim.rewrite import rewritten
-from sim.robot import Robot
-from sim.tree import kinematic_tree, standard_parameters
+from sim.robot.rewrite import rewritten
+from sim.robot.robot import Robot
+from sim.robot.tree import kinematic_tree, standard_parameters
 
 
 @pytest.fixture(scope="module", params=["scara", "puma560", "panda"])

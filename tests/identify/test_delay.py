@@ -9,10 +9,10 @@ from identify import ExcitationError, LogError, MotionLog, SettingError, TorqueC
 from identify.judge.delay import estimate_delay
 from sim.drives import AveragedDrive
 from sim.encoders import IncrementalEncoder
-from sim.engine import simulate
-from sim.measurement import TorqueMeasurement
-from sim.scenario import Timing
-from sim.scenario_file import load
+from sim.engine.simulation import simulate
+from sim.scenario.measurement import TorqueMeasurement
+from sim.scenario.scenario import Timing
+from sim.scenario.scenario_file import load
 from sim.trajectories import RandomMoves
 
 SIXTEEN = IncrementalEncoder(lines=2**14)

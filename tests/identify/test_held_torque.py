@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 
 from identify import MODELS, OPERATORS, AsLogged, PowerModel, idbench_chain, identify, scara
-from sim.engine import simulate
-from sim.scenario import Timing
-from sim.scenario_file import load
+from sim.engine.simulation import simulate
+from sim.scenario.scenario import Timing
+from sim.scenario.scenario_file import load
 
 DELAYS = [0.0, 0.003, 0.0052, 0.007, 0.010, 0.013]
 

@@ -5,8 +5,8 @@ import pytest
 
 from identify import LogError, MotionLog, PowerModel, TimeError, TorqueChannel, identify, scara
 from identify.data.resample import resample
-from sim.engine import simulate
-from sim.scenario_file import load
+from sim.engine.simulation import simulate
+from sim.scenario.scenario_file import load
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +26,7 @@ def test_an_instantaneous_log_with_jittered_times_is_identified(log, table1, tru
     """Times scattered by 5 % of a step: refused as they are, and identified when they are made uniform."""
     t = log.t + rng.uniform(-0.025, 0.025, log.samples) / log.fs
     reference = table1.scenario.trajectory.points.at(t, log.fs)
-    from sim.inverse_dynamics import coulomb_torque, inverse_dynamics
+    from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 
     tau = inverse_dynamics(table1.robot, reference.q, reference.qd, reference.qdd) + coulomb_torque(table1.robot, reference.qd)
     with pytest.raises(TimeError, match="time is not uniform"):

@@ -6,9 +6,9 @@ import pytest
 
 import models
 from sim.errors import RobotError
-from sim.inverse_dynamics import inverse_dynamics
-from sim.robot import Robot
-from sim.scara import scara_truth
+from sim.robot.inverse_dynamics import inverse_dynamics
+from sim.robot.robot import Robot
+from sim.robot.scara import scara_truth
 
 
 def mass_matrix(X, q2):

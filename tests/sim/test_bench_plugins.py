@@ -7,10 +7,10 @@ import pytest
 
 from identify import PluginError
 from sim.controllers import AbstractController
-from sim.controllers.base import AbstractLaw
+from sim.controllers.controller import AbstractLaw
 from sim.encoders import AbstractEncoder
-from sim.encoders.base import AbstractReader
-from sim.engine import simulate
+from sim.encoders.encoder import AbstractReader
+from sim.engine.simulation import simulate
 from sim.settings import settings
 
 

@@ -9,15 +9,15 @@ import pytest
 import models
 from sim.controllers import PID, ComputedTorque, PDFeedforward
 from sim.drives import AveragedDrive
-from sim.engine import simulate
+from sim.engine.simulation import simulate
 from sim.errors import ScenarioError
 from sim.frictions import CoulombViscous, LuGre, Stribeck
-from sim.measurement import CurrentSensor, TorqueMeasurement
-from sim.payload import Payload
-from sim.ripple import Ripple
-from sim.robot import Robot
-from sim.scara import scara_truth
-from sim.scenario import Physics, Timing
+from sim.robot.payload import Payload
+from sim.robot.robot import Robot
+from sim.robot.scara import scara_truth
+from sim.scenario.measurement import CurrentSensor, TorqueMeasurement
+from sim.scenario.ripple import Ripple
+from sim.scenario.scenario import Physics, Timing
 from sim.trajectories import Quintic
 
 WAIT = Quintic(((0.3, 0.2), (0.3, 0.2)), (1.0,), 0.2)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from sim.clock import Clock
+from sim.engine.clock import Clock
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.0004, 0.001, 0.0034, 0.0101, 0.03])

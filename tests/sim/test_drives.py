@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from sim.drives import DRIVES, AveragedDrive, IdealDrive, SwitchedDrive
-from sim.engine import simulate
+from sim.engine.simulation import simulate
 from sim.errors import RobotError, ScenarioError
-from sim.robot import Robot
+from sim.robot.robot import Robot
 
 
 def stepped(drive, robot, demand, speed, h, steps):

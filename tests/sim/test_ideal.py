@@ -4,10 +4,10 @@ import mujoco
 import numpy as np
 
 import models
-from sim.ideal import ideal_log
-from sim.inverse_dynamics import BLOCK, inverse_dynamics
-from sim.robot import Robot
-from sim.scenario_file import load
+from sim.engine.ideal_log import ideal_log
+from sim.robot.inverse_dynamics import BLOCK, inverse_dynamics
+from sim.robot.robot import Robot
+from sim.scenario.scenario_file import load
 
 ARM_WITH_GRAVITY = """
 <mujoco>

@@ -8,11 +8,11 @@ import pytest
 from sim.drives import AveragedDrive, SwitchedDrive
 from sim.encoders import IncrementalEncoder
 from sim.errors import ScenarioError
-from sim.measurement import TorqueMeasurement
-from sim.payload import Payload
-from sim.ripple import Ripple
-from sim.scenario import Physics, Scenario, Timing
-from sim.scenario_file import KINDS, from_dict, load, names, to_dict, to_toml
+from sim.robot.payload import Payload
+from sim.scenario.measurement import TorqueMeasurement
+from sim.scenario.ripple import Ripple
+from sim.scenario.scenario import Physics, Scenario, Timing
+from sim.scenario.scenario_file import KINDS, from_dict, load, names, to_dict, to_toml
 from sim.settings import description, fields_of, per_joint
 from sim.trajectories import Quintic
 

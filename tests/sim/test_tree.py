@@ -6,10 +6,10 @@ import pytest
 
 from identify import BaseParameters, State, tree_basis
 from sim.errors import RobotError
-from sim.inverse_dynamics import coulomb_torque, inverse_dynamics
-from sim.rewrite import rewritten
-from sim.robot import Robot
-from sim.tree import kinematic_tree, standard_parameters
+from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
+from sim.robot.rewrite import rewritten
+from sim.robot.robot import Robot
+from sim.robot.tree import kinematic_tree, standard_parameters
 
 CROOKED = """
 <mujoco model="crooked">

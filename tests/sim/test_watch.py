@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from sim.engine import simulate
-from sim.scenario_file import from_dict
-from sim.watch import Watch
+from sim.engine.simulation import simulate
+from sim.engine.watch import Watch
+from sim.scenario.scenario_file import from_dict
 
 MOTION = {"kind": "random", "moves": 1, "rest": 0.3}
 

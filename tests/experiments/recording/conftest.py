@@ -11,9 +11,9 @@ import rerun as rr
 import rerun_cli
 from rerun.chunk import RrdReader
 
-from experiments.recording.identified import RunRecording
-from experiments.run import ScenarioRun
-from sim.scenario_file import from_dict
+from experiments.identification.scenario_run import ScenarioRun
+from experiments.recording.identification_recording import RunRecording
+from sim.scenario.scenario_file import from_dict
 
 SCENARIO = {
     "name": "short",

@@ -9,8 +9,8 @@ from rerun.chunk import RrdReader
 from experiments.recording.arm import Arm
 from experiments.recording.columns import time_columns
 from experiments.recording.stream import Stream
-from sim.robot import Robot
-from sim.scene import motion, shapes
+from sim.robot.robot import Robot
+from sim.robot.scene import motion, shapes
 
 MJCF = """
 <mujoco>

@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.audience import Audience, Watching
 from experiments.cli import main
 from experiments.errors import ExperimentError
-from sim.scenario_file import load, to_toml
+from experiments.recording.audience import Audience, Watching
+from sim.scenario.scenario_file import load, to_toml
 from sim.trajectories import RandomMoves
 
 NOBODY = "rerun+http://127.0.0.1:{port}/proxy"
@@ -118,7 +118,7 @@ def test_a_viewer_that_goes_away_costs_nothing_but_itself(tmp_path, reading):
 
         threading.Thread(target=answer_once, daemon=True).start()
         words = ["run", brief(tmp_path), "--connect", url, "--out", "run"]
-        code = "import sys; import experiments.audience as a; a.GOODBYE = 1.0\n"
+        code = "import sys; import experiments.recording.audience as a; a.GOODBYE = 1.0\n"
         code += f"sys.argv = ['idbench', *{words}]; from experiments.cli import entry; entry()"
         done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0
@@ -134,7 +134,7 @@ def test_a_viewer_that_hangs_keeps_nothing_back(tmp_path, reading):
         server.listen(64)
         url = NOBODY.format(port=server.getsockname()[1])
         words = ["run", brief(tmp_path), "--connect", url, "--out", "run"]
-        code = f"import sys; sys.argv = ['idbench', *{words}]; import experiments.audience as a; a.GOODBYE = 1.0\n"
+        code = f"import sys; sys.argv = ['idbench', *{words}]; import experiments.recording.audience as a; a.GOODBYE = 1.0\n"
         code += "from experiments.cli import entry; entry()"
         done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0

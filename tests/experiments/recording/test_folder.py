@@ -18,7 +18,7 @@ def copied(recorded, tmp_path):
     from identify.data.log_file import write_log
 
     write_log(recorded.ran.run.alone(), folder / "log.parquet")
-    from experiments.results import write_summary
+    from experiments.identification.results import write_summary
 
     write_summary(folder / "summary.json", recorded.ran.summary())
     return folder
@@ -90,7 +90,7 @@ def test_what_is_wrong_is_told(copied, tmp_path, complaint):
 
 
 def test_files_of_two_recordings_are_not_mixed(copied, table1, tmp_path):
-    from experiments.recording.table1 import record_table1
+    from experiments.recording.table1_recording import record_table1
 
     name, stream = record_table1(table1)[0]
     stream.write(tmp_path / name)

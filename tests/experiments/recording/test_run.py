@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from experiments.audience import Audience
-from experiments.recording.identified import RunRecording
+from experiments.recording.audience import Audience
+from experiments.recording.identification_recording import RunRecording
 from identify import measured_state
-from sim.scenario_file import from_dict
-from sim.scene import motion, shapes
+from sim.robot.scene import motion, shapes
+from sim.scenario.scenario_file import from_dict
 
 TICK = 10_000_000
 """[ns] between samples."""

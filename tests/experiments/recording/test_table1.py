@@ -6,8 +6,8 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from experiments.errors import ResultsError
-from experiments.recording.table1 import record_table1
-from experiments.results import write_recording
+from experiments.identification.results import write_recording
+from experiments.recording.table1_recording import record_table1
 
 
 @pytest.fixture(scope="module")

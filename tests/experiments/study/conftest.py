@@ -6,7 +6,7 @@ from contextlib import nullcontext
 import pytest
 
 from experiments.cli import main
-from experiments.study.engine import local_pool, run_missing
+from experiments.study.run_study import local_pool, run_missing
 from experiments.study.store import Store
 from experiments.study.study_file import study_from
 

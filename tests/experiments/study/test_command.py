@@ -11,9 +11,8 @@ import rerun_cli
 from distributed import LocalCluster
 from rerun.chunk import RrdReader
 
-from experiments import study_commands
-from experiments.cli import main
-from experiments.study import engine
+from experiments.cli import main, study_commands
+from experiments.study import run_study as engine
 from experiments.study.store import Store
 
 
@@ -88,7 +87,7 @@ def test_a_run_is_made_again_bit_for_bit(done, tmp_path, capfd):
 @pytest.fixture
 def bare(monkeypatch):
     """Leave the figures of reports out: they take most of the time of a study of a second."""
-    monkeypatch.setattr("experiments.study.results.report", lambda *args: "")
+    monkeypatch.setattr("experiments.study.study_results.report", lambda *args: "")
 
 
 def test_an_interrupted_study_says_how_to_go_on(file, tmp_path, capfd, monkeypatch, undisturbed, bare):

@@ -7,14 +7,14 @@ import time
 import pytest
 
 from experiments.study.cluster import cluster_pool
-from experiments.study.engine import local_pool, run_missing
+from experiments.study.run_study import local_pool, run_missing
 from experiments.study.store import Store
 
 CODE = """
 import sys
 import time
 from pathlib import Path
-from experiments.study.engine import local_pool, run_missing
+from experiments.study.run_study import local_pool, run_missing
 from experiments.study.store import Store
 store = Store.open(Path(sys.argv[1]))
 with local_pool(store.study, 2) as pool:

@@ -1,0 +1,224 @@
+"""The command that identifies a log."""
+
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.text import Text
+
+from experiments.cli.logs import Identify
+from experiments.cli.page import new_page, shown
+from experiments.cli.plugins import plugin_conflicts
+from experiments.cli.reading import Question, file_of, read, told_by
+from experiments.errors import ExperimentError, ResultsError
+from experiments.identification.consistent_robot import Written
+from experiments.identification.identification_text import print_identified, print_validated
+from experiments.identification.identified import Identified
+from experiments.identification.log_warnings import doubts_of_log
+from experiments.identification.results import Place, beside, results_folder, tell_of, write_recording, write_summary
+from experiments.identification.subject import CLOSED_FORM, Subject, absolute
+from experiments.identification.validated import Validated
+from experiments.identification.verdict import Remedies, Verdict
+from experiments.identification.warnings import doubts_of_result, doubts_of_robot, helpful_moves
+from experiments.recording.audience import Audience, Watching
+from identify import MODELS, ExcitationError, IdentificationError, LogError, MotionLog
+from identify.data.log_file import write_log
+from identify.rows.pieces import is_long
+from sim.errors import BenchError
+from sim.robot.robot import Robot
+
+MOST_STARTS = 1000
+"""Instants of a log that are looked at for the beginning of another."""
+
+
+def identify(asked: Identify) -> None:
+    """Identify a log, judge the result, write it."""
+    page, models, out = new_page(), tuple(MODELS) if asked.model == "all" else (asked.model,), asked.out
+    path, said = file_of(asked.log), told_by(asked.log)
+    _require_label(asked.label)
+    subject = Subject(said.get("robot", CLOSED_FORM) if asked.robot is None else absolute(asked.robot), asked.parameters)
+    _require_target(asked.write_mjcf, subject)
+    place = None if out is None else Place(out, "identify", str(asked.log.absolute()), asked.force)
+    if place:
+        place.check()
+    named = Identified(  # complains of names first
+        (), subject, models=models, chain=asked.chain, estimator=asked.estimator, name=asked.label
+    )
+    known, about_delay = read(path, Question(asked.torque, asked.torque_delay, asked.unwrap), named)
+    found, hidden = _shown(replace(named, logs=(known,), truth=_truth(said, named)))
+    validated = _validated(found, asked, known)
+    doubts = [*hidden, *_doubts(validated), *plugin_conflicts()]
+    with asked.watching.audience() as audience, shown(page):
+        with _explained(doubts):
+            print_identified(page, found, str(asked.log))
+            print_validated(page, validated)
+        _say(page, [*doubts, *doubts_of_result(found), *_advice(validated, asked)])
+        if about_delay:
+            page.print(about_delay)
+        if place is not None:
+            _write_results(page, place, validated, asked.watching, audience)
+        elif asked.log.is_dir() and asked.watching.rerun and not is_long([known]):
+            _add_layer(page, asked.log, found, asked.watching, audience)
+        elif audience and not is_long([known]):
+            _show(found, audience)
+        if asked.write_mjcf is not None:
+            _write_mjcf(page, found, asked.write_mjcf)
+
+
+def _shown(found: Identified) -> tuple[Identified, list[str]]:
+    """Return the identification of what the log shows, and what is to be said of what it hides."""
+    told = []
+    leading = next(iter(found.outcomes.values()))
+    while isinstance(leading, ExcitationError) and leading.hidden and len(leading.hidden) < len(found.basis.names):
+        moves = helpful_moves(found.subject, found.logs[0], leading.hidden)
+        told.append(f"this log does not show {', '.join(leading.hidden)}: left out, as if zero{f' ({moves})' if moves else ''}")
+        fewer = replace(found.subject.asked, without=(*found.subject.asked.without, *leading.hidden))
+        subject = Subject(found.subject.name, fewer)
+        truth = None if found.truth is None else {name: found.truth[name] for name in subject.basis.names}
+        found = replace(found, subject=subject, truth=truth)
+        leading = next(iter(found.outcomes.values()))
+    return found, told
+
+
+def _advice(validated: Validated, asked: Identify) -> list[str]:
+    """Return what is most likely to mend a result that is not good; of a delay that nobody stated, what the log says."""
+    try:
+        good = "good" in {Verdict(validated, model).word for model in validated.torques}
+    except IdentificationError:
+        return []
+    if is_long(validated.found.logs):
+        return []
+    remedies, log = Remedies(validated), validated.found.logs[0]
+    assumed = asked.torque_delay is None and not log.torque.delay
+    delay = list(remedies.delay()) if assumed or (not good and asked.torque_delay != "estimate") else []
+    return delay + ([] if good else list(remedies.options()))
+
+
+def _add_layer(page: Console, folder: Path, found: Identified, watching: Watching, audience: Audience | None) -> None:
+    from experiments.recording.identification_recording import add_layer
+
+    with beside(folder) as hidden:
+        lost = write_recording(hidden, add_layer(folder, found, audience))
+    tell_of(lost, folder)
+    page.print(f"added to the recording in {folder}{watching.hint(folder)}", soft_wrap=True)
+
+
+def _show(found: Identified, audience: Audience) -> None:
+    from experiments.recording.identification_recording import record_log
+
+    for _, stream in record_log(found, audience):
+        stream.close()
+
+
+def _require_label(label: str) -> None:
+    if label and (not re.fullmatch(r"[A-Za-z0-9][\w.-]*", label) or label == "inner"):
+        raise ExperimentError(f"--label {label!r} must be of letters, digits, dots, hyphens and underscores, and not 'inner'")
+
+
+def _require_target(target: Path | None, subject: Subject) -> None:
+    """Raise ExperimentError if the robot cannot be written there; before the work, not after it."""
+    if target is None:
+        return
+    if target.suffix != ".xml":
+        raise ExperimentError(f"--write-mjcf {target}: its name must end with .xml, or nothing would read it back")
+    if target.is_dir() or not target.absolute().parent.is_dir():
+        raise ExperimentError(f"--write-mjcf {target}: there is no folder {target.parent} for it, or it is a folder itself")
+    if target.exists() and target.samefile(Robot.path(subject.name)):
+        raise ExperimentError(f"--write-mjcf {target} is the robot's own file: choose another name")
+
+
+def _doubts(validated: Validated) -> list[str]:
+    """Return what is suspicious about the robot's file and the logs."""
+    subject, second = validated.found.subject, validated.second
+    found = [*doubts_of_log(validated.found.logs[0], subject.tree), *doubts_of_robot(subject.robot)]
+    return found + ([f"{validated.name}: {doubt}" for doubt in doubts_of_log(second, subject.tree)] if second else [])
+
+
+def _truth(said: dict[str, Any], named: Identified) -> dict[str, float] | None:
+    """Return the truth that the summary of a run states, if it is of the same parameters."""
+    truth: dict[str, float] | None = said.get("truth")
+    return truth if truth and tuple(truth) == named.basis.names else None
+
+
+def _validated(found: Identified, asked: Identify, known: MotionLog) -> Validated:
+    """Return the identification, to be judged on a second log: its torque is that of the first if options say it."""
+    if asked.validate is None:
+        return Validated(found)
+    path = file_of(asked.validate)
+    said = known.torque if asked.torque or asked.torque_delay else None
+    try:
+        second, _ = read(path, Question(unwrap=asked.unwrap, otherwise=said, fallback=known.torque), found)
+    except (LogError, ExperimentError) as error:
+        raise ExperimentError(f"--validate {error}" if str(path) in str(error) else f"--validate {path}: {error}") from error
+    if _within(second, known):
+        raise ExperimentError(f"--validate {path} holds the motion that is identified: give one that it has not seen, or none")
+    return Validated(found, second, str(asked.validate))
+
+
+def _within(one: MotionLog, other: MotionLog) -> bool:
+    """Return whether a log is a part of another, or the other of it."""
+    short, long = sorted((one, other), key=lambda log: log.samples)
+    starts = np.flatnonzero((long.q[: long.samples - short.samples + 1] == short.q[0]).all(axis=1)) if short.n == long.n else ()
+    return any(np.array_equal(long.q[k : k + short.samples], short.q) for k in starts[:MOST_STARTS])
+
+
+@contextmanager
+def _explained(doubts: Sequence[str]) -> Iterator[None]:
+    """Add to what goes wrong what is suspicious about the log."""
+    try:
+        yield
+    except IdentificationError as error:
+        raise ExperimentError("; ".join([str(error), *(f"doubtful: {doubt}" for doubt in doubts)])) from error
+
+
+def _say(page: Console, doubts: Sequence[str]) -> None:
+    for doubt in doubts:
+        page.print(Text(f"doubtful: {doubt}"), soft_wrap=True)
+
+
+def _write_mjcf(page: Console, found: Identified, path: Path) -> None:
+    """Write the robot's file; raise ResultsError if that fails, which takes nothing else away."""
+    try:
+        written = Written(found, next(iter(found.estimates)))
+        written.write(path)
+    except (IdentificationError, BenchError) as error:
+        raise ResultsError(f"--write-mjcf {path}: {error}; everything else is as printed") from error
+    page.print(Text(f"written to {path}: the robot with the parameters of the {written.model} model"), soft_wrap=True)
+    _say(page, written.doubts)
+
+
+def _write_results(page: Console, place: Place, validated: Validated, watching: Watching, audience: Audience | None) -> None:
+    lost, found = "", validated.found
+    with results_folder(place) as folder:
+        write_log(found.logs[0], folder / "log.parquet")
+        summary = {
+            "experiment": "identify",
+            "log": Path(place.of).name,
+            "path": place.of,
+            **found.summary(),
+            "validation": _judged(validated),
+        }
+        write_summary(folder / "summary.json", summary)
+        if is_long(found.logs):
+            page.print("not recorded: the rows of so long a log are not kept; identify a part of it to look inside")
+        elif watching.rerun:
+            from experiments.recording.identification_recording import record_log
+
+            lost = write_recording(folder, record_log(found, audience))
+    tell_of(lost, place.out)
+    page.print(f"written to {place.out}{watching.hint(place.out)}", soft_wrap=True)
+
+
+def _judged(validated: Validated) -> dict[str, Any]:
+    """Return what a summary.json says of a validation, verdicts included; why, if there is none."""
+    try:
+        said = validated.summary()
+    except IdentificationError as error:
+        return {"on": validated.title, "models": {}, "failure": str(error)}
+    verdicts = {model: Verdict(validated, model).summary() for model in said["models"]}
+    return {**said, "models": {model: {**verdicts[model], **numbers} for model, numbers in said["models"].items()}}

@@ -1,0 +1,59 @@
+"""What can be combined."""
+
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from experiments.cli.page import new_page, show
+from identify import (
+    ALIGNMENTS,
+    BLOCKS,
+    CHAINS,
+    DIFFERENTIATORS,
+    ESTIMATORS,
+    MASKS,
+    MODELS,
+    OPERATORS,
+    PREFILTERS,
+)
+from identify.plugins import PluginTable
+from sim.scenario.scenario_file import KINDS
+
+TABLES: tuple[PluginTable[Any], ...] = (
+    BLOCKS,
+    MODELS,
+    PREFILTERS,
+    DIFFERENTIATORS,
+    ALIGNMENTS,
+    MASKS,
+    OPERATORS,
+    CHAINS,
+    ESTIMATORS,
+    *KINDS.values(),
+)
+"""Every plug-in point."""
+
+
+def list_plugins() -> None:
+    """List every plug-in."""
+    page = new_page()
+    print_plugins(page)
+    show(page)
+
+
+def print_plugins(console: Console) -> None:
+    """Print every plug-in with the first line of its documentation."""
+    for table in TABLES:
+        grid = Table.grid(padding=(0, 2))
+        for name in table:
+            grid.add_row(f"  {name}", Text(table.summary(name)))
+        console.print(Text(f"{table.point} (entry points: idbench.{table.point})", style="bold"), grid, sep="\n")
+    for conflict in plugin_conflicts():
+        console.print(Text(f"doubtful: {conflict}"), soft_wrap=True)
+
+
+def plugin_conflicts() -> list[str]:
+    """Return which plug-ins of other packages cannot be used, since their names are taken."""
+    return [f"{table.point} plug-in {conflict}" for table in TABLES for conflict in table.conflicts]

@@ -1,0 +1,1 @@
+"""One identification: robot, logs, estimates, their judgement, warnings and files."""

@@ -1,0 +1,97 @@
+"""The robot's file with the parameters that were identified."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import final
+
+import numpy as np
+
+from experiments.identification.identified import Identified
+from experiments.identification.results import write_whole
+from identify import Array, Consistent, consistent_parameters, transfer
+from sim.robot.rewrite import compiled, rewritten
+from sim.robot.robot import Robot
+from sim.robot.tree import standard_parameters
+
+SURE = 0.1
+"""Sigma of what was left out, as a share of the least of the others."""
+
+SIGMAS = 3.0
+"""Departures from the estimate beyond this many sigma are told."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Written:
+    """The physically consistent robot that agrees best with an estimate, as a file.
+
+    Parameters
+    ----------
+    found : Identified
+        The identification.
+    model : str
+        Name of the model whose estimate is taken.
+    """
+
+    found: Identified
+    model: str
+
+    @cached_property
+    def consistent(self) -> Consistent:
+        """Its standard parameters."""
+        subject = self.found.subject
+        given, grouping = standard_parameters(subject.robot), subject.grouping
+        values = np.array([given.get(name, 0.0) for name in grouping.standard.names])
+        T = np.eye(len(grouping.names)) if subject.base else transfer(subject.tree, subject.whole, grouping.basis)
+        X, C = self._of_all()
+        return consistent_parameters(grouping, T @ X, T @ C @ T.T, values)
+
+    def _of_all(self) -> tuple[Array, Array]:
+        """Return estimate and covariance with the parameters that were left out: they are zero, and known to be."""
+        estimate, names = self.found.estimates[self.model], self.found.subject.whole.names
+        C = estimate.best_covariance
+        place = [names.index(name) for name in estimate.names]
+        X, sure = np.zeros(len(names)), SURE * np.sqrt(np.diagonal(C).min())
+        whole = sure**2 * np.eye(len(names))
+        X[place], whole[np.ix_(place, place)] = estimate.X, C
+        return X, whole
+
+    @cached_property
+    def text(self) -> str:
+        """The file."""
+        return rewritten(self.found.subject.name, self._values())
+
+    @cached_property
+    def robot(self) -> Robot:
+        """The robot of the file."""
+        return compiled(self.found.subject.name, self.text)
+
+    def _values(self) -> dict[str, float]:
+        found = self.consistent
+        return dict(zip(found.names, map(float, found.standard), strict=True))
+
+    def write(self, path: Path) -> None:
+        """Write the file, whole or not at all."""
+        write_whole(path, rewritten(self.found.subject.name, self._values(), path.absolute().parent))
+
+    @property
+    def doubts(self) -> list[str]:
+        """What is wrong about it."""
+        found, names = self.consistent, self.found.subject.grouping.names
+        told = []
+        if not found.agrees:
+            far = [f"{n} by {abs(d):.1f}" for n, d in zip(names, found.departure, strict=True) if abs(d) > SIGMAS]
+            told.append(
+                f"no bodies that can exist have the estimate of the {self.model} model: the nearest are {found.distance:.1f} "
+                f"sigma off{', ' + ', '.join(far) + ' sigma' if far else ''}"
+            )
+        if self.lost:
+            told.append(f"{', '.join(self.lost)} have no place in an MJCF file and are left out")
+        return told
+
+    @property
+    def lost(self) -> dict[str, float]:
+        """Standard parameters that have no place in the file, and their values."""
+        known = standard_parameters(self.found.subject.robot)
+        return {name: value for name, value in self._values().items() if name not in known}

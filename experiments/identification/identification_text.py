@@ -1,0 +1,91 @@
+"""Identifications as text."""
+
+from math import isfinite
+
+from rich.console import Console
+from rich.text import Text
+
+from experiments.identification.identified import Identified
+from experiments.identification.validated import Validated
+from experiments.identification.verdict import Verdict
+from experiments.text import WORTHLESS, new_table, number, percent, percentage, print_titled
+from identify import AsLogged, Estimate, IdentificationError
+
+
+def print_identified(console: Console, found: Identified, title: str) -> None:
+    """Print truth, if it is known, and of each model estimate, error or sigma, %sigma, Cond(W) and what is explained.
+
+    Sigma is the corrected one; the paper's is in the summary.
+    """
+    known = found.truth is not None
+    what = ("X", "%e" if known else "sigma", "%sigma")
+    heads = [f"{model}\n{w}" for model in found.estimates for w in what]
+    grid = new_table("", [*(["true\nX"] if known else []), *heads])
+    for i, name in enumerate(found.basis.names):
+        true = [f"{list(found.truth.values())[i]:g}"] if found.truth is not None else []
+        grid.add_row(name, *true, *(cell for e in found.estimates.values() for cell in _cells(e, found, i)))
+    grid.add_section()
+    lead = [""] if known else []
+    grid.add_row("Cond(W)", *lead, *(c for e in found.estimates.values() for c in (f"{e.condition_number:.1f}", "", "")))
+    grid.add_row("rows", *lead, *(c for e in found.estimates.values() for c in (f"{e.row_count}", "", "")))
+    for j in range(found.basis.n):
+        shares = [_explained(share[j]) for share in found.explained.values()]
+        grid.add_row(f"tau{j + 1} explained", *lead, *(c for share in shares for c in (share, "", "")))
+    print_titled(console, f"{title}: chain {found.chain}, {found.estimator}", grid)
+    channel = found.logs[0].torque
+    read = f"{channel.meaning}, delay {1e3 * channel.delay:.4g} ms"
+    logged = isinstance(found.processing.alignment, AsLogged)
+    for model, why in found.failures.items():
+        console.print(Text(f"{model}: no estimate: {why}"), soft_wrap=True)
+    console.print(Text(f"torque: {read}" + (f", which chain {found.chain} ignores: it takes it as logged" if logged else "")))
+    console.print()
+
+
+def _explained(share: float) -> str:
+    return f"{100 * share:.3f} %" if share > -WORTHLESS / 100 else f"<-{WORTHLESS:g} %"
+
+
+def _cells(estimate: Estimate, found: Identified, i: int) -> tuple[str, str, str]:
+    if found.truth is None:
+        second = f"{estimate.best_sigma[i]:.2g}"
+    else:
+        error = float(estimate.error_percent(list(found.truth.values()))[i])
+        second = percent(error) if isfinite(error) else ""
+    share = 100 * estimate.best_sigma[i] / abs(estimate.X[i]) if estimate.X[i] else float("inf")
+    return number(estimate.X[i]), second, percentage(share) or f">{WORTHLESS:g}"
+
+
+def print_validated(console: Console, validated: Validated) -> None:
+    """Print how well torques of an unseen motion are predicted, what the simulated robot does on it, and verdicts."""
+    try:
+        torques = validated.torques
+    except IdentificationError as error:
+        if validated.second is not None:
+            raise
+        console.print(Text(f"not validated on {validated.title}: {error}\n"), soft_wrap=True)
+        return
+    heads = [f"{model}\n{what}" for model in torques for what in ("rms", "%", "R2", "q rms")]
+    grid, first = new_table("", ["noise of\nthe log %", *heads]), next(iter(torques.values()))
+    for j, joint in enumerate(validated.found.subject.robot.joints):
+        noise = percentage(first.percent_of_level(first.noise)[j])
+        grid.add_row(joint, noise, *(cell for model in torques for cell in _validation_cells(validated, model, j)))
+    print_titled(
+        console, f"{validated.title}: torque error while moving [N m, N], position error of the simulated robot [rad, m]", grid
+    )
+    still = first.standing
+    joints = validated.found.subject.robot.joints
+    apart = [f"{joint} {rms:.2g}" for joint, rms in zip(joints, still, strict=True) if isfinite(rms)]
+    if apart:
+        console.print(Text(f"standing and turning, where friction is not determined: {', '.join(apart)} N m"), soft_wrap=True)
+    for model in torques:
+        verdict = Verdict(validated, model)
+        console.print(Text(f"{model}: {verdict.word}: {'; '.join(verdict.reasons)}"), soft_wrap=True)
+    for model, why in validated.judged.failures.items():
+        console.print(Text(f"{model}: not judged: {why}"), soft_wrap=True)
+    console.print()
+
+
+def _validation_cells(validated: Validated, model: str, j: int) -> tuple[str, str, str, str]:
+    told, off = validated.torques[model], validated.position_error(model)
+    R2 = f"{told.R2[j]:.5f}" if told.R2[j] > -WORTHLESS else f"<-{WORTHLESS:g}"
+    return f"{told.rms[j]:.2g}", percentage(told.percent[j]), R2, "" if off is None else f"{off[j]:.1e}"

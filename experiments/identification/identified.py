@@ -1,0 +1,156 @@
+"""A log identified by some models: what every experiment prints, records and writes."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from experiments.identification.results import summarize
+from experiments.identification.subject import Subject
+from identify import (
+    CHAINS,
+    ESTIMATORS,
+    MODELS,
+    AbstractEstimator,
+    Array,
+    Basis,
+    Chain,
+    Estimate,
+    ExplicitModel,
+    IdentificationError,
+    MotionLog,
+    Problem,
+    attempt_each,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """A log, or several of one fit, identified when it is asked for.
+
+    Parameters
+    ----------
+    logs : tuple of MotionLog
+        What was logged.
+    subject : Subject
+        The robot.
+    truth : mapping of str to float, optional
+        The true parameters, where they are known.
+    models : tuple of str
+        Names of the models.
+    chain, estimator : str
+        Their names.
+    method : tuple of Chain and AbstractEstimator, optional
+        Both with settings of their own, instead of those that have the names.
+    trim : float, optional
+        Time at either end of a log that makes no rows [s]; by default what the chain needs.
+    name : str
+        What to call it beside others of the same log; by default chain and estimator.
+    """
+
+    logs: tuple[MotionLog, ...]
+    subject: Subject = field(default_factory=Subject)
+    truth: Mapping[str, float] | None = None
+    models: tuple[str, ...] = ("explicit", "implicit", "power")
+    chain: str = "idbench"
+    estimator: str = "WLS"
+    method: tuple[Chain, AbstractEstimator] | None = None
+    trim: float | None = None
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        _ = self.basis, self.processing, ESTIMATORS.create(self.estimator), [MODELS.create(name) for name in self.models]
+
+    @property
+    def basis(self) -> Basis:
+        """The robot, linear in its parameters."""
+        return self.subject.basis
+
+    @property
+    def processing(self) -> Chain:
+        """The chain."""
+        chain = self.method[0] if self.method else CHAINS.create(self.chain)
+        return chain if self.trim is None else replace(chain, trim=self.trim)
+
+    @property
+    def label(self) -> str:
+        """What tells this identification from others of the same log."""
+        return self.name or f"{self.chain}-{self.estimator}"
+
+    @property
+    def solver(self) -> AbstractEstimator:
+        """The estimator."""
+        return self.method[1] if self.method else ESTIMATORS.create(self.estimator)
+
+    @cached_property
+    def problem(self) -> Problem:
+        """Logs, robot and chain, by the explicit model."""
+        return Problem(self.logs, self.basis, ExplicitModel(), self.processing)
+
+    @cached_property
+    def outcomes(self) -> dict[str, Estimate | IdentificationError]:
+        """The estimate of every model, or why it has none."""
+        models = {name: MODELS.create(name) for name in self.models}
+        return attempt_each(self.problem, models, self.solver)
+
+    @cached_property
+    def estimates(self) -> dict[str, Estimate]:
+        """The estimates, of the models that have one; raise the first model's IdentificationError if none has."""
+        found = {name: outcome for name, outcome in self.outcomes.items() if isinstance(outcome, Estimate)}
+        for outcome in self.outcomes.values():
+            if not found and isinstance(outcome, IdentificationError):
+                raise outcome
+        return found
+
+    @property
+    def failures(self) -> dict[str, str]:
+        """Why models have no estimate."""
+        return {name: str(outcome) for name, outcome in self.outcomes.items() if isinstance(outcome, IdentificationError)}
+
+    @cached_property
+    def explained(self) -> dict[str, Array]:
+        """How much of each joint's torque every estimate explains, shape (joint,).
+
+        A share of its variance; of a log whose rows are not kept, of its squares.
+        """
+        squares = self._torque_squares
+        if not self.problem.long:
+            rows = self.problem.rows
+            squares = squares - np.sum(rows.by_kind(rows.Y), axis=-1) ** 2 / rows.by_kind(rows.Y).shape[-1]
+        factors = self.problem.factors
+        return {name: 1 - factors.squares(e.X) / np.maximum(squares, 1e-300) for name, e in self.estimates.items()}
+
+    @cached_property
+    def left_open(self) -> dict[str, Array]:
+        """Sigma of the torque that every estimate predicts on its own log, over that torque's rms, shape (joint,)."""
+        W = self.problem.factors.R[..., :-1]
+        spread = {name: np.sum(W @ e.best_covariance * W, axis=(-2, -1)) for name, e in self.estimates.items()}
+        squares = np.maximum(self._torque_squares, 1e-300)
+        return {name: np.sqrt(np.maximum(found, 0.0) / squares) for name, found in spread.items()}
+
+    @property
+    def _torque_squares(self) -> Array:
+        return np.sum(self.problem.factors.R[..., -1] ** 2, axis=-1)
+
+    def summary(self) -> dict[str, Any]:
+        """Return what a summary.json says of it."""
+        truth = None if self.truth is None else list(self.truth.values())
+        models = {name: summarize(e, truth) for name, e in self.estimates.items()}
+        for name, share in self.explained.items():
+            models[name]["explained_share"] = share.tolist()
+        channel = self.logs[0].torque
+        base = self.subject.base
+        return {
+            "parameters": list(self.basis.names),
+            "units": list(self.basis.units),
+            "made_of": None if base is None else dict(zip(base.names, map(base.grouping, range(len(base.names))), strict=True)),
+            "truth": truth,
+            "robot": self.subject.name,
+            "chain": self.chain,
+            "estimator": self.estimator,
+            "torque": {"meaning": channel.meaning, "delay": channel.delay, "gain": channel.gain},
+            "models": models,
+            "failures": self.failures,
+        }

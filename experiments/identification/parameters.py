@@ -1,0 +1,21 @@
+"""Which parameters of a robot are identified."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal, final
+
+import tyro
+
+Names = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME")]
+
+
+@final
+@dataclass(frozen=True)
+class Parameters:
+    """Which parameters of a robot are asked for."""
+
+    armature: Literal["file", "all"] = "file"
+    """Which joints have the inertia of a rotor: those to which the robot's file gives one, or all."""
+    add: Names = ()
+    """Laws of friction beside viscous and Coulomb friction, such as offset, a constant torque of each joint."""
+    without: Names = ()
+    """Parameters to leave out, as if they were zero."""

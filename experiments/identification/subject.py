@@ -1,0 +1,95 @@
+"""The robot that is identified: its basis, its joints, and what is true of it where it is simulated."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import final
+
+import numpy as np
+
+from experiments.errors import ExperimentError
+from experiments.identification.parameters import Parameters
+from identify import BLOCKS, AbstractFriction, BaseParameters, Basis, KinematicTree, scara, tree_basis
+from sim.robot.robot import FILES, Robot
+from sim.robot.scara import scara_truth
+from sim.robot.tree import kinematic_tree, standard_parameters
+
+CLOSED_FORM = "scara"
+"""The robot whose basis is the paper's, in closed form."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """A robot by its name or file, and which of its parameters are asked for.
+
+    Parameters
+    ----------
+    name : str
+        Name of a robot that ships, or path of an MJCF or URDF file.
+    asked : Parameters
+        Which of its parameters are asked for.
+    """
+
+    name: str = CLOSED_FORM
+    asked: Parameters = Parameters()  # noqa: RUF009  # frozen
+
+    @cached_property
+    def robot(self) -> Robot:
+        """The robot as its file describes it."""
+        return Robot.load(self.name)
+
+    @cached_property
+    def tree(self) -> KinematicTree:
+        """Its description."""
+        tree = kinematic_tree(self.robot)
+        if self.asked.armature == "file":
+            return tree
+        return replace(tree, joints=tuple(replace(joint, armature=True) for joint in tree.joints))
+
+    @cached_property
+    def grouping(self) -> BaseParameters:
+        """How its standard parameters are grouped."""
+        return BaseParameters.of(self.tree, self._with_laws(tree_basis(self.tree)))
+
+    @cached_property
+    def base(self) -> BaseParameters | None:
+        """The grouping, where its base parameters are what is identified; None for the closed form."""
+        return None if self.name == CLOSED_FORM and self.asked.armature == "file" else self.grouping
+
+    @cached_property
+    def whole(self) -> Basis:
+        """What could be identified."""
+        return self._with_laws(scara()) if self.base is None else self.base.basis
+
+    @cached_property
+    def basis(self) -> Basis:
+        """What is identified."""
+        return self.whole.without(*self.asked.without) if self.asked.without else self.whole
+
+    def truth(self, robot: Robot) -> dict[str, float]:
+        """Return the true value of every parameter of the basis for `robot`, this one as it is simulated.
+
+        What the simulated robot does not have, such as an offset, is zero.
+        """
+        if self.base is None:
+            known = scara_truth(robot)
+        else:
+            standard = standard_parameters(robot)
+            values = np.array([standard.get(name, 0.0) for name in self.base.standard.names])
+            known = dict(zip(self.base.names, map(float, self.base.base(values)), strict=True))
+        return {name: known.get(name, 0.0) for name in self.basis.names}
+
+    def _with_laws(self, basis: Basis) -> Basis:
+        for name in self.asked.add:
+            block = BLOCKS.create(name)
+            if not isinstance(block, AbstractFriction):
+                laws = [known for known in BLOCKS if isinstance(BLOCKS.create(known), AbstractFriction)]
+                raise ExperimentError(f"--add {name}: that is no law of a joint's friction; known: {', '.join(laws)}")
+            basis = basis + block
+        return basis
+
+
+def absolute(robot: str) -> str:
+    """Return the name of a robot, or the path of its file from the root: results are read from other folders too."""
+    return str(Path(robot).absolute()) if Path(robot).suffix in FILES else robot

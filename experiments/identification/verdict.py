@@ -1,0 +1,167 @@
+"""Is an identification any good? A word, the reasons for it, and what is most likely to mend it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, final
+
+import numpy as np
+
+from experiments.errors import ExperimentError
+from experiments.identification.identified import Identified
+from experiments.identification.subject import Subject
+from experiments.identification.validated import Validated
+from experiments.identification.warnings import wrong_sign
+from identify import Array, IdentificationError, RangeError, Validation, estimate, validate
+from identify.judge.delay import estimate_delay
+from identify.judge.validation import MARGIN
+
+GOOD, FAIR = 2.0, 10.0
+"""Torque errors [% of the torque] beyond noise and sigma up to which a model is called good, or fair.
+
+docs/any-arm.md has the table of right and wrong models from which these come."""
+
+NEGLIGIBLE = 2e-3
+"""Share of a sampling period by which a delay may be off without a word: a hundredth of the SCARA's Fv1 at 100 Hz."""
+
+SURE = 4.0
+"""A delay that differs from the stated one by so many sigma is told."""
+
+WORTH, TOLERABLE = 0.7, 20.0
+"""Options that bring the error below this share of what it was, and below these per cent, are told."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What to think of one model of a validated identification.
+
+    Parameters
+    ----------
+    validated : Validated
+        The identification and its validation.
+    model : str
+        Name of the model.
+    """
+
+    validated: Validated
+    model: str
+
+    @property
+    def told(self) -> Validation:
+        """Its errors."""
+        return self.validated.torques[self.model]
+
+    @cached_property
+    def word(self) -> str:
+        """good, fair or poor; unsure where noise or sigma would hide a poor model."""
+        if wrong_sign(self.validated.judged):
+            return "poor"
+        beyond, hidden = (_worst(self.told.percent_of_level(x)) for x in (self.told.excess, self.told.expected))
+        if beyond > FAIR:
+            return "poor"
+        if hidden > FAIR:
+            return "unsure"
+        return "good" if beyond <= GOOD else "fair"
+
+    @property
+    def reasons(self) -> list[str]:
+        """Why, the worst joint first."""
+        wrong = [reason.partition(":")[0] for reason in wrong_sign(self.validated.judged)]
+        return [*wrong, *self._errors(), *self._left()]
+
+    def _errors(self) -> Iterator[str]:
+        told, joints = self.told, self.validated.found.subject.robot.joints
+        share = told.excess if self.word in ("fair", "poor") else told.rms
+        j = int(np.nan_to_num(told.percent_of_level(share), posinf=np.inf).argmax())
+        worst = int(np.nan_to_num(told.percent, posinf=np.inf).argmax())
+        others = ", the others by less" if len(joints) > 1 and j == worst else ""
+        yield f"the torque of {joints[j]} is off by {percent(told.percent[j])}{others}; {self._expected(j)}"
+        hidden = told.percent_of_level(told.expected)
+        worst = int(np.nan_to_num(hidden).argmax())
+        if self.word == "unsure":
+            yield f"noise and sigma make {percent(hidden[worst])} of the torque of {joints[worst]}: a wrong model could hide"
+
+    def _expected(self, j: int) -> str:
+        noise, sigma = (self.told.percent_of_level(x)[j] for x in (self.told.noise, self.told.open))
+        known = f"noise of this log makes {percent(noise)}" if np.isfinite(noise) else "the noise of this log is not known"
+        return f"{known}, sigma of the parameters {percent(sigma)}"
+
+    def _left(self) -> Iterator[str]:
+        told, joints = self.told, self.validated.found.subject.robot.joints
+        beyond = told.percent_of_level(told.excess) > GOOD
+        coloured = [joint for joint, white, far in zip(joints, told.white, beyond, strict=True) if far and not white]
+        if coloured:
+            yield f"what is left of {', '.join(coloured)} is no noise"
+        elif self.word == "good" and (told.rms <= MARGIN * told.expected).all():
+            yield "noise and sigma explain all of it"
+        if isinstance(self.validated.replays[self.model], str):
+            yield f"not simulated: {self.validated.replays[self.model]}"
+
+    def summary(self) -> dict[str, Any]:
+        """Return what a summary.json says of it."""
+        return {"verdict": self.word, "reasons": self.reasons}
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Remedies:
+    """What is most likely to mend an identification that is not good, tried out: the likely cause first.
+
+    Parameters
+    ----------
+    validated : Validated
+        The identification and its validation.
+    """
+
+    validated: Validated
+
+    def delay(self) -> Iterator[str]:
+        """Yield the torque delay that the log itself says, where it is another than the one that is taken."""
+        found, stated = self.validated.found, self.validated.found.logs[0].torque.delay
+        if wrong_sign(found):
+            return
+        try:
+            told = estimate_delay(list(found.logs), found.basis, found.processing)
+        except RangeError as error:
+            yield f"the delay of the torque is far from what is taken, or it is none of this motion: {error}"
+            return
+        except IdentificationError:
+            return
+        if abs(told.delay - stated) > max(SURE * told.sigma, NEGLIGIBLE / found.logs[0].fs):
+            yield (
+                f"the log says a torque delay of {1e3 * told.delay:.3g} ms (sigma {1e3 * told.sigma:.1g}), where "
+                f"{1e3 * stated:.3g} ms is taken: --torque-delay estimate"
+            )
+
+    def options(self) -> Iterator[str]:
+        """Yield options with which the error falls, and how far."""
+        subject = self.validated.found.subject
+        options = {}
+        if not all(joint.armature for joint in subject.tree.joints):
+            options["--armature all"] = replace(subject.asked, armature="all")
+        if "offset" not in subject.asked.add:
+            options["--add offset"] = replace(subject.asked, add=(*subject.asked.add, "offset"))
+        before = self._worst(self.validated.judged)
+        for option, asked in options.items():
+            try:
+                after = self._worst(replace(self.validated.judged, subject=Subject(subject.name, asked), truth=None))
+            except (IdentificationError, ExperimentError):
+                continue
+            if after < min(WORTH * before, TOLERABLE):
+                yield f"with {option} the worst joint's error falls from {percent(before)} to {percent(after)}"
+
+    def _worst(self, judged: Identified) -> float:
+        """Return the largest error [%] of the explicit model on the unseen motion."""
+        X = estimate(judged.problem, judged.solver).X
+        return float(np.nanmax(validate(self.validated.problem_of(judged), X).percent))
+
+
+def percent(share: float) -> str:
+    """Return a percentage to two digits, or to none from ten on; beyond a thousand it says no more."""
+    return f"{share:.2g} %" if share < 10 else f"{share:.0f} %" if share < 1000 else "more than 1000 %"
+
+
+def _worst(shares: Array) -> float:
+    """Return the largest of some percentages; what is not known is none."""
+    return float(np.max(shares, initial=0.0, where=~np.isnan(shares)))

@@ -1,0 +1,168 @@
+"""What is suspicious about what was identified from a log, and what would help."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from experiments.identification.identified import Identified
+from experiments.identification.log_warnings import doubts_of_base, resting
+from experiments.identification.subject import Subject
+from identify import MotionLog, brisk_shares, showing_moves
+from identify.basis.parameter import NOT_NEGATIVE
+from sim.robot.robot import Robot
+from sim.robot.tree import kinematic_tree, unmodelled
+
+WELL_EXPLAINED = 0.95
+"""Share of a torque's variance that a model of the right robot explains on any log that is worth identifying."""
+
+USELESS = 0.5
+"""Share of a torque that one sigma of the parameters may make before the estimate is said to tell too little; a fifth of it is
+asked of what is recommended instead."""
+
+ENOUGH = 4
+"""Rows for each parameter beyond which a large sigma is no matter of too few of them."""
+
+MUCH_LONGER = 100
+"""Times from which on the length of a log is not what is wrong with it."""
+
+FAR_OFF = 30.0
+"""Factor between measured and expected torques that no missing rotor or friction makes in the joint that carries most."""
+
+OPEN = 0.02
+"""Share of a joint's torque on a brisk motion that one sigma of a parameter may make before it is said to be left open."""
+
+
+def doubts_of_result(found: Identified) -> list[str]:
+    """Return what no healthy identification shows, and what the log leaves open."""
+    told = [*wrong_sign(found), *wrong_unit(found)]
+    for name, estimate in found.estimates.items():
+        friction = zip(found.basis.parameters, estimate.X, estimate.best_sigma, strict=True)
+        negative = [p.name for p, x, sigma in friction if p.kind in NOT_NEGATIVE and _surely_negative(x, sigma)]
+        if negative and not told:
+            told.append(f"{', '.join(negative)} below zero in the {name} model: is the torque's meaning or delay wrong?")
+        told += list(_too_little(found, name)) or list(_badly_explained(found, name))
+    return told or _left_open(found)
+
+
+def _too_little(found: Identified, name: str) -> Iterator[str]:
+    """Yield why an estimate says nothing, where its sigma alone makes much of a torque, and what would help."""
+    estimate, shares = found.estimates[name], found.left_open[name]
+    worst = int(np.nan_to_num(shares, nan=np.inf).argmax())
+    if shares[worst] < USELESS or estimate.row_count > ENOUGH * len(estimate.names):  # else it is the model that is wrong
+        return
+    others = [other for other, open_ in found.left_open.items() if np.nan_to_num(open_, nan=np.inf).max() < USELESS / 5]
+    times = min(1000, int(np.ceil((shares[worst] / (USELESS / 5)) ** 2))) if np.isfinite(shares[worst]) else 1000
+    longer = f"a log {times} times as long" if times < MUCH_LONGER else "a log that moves all joints, and longer"
+    yield (
+        f"the {name} model tells too little: {int(estimate.row_count)} rows for {len(estimate.names)} parameters, Cond(W) "
+        f"{float(estimate.condition_number):.2g}, one sigma of its parameters makes {100 * shares[worst]:.0f} % of the torque "
+        f"of {found.subject.robot.joints[worst]}: take {f'the {others[0]} model' if others else longer}"
+        + (f", or {longer}" if others else "")
+    )
+
+
+def _badly_explained(found: Identified, name: str) -> Iterator[str]:
+    """Yield which torques a model does not explain: the log is suspected, unless another model explains them."""
+    joints = found.subject.robot.joints
+    poor = {j: share for j, share in enumerate(found.explained[name]) if not share >= WELL_EXPLAINED}
+    if not poor:
+        return
+    told = ", ".join(f"{_share(share)} of tau{j + 1}" for j, share in poor.items())
+    others = [o for o, shares in found.explained.items() if all(shares[j] >= WELL_EXPLAINED for j in poor)]
+    if others:
+        yield (
+            f"the {name} model explains {told}, where the {others[0]} model explains at least {100 * WELL_EXPLAINED:.0f} %: "
+            f"noise of the velocities, or too little motion of {', '.join(joints[j] for j in poor)}; take the {others[0]} model"
+        )
+    else:
+        yield f"the {name} model explains {told}: are units, signs, order of columns and the torque's delay right?"
+
+
+def _share(share: float) -> str:
+    return f"{100 * share:.0f} %" if share > 0 else "nothing"
+
+
+def wrong_unit(found: Identified) -> list[str]:
+    """Return whether torques are far from what the robot's file says of the same motion, as those in other units are."""
+    subject, R = found.subject, found.problem.factors.R
+    filed = R[..., :-1] @ np.array(list(subject.truth(subject.robot).values()))
+    sizes = zip(np.linalg.norm(R[..., -1], axis=-1), np.linalg.norm(filed, axis=-1), strict=True)
+    measured, expected = max(sizes, key=lambda pair: float(pair[1]))  # the joint of which the file expects most
+    if not expected or 1 / FAR_OFF < measured / expected < FAR_OFF:
+        return []
+    return [f"the torques are {measured / expected:.2g} times what the robot's file says of this motion: are they in N m?"]
+
+
+def doubts_of_robot(robot: Robot) -> list[str]:
+    """Return what of a robot's file no parameter describes."""
+    found = unmodelled(robot)
+    told = [f"the file of robot {robot.name!r} has {', '.join(found)}, which no parameter describes"] if found else []
+    return [*told, *doubts_of_base(kinematic_tree(robot))]
+
+
+def wrong_sign(found: Identified) -> list[str]:
+    """Return which torques have the wrong sign: those that drive their joint by friction."""
+    model, estimate = next(iter(found.estimates.items()))
+    values = zip(found.basis.parameters, estimate.X, estimate.best_sigma, strict=True)
+    known = {(p.kind, p.joint): (x, sigma) for p, x, sigma in values}
+    nothing = (0.0, 0.0)
+    wrong = [
+        joint
+        for j, joint in enumerate(found.subject.robot.joints)
+        if known.get(("viscous friction", j), nothing)[0] < 0 and _surely_negative(*known.get(("Coulomb friction", j), nothing))
+    ]
+    if not wrong:
+        return []
+    work = _work(found.logs[0])
+    balance = f", and the torques of the log take out {-work:.3g} J in all" if work < 0 else ""
+    return [
+        f"friction drives {', '.join(wrong)} in the {model} model{balance}: does the torque have the wrong sign (it must be "
+        "that on the joint, positive where it speeds up a positive motion)?"
+    ]
+
+
+def _surely_negative(x: float, sigma: float) -> bool:
+    return x < -2 * sigma
+
+
+def _work(log: MotionLog) -> float:
+    """Return the work of all torques [J]."""
+    tau = log.tau * np.asarray(log.torque.gain)
+    return float(np.sum((tau[1:] + tau[:-1]) / 2 * np.diff(log.q, axis=0)))
+
+
+def _left_open(found: Identified) -> list[str]:
+    """Return which base parameters the log leaves open so far that a brisk motion would show it, and what would tell them."""
+    subject, (model, estimate) = found.subject, next(iter(found.estimates.items()))
+    if subject.base is None:
+        return []
+    shares = brisk_shares(subject.tree, found.basis, estimate.X, estimate.best_sigma)
+    names = [name for name, share in zip(found.basis.names, shares, strict=True) if share > OPEN]
+    if not names:
+        return []
+    return [f"one sigma of these parameters is above {100 * OPEN:g} % of a brisk motion's torque ({model} model): "
+            f"{_moves(subject, names)}"]  # fmt: skip
+
+
+def helpful_moves(subject: Subject, log: MotionLog, names: Sequence[str]) -> str:
+    """Return what would show parameters that a log hides: joints that never move, or else moves; empty if that is not known."""
+    if still := resting(log, subject.tree):
+        return f"{', '.join(still)} never moves in this log: move it"
+    return _moves(subject, names) if subject.base is not None else ""
+
+
+def _moves(subject: Subject, names: Sequence[str]) -> str:
+    """Return parameters by the joints that show them when they move."""
+    moves: dict[tuple[int, ...], list[str]] = {}
+    for name, joints in showing_moves(subject.tree, subject.grouping, names).items():
+        moves.setdefault(joints, []).append(name)
+    each = [f"{', '.join(shown)} (move {_joints(subject, joints)})" for joints, shown in sorted(moves.items(), key=_size)]
+    return "; ".join(each)
+
+
+def _size(move: tuple[tuple[int, ...], list[str]]) -> int:
+    return len(move[0])
+
+
+def _joints(subject: Subject, joints: Sequence[int]) -> str:
+    return "all joints" if len(joints) == subject.robot.n > 1 else " with ".join(subject.robot.joints[j] for j in joints)

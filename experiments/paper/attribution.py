@@ -1,0 +1,87 @@
+"""What does each imperfection do to each parameter, alone? Everything else is ideal, and told to identification.
+
+Expected: what shifts the torque in time (hold, computing delay, half a physics step) turns inertia into viscous friction, most
+where friction is small; quantization and ripple are noise; standstill touches the friction of the dynamic models and leaves
+the power model alone; a gain error scales everything.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from identify import Array, AsLogged, Chain, MotionLog, NoMask, TorqueChannel, idbench_chain, identify_each, scara
+from identify.models import ExplicitModel, PowerModel
+from sim.drives import AveragedDrive, SwitchedDrive
+from sim.encoders import IncrementalEncoder
+from sim.engine.simulation import Progress, simulate
+from sim.frictions import Stribeck
+from sim.robot.scara import scara_truth
+from sim.scenario.measurement import TorqueMeasurement
+from sim.scenario.scenario import Physics, Scenario, Timing
+
+COMPARED = {"explicit": ExplicitModel(), "power": PowerModel()}
+"""The implicit model's errors are the explicit one's."""
+
+
+@dataclass(frozen=True)
+class Imperfection:
+    """One imperfection.
+
+    Parameters
+    ----------
+    name : str
+        What it is.
+    scenario : Scenario
+        An ideal loop but for it.
+    chain : Chain
+        Chain `idbench`, but for what it is about.
+    believed : TorqueChannel, optional
+        What identification believes of the torque; by default what is true.
+    """
+
+    name: str
+    scenario: Scenario
+    chain: Chain
+    believed: TorqueChannel | None = None
+
+
+def imperfections(table2: Scenario) -> list[Imperfection]:
+    """Return the imperfections of the robot of scenario `table2`, each alone, and some more."""
+    ideal = Scenario("ideal", table2.trajectory, table2.robot, table2.fs, table2.seed)
+    chain, prompt = idbench_chain(), TorqueChannel("held")
+    logged, unmasked = replace(chain, alignment=AsLogged()), replace(chain, mask=NoMask())
+    delay, coarse = Timing(delay=table2.timing.delay), Physics(integrator="implicitfast")
+    chopper = table2.drive if isinstance(table2.drive, SwitchedDrive) else SwitchedDrive()
+    plain = replace(chopper, emf_compensation=0.0)
+    ripple = replace(ideal, drive=AveragedDrive(), ripple=table2.ripple)
+    return [
+        Imperfection("nothing", ideal, chain),
+        Imperfection("hold, not told", ideal, logged),
+        Imperfection(f"computing delay of {1e3 * delay.delay:g} ms, not told", replace(ideal, timing=delay), chain, prompt),
+        Imperfection("half a physics step of 1 ms, not told", replace(ideal, physics=coarse), chain, prompt),
+        Imperfection("half a physics step of 1 ms, told", replace(ideal, physics=coarse), chain),
+        Imperfection("quantization", replace(ideal, encoder=table2.encoder), chain),
+        Imperfection("quantization, 20 bits", replace(ideal, encoder=IncrementalEncoder(lines=(2**18,))), chain),
+        Imperfection("cogging and commutation", ripple, chain),
+        Imperfection("chopper", replace(ideal, drive=chopper), chain),
+        Imperfection("chopper without EMF compensation", replace(ideal, drive=plain), chain),
+        Imperfection("standstill, not masked", ideal, unmasked),
+        Imperfection("Stribeck friction", replace(ideal, friction=Stribeck()), chain),
+        Imperfection("gain error of 2 %", replace(ideal, torque=TorqueMeasurement(gain_error=(0.02,))), chain),
+    ]
+
+
+def attribution(table2: Scenario, progress: Progress | None = None) -> Iterator[tuple[str, dict[str, Array]]]:
+    """Yield, for every imperfection, the signed error [%] of every parameter in each model."""
+    found = imperfections(table2)
+    for k, imperfection in enumerate(found):
+        if progress:
+            progress(k / len(found))
+        yield imperfection.name, _errors(imperfection)
+
+
+def _errors(imperfection: Imperfection) -> dict[str, Array]:
+    run = simulate(imperfection.scenario)
+    log, truth = run.alone(), list(scara_truth(run.robots[0]).values())
+    told = MotionLog(log.fs, log.q, log.tau, imperfection.believed or log.torque)
+    estimates = identify_each(told, scara(), COMPARED, imperfection.chain)
+    return {form: estimate.error_percent(truth) for form, estimate in estimates.items()}

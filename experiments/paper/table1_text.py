@@ -1,0 +1,112 @@
+"""Table 1 as text: for a terminal, and for a recording."""
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from experiments.paper.causes import COMPARED, causes
+from experiments.paper.table1 import PAPER, Table1
+from identify import Array, Estimate
+
+WHY = (
+    "Chain paper takes the paper's steps as they are printed, chain paper_masked leaves out what lies near reversals besides, "
+    "as the paper's school does; neither has the paper's trajectory, of which the paper gives the condition numbers alone. The "
+    "explicit model's errors of friction are {paper:.2g} and {paper_masked:.2g} times the paper's (geometric means), those of "
+    "ZZR1 {zzr1:.2g} times at the most; single errors are up to {most:.0f} times the paper's. How errors scatter over motions: "
+    "--motions 3500. What makes those of chain paper, by taking it out (largest error in %):"
+)
+
+EXACT = (
+    "Chain idbench has nothing left to err by here: the data are noise-free, and a 6th-order difference of a 5th-order move "
+    "is exact. It shows that the models are right and the paper's limits were those of its filters, not how a real arm fares."
+)
+
+
+def print_table1(console: Console, table: Table1) -> None:
+    """Print, for each model, estimates and errors of every chain beside the paper's, Cond(W) and rows."""
+    console.print(Text(f"Trajectory {table.scenario.name}: {table.scenario.origin}\n"))
+    for form in next(iter(table.estimates.values())):
+        console.print(_model_table(table, form))
+    if {"paper", "paper_masked"} <= set(table.chains):
+        console.print(Text(WHY.format(**_times_the_papers(table))), _causes_table(table))
+    if "idbench" in table.chains:
+        console.print(Text(EXACT))
+
+
+def _model_table(table: Table1, form: str) -> Table:
+    """Return a model's table: truth, what the paper prints, and what every chain gives."""
+    paper, estimates = PAPER.get(form), [found[form] for found in table.estimates.values()]
+    title = f"{form} model" if paper else f"{form} form (power over windows)"
+    grid = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
+    grid.add_column("")
+    sources = (*(("paper's\nTable 1",) if paper else ()), *(f"chain\n{chain}" for chain in table.chains))
+    for heading in ("\ntrue\nX", *(f"{source}\n{what}" for source in sources for what in ("X", "%e"))):
+        grid.add_column(heading, justify="right", no_wrap=True)
+    truth = list(table.truth.values())
+    for i, (name, true) in enumerate(table.truth.items()):
+        printed = (f"{paper.estimate[i]:.3f}", f"{paper.error[i]:.3f}") if paper else ()
+        grid.add_row(name, f"{true:g}", *printed, *(cell for e in estimates for cell in _cells(e, truth, i)))
+    grid.add_section()
+    printed = (f"{paper.condition_number:g}", "") if paper else ()
+    grid.add_row("Cond(W)", "", *printed, *(cell for e in estimates for cell in (f"{e.condition_number:.1f}", "")))
+    printed = (f"{paper.rows}", "") if paper else ()
+    grid.add_row("rows", "", *printed, *(cell for e in estimates for cell in (f"{e.row_count}", "")))
+    return grid
+
+
+def _times_the_papers(table: Table1) -> dict[str, float]:
+    """Return errors as multiples of the paper's own: of friction by chain, and the largest of ZZR1 and of all parameters."""
+    truth, chains = list(table.truth.values()), ("paper", "paper_masked")
+    errors = {chain: {form: table.estimates[chain][form].relative_error_percent(truth) for form in PAPER} for chain in chains}
+    times = np.array([[errors[chain][form] / PAPER[form].error for form in PAPER] for chain in chains])
+    friction = [i for i, name in enumerate(table.truth) if name.startswith("F")]
+    means = np.exp(np.log(times[:, 0, friction]).mean(axis=1))
+    return {"zzr1": float(times[..., 0].max()), "most": float(times.max()), **dict(zip(chains, map(float, means), strict=True))}
+
+
+def _causes_table(table: Table1) -> Table:
+    grid = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    grid.add_column("chain paper with")
+    for form in COMPARED:
+        for what in ("inertia", "friction"):
+            grid.add_column(f"{form}\n{what}", justify="right")
+    for name, worst in causes(table):
+        grid.add_row(name, *(f"{error:.1g}" for w in worst.values() for error in (w.inertia, w.friction)))
+    return grid
+
+
+def _cells(estimate: Estimate, truth: list[float], i: int) -> tuple[str, str]:
+    return f"{estimate.X[i]:.5f}", f"{estimate.relative_error_percent(truth)[i]:.2g}"
+
+
+def markdown(table: Table1) -> str:
+    """Return the errors of every form as a markdown table, from the first chain to the last."""
+    truth, forms = list(table.truth.values()), list(next(iter(table.estimates.values())))
+    found = {form: [estimates[form] for estimates in table.estimates.values()] for form in forms}
+    errors = {form: [e.relative_error_percent(truth) for e in found[form]] for form in forms}
+
+    def row(head: str, cells: Callable[[str], Iterable[str]]) -> str:
+        return f"| {head} | " + " | ".join(" → ".join(cells(form)) for form in forms) + " |"
+
+    return "\n".join(
+        [
+            f"Error [%] in chain **{' → '.join(table.chains)}**\n",
+            f"| | {' | '.join(forms)} |",
+            "|---|" + "---:|" * len(forms),
+            *(
+                row(f"{i + 1} {name} {true:g}", partial(_error_cells, errors, i))
+                for i, (name, true) in enumerate(table.truth.items())
+            ),
+            row("Cond(W)", lambda form: (f"{e.condition_number:.1f}" for e in found[form])),
+            row("rows", lambda form: (f"{e.row_count}" for e in found[form])),
+        ]
+    )
+
+
+def _error_cells(errors: Mapping[str, list[Array]], i: int, form: str) -> Iterable[str]:
+    return (f"{error[i]:.1g}" for error in errors[form])

@@ -1,0 +1,153 @@
+"""Does the paper's experiment (Table 2) come out of a simulated robot, and what made its negative friction?
+
+Expected: processed as the paper did, Fv1 negative and Fs1 inflated in all three models, the two dynamic models equal; aligned
+and masked, all parameters close to a truth that the paper did not have.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from experiments.errors import ExperimentError
+from experiments.identification.identified import Identified
+from experiments.identification.subject import Subject
+from experiments.paper.attribution import attribution
+from identify import CHAINS, Array, TorqueChannel
+from sim.engine.run import Run
+from sim.engine.simulation import Progress, simulate
+from sim.engine.watch import Watch
+from sim.robot.scara import scara_truth
+from sim.scenario.scenario import Scenario
+from sim.scenario.scenario_file import to_dict
+
+SCENARIO = "table2"
+"""The scenario that ships."""
+
+REALIZATIONS: Mapping[str, int] = {"explicit": 2, "implicit": 2, "power": 4}
+"""Realizations of the trajectory that make r = 1600 rows (section 7.3)."""
+
+PROCESSINGS: Mapping[str, tuple[str, str]] = {"paper": ("paper", "OLS"), "idbench": ("idbench", "WLS")}
+"""Chain and estimator: as the paper processed its data, and aligned, masked and weighted."""
+
+
+@dataclass(frozen=True)
+class PaperColumn:
+    """What the paper's Table 2 prints for a model.
+
+    Parameters
+    ----------
+    estimate, two_sigma, relative_sigma_percent : tuple of float
+        Its columns.
+    condition_number : float
+        Cond(W).
+    """
+
+    estimate: tuple[float, ...]
+    two_sigma: tuple[float, ...]
+    relative_sigma_percent: tuple[float, ...]
+    condition_number: float
+
+
+_DYNAMIC = PaperColumn(
+    (3.38, -0.18, 0.59, 0.060, 0.119, 0.001, 0.012, 0.12),
+    (0.025, 0.046, 0.024, 0.002, 0.002, 0.001, 0.007, 0.02),
+    (0.37, 13, 2.1, 2, 0.63, 50, 30, 6.6),
+    37,
+)
+
+PAPER: Mapping[str, PaperColumn] = {
+    "explicit": _DYNAMIC,
+    "implicit": _DYNAMIC,
+    "power": PaperColumn(
+        (3.39, -0.21, 0.61, 0.0633, 0.121, -0.001, 0.012, 0.12),
+        (0.025, 0.04, 0.03, 0.0005, 0.001, 0.001, 0.002, 0.01),
+        (0.37, 8.6, 2.8, 0.4, 0.5, 53, 7, 4),
+        111,
+    ),
+}
+"""Table 2 of the paper."""
+
+PAPER_ROWS = 1600
+"""r of every column of Table 2 (section 7.3)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Table2:
+    """The comparison, computed when it is asked for.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The robot and its motion; realization k has seed + k.
+    progress : callable, optional
+        Hears how much of the simulation is done.
+    watch : Watch, optional
+        Hears what happens in the first realization.
+    """
+
+    scenario: Scenario
+    progress: Progress | None = None
+    watch: Watch | None = None
+
+    def __post_init__(self) -> None:
+        scara_truth(self.scenario.real_robot)
+        held = TorqueChannel("held", self.scenario.timing.delay)
+        for name, _ in PROCESSINGS.values():
+            halo = CHAINS.create(name).halo(self.scenario.fs, held)
+            if halo > self.rest:
+                raise ExperimentError(
+                    f"rest = {self.rest:g} s is shorter than the {halo:.3g} s that chain {name} looks: raise it"
+                )
+
+    @cached_property
+    def run(self) -> Run:
+        """As many realizations as the power model needs."""
+        first = self.scenario.seed
+        seeds = range(first, first + max(REALIZATIONS.values()))
+        return simulate(self.scenario, seeds, progress=self.progress, watch=self.watch)
+
+    @cached_property
+    def truth(self) -> dict[str, float]:
+        """The true parameters."""
+        return scara_truth(self.run.robots[0])
+
+    @cached_property
+    def found(self) -> dict[str, dict[str, Identified]]:
+        """What each processing makes of each model's realizations."""
+        return {name: {model: self._identified(name, model) for model in REALIZATIONS} for name in PROCESSINGS}
+
+    def _identified(self, processing: str, model: str) -> Identified:
+        logs = tuple(self.run.alone(i) for i in range(REALIZATIONS[model]))
+        chain, estimator = PROCESSINGS[processing]
+        return Identified(logs, Subject(self.scenario.robot), self.truth, (model,), chain, estimator, trim=self.rest)
+
+    @property
+    def rest(self) -> float:
+        """Time at rest at either end of a realization, which makes no rows [s]."""
+        return self.scenario.quintic().rest
+
+    @cached_property
+    def attribution(self) -> dict[str, dict[str, Array]]:
+        """Signed error [%] of every parameter by every imperfection alone."""
+        return dict(attribution(self.scenario, self.progress))
+
+    def summary(self) -> dict[str, Any]:
+        """Return summary.json: `models` holds processing `idbench`, `paper_processing` that of the paper."""
+        parts = {name: [one.summary() for one in found.values()] for name, found in self.found.items()}
+        models = {name: {k: v for part in some for k, v in part["models"].items()} for name, some in parts.items()}
+        common = parts["idbench"][0]
+        return {
+            "experiment": "table2",
+            "seed": self.scenario.seed,
+            "scenario": to_dict(self.scenario),
+            **{key: common[key] for key in ("parameters", "truth", "robot", "chain", "estimator", "torque")},
+            "models": models["idbench"],
+            "paper_processing": models["paper"],
+            "attribution_percent": {
+                name: {form: np.round(error, 6).tolist() for form, error in errors.items()}
+                for name, errors in self.attribution.items()
+            },
+        }

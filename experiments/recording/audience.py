@@ -1,0 +1,152 @@
+"""Who watches a run while it goes on: a viewer on this machine, in a browser, or elsewhere."""
+
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from experiments.errors import ExperimentError
+from experiments.recording.viewers import answers, reachable, served, spawned
+
+if TYPE_CHECKING:
+    import rerun as rr
+
+GOODBYE = 10.0
+"""How long a viewer may take to take what is still on its way to it, at the end [s]."""
+
+DEAF = 6
+"""How often in a row a viewer may fail to take what is sent within half a second."""
+
+LEAVING = "idbench-leaving"
+
+Url = Annotated[str | None, tyro.conf.arg(metavar="URL")]
+Times = Annotated[float | None, tyro.conf.arg(metavar="FLOAT")]
+Window = Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="FROM TO")]
+
+
+@dataclass(frozen=True)
+class Watching:
+    """How the command is watched."""
+
+    live: bool = False
+    """Open a rerun viewer and show everything while it is computed."""
+    connect: Url = None
+    """Show it in a viewer that runs already, such as rerun+http://127.0.0.1:9876/proxy."""
+    serve: bool = False
+    """Show it in a browser: serve the web viewer on this machine until Ctrl-C."""
+    port: int = 9090
+    """Port of the web viewer; data go through the port after it."""
+    pace: Times = None
+    """Simulated seconds shown in a second, such as 1.0; as fast as possible without it."""
+    rerun: bool = True
+    """Record; without it rerun is not even loaded."""
+
+    def __post_init__(self) -> None:
+        ways = [name for name, given in (("--live", self.live), ("--connect", self.connect), ("--serve", self.serve)) if given]
+        if len(ways) > 1:
+            raise ExperimentError(f"{' and '.join(ways)} name several viewers: give one")
+        if self.pace is not None and not (0 < self.pace < float("inf")):
+            raise ExperimentError(f"--pace {self.pace:g} must be above 0: 1.0 is real time")
+        if self.pace is not None and not ways:
+            raise ExperimentError(f"--pace {self.pace:g} needs somebody who watches: add --live, --serve or --connect URL")
+        if not 0 < self.port < 65535:
+            raise ExperimentError(f"--port {self.port} must be between 1 and 65534; data go through the port after it")
+        if ways and not self.rerun:
+            raise ExperimentError(f"{ways[0]} and --no-rerun contradict each other: give one")
+
+    def hint(self, out: Path) -> str:
+        """Return how to see what was written to `out`."""
+        return f"; see it: uv run idbench view {out}" if self.rerun else ""
+
+    @contextmanager
+    def audience(self) -> Iterator["Audience | None"]:
+        """Give who watches, if anybody does; a web viewer is served until Ctrl-C once the block is done.
+
+        Raises
+        ------
+        ExperimentError
+            If no viewer can be started or reached.
+        """
+        if self.connect:
+            yield Audience(reachable(self.connect), self.pace)
+        elif self.live:
+            yield Audience(spawned(), self.pace)
+        elif self.serve:
+            with served(self.port) as url:
+                yield Audience(url, self.pace)
+                _until_interrupted()
+        else:
+            yield None
+
+
+Watched = Annotated[Watching, tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes]
+"""The same options for every command."""
+
+
+class Audience:
+    """A viewer that watches; when it goes, that is said once, and the work goes on.
+
+    Parameters
+    ----------
+    url : str
+        Where it listens.
+    pace : float, optional
+        Simulated seconds in a second.
+    """
+
+    def __init__(self, url: str, pace: float | None = None) -> None:
+        self.url, self.pace, self.watching, self._start = url, pace, True, time.perf_counter()
+        self._deaf = 0
+
+    @property
+    def every(self) -> float:
+        """How much simulated time is shown at once [s]: a tenth of a second as it passes, 0.1 to 1 s."""
+        return 1.0 if self.pace is None else min(1.0, max(0.1, 0.1 * self.pace))
+
+    def begin(self) -> None:
+        """Start the clock by which the pace is kept."""
+        self._start = time.perf_counter()
+
+    def reached(self, recording: "rr.RecordingStream", seconds: float | None) -> bool:
+        """Hand on what was sent; wait until `seconds` of simulated time are due; return whether the viewer still watches."""
+        if not self.watching:
+            return False
+        try:
+            recording.flush(timeout_sec=0.5 if seconds is not None else GOODBYE)
+            self._deaf = 0
+        except RuntimeError:  # rerun tells a slow viewer and one that has gone apart in words alone
+            self._deaf += 1
+            gone = not answers(self.url)
+            self.watching = not gone and self._deaf < DEAF and seconds is not None
+            if not self.watching:
+                why = "has gone" if gone else "takes nothing"
+                sys.stderr.write(f"idbench: the viewer at {self.url} {why}; the work goes on without it\n")
+        if self.watching and self.pace and seconds is not None:
+            time.sleep(max(0.0, self._start + seconds / self.pace - time.perf_counter()))
+        return self.watching
+
+    def leave(self, recording: "rr.RecordingStream") -> None:
+        """Take leave of the viewer; one that hangs is left behind, with the thread that waits for it."""
+        thread = threading.Thread(target=recording.disconnect, name=LEAVING, daemon=True)
+        thread.start()
+        thread.join(GOODBYE)
+
+
+def left_behind() -> bool:
+    """Return whether something still waits for a viewer that hangs, which would keep the process from ending."""
+    return any(thread.name == LEAVING for thread in threading.enumerate())
+
+
+def _until_interrupted() -> None:
+    sys.stderr.write("idbench: done; served until Ctrl-C\n")
+    try:
+        while True:
+            time.sleep(3600)
+    except KeyboardInterrupt:
+        sys.stderr.write("\n")

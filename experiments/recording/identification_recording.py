@@ -1,0 +1,118 @@
+"""The recordings of a run and of a log: a base, a layer inside the loop, and a layer for each identification."""
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+
+from rerun.chunk import RrdReader
+
+from experiments.errors import ResultsError
+from experiments.identification.identified import Identified
+from experiments.identification.scenario_run import ScenarioRun
+from experiments.recording.audience import Audience
+from experiments.recording.folder import BASE, INNER, files, known, layer_file, rearranged
+from experiments.recording.identification_layer import Layer
+from experiments.recording.motion_layer import Base
+from experiments.recording.stream import Stream
+from experiments.recording.texts import about
+from identify import measured_state
+from identify.rows.pieces import is_long
+from sim.engine.run import Run
+from sim.engine.watch import Watch
+from sim.scenario.scenario import Scenario
+from sim.scenario.scenario_file import to_toml
+
+ROLES = ("true", "planned", "measured")
+
+UNWATCHED = 10.0
+"""Length of the stretches of a run that nobody watches [s]: what is not recorded yet takes memory."""
+
+
+class RunRecording:
+    """The recording of a scenario, which grows while it is simulated.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is simulated.
+    audience : Audience, optional
+        Who watches.
+    window : tuple of float, optional
+        From when to when signals inside the loop are shown at their full rate [s].
+    """
+
+    def __init__(self, scenario: Scenario, audience: Audience | None = None, window: tuple[float, float] | None = None) -> None:
+        self._audience, written = audience, to_toml(scenario)
+        self.base = Base(recording_id(scenario.name, written.encode()), scenario.real_robot, scenario.fs, ROLES, audience)
+        self.base.stream.describe(scenario=written, seed=str(scenario.seed), fs_hz=f"{scenario.fs:g}")
+        if audience:  # so that the view holds the whole motion from the beginning
+            self.base.foretell(scenario.trajectory.sample(scenario.real_robot, scenario.fs).q)
+        self.watch = Watch(self.base.stretch, audience.every if audience else UNWATCHED, window)
+
+    def end(self, run: Run) -> list[tuple[str, Stream]]:
+        """Add what only the end of a simulation tells; return the streams by the name of their file."""
+        self.base.end(run.alone(), run.q[0])
+        return [(BASE, self.base.stream), *([(INNER, self.base.inner)] if self.base.inner else [])]
+
+    def finish(self, ran: ScenarioRun) -> list[tuple[str, Stream]]:
+        """Add what only the end tells, and the identification; return the streams by the name of their file."""
+        streams = self.end(ran.run)
+        self.base.finish(about(ran.scenario.name, ran.scenario.origin, ROLES))
+        if is_long([ran.run.alone()]):  # of which no rows are kept
+            return streams
+        there = set().union(*(stream.paths for _, stream in streams))
+        return [*streams, layer(self.base.stream.name, ran.identified, ran.run.robots[0].joints, there, self._audience)]
+
+
+def record_log(found: Identified, audience: Audience | None = None) -> list[tuple[str, Stream]]:
+    """Return the streams of an identified log's recording, by the name of their file."""
+    log, robot = found.logs[0], found.subject.robot
+    base = Base(recording_id("log", log.q.tobytes() + log.tau.tobytes()), robot, log.fs, ("measured",), audience)
+    channel = log.torque
+    base.stream.describe(fs_hz=f"{log.fs:g}", torque=channel.meaning, torque_delay_s=f"{channel.delay:g}")
+    base.replay(log, {}, measured_state(log, found.processing).qd.T)
+    base.end(log, log.q)
+    base.finish(about("log", "", ("measured",)))
+    return [(BASE, base.stream), layer(base.stream.name, found, robot.joints, base.stream.paths, audience)]
+
+
+def add_layer(folder: Path, found: Identified, audience: Audience | None = None) -> list[tuple[str, Stream]]:
+    """Return the streams of the layers of the recording in a results folder, that of an identification first.
+
+    The layers that are there already come anew with it, to lay out the new one beside them.
+
+    Raises
+    ------
+    ResultsError
+        If there is no recording, or it cannot be read or written.
+    """
+    others = [path for path in files(folder) if path.name != layer_file(found.label)]
+    if not (folder / BASE).is_file():
+        raise ResultsError(f"there is no {BASE} in {folder} to add a layer to: give --out for a recording of its own")
+    name, there = known(others)
+    if audience:
+        show(name, others, audience)
+    made = layer(name, found, found.subject.robot.joints, there, audience)
+    return [made, *rearranged(others, made[1])]
+
+
+def show(name: str, paths: Sequence[Path], audience: Audience) -> None:
+    """Send the files of a recording to who watches."""
+    stream = Stream(name, audience)
+    for path in reversed(paths):
+        stream.copy(RrdReader(path))
+    stream.close()
+
+
+def layer(
+    name: str, found: Identified, joints: Sequence[str], there: set[str], audience: Audience | None = None
+) -> tuple[str, Stream]:
+    """Return the stream of an identification's layer, and the name of its file."""
+    made = Layer(name, found, joints, there, audience)
+    made.send()
+    return layer_file(found.label), made.stream
+
+
+def recording_id(name: str, content: bytes) -> str:
+    """Return a name and what tells its content from others: recordings of one id are shown as one."""
+    return f"{name}-{hashlib.sha256(content).hexdigest()[:10]}"

@@ -1,0 +1,162 @@
+"""The base of a recording: a motion, what was planned, measured and true, and what the drives did."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import rerun as rr
+
+from experiments.recording.arm import Arm
+from experiments.recording.audience import Audience
+from experiments.recording.columns import Times, part, seconds, time_columns
+from experiments.recording.lanes import Lanes, joint_states
+from experiments.recording.layouts import tabs
+from experiments.recording.stream import Stream
+from experiments.recording.style import WIDTHS, kind_colors
+from identify import Array, MotionLog
+from sim.engine.watch import Inner, Stretch
+from sim.robot.robot import Robot
+
+LOGGED = {"q/measured", "torque/log"}
+"""What a robot would log: numbered by samples, too, which takes room."""
+
+ELECTRIC = ("reference", "current", "voltage", "duty")
+"""Signals of a drive."""
+
+
+class Base:
+    """A recording that grows with the motion that it shows.
+
+    Parameters
+    ----------
+    name : str
+        Recording id.
+    robot : Robot
+        What moves.
+    fs : float
+        Sampling frequency [Hz].
+    roles : tuple of str
+        Arms that are drawn, of `arm.ROLES`.
+    audience : Audience, optional
+        Who watches.
+    """
+
+    def __init__(self, name: str, robot: Robot, fs: float, roles: tuple[str, ...], audience: Audience | None = None) -> None:
+        self.stream, self._audience = Stream(name, audience), audience
+        self.inner: Stream | None = None
+        self._shown = 0
+        self._joints, self._fs, self._roles = [part(joint) for joint in robot.joints], fs, roles
+        self._arm, self._lanes = Arm(self.stream, robot, roles), Lanes(self.stream, fs)
+        self._before, self._turning = (np.empty(0), np.empty((0, robot.n))), np.zeros(robot.n)
+        if audience:
+            audience.begin()
+
+    def stretch(self, stretch: Stretch) -> None:
+        """Send a stretch of a simulation, as it is heard from it."""
+        signals, t = _signals(stretch), (stretch.first + np.arange(len(stretch.q))) / self._fs
+        if stretch.electric is not None:
+            signals |= {f"drive/{name}": getattr(stretch.electric, name) for name in ELECTRIC}
+        self._accelerate(t, stretch.qd)
+        if stretch.inner is not None:
+            self.inside(stretch.inner)
+        poses = {"true": stretch.q, "planned": stretch.reference.q, "measured": stretch.measured}
+        limited = stretch.electric.limited if stretch.electric else None
+        self.add(stretch.first, signals, {role: poses[role] for role in self._roles}, stretch.qd, limited)
+
+    def add(
+        self, first: int, signals: Mapping[str, Array], poses: Mapping[str, Array], qd: Array, limited: Array | None = None
+    ) -> None:
+        """Send what happened from sample `first` on.
+
+        Parameters
+        ----------
+        first : int
+            Number of the first sample.
+        signals, poses : mapping of str to Array, shape (time, joint)
+            Curves by their path, and positions [rad] of the arms by their role.
+        qd : Array, shape (time, joint)
+            Velocities [rad/s] by which joints are said to stand.
+        limited : Array, shape (time, joint), optional
+            Share of each sample for which a drive was at a limit of its.
+        """
+        t = (first + np.arange(len(qd))) / self._fs
+        times = time_columns(t, self._fs)
+        for path, values in signals.items():
+            self._curves(self.stream, path, times if path in LOGGED else times[:1], values)
+        self._arm.move(times[:1], poses)
+        for j, joint in enumerate(self._joints):
+            states = joint_states(qd[:, j], None if limited is None else limited[:, j], self._turning[j])
+            self._lanes.send(f"state/{joint}", t, states)
+        self._turning = qd[-1]
+        if self._audience and self._shown != len(self._paths):
+            self._shown = len(self._paths)
+            self.stream.show(tabs(self._paths))
+        self.stream.breathe(float(t[-1]))
+
+    def replay(self, log: MotionLog, signals: Mapping[str, Array], qd: Array) -> None:
+        """Send a log and what else is known of it, as fast as the audience wants to see it."""
+        every = self._audience.every if self._audience else log.samples / log.fs
+        step, all_signals = max(1, round(every * log.fs)), {"q/measured": log.q, "torque/log": log.tau, **signals}
+        for first in range(0, log.samples, step):
+            now = slice(first, first + step)
+            self.add(first, {p: x[now] for p, x in all_signals.items()}, dict.fromkeys(self._roles, log.q[now]), qd[now])
+
+    def foretell(self, q: Array) -> None:
+        """Draw the way of the tool along planned positions [rad], shape (time, joint), before anything moves."""
+        self._arm.trace(q)
+
+    def end(self, log: MotionLog, q: Array) -> None:
+        """Send what only the end tells: the torque that was logged, and the way of the tool along `q` [rad]."""
+        if "torque/log" not in self.stream.paths:
+            self._curves(self.stream, "torque/log", time_columns(log.t, log.fs), log.tau)
+        self._arm.trace(q)
+
+    def finish(self, text: str) -> None:
+        """Send a text about it all, and the layout."""
+        self.stream.keep("about", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+        self.stream.arrange(tabs(self._paths))
+
+    @property
+    def _paths(self) -> set[str]:
+        return self.stream.paths | (self.inner.paths if self.inner else set())
+
+    def _curves(self, stream: Stream, path: str, times: Times, values: Array) -> None:
+        if path not in stream.paths:
+            kind, colors = path.rsplit("/", 1)[-1], len(self._joints)
+            names = [f"{kind} {joint}" for joint in self._joints]
+            stream.style(path, names, kind_colors(kind, colors), WIDTHS.get(kind, 1.5))
+        stream.curves(path, times, values)
+
+    def _accelerate(self, t: Array, qd: Array) -> None:
+        """Send the mean acceleration from sample to sample, in the middle between them."""
+        t, qd = np.concatenate([self._before[0], t]), np.concatenate([self._before[1], qd])
+        self._before = t[-1:], qd[-1:]
+        if len(t) > 1:
+            middle = [seconds((t[1:] + t[:-1]) / 2)]
+            self._curves(self.stream, "qdd/true", middle, np.diff(qd, axis=0) * self._fs)
+
+    def inside(self, inner: Inner) -> None:
+        """Send signals inside the loop, in a layer of their own."""
+        if self.inner is None:
+            self.inner = Stream(self.stream.name, self._audience, layer=True)
+        times = [seconds(inner.t)]
+        for name in ELECTRIC:
+            self._curves(self.inner, f"inner/{name}", times, getattr(inner.electric, name))
+        self._curves(self.inner, "inner/torque", times, inner.tau)
+
+
+def _signals(stretch: Stretch) -> dict[str, Array]:
+    """Return the curves of a stretch, by path."""
+    planned = stretch.reference
+    return {
+        "q/planned": planned.q,
+        "q/true": stretch.q,
+        "q/measured": stretch.measured,
+        "qd/planned": planned.qd,
+        "qd/true": stretch.qd,
+        "qdd/planned": planned.qdd,
+        "error/tracking": planned.q - stretch.q,
+        "error/encoder": stretch.measured - stretch.q,
+        "torque/command": stretch.command,
+        "torque/true": stretch.tau,
+        "torque/disturbance": stretch.tau - stretch.command,
+    }

@@ -1,0 +1,28 @@
+"""The recording of Table 1: the motion, and a layer for each chain."""
+
+from experiments.identification.identified import Identified
+from experiments.paper.table1 import Table1
+from experiments.paper.table1_text import markdown
+from experiments.recording.audience import Audience
+from experiments.recording.folder import BASE
+from experiments.recording.identification_recording import layer, recording_id
+from experiments.recording.motion_layer import Base
+from experiments.recording.stream import Stream
+from sim.scenario.scenario_file import to_toml
+
+
+def record_table1(table: Table1, audience: Audience | None = None) -> list[tuple[str, Stream]]:
+    """Return the streams of the recording of `table`, by the name of their file."""
+    log, reference, scenario = table.log, table.reference, table.scenario
+    base = Base(recording_id(scenario.name, to_toml(scenario).encode()), table.robot, log.fs, ("measured",), audience)
+    base.stream.describe(scenario=to_toml(scenario), seed=str(scenario.seed), fs_hz=f"{log.fs:g}")
+    planned = {"q/planned": reference.q, "qd/planned": reference.qd, "qdd/planned": reference.qdd}
+    base.replay(log, planned, reference.qd)
+    base.end(log, log.q)
+    base.finish(markdown(table))
+    streams = [(BASE, base.stream)]
+    for chain in table.chains:
+        found = Identified((log,), truth=table.truth, chain=chain, estimator="OLS", trim=scenario.quintic().rest)
+        known = set().union(*(stream.paths for _, stream in streams))
+        streams.append(layer(base.stream.name, found, table.robot.joints, known, audience))
+    return streams

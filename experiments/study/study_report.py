@@ -1,0 +1,116 @@
+"""The report of a study: one HTML file that needs no other."""
+
+from collections.abc import Iterator, Sequence
+from importlib.resources import files
+from pathlib import Path
+from shlex import quote
+from typing import Any
+
+import numpy as np
+import tomli_w
+from jinja2 import Environment
+
+from experiments.study.answer import answer, grouped, method, percent, short, value, where
+from experiments.study.axis import Axis
+from experiments.study.comparison import differences
+from experiments.study.figures import cost_figure, coverage_figure, error_figure
+from experiments.study.statistics import Cell
+from experiments.study.study import Study
+from experiments.study.versions import versions
+from experiments.text import percent as signed
+
+WORST = 10
+"""Runs that are listed as the worst."""
+
+
+def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folder: Path) -> str:
+    """Return the page: question, answer, tables, figures, and how to make it again."""
+    template = Environment(autoescape=True, trim_blocks=True).from_string(
+        files("experiments.study").joinpath("report.html.j2").read_text(encoding="utf-8")
+    )
+    solved = [cell for cell in cells if cell.runs]
+    return template.render(
+        study=study,
+        methods=len(study.methods),
+        answer=answer(cells),
+        axes=[short(name) for name in cells[0].settings],
+        overview=[_overview(cell) for cell in cells],
+        families=[_family(title, group, main_axis(study)) for title, group in families(study, solved)],
+        differences=list(_differences(solved)),
+        details=[row for cell in solved for row in _details(cell, where(cell, cells))],
+        failed=[
+            (where(c, cells), len(runs), f"{reason} (run {runs[0]})") for c in cells for reason, runs in c.failures.items()
+        ],
+        worst=[
+            (where(c, cells), name, signed(100 * e), command(study, folder, c, run)) for c, name, e, run in worst_runs(solved)
+        ],
+        cost=cost_figure(seconds, study.size),
+        versions=versions(),
+        toml=tomli_w.dumps(study.content),
+    )
+
+
+def main_axis(study: Study) -> Axis:
+    """Return the axis with the most values: figures are drawn against it."""
+    return max(study.axes, key=lambda axis: len(axis.points))
+
+
+def families(study: Study, cells: Sequence[Cell]) -> Iterator[tuple[str, list[Cell]]]:
+    """Yield the cells that differ only in the main axis and the model, with what they have in common."""
+    main, groups = main_axis(study).field, dict[str, list[Cell]]()
+    for cell in cells:
+        fixed = [f"{short(name)} {value(x)}" for name, x in cell.settings.items() if name != main]
+        groups.setdefault(", ".join([*fixed, f"chain {cell.names[0]}", cell.names[1]]), []).append(cell)
+    yield from groups.items()
+
+
+def worst_runs(cells: Sequence[Cell]) -> list[tuple[Cell, str, float, int]]:
+    """Return the identifications with the largest relative errors: cell, parameter, error, run; one a run."""
+    found = []
+    for cell in cells:
+        p = np.nan_to_num(np.abs(cell.error)).argmax(axis=1)
+        found += [(cell, cell.parameters[j], float(cell.error[i, j]), int(cell.run[i])) for i, j in enumerate(p)]
+    worst: dict[int, tuple[Cell, str, float, int]] = {}
+    for entry in sorted(found, key=lambda entry: -abs(entry[2])):
+        worst.setdefault(entry[3], entry)
+    return list(worst.values())[:WORST]
+
+
+def command(study: Study, folder: Path, cell: Cell, run: int) -> str:
+    """Return what makes a run again, identified as in a cell."""
+    number = next(i for i, found in enumerate(study.methods) if found.names == cell.names[:2] and found.fits(cell.settings))
+    chosen = f" --method {number}" if number else ""
+    return f"uv run idbench run --from {quote(str(folder))} --index {run}{chosen}"
+
+
+def _family(title: str, cells: Sequence[Cell], axis: Axis) -> dict[str, Any]:
+    figures = {"error": error_figure(cells, axis), "coverage": coverage_figure(cells, axis)}
+    return {"title": title, **figures}
+
+
+def _overview(cell: Cell) -> list[str]:
+    settings = [value(x) for x in cell.settings.values()]
+    head = [*settings, *cell.names, f"{cell.runs}", f"{cell.failed or ''}"]
+    if not cell.runs:
+        return [*head, *[""] * 4]
+    worst = int(np.nan_to_num(cell.rmse).argmax())
+    shares = []
+    for sigma in (cell.sigma, cell.paper_sigma):
+        share = 100 * cell.coverage(sigma)
+        shares.append(f"{share.mean():.0f} % ({share.min():.0f} to {share.max():.0f})" if np.isfinite(share).all() else "")
+    return [*head, percent(cell.typical), f"{percent(cell.rmse[worst])} {cell.parameters[worst]}", *shares]
+
+
+def _details(cell: Cell, title: str) -> Iterator[list[str]]:
+    interval, corrected, paper = cell.coverage_interval(cell.sigma), cell.coverage(cell.sigma), cell.coverage(cell.paper_sigma)
+    for p, name in enumerate(cell.parameters):
+        bias = f"{signed(100 * cell.bias[p])} ± {100 * cell.bias_margin[p]:.2g}"
+        share = f"{100 * corrected[p]:.1f} ({100 * interval[p, 0]:.0f} to {100 * interval[p, 1]:.0f})"
+        spread = f"{100 * cell.deviation[p]:.3g}", f"{100 * cell.rmse[p]:.3g}"
+        yield [title, name, bias, *spread, share, f"{100 * paper[p]:.1f}"]
+
+
+def _differences(cells: Sequence[Cell]) -> Iterator[list[str]]:
+    for title, group in grouped(cells).items():
+        for d in differences(group):
+            yield [title, method(d.better, cells), method(d.worse, cells), f"{d.ratio:.3g}", f"{d.p:.1g}", f"{d.runs}"]

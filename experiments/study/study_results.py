@@ -1,0 +1,98 @@
+"""What a finished study leaves: a summary, a report and a recording beside its shards."""
+
+from collections import Counter
+from collections.abc import Sequence
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.text import Text
+
+from experiments.errors import ResultsError
+from experiments.identification.results import beside, tell_of, write_recording, write_summary
+from experiments.study.answer import answer, method, percent, short, value
+from experiments.study.shard_file import arrays
+from experiments.study.statistics import Cell, cells
+from experiments.study.store import Store
+from experiments.study.study_report import report
+from experiments.study.versions import versions
+from experiments.text import new_table
+
+MOST_REASONS = 3
+"""Reasons of failures that are printed; the report has all."""
+
+if TYPE_CHECKING:
+    from experiments.recording.study_recording import StudyRecording
+
+
+def write_results(page: Console, store: Store, recording: "StudyRecording | None") -> list[Cell]:
+    """Write summary.json, report.html and the recording into the folder of a study, and print its answer."""
+    study, seconds = store.study, store.seconds()
+    found = cells(arrays(store.table()), study.varied, study.parameters)
+    with beside(store.folder) as folder:
+        (folder / "report.html").write_text(report(study, found, seconds, store.folder), encoding="utf-8")
+        write_summary(folder / "summary.json", _summary(store, found, seconds))
+        lost = write_recording(folder, recording.finish(found)) if recording else ""
+    _print(page, store, found)
+    tell_of(lost, store.folder)
+    if not any(cell.runs for cell in found):
+        raise ResultsError(f"no run of study {study.name} gave an estimate: {_reasons(found)[0]}")
+    return found
+
+
+def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:
+    axes = [short(field) for field in store.study.varied]
+    grid = new_table(store.study.question, [*axes[1:], "identified by", "runs", "failed", "typical error", "within 2 sigma"])
+    for cell in found:
+        settings = [value(x) for x in cell.settings.values()]
+        numbers = f"{cell.runs}", f"{cell.failed or ''}"
+        judged = (percent(cell.typical), f"{100 * cell.coverage(cell.sigma).mean():.0f} %") if cell.runs else ("", "")
+        grid.add_row(*settings, method(cell, found), *numbers, *judged)
+    grid.columns[0].header = axes[0]
+    page.print(grid)
+    page.print(Text(answer(found)))
+    for reason in _reasons(found)[:MOST_REASONS]:
+        page.print(Text(f"failed: {reason}"), soft_wrap=True)
+    page.print(Text(f"\nwritten to {store.folder}: open {store.folder / 'report.html'}"), soft_wrap=True)
+
+
+def _reasons(found: Sequence[Cell]) -> list[str]:
+    """Return why runs failed, the most frequent reason first."""
+    counts: Counter[str] = Counter()
+    for cell in found:
+        counts.update({reason: len(runs) for reason, runs in cell.failures.items()})
+    return [f"{count} times: {reason}" for reason, count in counts.most_common()]
+
+
+def _summary(store: Store, found: Sequence[Cell], seconds: dict[str, float]) -> dict[str, Any]:
+    return {
+        "experiment": "study",
+        "versions": versions(),
+        "seed": store.study.seed,
+        "study": store.study.content,
+        "scenario": store.study.scenario,
+        "answer": answer(found),
+        "parameters": list(store.study.parameters),
+        "cells": [_cell(cell) for cell in found],
+        "seconds": {**seconds, "runs": store.study.size},
+    }
+
+
+def _cell(cell: Cell) -> dict[str, Any]:
+    chain, estimator, model = cell.names
+    said: dict[str, Any] = {"settings": dict(cell.settings), "chain": chain, "estimator": estimator, "model": model}
+    said |= {"runs": cell.runs, "failures": {reason: len(runs) for reason, runs in cell.failures.items()}}
+    if cell.runs:
+        numbers = {
+            "truth": cell.truth.mean(axis=0),
+            "bias_percent": 100 * cell.bias,
+            "bias_margin_percent": 100 * cell.bias_margin,
+            "deviation_percent": 100 * cell.deviation,
+            "rmse_percent": 100 * cell.rmse,
+            "coverage": cell.coverage(cell.sigma),
+            "coverage_low": cell.coverage_interval(cell.sigma)[:, 0],
+            "coverage_high": cell.coverage_interval(cell.sigma)[:, 1],
+            "paper_coverage": cell.coverage(cell.paper_sigma),
+        }
+        said |= {name: [float(x) if isfinite(x) else None for x in values] for name, values in numbers.items()}
+    return said

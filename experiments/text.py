@@ -1,0 +1,46 @@
+"""Tables and numbers as text."""
+
+from collections.abc import Iterable
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+WORTHLESS = 999.0
+"""Percentages from here on all say the same."""
+
+
+def new_table(title: str, columns: Iterable[str]) -> Table:
+    """Return an empty table, its first column of names, the others of numbers."""
+    grid = Table(
+        title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0)
+    )
+    grid.add_column("", no_wrap=True)
+    for heading in columns:
+        grid.add_column(heading, justify="right", no_wrap=True)
+    return grid
+
+
+def print_titled(console: Console, title: str, grid: Table) -> None:
+    """Print a table below a title that may be wider than it."""
+    console.print(Text(title, style="bold"), soft_wrap=True)
+    console.print(grid)
+
+
+def number(x: float) -> str:
+    """Return a number to five digits, a small one to three."""
+    return f"{x:#.5g}" if abs(x) >= 1e-3 or x == 0 else f"{x:.2e}"
+
+
+def percent(share: float) -> str:
+    """Return a signed percentage to two decimals, to none from a hundred on, to one digit below a hundredth."""
+    size = abs(share)
+    if size >= WORTHLESS:
+        return f"{'-' if share < 0 else ''}>{WORTHLESS:g}"
+    return f"{share:+.0f}" if size >= 100 else f"{share:+.2f}" if size >= 0.01 else f"{share:+.0e}" if size else "0"
+
+
+def percentage(x: float) -> str:
+    """Return a percentage without a sign, to two digits; empty if it is not known."""
+    return f"{x:.2g}" if x < WORTHLESS else f">{WORTHLESS:g}" if x >= WORTHLESS else ""

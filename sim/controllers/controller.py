@@ -1,0 +1,88 @@
+"""What a controller is: a law that turns sampled positions into commanded torques, for many simulations at once."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.robot.inverse_dynamics import InverseDynamics, inverse_dynamics
+from sim.robot.motors import Array
+from sim.robot.robot import Robot
+from sim.trajectories import Reference
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What a controller knows when it starts.
+
+    Parameters
+    ----------
+    nominal : Robot
+        The robot as its maker describes it: without payload, with the friction of its MJCF.
+    reference : Reference
+        The planned motion at the sample rate, of all simulations or of each.
+    nsim : int
+        Number of simulations.
+    """
+
+    nominal: Robot
+    reference: Reference
+    nsim: int
+
+    @property
+    def inertia(self) -> Array:
+        """Inertia that each joint's motor sees when the motion starts [kg m^2], shape (1 or nsim, joint)."""
+        at = np.atleast_2d(self.reference.q[0])
+        model = InverseDynamics(self.nominal, len(at))
+        model(at, np.zeros_like(at), np.zeros_like(at))
+        return model.inertia().copy()
+
+    @property
+    def feedforward(self) -> Array:
+        """Torque of the nominal robot along the planned motion, without Coulomb friction [N m], shape as the motion's."""
+        q, qd, qdd = (x.reshape(-1, self.nominal.n) for x in (self.reference.q, self.reference.qd, self.reference.qdd))
+        return inverse_dynamics(self.nominal, q, qd, qdd).reshape(self.reference.q.shape)
+
+
+class AbstractLaw(ABC):
+    """A controller at work; what it remembers between samples is of shape (nsim, joint)."""
+
+    @abstractmethod
+    def command(self, k: int, q: Array) -> Array:
+        """Return the torques [N m], shape (nsim, joint), for the positions `q` [rad] of sample `k`; asked once a sample."""
+
+
+class AbstractController(ABC):
+    """The settings of a control law."""
+
+    @abstractmethod
+    def start(self, task: Task) -> AbstractLaw:
+        """Return the law at the start of a motion."""
+
+
+class Error:
+    """Control error e = q_ref - q and its low-passed difference quotient.
+
+    Parameters
+    ----------
+    reference : Reference
+        The planned motion.
+    nsim : int
+        Number of simulations.
+    cutoff : float
+        Of the first-order low-pass on the difference quotient [Hz].
+    """
+
+    def __init__(self, reference: Reference, nsim: int, cutoff: float) -> None:
+        self._reference = reference
+        self._share = 1 - np.exp(-2 * np.pi * cutoff / reference.fs)
+        self._before: Array | None = None
+        self._rate = np.zeros((nsim, reference.q.shape[-1]))
+
+    def update(self, k: int, q: Array) -> tuple[Array, Array]:
+        """Return e [rad] and its rate [rad/s] at sample `k`."""
+        e = self._reference.q[k] - q
+        if self._before is not None:
+            self._rate = self._rate + self._share * ((e - self._before) * self._reference.fs - self._rate)
+        self._before = e
+        return e, self._rate

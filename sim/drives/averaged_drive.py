@@ -1,0 +1,102 @@
+"""A current-controlled DC motor, its chopper averaged away."""
+
+from typing import final
+
+import numpy as np
+
+from sim.drives.drive import AbstractAmplifier, AbstractDrive, Trace, every
+from sim.drives.electric import Electric
+from sim.errors import ScenarioError
+from sim.robot.motors import Array, Motors
+from sim.robot.robot import Robot
+from sim.settings import EachPositiveOrNone, Positive, per_joint, settings
+
+Limit = EachPositiveOrNone
+
+
+def limits(robot: Robot, voltage: Limit, current: Limit) -> tuple[Array, Array]:
+    """Return the bus voltage [V] and largest current [A] of every joint: a setting, or what the motors have, if less."""
+    motors, n, unlimited = robot.motors, robot.n, (np.inf,)
+    V = np.minimum(motors.V, per_joint(voltage or unlimited, n, "drive.bus_voltage"))
+    return V, np.minimum(motors.I, per_joint(current or unlimited, n, "drive.current_limit"))
+
+
+@final
+@settings
+class AveragedDrive(AbstractDrive):
+    """Current-controlled DC motor: winding, bus voltage and current limit; the current loop is of first order.
+
+    L di/dt = v - R i - K qd with v = R i + L w (i_ref - i) + K qd as long as that is within the bus voltage: a PI controller
+    whose zero cancels the winding's pole, and that knows the back-EMF. The equation is solved exactly for the speed in the
+    middle of a stretch: the first physics step of a command, and the rest of its period.
+    """
+
+    bandwidth: Positive = 1000.0
+    """Bandwidth of the current loop, w / (2 pi) [Hz]."""
+    bus_voltage: EachPositiveOrNone = None
+    """Bus voltage [V], of all joints or of each; without it, or where the robot's motors have less, theirs holds."""
+    current_limit: EachPositiveOrNone = None
+    """Largest current [A], of all joints or of each; without it, or where the robot's motors have less, theirs holds."""
+
+    def start(self, robot: Robot, nsim: int, h: float) -> AbstractAmplifier:
+        """Return the drive without current."""
+        V, I = limits(robot, self.bus_voltage, self.current_limit)  # noqa: E741
+        return _Amplifier(robot.motors, 2 * np.pi * self.bandwidth, V, I, nsim, h)
+
+    def lag(self, robot: Robot) -> Array:
+        """Return 1 / w."""
+        return np.full(robot.n, 1 / (2 * np.pi * self.bandwidth))
+
+    @property
+    def steady(self) -> bool:
+        """True."""
+        return True
+
+
+class _Amplifier(AbstractAmplifier):
+    """i follows the loop with rate w; where that needs more than the bus voltage, the winding's own rate R/L comes first."""
+
+    def __init__(self, motors: Motors, w: float, V: Array, I: Array, nsim: int, h: float) -> None:  # noqa: E741
+        if (w * motors.L <= motors.R).any():
+            raise ScenarioError(
+                f"drive.bandwidth = {w / 2 / np.pi:g} Hz must be above that of the bare winding, "
+                f"{(motors.R / motors.L / 2 / np.pi).max():.3g} Hz"
+            )
+        self._w, self._h = w, h
+        self._R, self._L, self._K, self._V, self._I = (every(x, nsim) for x in (motors.R, motors.L, motors.K, V, I))
+        self._i = np.zeros(self._R.shape)
+
+    def step(self, demand: Array, speed: Array, steps: int) -> Array:
+        dt, e, i0 = steps * self._h, self._K * speed[len(speed) // 2], self._i
+        limited = np.minimum(np.maximum(demand / self._K, -self._I), self._I)
+        target = np.minimum(np.maximum(limited, (-self._V - e) / self._R), (self._V - e) / self._R)
+        asked = self._R * i0 + self._L * self._w * (target - i0) + e
+        saturated = np.abs(asked) > self._V
+        if saturated.any():
+            v = np.copysign(self._V, asked)
+            t = np.where(saturated, np.minimum(self._release(v, target, e), dt), 0.0)
+            end = (v - e) / self._R
+            i1 = np.where(saturated, end + (i0 - end) * np.exp(-t * self._R / self._L), i0)
+            charge = np.where(saturated, end * t - (i1 - i0) * self._L / self._R, 0.0)
+        else:
+            t, i1, charge = np.zeros(1), i0, np.zeros(1)
+        away, rest = i1 - target, dt - t
+        self._i = target + away * np.exp(-self._w * rest)
+        current = (charge + target * rest - away * (np.expm1(-self._w * rest) / self._w)) / dt
+        self.trace = demand, limited, current, i0, self._i, e, saturated
+        return (self._K * current)[None]
+
+    def electric(self, trace: Trace, dt: Array) -> Electric:
+        demand, reference, current, i0, i1, e, saturated = trace
+        R, L, K, V, most = (x[0] for x in (self._R, self._L, self._K, self._V, self._I))
+        voltage = R * current + L * (i1 - i0) / dt + e
+        limited = np.maximum(saturated, np.abs(demand) > most * K)
+        duty = np.where(np.isfinite(V), voltage / V, np.nan)  # a share of a bus that has no end is none
+        return Electric(reference, current, voltage, duty, limited)
+
+    def _release(self, v: Array, target: Array, e: Array) -> Array:
+        """Return how long [s] the loop asks for more than the voltage `v`, which is all there is."""
+        R, L, w = self._R, self._L, self._w
+        end, released = (v - e) / R, (v - e - L * w * target) / (R - L * w)  # currents far later, and when it asks for v
+        share = (released - end) / np.where(self._i == end, 1.0, self._i - end)
+        return -np.log(np.minimum(np.maximum(share, 1e-300), 1.0)) * L / R

@@ -1,0 +1,84 @@
+"""What a drive is: what stands between a commanded torque and the torque at the joint."""
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+from sim.drives.electric import Electric
+from sim.robot.motors import Array
+from sim.robot.robot import Robot
+
+Trace = tuple[Array, ...]
+
+
+class AbstractAmplifier(ABC):
+    """A drive at work; what it remembers is of shape (nsim, joint)."""
+
+    trace: Trace = ()
+    """What the last call of `step` did, raw, (steps or 1, nsim, joint) or (nsim, joint) each; empty without currents."""
+
+    @abstractmethod
+    def step(self, demand: Array, speed: Array, steps: int) -> Array:
+        """Advance by some physics steps; return the torques in them [N m].
+
+        Parameters
+        ----------
+        demand : Array, shape (nsim, joint)
+            Torque asked for, its mean over the steps [N m].
+        speed : Array, shape (steps or 1, nsim, joint)
+            Speed in the middle of every step, times the torque constant over its nominal value [rad/s]; that in the middle of
+            all of them for a steady drive.
+        steps : int
+            How many.
+
+        Returns
+        -------
+        Array, shape (steps or 1, nsim, joint)
+            The mean torque in every step, or in all of them.
+        """
+
+    @abstractmethod
+    def electric(self, trace: Trace, dt: Array) -> Electric:
+        """Return currents and voltages of the first simulation from its traces.
+
+        Parameters
+        ----------
+        trace : tuple of Array, shape (step, joint)
+            As this drive left them; not empty.
+        dt : Array, shape (step, 1)
+            How long each step was [s].
+        """
+
+
+class AbstractDrive(ABC):
+    """The settings of a drive."""
+
+    @abstractmethod
+    def start(self, robot: Robot, nsim: int, h: float) -> AbstractAmplifier:
+        """Return the drive at rest, to be advanced by physics steps of `h` [s].
+
+        Raises
+        ------
+        RobotError
+            If the robot's motors are not described well enough.
+        ScenarioError
+            If a setting does not fit the motors.
+        """
+
+    @abstractmethod
+    def lag(self, robot: Robot) -> Array:
+        """Return how late the torque follows a slow command [s], shape (joint,)."""
+
+    @property
+    @abstractmethod
+    def steady(self) -> bool:
+        """Whether the torque, once the first step of a command is over, may be taken as one mean for any number of steps."""
+
+    def step_length(self, fs: float, longest: float) -> float:
+        """Return the physics step [s] that fits whole times into a sample of 1/`fs` and is not above `longest`."""
+        return 1 / fs / max(1, int(np.ceil(1 / fs / longest - 1e-9)))
+
+
+def every(values: Array, nsim: int) -> Array:
+    """Return the values of the joints for every simulation, shape (nsim, joint): NumPy is slow where it must broadcast."""
+    return np.array(np.broadcast_to(values, (nsim, *values.shape)))

@@ -1,0 +1,41 @@
+"""A drive that does as it is told."""
+
+from typing import final
+
+import numpy as np
+
+from sim.drives.drive import AbstractAmplifier, AbstractDrive, Trace
+from sim.drives.electric import Electric
+from sim.robot.motors import Array
+from sim.robot.robot import Robot
+from sim.settings import settings
+
+
+@final
+@settings
+class IdealDrive(AbstractDrive):
+    """Torque as asked: no winding, no limit, no lag."""
+
+    def start(self, robot: Robot, nsim: int, h: float) -> AbstractAmplifier:
+        """Return the drive."""
+        del robot, nsim, h
+        return _Amplifier()
+
+    def lag(self, robot: Robot) -> Array:
+        """Return zeros."""
+        return np.zeros(robot.n)
+
+    @property
+    def steady(self) -> bool:
+        """True."""
+        return True
+
+
+class _Amplifier(AbstractAmplifier):
+    def step(self, demand: Array, speed: Array, steps: int) -> Array:
+        del speed, steps
+        return demand[None]
+
+    def electric(self, trace: Trace, dt: Array) -> Electric:
+        del trace
+        return Electric(*np.zeros((5, *dt.shape)))

@@ -1,0 +1,172 @@
+"""A DC motor behind an H-bridge chopper, the winding resolved between the edges of the pulses."""
+
+from typing import Annotated, final
+
+import numpy as np
+from pydantic import Field
+
+from sim.drives.averaged_drive import limits
+from sim.drives.drive import AbstractAmplifier, AbstractDrive, Trace, every
+from sim.drives.electric import Electric
+from sim.drives.one_winding import Loop, OneWinding
+from sim.drives.passages import TabulatedPassages, passages
+from sim.drives.pwm import Modulation, Modulator
+from sim.drives.winding import Winding
+from sim.errors import ScenarioError
+from sim.robot.motors import Array, Motors
+from sim.robot.robot import Robot
+from sim.settings import EachPositiveOrNone, NotNegative, Number, Positive, Share, settings
+
+FEW = 8
+"""Windings up to which they are faster one by one than in arrays."""
+
+
+@final
+@settings
+class SwitchedDrive(AbstractDrive):
+    """H-bridge chopper with a digital PI current loop; torque ripple emerges from its pulses.
+
+    The loop samples the current at the start of every PWM period. Its zero cancels the winding's pole, so that the sampled
+    current follows its reference with the pole a = exp(-2 pi bandwidth / pwm). A physics step is a PWM period; the plant gets
+    the mean torque of the period.
+    """
+
+    pwm: Positive = 5000.0
+    """Switching frequency [Hz], a whole multiple of fs."""
+    modulation: Modulation = "unipolar"
+    """unipolar (phase-shifted legs), bipolar, or sign_magnitude."""
+    bandwidth: Positive = 500.0
+    """Bandwidth of the current loop [Hz], below a fifth of the switching frequency."""
+    dead_time: NotNegative = 520e-9
+    """Time for which both transistors of a leg are off before one turns on [s]; below a tenth of the PWM period."""
+    emf_compensation: Share = 1.0
+    """Share of the back-EMF that the current loop feeds forward; without it the motor seems to have more inertia."""
+    duty_resolution: Annotated[Number, Field(ge=0, le=0.1)] = 0.001
+    """Step of the duty, as a share of the period; 0 is exact."""
+    bus_voltage: EachPositiveOrNone = None
+    """Bus voltage [V], of all joints or of each; without it, or where the robot's motors have less, theirs holds."""
+    current_limit: EachPositiveOrNone = None
+    """Largest current [A], of all joints or of each; without it, or where the robot's motors have less, theirs holds."""
+
+    def __post_init__(self) -> None:
+        if self.dead_time * self.pwm >= 0.1:
+            raise ScenarioError(f"dead_time = {self.dead_time:g} s must be below a tenth of the period, {0.1 / self.pwm:g} s")
+        if self.bandwidth > self.pwm / 5:
+            raise ScenarioError(f"bandwidth = {self.bandwidth:g} Hz must be at most a fifth of pwm = {self.pwm:g} Hz")
+
+    def start(self, robot: Robot, nsim: int, h: float) -> AbstractAmplifier:
+        """Return the drive without current."""
+        V, I = limits(robot, self.bus_voltage, self.current_limit)  # noqa: E741
+        if not np.isfinite(V).all():
+            raise ScenarioError("drive.bus_voltage is needed: the robot's motors give none")
+        return SwitchedAmplifier(self, robot.motors, V, I, nsim, h)
+
+    def lag(self, robot: Robot) -> Array:
+        """Return T / (1 - a) - T / 2, from the sampled loop and the hold of its reference."""
+        T = 1 / self.pwm
+        return np.full(robot.n, T / -np.expm1(-2 * np.pi * self.bandwidth * T) - T / 2)
+
+    @property
+    def steady(self) -> bool:
+        """False: every PWM period is a step of its own."""
+        return False
+
+    def step_length(self, fs: float, longest: float) -> float:
+        """Return the PWM period [s].
+
+        Raises
+        ------
+        ScenarioError
+            If it is above `longest`, or does not fit whole times into a sample.
+        """
+        times = self.pwm / fs
+        if times < 1 or abs(times - round(times)) > 1e-9 * times:
+            raise ScenarioError(f"drive.pwm = {self.pwm:g} Hz must be a whole multiple of fs = {fs:g} Hz")
+        if 1 / self.pwm > longest * (1 + 1e-9):
+            raise ScenarioError(f"drive.pwm = {self.pwm:g} Hz makes steps longer than physics.step = {longest:g} s: raise it")
+        return 1 / self.pwm
+
+
+class SwitchedAmplifier(AbstractAmplifier):
+    """The chopper at work.
+
+    `i` is the current [A], `electrical` and `mechanical` count what came in at the terminals and what went to the rotor [J],
+    all of shape (nsim, joint).
+    """
+
+    def __init__(self, settings: SwitchedDrive, motors: Motors, V: Array, I: Array, nsim: int, h: float) -> None:  # noqa: E741
+        R, L, K, V, self._I = (every(x, nsim) for x in (motors.R, motors.L, motors.K, V, I))
+        self._K, self._h, self._winding = K, h, Winding(V, R, L)
+        lost = -np.expm1(-h * R / L)
+        self._kp = R / lost * -np.expm1(-2 * np.pi * settings.bandwidth * h)
+        self._ki = self._kp * lost
+        self._least = settings.duty_resolution * (1 if settings.modulation == "sign_magnitude" else 2)
+        self._passages = passages(self._winding, Modulator(settings.modulation, h, settings.dead_time), self._least)
+        most = 1 - 4 * settings.dead_time / h
+        self._most = (np.floor(most / self._least) * self._least if self._least else most) * V
+        self._known = settings.emf_compensation
+        self.i, self._sum, self.electrical, self.mechanical = np.zeros((4, *V.shape))
+        self._single = self._one_by_one()
+
+    def _one_by_one(self) -> dict[tuple[int, int], OneWinding]:
+        """Return the windings one by one, where they are few and have a table."""
+        if not isinstance(self._passages, TabulatedPassages) or self.i.size > FEW:
+            return {}
+        gains = np.broadcast_arrays(self._kp, self._ki, self._most)
+        each = {}
+        for at in np.ndindex(self.i.shape):
+            kp, ki, most = (float(x[at]) for x in gains)
+            each[at] = Loop(kp, ki, most, self._known)
+        return {(sim, joint): OneWinding(self._passages, joint, loop) for (sim, joint), loop in each.items()}
+
+    def step(self, demand: Array, speed: Array, steps: int) -> Array:
+        """Advance by PWM periods; return the mean torque in each."""
+        del steps
+        wanted = np.minimum(np.maximum(demand / self._K, -self._I), self._I)
+        e = self._K * speed
+        charge, before, after, index = self._each(wanted, e) if self._single else self._together(wanted, e)
+        self.trace = wanted, charge, before, after, e, index
+        self.mechanical += (e * charge).sum(axis=0)
+        return charge * (self._K / self._h)
+
+    def _each(self, wanted: Array, e: Array) -> Array:
+        """Advance one winding after the other; return charge, currents before and after, and modulation index."""
+        done = np.empty((4, *e.shape))
+        for at, winding in self._single.items():
+            done[(slice(None), slice(None), *at)] = winding.advance(float(wanted[at]), e[(slice(None), *at)].tolist())
+            self.i[at], self.electrical[at] = winding.i, winding.electrical
+        return done
+
+    def _together(self, wanted: Array, e: Array) -> Array:
+        """Advance all windings, period by period; return charge, currents before and after, and modulation index."""
+        done = np.empty((4, *e.shape))
+        charge, before, after, index = done
+        for k in range(len(e)):
+            index[k], before[k] = self._index(wanted, self._known * e[k]), self.i
+            self.i, charge[k], electrical = self._passages.through(self.i, index[k], e[k])
+            self.electrical += electrical
+            after[k] = self.i
+        return done
+
+    def electric(self, trace: Trace, dt: Array) -> Electric:
+        """Return currents and voltages of PWM periods."""
+        reference, charge, before, after, e, index = trace
+        V, R, L = (x[0] for x in self._winding)
+        voltage = (R * charge + L * (after - before)) / dt + e
+        most = self._most[0] / V * (1 - 1e-9)  # as an index is rounded
+        limited = (np.abs(reference) >= self._I[0]) | (np.abs(index) >= most)
+        return Electric(reference, charge / dt, voltage, index, limited.astype(np.float64))
+
+    @property
+    def copper(self) -> Array:
+        """What became heat [J]: what came in, less what went to the rotor and what is stored, L i^2 / 2."""
+        return self.electrical - self.mechanical - self._winding.L / 2 * self.i**2
+
+    def _index(self, wanted: Array, emf: Array) -> Array:
+        """Return the modulation that the current loop asks for; its integrator rests while the voltage is at its limit."""
+        error = wanted - self.i
+        asked = self._kp * error + self._sum + emf
+        v = np.minimum(np.maximum(asked, -self._most), self._most)
+        self._sum += self._ki * error * (v == asked)
+        m = v / self._winding.V
+        return np.rint(m / self._least) * self._least if self._least else m

@@ -1,0 +1,213 @@
+"""A run in progress: controller, drive and encoder in NumPy around MuJoCo."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from identify.blame import expect
+from identify.data.motion_log import MotionLog
+from identify.errors import PluginError
+from sim.controllers.controller import AbstractLaw, Task
+from sim.drives.drive import AbstractAmplifier, every
+from sim.encoders.encoder import AbstractReader
+from sim.engine.clock import Clock
+from sim.engine.failures import Failures
+from sim.engine.history import History
+from sim.engine.plant import Plant
+from sim.engine.run import Run
+from sim.engine.watch import Step, Watcher
+from sim.errors import ScenarioError
+from sim.frictions.friction_law import AbstractContact
+from sim.robot.inverse_dynamics import inverse_dynamics
+from sim.robot.motors import Array
+from sim.robot.robot import Robot
+from sim.scenario.measurement import CurrentSensor
+from sim.scenario.scenario import Scenario
+from sim.trajectories import Reference
+
+T = TypeVar("T")
+
+BLOCK = 1e-3
+"""Time [s] over which the motion of the rotors may be foretold, for their back-EMF and ripple: with a jerk of 1000 rad/s^3 they
+are then off by 2e-7 rad and 5e-4 rad/s."""
+
+
+class Bench:
+    """A run in progress: controller, drive and encoder around a plant."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        robot: Robot,
+        planned: Reference,
+        seeds: tuple[int, ...],
+        vary: Mapping[str, npt.ArrayLike],
+        threads: int,
+        watcher: Watcher | None = None,
+    ) -> None:
+        fs, n, nsim, samples = scenario.fs, robot.n, len(seeds), len(planned.q)
+        self._scenario, self._planned, self._seeds, self._watcher = scenario, planned, seeds, watcher
+        self._h = scenario.drive.step_length(fs, scenario.physics.step)
+        self._clock = clock = Clock(round(1 / fs / self._h), self._h, scenario.timing.delay)
+        self._plant = Plant(robot, nsim, scenario.physics, self._h, vary, threads)
+        self._plant.q[:] = planned.q[0]
+        task = Task(scenario.nominal_robot, planned, nsim)
+        self._law = _started(scenario.controller, scenario.controller.start(task), AbstractLaw)
+        self._drive = _started(scenario.drive, scenario.drive.start(robot, nsim, self._h), AbstractAmplifier)
+        self._ripple = scenario.ripple.start(robot)
+        friction, encoder = scenario.friction, scenario.encoder
+        self._friction = _started(friction, friction.start(self._plant.batch, self._plant.Fs, self._h), AbstractContact)
+        self._encoder = _started(encoder, encoder.start(n, samples, fs, _generators(seeds, 0)), AbstractReader)
+        self._each = nsim, n
+        self._sensor = CurrentSensor(scenario.torque, nsim, n)
+        self._jitter = self._drawn_jitter(samples)
+        self._history = History(clock.late + clock.per_sample, nsim, n, self._h)
+        self._failures = Failures(robot, planned, seeds)
+        self._going: npt.NDArray[np.intp] | None = None
+        at_rest = every(planned.q[0], nsim) if planned.q.ndim == 2 else planned.q[0]
+        self._at_rest, still = at_rest, np.zeros((nsim, n))
+        self._before = self._command = self._demand = inverse_dynamics(robot, at_rest, still, still)
+        self._qd, self._steps, self._instants = np.zeros((nsim, n)), 1, dict[int, Array]()
+        self._steady = scenario.drive.steady and scenario.ripple.steady
+        watched = scenario.timing.jitter or scenario.torque.source == "current"
+        one_by_one = watched or not scenario.friction.steady
+        self._most = 1 if one_by_one else clock.per_sample if self._steady else max(1, round(BLOCK / self._h))
+        self._measured, self._commands, self._currents, self._q, self._speeds, self._tau = np.zeros((6, samples, nsim, n))
+        self.steps = samples * clock.per_sample + clock.late
+
+    def _drawn_jitter(self, samples: int) -> Array:
+        """Return by how many steps each sample is off its claimed instant, shape (sample, nsim)."""
+        width = self._scenario.timing.jitter / self._h
+        if width >= self._clock.per_sample:
+            raise ScenarioError(
+                f"timing.jitter = {self._scenario.timing.jitter:g} s must be below 1/fs = {1 / self._scenario.fs:g} s"
+            )
+        if width / 2 > self._clock.late:
+            raise ScenarioError(
+                f"timing.jitter = {self._scenario.timing.jitter:g} s needs a timing.delay of at least its half in whole "
+                f"physics steps of {self._h:g} s: a command cannot act before its sample is taken"
+            )
+        return np.stack([width * (rng.random(samples) - 0.5) for rng in _generators(self._seeds, 1)], axis=1)
+
+    def advance(self, step: int) -> int:
+        """Advance from physics step `step` to where something may change; return how many steps that were."""
+        q, qd = self._plant.q, self._plant.qd
+        sample = self._clock.sample(step)
+        if sample is not None:
+            self._stop_failed(step)
+        if sample is not None and sample < len(self._q):
+            self._q[sample], self._speeds[sample], self._currents[sample] = q, qd, self._sensor.value
+            if self._watcher and self._watcher.due(self._final(step)):
+                self.tell(step)
+        self._history.put(step, q, qd)
+        steps = self._listen(step)
+        t = self._middles(steps)
+        rate = (qd - self._qd) / (self._steps * self._h)  # accelerating as in the steps before
+        mid_qd, mid_q = qd + rate * t, q + qd * t + rate * (t**2 / 2)
+        self._qd, self._steps = qd.copy(), steps
+        constant = 1 + self._ripple.commutation.at(mid_q)
+        electric = self._drive.step(self._demand, mid_qd * constant, steps)
+        expect(self._drive, "step", electric, (1, *self._each), (steps, *self._each))
+        self._sensor.take(electric, steps * self._h)
+        tau = electric * constant + self._ripple.cogging.at(mid_q)
+        resistance = self._friction.torque(mid_qd[0])
+        expect(self._friction, "torque", np.asarray(resistance), (), self._each)
+        total = tau + resistance
+        if not np.isfinite(total).all():
+            self._stop_failed(step)
+            self._failures.finite({"the controller": self._demand, "the drive": tau, "the friction": resistance})
+            self._stop_failed(step)
+        if self._watcher:
+            self._watcher.take(Step(step, steps, tau, self._drive.trace))
+        self._plant.step(total, steps, self._going)
+        current = step // self._clock.per_sample
+        if current < len(self._tau):
+            self._tau[current] += tau.mean(axis=0) * steps
+        return steps
+
+    def _final(self, step: int) -> int:
+        """Return how many samples nothing can change any more at the beginning of physics step `step`."""
+        clock, samples = self._clock, len(self._q)
+        return min(samples, step // clock.per_sample, max(0, (step - clock.late - 1) // clock.per_sample + 1))
+
+    def tell(self, step: int) -> None:
+        """Hand on to the watcher what is final at the beginning of physics step `step`, of the first simulation."""
+        if self._watcher:
+            channels = {
+                "measured": self._measured,
+                "q": self._q,
+                "qd": self._speeds,
+                "tau": self._tau,
+                "command": self._commands,
+            }
+            self._watcher.tell(self._final(step), self._planned, channels, self._drive)
+
+    def _middles(self, steps: int) -> Array:
+        """Return the middle of each of the steps to come [s], shape (steps, 1, 1), or of all of them for steady parts."""
+        if steps not in self._instants:
+            count = 1 if self._steady else steps
+            self._instants[steps] = np.linspace(0.5, count - 0.5, count)[:, None, None] * (steps / count * self._h)
+        return self._instants[steps]
+
+    def _listen(self, step: int) -> int:
+        """Let the command whose turn it is act; return for how many steps nothing changes."""
+        clock, (k, after) = self._clock, self._clock.command(step)
+        if after == 0 and k >= 0:
+            q = self._encoder.read(k, self._history.at(step - clock.late + self._jitter[k]))
+            expect(self._encoder, "read", q, self._each)
+            self._before, self._command = self._command, expect(self._law, "command", self._law.command(k, q), self._each)
+            self._measured[k], self._commands[k] = q, self._command
+            self._demand = clock.old * self._before + (1 - clock.old) * self._command
+        elif after == 1:
+            self._demand = self._command
+        if after == 0 and (self._steady or clock.old > 0):
+            return 1  # the current of a new command settles in a step of its own, and so does a mixture of two
+        return min(clock.undisturbed(step), self._most)
+
+    @property
+    def failures(self) -> Mapping[int, str]:
+        """Why simulations have failed, by their number."""
+        return self._failures.reasons
+
+    def run(self, skipped: int) -> Run:
+        """Return what has happened since sample `skipped`."""
+        channels = self._measured, self._commands, self._currents, self._q, self._speeds, self._tau / self._clock.per_sample
+        measured, command, current, q, qd, tau = (np.swapaxes(x[skipped:], 0, 1) for x in channels)
+        for sim in np.flatnonzero(~np.isfinite(command).all(axis=(1, 2))):
+            self._failures.add(int(sim), "the controller commands no finite torque")
+        for failed in self._failures.reasons:
+            measured[failed] = command[failed] = current[failed] = 0.0
+        scenario, n = self._scenario, q.shape[-1]
+        logged = scenario.torque.logged(
+            current if scenario.torque.source == "current" else command, n, _generators(self._seeds, 2)
+        )
+        planned = replace(self._planned, **{x: getattr(self._planned, x)[skipped:] for x in ("q", "qd", "qdd")})
+        lag = float(scenario.drive.lag(self._plant.robot).mean()) - scenario.physics.early * self._h
+        log = MotionLog(scenario.fs, measured, logged, scenario.torque.channel(scenario.timing.delay, lag, scenario.fs))
+        return Run(scenario, self._seeds, self._plant.robots, planned, log, q, qd, tau, command, self._failures.reasons)
+
+    def _stop_failed(self, step: int) -> None:
+        """Leave simulations at rest that cannot go on."""
+        plant, failures = self._plant, self._failures
+        failures.look(step / self._clock.per_sample, plant.q, plant.qd)
+        for sim, complaint in plant.troubles.items():
+            failures.add(sim, f"MuJoCo cannot go on: {complaint}")
+        if failures.reasons:
+            failed = list(failures.reasons)
+            plant.q[failed], plant.qd[failed] = self._at_rest[failed], 0.0
+            self._going = np.setdiff1d(np.arange(len(self._seeds)), failed)
+
+
+def _started(settings: object, made: T, kind: type) -> T:
+    """Return what a plug-in started; raise PluginError if that is something else."""
+    if not isinstance(made, kind):
+        raise PluginError(f"plug-in {type(settings).__name__}.start returned {made!r:.60}, expected an {kind.__name__}")
+    return made
+
+
+def _generators(seeds: Sequence[int], stream: int) -> list[np.random.Generator]:
+    """Return a generator for each simulation, that depends on its seed and the purpose alone."""
+    return [np.random.default_rng([seed, stream]) for seed in seeds]

@@ -1,0 +1,105 @@
+"""The rigid bodies of many simulations, in MuJoCo."""
+
+from collections.abc import Mapping
+from copy import copy
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+from mujoco.batch import Batch, SimulationError
+
+from sim.errors import ScenarioError
+from sim.robot.motors import Array
+from sim.robot.robot import Robot
+from sim.scenario.scenario import Physics
+
+SWITCHED_OFF = (
+    mujoco.mjtDisableBit.mjDSBL_ACTUATION,
+    # Shapes of neighbours overlap in many files, and a torque of contact is none of the models'.
+    mujoco.mjtDisableBit.mjDSBL_CONTACT,
+    # A simulation that diverges would begin anew without a word.
+    mujoco.mjtDisableBit.mjDSBL_AUTORESET,
+)
+"""Of MuJoCo."""
+
+
+class Plant:
+    """Simulations of a robot whose joints are driven by torques; its actuators are switched off.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    nsim : int
+        Number of simulations.
+    physics : Physics
+        Integrator.
+    h : float
+        Physics step [s].
+    vary : mapping of str to array_like
+        Fields of MuJoCo's model with a value for each simulation, shape (nsim, ...).
+    threads : int
+        Native threads; 0 for all processors.
+    """
+
+    def __init__(
+        self, robot: Robot, nsim: int, physics: Physics, h: float, vary: Mapping[str, npt.ArrayLike], threads: int
+    ) -> None:
+        model = copy(robot.model)
+        model.opt.timestep = h
+        model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{physics.integrator.upper()}")
+        for flag in SWITCHED_OFF:
+            model.opt.disableflags |= int(flag)
+        self.robot, self.batch = robot, Batch(model, nsim, threads)
+        self._errors: dict[int, str] = {}
+        for name, values in vary.items():
+            _vary(self.batch, name, np.asarray(values, dtype=np.float64))
+        varied = (Robot(robot.name, self.batch.get_model(i)) for i in range(nsim))
+        self.robots = tuple(varied) if vary else (robot,) * nsim
+        self.q, self.qd, self._applied = (self.batch.bind(name) for name in ("qpos", "qvel", "qfrc_applied"))
+        expanded = self.batch.expanded("dof_frictionloss")
+        self.Fs: Array = np.array(np.broadcast_to(model.dof_frictionloss, (nsim, robot.n)) if expanded is None else expanded)
+
+    def step(self, torques: Array, steps: int, going: npt.NDArray[np.intp] | None = None) -> None:
+        """Advance simulations by `steps` physics steps.
+
+        Parameters
+        ----------
+        torques : Array, shape (steps or 1, nsim, joint)
+            On the joints in every step, or the same in all of them [N m].
+        steps : int
+            How many.
+        going : int array, optional
+            The simulations that advance; all by default.
+        """
+        try:
+            if len(torques) == 1:
+                self._applied[:] = torques[0]
+                self.batch.step(going, steps)
+            else:
+                control = np.ascontiguousarray(np.swapaxes(torques if going is None else torques[:, going], 0, 1))
+                self.batch.rollout(steps, control, int(mujoco.mjtState.mjSTATE_QFRC_APPLIED), record=(), ids=going)
+        except SimulationError as error:
+            self._errors |= {int(sim): " ".join(self.batch.error(int(sim)).split()) for sim in error.ids}
+
+    @property
+    def troubles(self) -> dict[int, str]:
+        """What MuJoCo has complained of, by the number of the simulation."""
+        found = dict(self._errors)
+        if not self.batch.warning[..., 1].any():
+            return found
+        for sim, kind in np.argwhere(self.batch.warning[..., 1]).tolist():
+            found.setdefault(sim, mujoco.mju_warningText(kind, int(self.batch.warning[sim, kind, 0])))
+        return found
+
+
+def _vary(batch: Batch, name: str, values: Array) -> None:
+    """Give a field of the model the values of every simulation."""
+    try:
+        field = batch.expand(name)
+    except (AttributeError, ValueError, KeyError, TypeError) as error:
+        raise ScenarioError(f"vary: MuJoCo's model has no field {name!r} that could vary: {error}") from error
+    if values.shape != field.shape:
+        raise ScenarioError(f"vary: {name} needs the shape {field.shape}, not {values.shape}")
+    field[:] = values
+    batch.set_const()

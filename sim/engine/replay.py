@@ -1,0 +1,102 @@
+"""A robot driven by the torques of a log, held to its motion by a weak loop."""
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from identify.data.motion_log import MotionLog
+from sim.engine.failures import Bounds
+from sim.engine.plant import Plant
+from sim.errors import ScenarioError
+from sim.robot.inverse_dynamics import BLOCK, InverseDynamics
+from sim.robot.motors import Array
+from sim.robot.robot import Robot
+from sim.scenario.scenario import Physics
+from sim.trajectories import Reference
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """What a simulated robot does with the torques of a log.
+
+    Parameters
+    ----------
+    q : Array, shape (time, joint)
+        Its positions [rad].
+    feedback : Array, shape (time, joint)
+        What the loop adds to the torques of the log to hold it to the log's motion [N m].
+    """
+
+    q: Array
+    feedback: Array
+
+
+def replay(robot: Robot, log: MotionLog, qd: Array, bandwidth: float) -> Replay:
+    """Return what `robot` does with the torques of a log.
+
+    The torques act as the log's channel says; the loop adds M (w^2 e + 2 w de/dt), M the diagonal of the inertia matrix. A
+    robot with the parameters of the one that was logged needs no feedback, beside noise.
+
+    Parameters
+    ----------
+    robot : Robot
+        To be simulated.
+    log : MotionLog
+        One run.
+    qd : Array, shape (time, joint)
+        Velocities of the log [rad/s].
+    bandwidth : float
+        Natural frequency w of the loop [rad/s].
+
+    Raises
+    ------
+    ScenarioError
+        If it runs away.
+    """
+    physics = Physics()
+    per_sample = int(np.ceil(1 / log.fs / physics.step - 1e-9))
+    h = 1 / log.fs / per_sample
+    plant = Plant(robot, 1, physics, h, {}, 1)
+    plant.q[:], plant.qd[:] = log.q[0], qd[0]
+    torques = _mean_torques(log, h, per_sample)
+    kp = _inertia(robot, log.q) * bandwidth**2
+    q, feedback = np.empty(log.q.shape), np.empty(log.q.shape)
+    bounds = Bounds(robot, Reference(log.fs, log.q, qd, np.zeros_like(qd)), 1)
+    for k in range(log.samples):
+        if broken := {**plant.troubles, **bounds.broken(plant.q, plant.qd)}:
+            raise ScenarioError(f"a robot with these parameters does not follow the log: {broken[0]} after {k / log.fs:.3g} s")
+        q[k] = plant.q[0]
+        feedback[k] = kp[k] * (log.q[k] - q[k] + 2 / bandwidth * (qd[k] - plant.qd[0]))
+        plant.step((torques[k] + feedback[k])[:, None, :], per_sample)
+    return Replay(q, feedback)
+
+
+def _mean_torques(log: MotionLog, h: float, per_sample: int) -> Array:
+    """Return the mean of the torque that acts in every physics step, shape (time, step, joint)."""
+    tau, T, delay = log.tau * np.asarray(log.torque.gain), 1 / log.fs, log.torque.delay
+    edges = np.arange(log.samples * per_sample + 1) * h
+    if log.torque.meaning == "instantaneous":
+        at = log.t + delay
+        values = np.stack([np.interp(edges, at, x) for x in tau.T], axis=-1)
+        means = (values[1:] + values[:-1]) / 2
+    else:
+        starts = np.arange(log.samples + 1) * T + delay
+        impulse = np.concatenate([np.zeros((1, log.n)), np.cumsum(tau, axis=0) * T])
+        before, after = np.minimum(edges - starts[0], 0.0), np.maximum(edges - starts[-1], 0.0)
+        grown = np.stack([np.interp(edges, starts, x) for x in impulse.T], axis=-1)
+        grown += before[:, None] * tau[0] + after[:, None] * tau[-1]
+        means = np.diff(grown, axis=0) / h
+    return means.reshape(log.samples, per_sample, log.n)
+
+
+def _inertia(robot: Robot, q: Array) -> Array:
+    """Return the diagonal of M at every sample, shape (time, joint)."""
+    found = np.empty(q.shape)
+    for i in range(0, len(q), BLOCK):
+        part = q[i : i + BLOCK]
+        states = InverseDynamics(robot, len(part))
+        states(part, np.zeros_like(part), np.zeros_like(part))
+        found[i : i + BLOCK] = states.inertia()
+    return found

@@ -1,0 +1,51 @@
+"""What a simulation gives: the log that a robot would give, and the truth behind it."""
+
+from dataclasses import dataclass
+
+from identify.data.motion_log import MotionLog
+from sim.robot.motors import Array
+from sim.robot.robot import Robot
+from sim.scenario.scenario import Scenario
+from sim.trajectories import Reference
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Simulations of one scenario that advanced together; the leading axis of all arrays is the simulation.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What was simulated.
+    seeds : tuple of int
+        Seed of every simulation.
+    robots : tuple of Robot
+        The true robot of every simulation.
+    reference : Reference
+        The planned motion.
+    log : MotionLog
+        What the robot logged; shape (nsim, time, joint).
+    q, qd : Array, shape (nsim, time, joint)
+        True positions [rad] and velocities [rad/s] at the instants of the log.
+    tau : Array, shape (nsim, time, joint)
+        True mean torque of the motors between an instant of the log and the next, ripple included [N m].
+    command : Array, shape (nsim, time, joint)
+        Torque that the controller asked for [N m].
+    failures : dict of int to str
+        Why simulations failed, by their number; from then on their arrays hold nothing of use.
+    """
+
+    scenario: Scenario
+    seeds: tuple[int, ...]
+    robots: tuple[Robot, ...]
+    reference: Reference
+    log: MotionLog
+    q: Array
+    qd: Array
+    tau: Array
+    command: Array
+    failures: dict[int, str]
+
+    def alone(self, i: int = 0) -> MotionLog:
+        """Return the log of simulation `i` by itself."""
+        return MotionLog(self.log.fs, self.log.q[i], self.log.tau[i], self.log.torque)

@@ -1,0 +1,102 @@
+"""Running a scenario, many simulations at once."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from identify.blame import blamed
+from sim.engine.bench import Bench
+from sim.engine.run import Run
+from sim.engine.watch import Watch, Watcher
+from sim.errors import ScenarioError
+from sim.robot.robot import Robot
+from sim.scenario.scenario import Scenario
+from sim.trajectories import Reference
+from sim.trajectories.approach import approach
+
+Progress = Callable[[float], None]
+"""Hears the share of a run that is done."""
+
+
+def simulate(  # noqa: PLR0913  # all but two by their names
+    scenario: Scenario,
+    seeds: Sequence[int] = (),
+    *,
+    motions: Sequence[Reference] = (),
+    vary: Mapping[str, npt.ArrayLike] | None = None,
+    threads: int = 0,
+    progress: Progress | None = None,
+    watch: Watch | None = None,
+    throw: bool = True,
+) -> Run:
+    """Run a scenario in closed loop.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What to run.
+    seeds : sequence of int, optional
+        A simulation for each; that of the scenario by default. What a simulation gives depends on its own seed alone.
+    motions : sequence of Reference, optional
+        A planned motion for each simulation, of equal numbers of samples; that of the scenario's trajectory by default.
+    vary : mapping of str to array_like, optional
+        Fields of MuJoCo's model, such as dof_damping, with a value for every simulation, shape (nsim, ...).
+    threads : int
+        Native threads; 0 for all processors. No bit depends on it.
+    progress : callable, optional
+        Hears the share of the run that is done, about a hundred times.
+    watch : Watch, optional
+        Hears what the first simulation does, while it runs. No bit depends on it.
+    throw : bool
+        Raise if a simulation fails while it runs; otherwise `Run.failures` tells why, and the others go on.
+
+    Raises
+    ------
+    ScenarioError
+        If settings do not fit each other or the robot, a joint leaves its range, or the loop is unstable.
+    RobotError
+        If the robot does not have what the scenario asks of it.
+    """
+    seeds = tuple(seeds) or (scenario.seed,)
+    robot = scenario.real_robot
+    planned, skipped = _joined([_planned(scenario, robot, motion) for motion in motions or (None,)])
+    h = scenario.drive.step_length(scenario.fs, scenario.physics.step)
+    watcher = Watcher(watch, scenario.fs, h, skipped) if watch else None
+    with blamed():
+        bench = Bench(scenario, robot, planned, seeds, vary or {}, threads, watcher)
+    step, told, bearable = 0, -1, 0 if throw else len(seeds) - 1
+    # Of simulations that diverge: they are told, and end, alone.
+    with np.errstate(over="ignore", invalid="ignore"), blamed():
+        while step < bench.steps and len(bench.failures) <= bearable:
+            step += bench.advance(step)
+            if progress and 100 * step // bench.steps > told:
+                told = 100 * step // bench.steps
+                progress(step / bench.steps)
+    bench.tell(bench.steps)
+    run = bench.run(skipped)
+    if throw and run.failures:
+        raise ScenarioError(next(iter(run.failures.values())))
+    return run
+
+
+def _joined(planned: Sequence[tuple[Reference, int]]) -> tuple[Reference, int]:
+    """Return the motion of all simulations, or of each of them, and the samples before the log begins."""
+    motions, skipped = zip(*planned, strict=True)
+    if len(motions) == 1:
+        return planned[0]
+    if len({(len(motion.q), before) for motion, before in planned}) > 1:
+        lengths = sorted({len(motion.q) for motion in motions})
+        raise ScenarioError(f"motions of {lengths[0]} to {lengths[-1]} samples cannot advance together: group them by length")
+    stacked = (np.stack([getattr(motion, x) for motion in motions], axis=1) for x in ("q", "qd", "qdd"))
+    return Reference(motions[0].fs, *stacked), skipped[0]
+
+
+def _planned(scenario: Scenario, robot: Robot, motion: Reference | None) -> tuple[Reference, int]:
+    """Return the planned motion, the way to its start before it, and how many samples that takes."""
+    main = scenario.trajectory.sample(robot, scenario.fs) if motion is None else motion
+    if not scenario.start:
+        return main, 0
+    way = approach(robot, np.array(scenario.start), main.q[0], scenario.fs)
+    joined = (np.concatenate([getattr(way, x), getattr(main, x)]) for x in ("q", "qd", "qdd"))
+    return Reference(scenario.fs, *joined), len(way.q)

@@ -1,0 +1,199 @@
+"""Watching a run while it goes on: what has become final, stretch by stretch."""
+
+from bisect import bisect_left
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.drives.drive import AbstractAmplifier, Trace
+from sim.drives.electric import Electric
+from sim.robot.motors import Array
+from sim.trajectories.reference import Reference
+
+
+@dataclass(frozen=True, eq=False)
+class Inner:
+    """Signals inside the loop of the first simulation, once for each step of its drive.
+
+    Parameters
+    ----------
+    t : Array, shape (step,)
+        When each step begins, on the time of the log [s].
+    electric : Electric
+        Shape (step, joint) each.
+    tau : Array, shape (step, joint)
+        Mean torque of the motors, ripple included [N m].
+    """
+
+    t: Array
+    electric: Electric
+    tau: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Samples of the first simulation that have become final; all arrays of shape (time, joint).
+
+    Parameters
+    ----------
+    first : int
+        Number of the first sample, in the log.
+    reference : Reference
+        The planned motion.
+    measured : Array
+        Positions as the encoders give them [rad].
+    q, qd : Array
+        True positions [rad] and velocities [rad/s].
+    tau, command : Array
+        True mean torque of the motors until the next sample, and the torque asked for [N m].
+    electric : Electric, optional
+        Means until the next sample; none for a drive without currents.
+    inner : Inner, optional
+        What is in the window, if anything is.
+    """
+
+    first: int
+    reference: Reference
+    measured: Array
+    q: Array
+    qd: Array
+    tau: Array
+    command: Array
+    electric: Electric | None
+    inner: Inner | None
+
+
+@dataclass(frozen=True)
+class Watch:
+    """Somebody who watches the first simulation of a run. No bit of the run depends on it.
+
+    Parameters
+    ----------
+    hear : callable
+        Hears every stretch, in order, while the run goes on.
+    every : float
+        Length of a stretch [s]; by default the whole run is one.
+    window : tuple of float, optional
+        From when to when, on the time of the log [s], the signals inside the loop are given at their full rate.
+    """
+
+    hear: Callable[[Stretch], None]
+    every: float = np.inf
+    window: tuple[float, float] | None = None
+
+
+class Step(NamedTuple):
+    """What the motors did from a physics step on."""
+
+    step: int
+    """The first."""
+
+    steps: int
+    """How many there are."""
+
+    tau: Array
+    """Torque of the motors [N m], shape (steps or 1, nsim, joint)."""
+
+    trace: Trace
+    """What their drive did."""
+
+
+class Watcher:
+    """Collects what the motors do, and hands on what has become final.
+
+    Parameters
+    ----------
+    watch : Watch
+        Who hears it.
+    fs, h : float
+        Sampling frequency [Hz] and physics step [s].
+    skipped : int
+        Samples before the log begins.
+    """
+
+    def __init__(self, watch: Watch, fs: float, h: float, skipped: int) -> None:
+        self._watch, self._fs, self._h, self._skipped = watch, fs, h, skipped
+        self._samples = max(1, round(watch.every * fs)) if np.isfinite(watch.every) else np.inf
+        self._told, self._taken = skipped, list[Step]()
+
+    def take(self, step: Step) -> None:
+        """Take in what the motors do."""
+        self._taken.append(step)
+
+    def due(self, final: int) -> bool:
+        """Return whether a stretch is complete when `final` samples are."""
+        return final - self._told >= self._samples
+
+    def tell(self, final: int, planned: Reference, channels: Mapping[str, Array], drive: AbstractAmplifier) -> None:
+        """Hand on the samples up to `final`; `channels` hold all samples, approach included, shape (sample, nsim, joint)."""
+        if final <= self._told:
+            return
+        now, per_sample = slice(self._told, final), round(1 / (self._fs * self._h))
+        parts = {name: x[now, 0].copy() for name, x in channels.items()}
+        parts["tau"] /= per_sample
+        reference = Reference(self._fs, *(_alone(getattr(planned, x)[now]) for x in ("q", "qd", "qdd")))
+        ready = bisect_left(self._taken, final * per_sample, key=lambda taken: taken.step)
+        taken, self._taken = self._taken[:ready], self._taken[ready:]
+        electric, inner = None, None
+        if taken and taken[0].trace:
+            rows = _Rows.of(taken, drive, self._h)
+            electric = rows.means(self._told, final, per_sample)
+            inner = rows.inside(self._watch.window, self._h, self._skipped / self._fs) if self._watch.window else None
+        self._watch.hear(Stretch(self._told - self._skipped, reference, electric=electric, inner=inner, **parts))
+        self._told = final
+
+
+def _alone(x: Array) -> Array:
+    return x if x.ndim == 2 else x[:, 0]
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Steps of a drive as arrays: when they begin and how long they last, in physics steps, and what happens in them."""
+
+    start: Array
+    length: Array
+    electric: Electric
+    tau: Array
+
+    @classmethod
+    def of(cls, taken: Sequence[Step], drive: AbstractAmplifier, h: float) -> "_Rows":
+        """Return the steps of a drive, unrolled: a trace, or a torque, that has several rows says what each step did."""
+        steps = np.array([s.steps for s in taken])
+        rows = np.array([max([len(x) for x in s.trace if x.ndim == 3], default=1) for s in taken])
+        count = np.array([max(n, len(s.tau)) for n, s in zip(rows, taken, strict=True)])
+        length = np.repeat(steps // count, count)
+        within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+        start = np.repeat([s.step for s in taken], count) + within * length
+        traces = (_unrolled(x, rows) for x in zip(*(s.trace for s in taken), strict=True))
+        whole = drive.electric(tuple(traces), (np.repeat(steps / rows, rows) * h)[:, None])
+        again = np.repeat(count // rows, rows)  # a mean over several steps holds for each of them
+        electric = Electric(*(np.repeat(x, again, axis=0) for x in whole))
+        return cls(start, length.astype(np.float64), electric, _unrolled([s.tau for s in taken], count))
+
+    def means(self, first: int, final: int, per_sample: int) -> Electric:
+        """Return the means over the samples from `first` to before `final`."""
+        sample = self.start // per_sample - first
+        keep = sample >= 0  # an approach before the log is nobody's
+        begins = np.searchsorted(sample[keep], np.arange(final - first))
+        weights = (self.length[keep] / per_sample)[:, None]
+        return Electric(*(np.add.reduceat(x[keep] * weights, begins, axis=0) for x in self.electric))
+
+    def inside(self, window: tuple[float, float], h: float, before: float) -> Inner | None:
+        """Return what lies in the window [s], None if nothing does."""
+        t = self.start * h - before
+        within = (t > window[0] - h / 2) & (t < window[1] - h / 2)  # half a step aside, where rounding decides nothing
+        if not within.any():
+            return None
+        return Inner(t[within], Electric(*(x[within] for x in self.electric)), self.tau[within])
+
+
+def _unrolled(arrays: Sequence[Array], count: npt.NDArray[np.int64]) -> Array:
+    """Return arrays of shape (steps or 1, nsim, joint) or (nsim, joint) of the first simulation as one, `count` rows each."""
+    if arrays[0].ndim == 2:
+        return np.repeat([x[0] for x in arrays], count, axis=0)
+    rows, lengths = np.concatenate([x[:, 0] for x in arrays]), np.array([len(x) for x in arrays])
+    return rows if (lengths == count).all() else np.repeat(rows, count, axis=0)

@@ -1,0 +1,61 @@
+"""What a friction of a scenario is: how the joints of the simulated robot resist."""
+
+from abc import ABC, abstractmethod
+from typing import final
+
+import mujoco
+from mujoco.batch import Batch
+
+from sim.robot.motors import Array
+from sim.settings import EachNotNegativeOrNone, per_joint
+
+
+class AbstractContact(ABC):
+    """A friction at work; what it remembers is of shape (nsim, joint)."""
+
+    @abstractmethod
+    def torque(self, qd: Array) -> Array | float:
+        """Return the torque on the joints in the step to come [N m], beside what MuJoCo itself applies.
+
+        Parameters
+        ----------
+        qd : Array, shape (nsim, joint)
+            Speed in the middle of the step [rad/s].
+        """
+
+
+class AbstractFrictionLaw(ABC):
+    """The settings of a friction; all have Fv and Fs."""
+
+    viscous: EachNotNegativeOrNone
+    coulomb: EachNotNegativeOrNone
+
+    @property
+    @abstractmethod
+    def steady(self) -> bool:
+        """Whether MuJoCo alone makes the friction, so that many physics steps may be taken at once."""
+
+    @final
+    def edit(self, spec: mujoco.MjSpec) -> None:
+        """Write viscous and Coulomb friction into the joints of a robot, and leave its own where none is given."""
+        n = len(spec.joints)
+        if self.viscous is not None:
+            for joint, value in zip(spec.joints, per_joint(self.viscous, n, "friction.viscous"), strict=True):
+                joint.damping = [value, *([0.0] * (len(joint.damping) - 1))]
+        if self.coulomb is not None:
+            for joint, value in zip(spec.joints, per_joint(self.coulomb, n, "friction.coulomb"), strict=True):
+                joint.frictionloss = value
+
+    @abstractmethod
+    def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
+        """Return the friction of standing joints.
+
+        Parameters
+        ----------
+        plant : mujoco.batch.Batch
+            The simulations, which have the friction that `edit` wrote.
+        Fs : Array, shape (nsim, joint)
+            Coulomb friction [N m] of every simulation.
+        h : float
+            Physics step [s].
+        """

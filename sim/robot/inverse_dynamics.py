@@ -1,0 +1,58 @@
+"""Torques that make a robot move along given states: MuJoCo's inverse dynamics, and a friction law."""
+
+import numpy as np
+from mujoco import mjtStage
+from mujoco.batch import Batch
+
+from sim.robot.motors import Array
+from sim.robot.robot import Robot
+
+BLOCK = 8192
+"""States evaluated together: bounds the memory of long trajectories."""
+
+
+class InverseDynamics:
+    """M(q) qdd + bias - passive forces [N m] of many states at once, all from MuJoCo, without `frictionloss`.
+
+    This is `mj_inverse` without its constraint forces. With `frictionloss`, `mj_inverse` takes the sign of the friction
+    from qd plus a share of qdd, so that joints that brake get the wrong one; damping, a passive force, is right.
+
+    Parameters
+    ----------
+    robot : Robot
+        The arm.
+    count : int
+        Number of states of every call.
+    """
+
+    def __init__(self, robot: Robot, count: int) -> None:
+        self._states = Batch(robot.model, count)
+        names = ("qpos", "qvel", "M", "qfrc_bias", "qfrc_passive")
+        self._q, self._qd, self._packed, self._bias, self._passive = (self._states.bind(name) for name in names)
+        self._M = np.zeros((count, robot.n, robot.n))
+        self._place = np.repeat(np.arange(robot.n), robot.model.M_rownnz), robot.model.M_colind
+
+    def __call__(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """Return the torques at the states `q` [rad], `qd` [rad/s], `qdd` [rad/s^2], shape (state, joint)."""
+        self._q[:], self._qd[:] = q, qd
+        self._states.forward(stage=mjtStage.mjSTAGE_VEL.value)
+        row, column = self._place
+        self._M[:, row, column] = self._packed
+        self._M[:, column, row] = self._packed
+        # Sums along an axis of each state: the bits do not depend on how many states there are.
+        return (self._M * qdd[:, None, :]).sum(axis=-1) + self._bias - self._passive
+
+    def inertia(self) -> Array:
+        """Return the diagonal of M at the states of the last call [kg m^2], shape (state, joint)."""
+        return np.diagonal(self._M, axis1=1, axis2=2)
+
+
+def inverse_dynamics(robot: Robot, q: Array, qd: Array, qdd: Array) -> Array:
+    """Return the torques [N m] along a motion, as `InverseDynamics`; all arrays have the shape (time, joint)."""
+    blocks = [slice(i, i + BLOCK) for i in range(0, len(q), BLOCK)]
+    return np.concatenate([InverseDynamics(robot, len(q[b]))(q[b], qd[b], qdd[b]) for b in blocks])
+
+
+def coulomb_torque(robot: Robot, qd: Array) -> Array:
+    """Return Fs sign(qd) [N m], shape (time, joint), with Fs the `frictionloss` of the model's joints."""
+    return robot.model.dof_frictionloss * np.sign(qd)

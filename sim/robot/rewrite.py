@@ -1,0 +1,190 @@
+"""A robot's file with other parameters."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.parsers import expat
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from identify.data.kinematics import INERTIAL
+from sim.errors import RobotError
+from sim.robot.motors import Array
+from sim.robot.robot import Robot
+from sim.robot.tree import standard_parameters
+
+ROUNDING = 1e-9
+"""Share of the largest parameter by which those of the compiled file may differ from what was written into it."""
+
+Values = Mapping[str, float]
+
+
+def rewritten(name: str, standard: Values, folder: Path | None = None) -> str:
+    """Return the file of a robot as MJCF, with other standard parameters.
+
+    The inertia of a link stands at the body that its joint moves; bodies that are welded to it become massless. Everything
+    else, comments included, stays as it is; files that the file includes are put in their places.
+
+    Parameters
+    ----------
+    name : str
+        Name of a robot that ships, or path of its file.
+    standard : mapping of str to float
+        Values by the names that `sim.robot.tree.standard_parameters` gives; those that it leaves out stay.
+    folder : Path, optional
+        Where it will be written, so that it finds its meshes; by default where the file of the robot is.
+
+    Raises
+    ------
+    RobotError
+        If a link with these parameters cannot exist, or the model does not compile to them.
+    """
+    robot = Robot.load(name)
+    known = standard_parameters(robot)
+    wanted = {**known, **{key: value for key, value in standard.items() if key in known}}
+    root = _document(name)
+    _require_alike(robot, root)
+    for compiler in root.iter("compiler"):
+        compiler.attrib.pop("inertiafromgeom", None)  # bodies keep what they are given
+    bodies, joints = _elements(root)
+    for j, joint in enumerate(joints):
+        for letters, attribute in (("Ia", "armature"), ("Fv", "damping"), ("Fs", "frictionloss")):
+            joint.set(attribute, repr(float(wanted[f"{letters}{j + 1}"])))
+        if f"M{j + 1}" in wanted:
+            _set_link(robot, bodies, j, wanted)
+    home = Robot.path(name).absolute().parent
+    if folder is not None:
+        _relocate(root, home, folder)
+    text = _around(name, ElementTree.tostring(root, encoding="unicode"))
+    _require_same(name, compiled(name, text, folder or home), wanted)
+    return text
+
+
+def compiled(name: str, text: str, folder: Path | None = None) -> Robot:
+    """Return the robot of a text that stands for the file of a robot; raise RobotError if it does not compile.
+
+    Meshes are looked for from `folder`, by default that of the robot's file.
+    """
+    try:
+        spec = mujoco.MjSpec.from_string(text)
+        spec.modelfiledir = str(folder or Robot.path(name).parent)
+        return Robot(Path(name).stem, spec.compile())
+    except ValueError as error:
+        raise RobotError(f"MuJoCo cannot compile {name!r} with these parameters: {' '.join(str(error).split())}") from error
+
+
+def _around(name: str, text: str) -> str:
+    """Return a text with what stands before and after the element of the robot in its file: licences, as a rule."""
+    raw = Robot.path(name).read_bytes()
+    parser, starts, ends = expat.ParserCreate(), list[int](), [0]
+    parser.StartElementHandler = lambda *_: starts.append(parser.CurrentByteIndex)
+    parser.EndElementHandler = lambda *_: ends.append(parser.CurrentByteIndex)
+    parser.Parse(raw, True)
+    before, after = raw[: starts[0]], raw[raw.index(b">", ends[-1]) + 1 :]
+    if b"<robot" in raw[starts[0] : starts[0] + 6]:  # a URDF became MJCF
+        before = after = b""
+    return before.decode() + text + (after.decode() or "\n")
+
+
+def _relocate(root: ElementTree.Element, old: Path, new: Path) -> None:
+    """Let a file in another folder find the meshes and textures of this one."""
+    assets = [asset for assets in root.iter("asset") for asset in assets if any(key.startswith("file") for key in asset.attrib)]
+    if not assets or old == new:
+        return
+    compilers = root.findall("compiler")
+    settings: dict[str, str] = {}
+    for compiler in compilers:  # the last that says it holds
+        settings |= {key: compiler.attrib.pop(key) for key in ("assetdir", "meshdir", "texturedir") if key in compiler.attrib}
+    first = compilers[0] if compilers else ElementTree.Element("compiler")
+    if not compilers:
+        root.insert(0, first)
+    for attribute in ("meshdir", "texturedir"):
+        first.set(attribute, os.path.relpath(old / settings.get(attribute, settings.get("assetdir", "")), new))
+
+
+def _document(name: str) -> ElementTree.Element:
+    """Return a robot's file as MJCF, its inclusions in their places."""
+    path = Robot.path(name)
+    root = _parsed(path)
+    if root.tag == "robot":
+        spec = Robot.spec(name)
+        spec.compile()
+        return ElementTree.fromstring(spec.to_xml())
+    while any(child.tag == "include" for parent in root.iter() for child in parent):
+        for parent in list(root.iter()):
+            for child in [child for child in parent if child.tag == "include"]:
+                place = list(parent).index(child)
+                parent.remove(child)
+                for k, included in enumerate(_parsed(path.parent / child.get("file", ""))):
+                    parent.insert(place + k, included)
+    return root
+
+
+def _parsed(path: Path) -> ElementTree.Element:
+    try:
+        builder = ElementTree.TreeBuilder(insert_comments=True)
+        return ElementTree.fromstring(path.read_text(encoding="utf-8"), ElementTree.XMLParser(target=builder))
+    except (OSError, ElementTree.ParseError) as error:
+        raise RobotError(f"cannot read {path}: {error}") from error
+
+
+def _elements(root: ElementTree.Element) -> tuple[list[ElementTree.Element], list[ElementTree.Element]]:
+    """Return the elements of bodies, with the world's at 0, and of joints, by their numbers in the model."""
+    worlds = [world for world in root if world.tag == "worldbody"]
+    bodies = [body for world in worlds for body in world.iter("body")]
+    return [worlds[0], *bodies], [joint for world in worlds for joint in world.iter("joint")]
+
+
+def _require_alike(robot: Robot, root: ElementTree.Element) -> None:
+    """Raise RobotError unless the elements of a file are the bodies and joints of the model, one by one."""
+    model, (bodies, joints) = robot.model, _elements(root)
+    written = [body.get("name", "") for body in bodies[1:]], [joint.get("name", "") for joint in joints]
+    compiled = [model.body(b).name for b in range(1, model.nbody)], [model.joint(j).name for j in range(robot.n)]
+    if written != compiled:
+        raise RobotError(
+            f"the file of robot {robot.name!r} makes its bodies by replicate, attach or composite: write it out flat first "
+            "(mujoco.MjSpec.from_file(...).to_xml() does)"
+        )
+
+
+def _set_link(robot: Robot, bodies: list[ElementTree.Element], joint: int, wanted: Values) -> None:
+    """Give a link its mass, centre of mass and inertia, and the bodies welded to it none."""
+    model, link = robot.model, int(robot.model.jnt_bodyid[joint])
+    xx, xy, xz, yy, yz, zz, *first, mass = (wanted[f"{x}{joint + 1}"] for x in INERTIAL)
+    centre = np.array(first) / mass if mass > 0 else np.zeros(3)
+    about_origin = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    inertia = about_origin - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    if mass <= 0 or np.linalg.eigvalsh(np.trace(inertia) / 2 * np.eye(3) - inertia)[0] < 0:
+        raise RobotError(f"link {joint + 1} with a mass of {mass:.4g} kg and this inertia cannot exist")
+    for body in range(link, model.nbody):
+        if model.body_weldid[body] == link:
+            _give(bodies[body], mass * (body == link), centre, inertia * (body == link))
+
+
+def _give(body: ElementTree.Element, mass: float, centre: Array, inertia: Array) -> None:
+    for old in body.findall("inertial"):
+        body.remove(old)
+    six = [*np.diagonal(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]
+    kind = {"fullinertia": _numbers(six)} if mass else {"diaginertia": "0 0 0"}
+    made = ElementTree.Element("inertial", {"pos": _numbers(centre), "mass": repr(float(mass)), **kind})
+    made.tail = body.text
+    body.insert(0, made)
+
+
+def _numbers(values: npt.ArrayLike) -> str:
+    return " ".join(repr(float(value)) for value in np.asarray(values))
+
+
+def _require_same(name: str, made: Robot, wanted: Values) -> None:
+    """Raise RobotError if a robot does not have the parameters that were written into its file."""
+    found = standard_parameters(made)
+    largest = max(abs(value) for value in wanted.values())
+    for key, value in wanted.items():
+        if not abs(found[key] - value) <= ROUNDING * largest:
+            raise RobotError(
+                f"robot {name!r} compiles to {key} = {found[key]:.6g} instead of {value:.6g}: does its file bound or balance "
+                "inertias (boundmass, boundinertia, balanceinertia, settotalmass)?"
+            )

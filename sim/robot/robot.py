@@ -1,0 +1,185 @@
+"""A robot: a compiled MuJoCo model of one arm and what the bench asks of it."""
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Self
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+import models
+from identify.plugins import did_you_mean
+from sim.errors import BenchError, RobotError
+from sim.robot.motors import Array, Motors
+
+_log = mujoco.MjLogConfig.get()
+_log.logto_console = _log.logto_file = False  # what it warns of is looked at, and told, by the bench
+_log.set()
+
+FILES = (".xml", ".urdf")
+"""What names of files end with."""
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """An arm whose every joint is a hinge or a slide.
+
+    Parameters
+    ----------
+    name : str
+        Name of the robot.
+    model : mujoco.MjModel
+        The compiled model.
+    """
+
+    name: str
+    model: mujoco.MjModel
+
+    def __post_init__(self) -> None:
+        simple = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+        other = [_called(self.model, j) for j in range(self.model.njnt) if self.model.jnt_type[j] not in simple]
+        if other:
+            raise RobotError(f"robot {self.name!r}: only hinge and slide joints can be simulated, not {', '.join(other)}")
+        if not self.model.njnt:
+            raise RobotError(f"robot {self.name!r} has no joints")
+
+    @classmethod
+    def load(cls, name: str, *edits: Callable[[mujoco.MjSpec], None]) -> Self:
+        """Return the robot that ships as `name`, or that of an MJCF or URDF file, changed by `edits` before it is compiled.
+
+        Raises
+        ------
+        RobotError
+            If there is no such robot or file, or MuJoCo cannot compile it.
+        """
+        spec = cls.spec(name)
+        try:
+            for edit in edits:
+                edit(spec)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # what it warns of ends a simulation, by name
+                robot = cls(Path(name).stem, spec.compile())
+            robot.require_resisting()
+            return robot
+        except BenchError:
+            raise
+        except ValueError as error:
+            raise RobotError(f"MuJoCo cannot compile {name!r}: {' '.join(str(error).split())}{_way_out(str(error))}") from error
+
+    @staticmethod
+    def path(name: str) -> Path:
+        """Return the file of a robot; raise RobotError if `name` is neither one that ships nor that of a file."""
+        try:
+            return Path(name) if Path(name).suffix in FILES else models.path(name)
+        except KeyError as error:
+            hint = did_you_mean(name, models.names())
+            raise RobotError(f"{error.args[0]}{hint}, or give the path of an MJCF or URDF file ({', '.join(FILES)})") from None
+
+    @staticmethod
+    def spec(name: str) -> mujoco.MjSpec:
+        """Return the description of the robot that ships as `name`, or of an MJCF or URDF file, to be edited and compiled.
+
+        Of a URDF only what moves is read, not the shapes: their meshes are mostly in formats that MuJoCo does not read.
+
+        Raises
+        ------
+        RobotError
+            If there is no such robot or file, or MuJoCo cannot read it.
+        """
+        path = Robot.path(name)
+        try:
+            text = path.read_text(encoding="utf-8")
+            urdf = "<robot" in text
+            spec = mujoco.MjSpec.from_string(_without_shapes(text)) if urdf else mujoco.MjSpec.from_file(str(path))
+            spec.compiler.fusestatic = False  # bodies stay those of the file
+            return spec
+        except OSError as error:
+            raise RobotError(f"cannot read robot {name!r}: {error.strerror}") from error
+        except (ValueError, ElementTree.ParseError) as error:
+            raise RobotError(f"MuJoCo cannot read {name!r}: {' '.join(str(error).split())}") from error
+
+    def require_resisting(self) -> None:
+        """Raise RobotError if a joint has a negative friction or rotor: it would drive itself."""
+        for field in ("damping", "frictionloss", "armature"):
+            values = getattr(self.model, f"dof_{field}")
+            if (values < 0).any():
+                j = int(np.argmin(values))
+                raise RobotError(
+                    f"robot {self.name!r}: joint {self.joints[j]} has {field} = {values[j]:g}, which must be 0 or above: "
+                    "correct the file"
+                )
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return int(self.model.njnt)
+
+    @cached_property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints."""
+        return tuple(self.model.joint(j).name or f"joint {j + 1}" for j in range(self.n))
+
+    @cached_property
+    def motors(self) -> Motors:
+        """The DC motors of the joints; RobotError if a joint has none."""
+        return Motors.of(self.model)
+
+    @property
+    def ranges(self) -> Array:
+        """Lowest and highest position of every joint [rad], shape (joint, 2), infinite where the model has no limits."""
+        unlimited = np.tile([-np.inf, np.inf], (self.n, 1))
+        return np.where(self.model.jnt_limited[:, None].astype(bool), self.model.jnt_range, unlimited)
+
+    @property
+    def slides(self) -> npt.NDArray[np.bool_]:
+        """Whether each joint slides, shape (joint,); the others are hinges."""
+        return np.asarray(self.model.jnt_type == int(mujoco.mjtJoint.mjJNT_SLIDE))
+
+    @property
+    def torque_limits(self) -> Array:
+        """Largest torque of every joint's actuator [N m], shape (joint,), infinite where the model has no limits.
+
+        From the range of forces, and from that of controls where the control is a force, as in `motor`.
+        """
+        limits, model = np.full(self.n, np.inf), self.model
+        for a in range(model.nu):
+            if model.actuator_trntype[a] != int(mujoco.mjtTrn.mjTRN_JOINT):
+                continue
+            joint, gear = model.actuator_trnid[a, 0], abs(model.actuator_gear[a, 0])
+            if model.actuator_forcelimited[a]:
+                limits[joint] = min(limits[joint], gear * model.actuator_forcerange[a].max())
+            is_force = model.actuator_biastype[a] == int(mujoco.mjtBias.mjBIAS_NONE)
+            if model.actuator_ctrllimited[a] and is_force:
+                limits[joint] = min(limits[joint], gear * model.actuator_gainprm[a, 0] * model.actuator_ctrlrange[a].max())
+        return limits
+
+
+def _without_shapes(urdf: str) -> str:
+    """Return a URDF without its shapes."""
+    root = ElementTree.fromstring(urdf)
+    for link in root.iter("link"):
+        for shape in [child for child in link if child.tag in ("visual", "collision")]:
+            link.remove(shape)
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _called(model: mujoco.MjModel, joint: int) -> str:
+    """Return what a joint is called, or the body that it moves."""
+    kind = mujoco.mjtJoint(model.jnt_type[joint]).name.removeprefix("mjJNT_").lower()
+    return f"{model.joint(joint).name or kind} of body {model.body(model.jnt_bodyid[joint]).name!r}"
+
+
+def _way_out(reason: str) -> str:
+    """Return what to do about a reason why MuJoCo does not compile a model."""
+    if "mass and inertia" in reason:
+        return "; give every body that a joint moves a mass and an inertia"
+    if "eigenvalues" in reason or "A + B" in reason or "inertia must satisfy" in reason:
+        return "; correct the inertia of that body: it must be that of a body that can exist"
+    if "file" in reason.lower():
+        return "; put the file there, or take the mesh and its geoms out: identification needs the inertials alone"
+    return ""

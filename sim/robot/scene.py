@@ -1,0 +1,148 @@
+"""What a robot looks like: shapes on moving bodies, for any viewer."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+from mujoco import mjtStage
+from mujoco.batch import Batch
+
+from sim.robot.motors import Array
+from sim.robot.robot import Robot
+
+Kind = Literal["sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh"]
+
+_KINDS: dict[int, Kind] = {
+    int(mujoco.mjtGeom.mjGEOM_SPHERE): "sphere",
+    int(mujoco.mjtGeom.mjGEOM_CAPSULE): "capsule",
+    int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): "ellipsoid",
+    int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder",
+    int(mujoco.mjtGeom.mjGEOM_BOX): "box",
+    int(mujoco.mjtGeom.mjGEOM_MESH): "mesh",
+}
+
+HIDDEN = 3
+"""Geoms of this group and higher are not drawn, as in MuJoCo's own viewer: they are there for collisions."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """One geom.
+
+    Parameters
+    ----------
+    name, body : str
+        Its name and the body that carries it.
+    kind : str
+        Sphere, capsule, ellipsoid, cylinder, box or mesh; capsules and cylinders along z, all but meshes centred.
+    size : Array, shape (3,)
+        MuJoCo's sizes [m]: radius; radius and half length; half lengths.
+    position : Array, shape (3,)
+        In the body's frame [m].
+    quaternion : Array, shape (4,)
+        Orientation in the body's frame, x y z w.
+    rgba : Array, shape (4,)
+        Colour, 0 to 1.
+    vertices, faces : Array, shape (vertex, 3) [m] and (face, 3)
+        Of a mesh, in its own frame; empty otherwise.
+    """
+
+    name: str
+    body: str
+    kind: Kind
+    size: Array
+    position: Array
+    quaternion: Array
+    rgba: Array
+    vertices: Array
+    faces: npt.NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Poses in the world.
+
+    Parameters
+    ----------
+    positions : dict
+        Of every body, by name: (time, 3) [m].
+    quaternions : dict
+        Of every body, by name: (time, 4), x y z w.
+    sites : dict
+        Positions of every site, by name: (time, 3) [m].
+    """
+
+    positions: dict[str, Array]
+    quaternions: dict[str, Array]
+    sites: dict[str, Array]
+
+
+def shapes(robot: Robot) -> list[Shape]:
+    """Return the visible shapes of the robot; planes and height fields are left out."""
+    model, found = robot.model, []
+    for g in range(model.ngeom):
+        kind, geom, rgba = _KINDS.get(int(model.geom_type[g])), model.geom(g), _color(model, g)
+        if kind is None or rgba[3] == 0 or model.geom_group[g] >= HIDDEN:
+            continue
+        body = body_name(model, int(model.geom_bodyid[g]))
+        name = geom.name or f"geom{g}"
+        mesh = _mesh(model, int(model.geom_dataid[g])) if kind == "mesh" else (np.empty((0, 3)), np.empty((0, 3), np.int32))
+        found.append(Shape(name, body, kind, geom.size.copy(), geom.pos.copy(), _xyzw(geom.quat), rgba, *mesh))
+    return found
+
+
+def body_name(model: mujoco.MjModel, b: int) -> str:
+    """Return the name of a body, or its number where it has none."""
+    return model.body(b).name or f"body{b}"
+
+
+def _color(model: mujoco.MjModel, g: int) -> Array:
+    material = int(model.geom_matid[g])
+    return (model.geom_rgba[g] if material < 0 else model.mat_rgba[material]).astype(np.float64)
+
+
+def _mesh(model: mujoco.MjModel, m: int) -> tuple[Array, npt.NDArray[np.int32]]:
+    first, face = int(model.mesh_vertadr[m]), int(model.mesh_faceadr[m])
+    vertices = model.mesh_vert[first : first + int(model.mesh_vertnum[m])].astype(np.float64)
+    return vertices, model.mesh_face[face : face + int(model.mesh_facenum[m])].copy()
+
+
+def motion(robot: Robot, q: Array) -> Motion:
+    """Return where the bodies and sites are at the positions `q` [rad], shape (time, joint)."""
+    return Mover(robot).at(q)
+
+
+class Mover:
+    """Moves the bodies of a robot; for the next motion of as many instants it is ready.
+
+    Parameters
+    ----------
+    robot : Robot
+        What is moved.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        self._model, self._size = robot.model, -1
+        self._states: Batch | None = None
+        self._bodies = {body_name(robot.model, b): b for b in range(1, robot.model.nbody)}
+        self._sites = {robot.model.site(s).name or f"site{s}": s for s in range(robot.model.nsite)}
+
+    def at(self, q: Array) -> Motion:
+        """Return where the bodies and sites are at the positions `q` [rad], shape (time, joint)."""
+        if self._states is None or len(q) != self._size:
+            self._states, self._size = Batch(self._model, len(q)), len(q)
+            names = ("qpos", "xpos", "xquat", "site_xpos")
+            self._qpos, self._xpos, self._xquat, self._site_xpos = (self._states.bind(name) for name in names)
+        self._qpos[:] = q
+        self._states.forward(stage=mjtStage.mjSTAGE_POS.value)
+        return Motion(
+            {name: self._xpos[:, b].copy() for name, b in self._bodies.items()},
+            {name: _xyzw(self._xquat[:, b]) for name, b in self._bodies.items()},
+            {name: self._site_xpos[:, s].copy() for name, s in self._sites.items()},
+        )
+
+
+def _xyzw(wxyz: Array) -> Array:
+    return np.roll(wxyz, -1, axis=-1)

@@ -1,0 +1,150 @@
+"""Any robot's kinematic description and its true parameters, read from its compiled model."""
+
+from collections.abc import Iterator
+
+import mujoco
+import numpy as np
+
+from identify.data.kinematics import GROUND, INERTIAL, Joint, KinematicTree
+from sim.errors import RobotError
+from sim.robot.motors import Array
+from sim.robot.robot import Robot
+
+
+def kinematic_tree(robot: Robot) -> KinematicTree:
+    """Return the tree of a robot's links; bodies that are welded to a link belong to it.
+
+    A joint has an armature if the model gives it one.
+
+    Raises
+    ------
+    RobotError
+        If equality constraints or tendons close chains or couple joints; they are named.
+    """
+    model = robot.model
+    _require_open(robot)
+    joints: list[Joint] = []
+    last = {0: GROUND}
+    for body in range(1, model.nbody):
+        first, count = model.body_jntadr[body], model.body_jntnum[body]
+        if not count:
+            continue
+        parent, position, rotation = _placement(model, body)
+        carrier = last[parent]
+        for k in range(first, first + count):
+            at_first = k == first
+            joints.append(
+                Joint(
+                    name=robot.joints[k],
+                    kind="slide" if robot.slides[k] else "hinge",
+                    parent=carrier,
+                    position=position if at_first else np.zeros(3),
+                    rotation=rotation if at_first else np.eye(3),
+                    axis=model.jnt_axis[k],
+                    anchor=model.jnt_pos[k],
+                    zero=float(model.qpos0[k]),
+                    range=tuple(float(x) for x in robot.ranges[k]),  # type: ignore[arg-type]  # two of them
+                    armature=bool(model.dof_armature[k] > 0),
+                    massive=k == first + count - 1,
+                )
+            )
+            carrier = k
+        last[body] = carrier
+    weightless = model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+    return KinematicTree(robot.name, tuple(joints), np.zeros(3) if weightless else model.opt.gravity)
+
+
+def standard_parameters(robot: Robot) -> dict[str, float]:
+    """Return the true standard parameters: ten a link, armature, viscous and Coulomb friction of every joint.
+
+    Inertias and first moments [kg m^2, kg m] are about the origin of the frame of the body that a joint moves, in its axes,
+    with all bodies that are welded to it; see `identify.tree_basis` for the names.
+    """
+    model = robot.model
+    found: dict[str, float] = {}
+    for j in range(robot.n):
+        body = int(model.jnt_bodyid[j])
+        if j + 1 == robot.n or model.jnt_bodyid[j + 1] != body:
+            inertia, first, mass = _inertial(model, body)
+            values = *inertia[np.triu_indices(3)], *first, mass
+            found |= {f"{x}{j + 1}": float(v) for x, v in zip(INERTIAL, values, strict=True)}
+        for letters, field in (("Ia", "dof_armature"), ("Fv", "dof_damping"), ("Fs", "dof_frictionloss")):
+            found[f"{letters}{j + 1}"] = float(getattr(model, field)[j])
+    return found
+
+
+def _require_open(robot: Robot) -> None:
+    """Raise RobotError if something other than the tree ties joints together."""
+    model = robot.model
+    ties = [_tie(model, i) for i in range(model.neq) if model.eq_active0[i]]
+    ties += [f"tendon {model.tendon(i).name!r}" for i in range(model.ntendon) if _is_stiff(model, i)]
+    if ties:
+        raise RobotError(
+            f"robot {robot.name!r} is no open tree: {', '.join(ties)} closes a chain or couples joints; remove it from the "
+            "file, and weld or remove the joints that follow others"
+        )
+
+
+def _tie(model: mujoco.MjModel, equality: int) -> str:
+    """Return kind and name of an equality constraint, and what it ties."""
+    kind = mujoco.mjtEq(model.eq_type[equality]).name.removeprefix("mjEQ_").lower()
+    one, two, name = int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality]), model.equality(equality).name
+    of = model.joint if kind == "joint" else model.body if model.eq_objtype[equality] == mujoco.mjtObj.mjOBJ_BODY else None
+    tied = f" ({' and '.join(of(i).name for i in (one, two) if i >= 0)})" if of else ""
+    return f"{kind} {name!r}{tied}" if name else f"{kind}{tied}"
+
+
+def unmodelled(robot: Robot) -> list[str]:
+    """Return what of a robot's file makes torques that no parameter describes."""
+    model = robot.model
+    sprung = [robot.joints[j] for j in np.flatnonzero(model.jnt_stiffness.reshape(robot.n, -1).any(axis=1))]
+    found = [f"springs at {', '.join(sprung)}"] if sprung else []
+    if model.body_gravcomp.any():
+        found.append("gravity compensation (gravcomp)")
+    if model.opt.density or model.opt.viscosity:
+        found.append("a fluid (density, viscosity)")
+    if model.dof_dampingpoly.any():
+        found.append("damping that is not proportional to the velocity")
+    return found
+
+
+def _is_stiff(model: mujoco.MjModel, tendon: int) -> bool:
+    return bool(model.tendon_stiffness[tendon] or model.tendon_damping[tendon] or model.tendon_frictionloss[tendon])
+
+
+def _placement(model: mujoco.MjModel, body: int) -> tuple[int, Array, Array]:
+    """Return the nearest body above `body` that has joints, or the world, and where `body` stands in its frame."""
+    position, rotation = np.array(model.body_pos[body]), _rotation(model.body_quat[body])
+    parent = int(model.body_parentid[body])
+    while parent and not model.body_jntnum[parent]:
+        turned = _rotation(model.body_quat[parent])
+        position, rotation = model.body_pos[parent] + turned @ position, turned @ rotation
+        parent = int(model.body_parentid[parent])
+    return parent, position, rotation
+
+
+def _inertial(model: mujoco.MjModel, link: int) -> tuple[Array, Array, float]:
+    """Return inertia matrix and first moments about the origin of a link's frame, and its mass."""
+    inertia, first, mass = np.zeros((3, 3)), np.zeros(3), 0.0
+    for body, position, rotation in _welded(model, link):
+        m, c = float(model.body_mass[body]), position + rotation @ model.body_ipos[body]
+        axes = rotation @ _rotation(model.body_iquat[body])
+        inertia += axes @ np.diag(model.body_inertia[body]) @ axes.T + m * (c @ c * np.eye(3) - np.outer(c, c))
+        first += m * c
+        mass += m
+    return inertia, first, mass
+
+
+def _welded(model: mujoco.MjModel, link: int) -> Iterator[tuple[int, Array, Array]]:
+    """Yield the bodies of a link, and where they stand in its frame."""
+    yield link, np.zeros(3), np.eye(3)
+    for body in range(link + 1, model.nbody):
+        if model.body_weldid[body] == link:
+            _, position, rotation = _placement(model, body)
+            yield body, position, rotation
+
+
+def _rotation(quaternion: Array) -> Array:
+    matrix = np.zeros(9)
+    mujoco.mju_quat2Mat(matrix, quaternion)
+    return matrix.reshape(3, 3)

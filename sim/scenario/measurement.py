@@ -1,0 +1,71 @@
+"""How the torque comes into the log."""
+
+from collections.abc import Sequence
+from typing import Literal, final
+
+import numpy as np
+
+from identify.data.motion_log import TorqueChannel
+from sim.errors import ScenarioError
+from sim.robot.motors import Array
+from sim.settings import EachNotNegative, EachNumber, EachShareError, Positive, per_joint, settings
+
+
+@final
+@settings
+class TorqueMeasurement:
+    """What the log's torque is made of: the current reference, as in the paper (Eq. 13), or a measured current."""
+
+    source: Literal["reference", "current"] = "reference"
+    """reference: the commanded torque, sample by sample; current: the motor current, measured when a sample is taken."""
+    gain_error: EachShareError = (0.0,)
+    """Error of the gain G_T by which the log was turned into N m, as a share, of all joints or of each."""
+    offset: EachNumber = (0.0,)
+    """Constant error [N m], of all joints or of each."""
+    noise: EachNotNegative = (0.0,)
+    """White noise, rms [N m], of all joints or of each."""
+    resolution: EachNotNegative = (0.0,)
+    """Step of the converter [N m], of all joints or of each: twice its range over 2^bits; 0 is exact."""
+    cutoff: Positive | None = None
+    """Anti-alias filter of the measured current, first order [Hz]; without it none."""
+
+    def __post_init__(self) -> None:
+        if self.cutoff and self.source == "reference":
+            raise ScenarioError(f"cutoff = {self.cutoff:g} Hz needs source = 'current': a reference is not filtered")
+
+    def logged(self, tau: Array, n: int, rngs: Sequence[np.random.Generator]) -> Array:
+        """Return what the log says of the torques `tau` [N m], shape (nsim, time, joint)."""
+        gain, offset, noise, step = (
+            per_joint(getattr(self, name), n, f"torque.{name}") for name in ("gain_error", "offset", "noise", "resolution")
+        )
+        drawn = np.stack([rng.standard_normal(tau.shape[1:]) for rng in rngs])
+        said = (1 + gain) * tau + offset + noise * drawn
+        return np.where(step > 0, np.rint(said / np.where(step > 0, step, 1.0)) * step, said)
+
+    def channel(self, delay: float, lag: float, fs: float) -> TorqueChannel:
+        """Return what the log's torque means, when a command acts `delay` [s] after its sample and the torque `lag` later.
+
+        A measured current is what earlier commands have left when a sample is taken. The last of them had a share
+        1 - exp(-(T - r)/tau) of the filter's output, with T = 1/fs, r = delay modulo T and tau its time constant; those
+        before it follow geometrically. The channel states their mean delay.
+        """
+        if self.source == "reference":
+            return TorqueChannel("held", delay + lag)
+        T = 1 / fs
+        r = max(0.0, delay - int(delay * fs + 1e-9) * T)  # a command that acts as the sample is taken is not in it yet
+        tau = 1 / (2 * np.pi * self.cutoff) if self.cutoff else 0.0
+        earlier = np.exp(-(T - r) / tau) / -np.expm1(-T / tau) if tau else 0.0
+        return TorqueChannel("held", float(r - T * (1 + earlier) + lag))
+
+
+class CurrentSensor:
+    """A first-order anti-alias filter on the motor's torque-making current, advanced by times given in [s]."""
+
+    def __init__(self, settings: TorqueMeasurement, nsim: int, n: int) -> None:
+        self._rate = 2 * np.pi * settings.cutoff if settings.cutoff else np.inf
+        self.value: Array = np.zeros((nsim, n))
+
+    def take(self, tau: Array, dt: float) -> None:
+        """Take in the torques [N m], before ripple, of equal parts of the next `dt` [s], shape (part, nsim, joint)."""
+        for part in tau if np.isfinite(self._rate) else tau[-1:]:
+            self.value = part - (part - self.value) * np.exp(-self._rate * dt / len(tau))

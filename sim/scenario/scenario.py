@@ -1,0 +1,103 @@
+"""Everything that defines a run, from TOML or Python."""
+
+from typing import Annotated, Literal, final
+
+from pydantic import Field
+
+from sim.controllers import AbstractController, PDFeedforward
+from sim.drives import AbstractDrive, IdealDrive
+from sim.encoders import AbstractEncoder, ExactEncoder
+from sim.errors import ScenarioError
+from sim.frictions import AbstractFrictionLaw, CoulombViscous
+from sim.robot.payload import Payload
+from sim.robot.robot import Robot
+from sim.scenario.measurement import TorqueMeasurement
+from sim.scenario.ripple import Ripple
+from sim.settings import NotNegative, Number, Positive, Seed, settings
+from sim.trajectories import AbstractTrajectory, Quintic
+
+
+@final
+@settings
+class Timing:
+    """When things happen."""
+
+    delay: NotNegative = 0.0
+    """Computing delay: from a sample to the instant its command acts [s]; below 1 s."""
+    jitter: NotNegative = 0.0
+    """Sample instants scatter evenly over this width around the instant that the log claims [s]."""
+
+    def __post_init__(self) -> None:
+        if self.delay >= 1:
+            raise ScenarioError(f"delay = {self.delay:g} s must be below 1 s")
+
+
+@final
+@settings
+class Physics:
+    """How the plant is integrated."""
+
+    step: Annotated[Number, Field(gt=0, le=0.01)] = 0.001
+    """Longest physics step [s]; the drive may need a shorter one."""
+    integrator: Literal["RK4", "implicitfast", "implicit", "Euler"] = "RK4"
+    """MuJoCo's integrator. All but RK4 act half a step early, which the log's torque delay states."""
+
+    @property
+    def early(self) -> float:
+        """Share of a step by which torques act early."""
+        return 0.0 if self.integrator == "RK4" else 0.5
+
+
+@final
+@settings
+class Scenario:
+    """A robot, a motion, and all that is imperfect about them."""
+
+    name: Annotated[str, Field(pattern=r"^\w[\w .-]*$")]
+    """Name of the run: letters, digits, space, dot, hyphen and underscore."""
+    trajectory: AbstractTrajectory
+    """Where the joints shall go: a table with a kind, or the name of a scenario whose trajectory it takes."""
+    robot: str = "scara"
+    """Name of a robot that ships, or path of an MJCF or URDF file."""
+    fs: Positive = 100.0
+    """Sampling frequency of controller and log [Hz]."""
+    seed: Seed = 0
+    """Seed of whatever is random in it."""
+    origin: str = ""
+    """Where it comes from."""
+    start: tuple[Number, ...] = ()
+    """Positions [rad] from which the arm is brought to the trajectory, before the log begins; empty: it is there."""
+    controller: AbstractController = PDFeedforward()
+    """What commands the torques."""
+    timing: Timing = Timing()
+    """When things happen."""
+    drive: AbstractDrive = IdealDrive()
+    """What makes torque of a command."""
+    ripple: Ripple = Ripple()
+    """Torque that depends on the rotor's position."""
+    friction: AbstractFrictionLaw = CoulombViscous()
+    """How the joints resist."""
+    payload: Payload = Payload()
+    """A mass that the controller does not know."""
+    encoder: AbstractEncoder = ExactEncoder()
+    """What measures the positions."""
+    torque: TorqueMeasurement = TorqueMeasurement()
+    """What the log's torque is made of."""
+    physics: Physics = Physics()
+    """How the plant is integrated."""
+
+    @property
+    def real_robot(self) -> Robot:
+        """The robot that is simulated: with its payload, and the friction of the scenario."""
+        return Robot.load(self.robot, self.payload.edit, self.friction.edit)
+
+    @property
+    def nominal_robot(self) -> Robot:
+        """The robot as its maker describes it."""
+        return Robot.load(self.robot)
+
+    def quintic(self) -> Quintic:
+        """Return the trajectory if it is given by waypoints and times; raise ScenarioError if not."""
+        if not isinstance(self.trajectory, Quintic):
+            raise ScenarioError(f"scenario {self.name!r}: only a trajectory of kind quintic will do here")
+        return self.trajectory

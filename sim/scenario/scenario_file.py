@@ -1,0 +1,185 @@
+"""Scenarios as TOML: read with every key checked, written with every key explained."""
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from identify.plugins import PluginTable, did_you_mean
+from sim.controllers import CONTROLLERS
+from sim.drives import DRIVES
+from sim.encoders import ENCODERS
+from sim.errors import ScenarioError
+from sim.frictions import FRICTIONS
+from sim.scenario.scenario import Scenario
+from sim.settings import description, for_all_joints, limits, make
+from sim.trajectories import TRAJECTORIES
+
+LONG = 60
+"""Characters beyond which a value stands on lines of its own."""
+
+FOLDER = Path(__file__).parent / "scenarios"
+
+KINDS: Mapping[str, PluginTable[Any]] = {
+    "trajectory": TRAJECTORIES,
+    "controller": CONTROLLERS,
+    "drive": DRIVES,
+    "friction": FRICTIONS,
+    "encoder": ENCODERS,
+}
+"""The parts of a scenario that are plug-ins: their tables say `kind` which."""
+
+
+def names() -> tuple[str, ...]:
+    """Return the names of the scenarios that ship."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
+
+
+def load(name: str) -> Scenario:
+    """Return the scenario that ships as `name`, or that of a TOML file.
+
+    Raises
+    ------
+    ScenarioError
+        If there is none, it is not TOML, or a key is unknown, missing, of the wrong type or out of its range.
+    """
+    content = _content(name)
+    try:
+        return from_dict(content)
+    except ScenarioError as error:
+        raise ScenarioError(f"scenario {name}: {error}") from error
+
+
+def _content(name: str) -> dict[str, Any]:
+    """Return the TOML document of a scenario."""
+    path = Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
+    if not name.endswith(".toml") and name not in names():
+        hint = did_you_mean(name, names())
+        raise ScenarioError(f"no scenario {name!r}{hint}; known: {', '.join(names())}, or give the path of a TOML file (.toml)")
+    try:
+        return tomllib.loads(path.read_text())
+    except OSError as error:
+        raise ScenarioError(f"cannot read scenario {path}: {error.strerror}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ScenarioError(f"cannot read scenario {path}: {error}") from error
+
+
+def from_dict(content: Mapping[str, Any]) -> Scenario:
+    """Make a scenario from the keys of a TOML document; raise ScenarioError as `load`."""
+    made = dict(content)
+    if isinstance(made.get("trajectory"), str):
+        made["trajectory"] = _trajectory_of(made["trajectory"])
+    wrong = []
+    for key, table in KINDS.items():
+        if key in made and not isinstance(made[key], table.kind):
+            try:
+                made[key] = _plugin(key, table, made[key])
+            except ScenarioError as error:  # with whatever else is wrong
+                wrong.append(str(error))
+                made.pop(key)
+    try:
+        scenario: Scenario = make(Scenario, made, "")
+    except ScenarioError as error:
+        raise ScenarioError("; ".join([*wrong, *_besides(str(error), content)])) from error
+    if wrong:
+        raise ScenarioError("; ".join(wrong))
+    return scenario
+
+
+def _besides(error: str, content: Mapping[str, Any]) -> list[str]:
+    """Return what is wrong, but for keys that are there and were taken out because they are wrong themselves."""
+    return [part for part in error.split("; ") if not any(part.startswith(f"key {key!r} is missing") for key in content)]
+
+
+def _trajectory_of(name: str) -> Any:
+    """Return the trajectory of another scenario, which must be its own."""
+    trajectory: Any = _content(name).get("trajectory")
+    if isinstance(trajectory, str):
+        raise ScenarioError(f"trajectory = {name!r}: that scenario has none of its own; name {trajectory!r}")
+    return _plugin("trajectory", TRAJECTORIES, trajectory)
+
+
+def _plugin(key: str, table: PluginTable[Any], content: Mapping[str, Any]) -> Any:
+    """Return the plug-in that a table with a `kind` describes."""
+    if not isinstance(content, dict):
+        raise ScenarioError(f"{key} = {content!r:.60} must be a table with a kind: {', '.join(table)}")
+    if "kind" not in content:
+        raise ScenarioError(f"key '{key}.kind' is missing; known: {', '.join(table)}")
+    kind, rest = content["kind"], {name: value for name, value in content.items() if name != "kind"}
+    if not isinstance(kind, str) or kind not in table:
+        hint = did_you_mean(str(kind), list(table))
+        raise ScenarioError(f"{key}.kind = {kind!r} is unknown{hint}; known: {', '.join(table)}")
+    return make(table[kind], rest, key)  # type: ignore[arg-type]  # the factories of these tables are classes
+
+
+def to_dict(scenario: Scenario) -> dict[str, Any]:
+    """Return the scenario as the keys of a TOML or JSON document, without the settings that are left open."""
+    return _keys(scenario)
+
+
+def _keys(part: Any) -> dict[str, Any]:
+    return {key: _value(key, value) for key, value in _settings(part) if value is not None}
+
+
+def _settings(part: Any) -> Iterator[tuple[str, Any]]:
+    yield from ((field.name, getattr(part, field.name)) for field in fields(part))
+
+
+def _value(key: str, value: Any) -> Any:
+    if is_dataclass(value):
+        return {**({"kind": _kind(key, value)} if key in KINDS else {}), **_keys(value)}
+    if isinstance(value, tuple):
+        return [_value(key, item) for item in value]
+    return value
+
+
+def _kind(key: str, value: Any) -> str:
+    for name in KINDS[key]:
+        if KINDS[key][name] is type(value):
+            return name
+    raise ScenarioError(f"{key}: {type(value).__name__} is not in the table of {KINDS[key].point}")
+
+
+def to_toml(scenario: Scenario) -> str:
+    """Return the scenario as a TOML document that explains every key."""
+    simple, tables = [], []
+    for key, value in _settings(scenario):
+        if is_dataclass(value):
+            tables.append("\n".join(_table(key, value)))
+        elif value not in ("", (), None):
+            simple.append(_explained(type(scenario), key, value))
+    return "\n\n".join(["\n".join(simple), *tables]) + "\n"
+
+
+def _table(key: str, part: Any) -> Iterator[str]:
+    yield f"# {description(Scenario, key)}."
+    yield f"[{key}]"
+    if key in KINDS:
+        yield f"kind = {_kind(key, part)!r}  # {', '.join(KINDS[key])}".replace("'", '"')
+    for name, value in _settings(part):
+        if value is None:
+            yield f"# {name} = ...  # {description(type(part), name)}"
+        else:
+            yield _explained(type(part), name, value)
+
+
+def _explained(cls: type, key: str, value: Any) -> str:
+    """Return `key = value  # what it is (its range)`."""
+    one = for_all_joints(cls, key) and len(value) == 1
+    text = f"{key} = {_written(value[0] if one else value)}"
+    allowed = limits(cls, key)
+    told = f"# {description(cls, key)}" + (f" ({allowed})" if allowed else "")
+    return f"{text}  {told}" if len(text) < LONG else f"{told}\n{text}"
+
+
+def _written(value: Any) -> str:
+    """Return a value as TOML: a list of numbers in one line, a list of lists or a long list in many."""
+    if not isinstance(value, tuple):
+        return tomli_w.dumps({"x": value}).removeprefix("x = ").rstrip("\n")
+    items = [_written(item) for item in value]
+    short = f"[{', '.join(items)}]"
+    many = "".join(f"    {item},\n" for item in items)
+    return short if len(short) < LONG and "[" not in short[1:] else f"[\n{many}]"
