@@ -12,6 +12,7 @@ from importlib.metadata import version
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from uuid import uuid4
 
 from experiments.errors import ResultsError
 from identify import Estimate
@@ -147,16 +148,13 @@ def tell_of(lost: str, out: Path) -> None:
 def write_whole(path: Path, text: str) -> None:
     """Write `text` to `path`, whole or not at all; raise ResultsError if that fails."""
     try:
-        number, beside = tempfile.mkstemp(prefix=".idbench-", dir=path.parent)
+        beside = path.parent / f".idbench-{uuid4().hex}"
         try:
-            with os.fdopen(number, "w", encoding="utf-8") as file:
+            with beside.open("x", encoding="utf-8") as file:
                 file.write(text)
-            umask = os.umask(0)
-            os.umask(umask)
-            Path(beside).chmod(0o666 & ~umask)  # temporary files are the owner's alone
-            Path(beside).replace(path)
+            beside.replace(path)
         finally:
-            Path(beside).unlink(missing_ok=True)
+            beside.unlink(missing_ok=True)
     except OSError as error:
         raise ResultsError(f"cannot write {path}: {error.strerror}; choose another place") from error
 

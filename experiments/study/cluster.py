@@ -131,7 +131,7 @@ def ready() -> dict[str, str]:
 def compute(text: str, first: int, stop: int, theirs: dict[str, str]) -> Shard:
     """Return a shard, on a worker; raise StudyError if its versions are not those of the process that asks."""
     require_versions(theirs, "the process that runs the study")
-    threadpool_limits(1)
+    threadpool_limits(1)  # for good: the process is a worker's, and its other threads compute shards, too
     return run_shard(_study(text), range(first, stop))
 
 

@@ -37,7 +37,8 @@ class LocalPool:
         self.width = threads
         self._study, self._stop, self._done = study, threading.Event(), dict[int, float]()
         self._pool: Executor = ThreadPoolExecutor(threads)
-        threadpool_limits(1)  # shards are the parallel work; a matrix product that forks would only be in their way
+        # Shards are the parallel work; a matrix product that forks would only be in their way.
+        self._limits = threadpool_limits(1)
 
     def submit(self, runs: range) -> Future[Shard]:
         """Begin a shard."""
@@ -51,6 +52,7 @@ class LocalPool:
         """Stop at the next opportunity and wait for it."""
         self._stop.set()
         self._pool.shutdown(cancel_futures=True)
+        self._limits.restore_original_limits()
 
     def _run(self, runs: range) -> Shard:
         def hear(share: float) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from experiments.cli import main
 from experiments.errors import ResultsError
-from experiments.identification.results import HIDDEN, Place, results_folder
+from experiments.identification.results import HIDDEN, Place, results_folder, write_whole
 from identify.data.log_file import read_log, write_log
 
 
@@ -79,3 +79,14 @@ def test_folders_of_killed_processes_go_and_those_of_others_stay(tmp_path):
     with results_folder(Place(tmp_path / "out", "run", "mine")):
         pass
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*kept, "out"])
+
+
+def test_a_file_is_written_whole_with_the_rights_that_new_files_have(tmp_path, monkeypatch):
+    """Without a look at the mask of the process, which is set to 0 for that and belongs to all threads."""
+    monkeypatch.setattr(os, "umask", None)
+    write_whole(tmp_path / "whole.txt", "text")
+    (tmp_path / "plain.txt").write_text("text")
+    assert (tmp_path / "whole.txt").stat().st_mode == (tmp_path / "plain.txt").stat().st_mode
+    with pytest.raises(ResultsError, match="cannot write .*nowhere"):
+        write_whole(tmp_path / "nowhere" / "x.txt", "text")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["plain.txt", "whole.txt"]

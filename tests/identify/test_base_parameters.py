@@ -1,7 +1,7 @@
 """Base parameters against published counts, the closed form, and their own definition."""
 
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib.metadata import files
 
 import numpy as np
@@ -10,6 +10,7 @@ import pytest
 import identify.parameters.base_parameters
 from identify import (
     MODELS,
+    AbstractConservativeBlock,
     Armature,
     BaseParameters,
     Basis,
@@ -17,6 +18,7 @@ from identify import (
     Joint,
     KinematicTree,
     Offset,
+    Parameter,
     Problem,
     SettingError,
     State,
@@ -212,3 +214,26 @@ def test_rounded_angles_do_not_change_the_grouping(arm, tmp_path):
         kept.append(BaseParameters.of(tree, tree_basis(tree)).kept)
     assert len(kept[0]) == len(kept[1]) == len(kept[2])
     assert arm not in {"ur3", "z1"} or kept[0] == kept[1] == kept[2]
+
+
+def test_parameters_whose_names_end_in_no_digit_are_grouped():
+    """A spring of the whole robot belongs to no joint, and two like it are one."""
+
+    @dataclass(frozen=True)
+    class Wind(AbstractConservativeBlock):
+        """A constant torque on joint 1, twice."""
+
+        def parameters(self, n):
+            return Parameter("wind", None, "other", "N m"), Parameter("draught", None, "other", "N m")
+
+        def explicit(self, state):
+            return {(0, name): np.ones_like(state.q[..., 0, :]) for name in ("wind", "draught")}
+
+        momentum = energy = lambda self, state: {}
+        remainder = explicit
+
+    tree = planar(1, [0, 0, -9.81])
+    found = BaseParameters.of(tree, tree_basis(tree) + Wind())
+    assert "windR" in found.names
+    assert "draught" not in found.names
+    assert found.grouping(found.names.index("windR")) == "wind + draught"

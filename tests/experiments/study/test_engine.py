@@ -2,6 +2,7 @@
 
 import pytest
 from distributed import LocalCluster
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from experiments.errors import StudyError
 from experiments.study import cluster
@@ -108,3 +109,11 @@ def test_motion_can_be_shared(content):
     power = [row for row in rows if row["model"] == "power"]
     assert len({row["condition_number"] for row in power}) == 2  # the two methods'
     assert len({row["ZZR1"] for row in power}) == 6  # the torques' noise is drawn anew
+
+
+def test_a_study_leaves_the_threads_of_the_libraries_as_they_were(small, tmp_path, run_study):
+    """One BLAS thread while it runs, and afterwards as many as before."""
+    with threadpool_limits(2):
+        before = [pool["num_threads"] for pool in threadpool_info()]
+        run_study(small, tmp_path / "out")
+        assert [pool["num_threads"] for pool in threadpool_info()] == before
