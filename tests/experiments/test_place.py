@@ -87,6 +87,6 @@ def test_a_file_is_written_whole_with_the_rights_that_new_files_have(tmp_path, m
     write_whole(tmp_path / "whole.txt", "text")
     (tmp_path / "plain.txt").write_text("text")
     assert (tmp_path / "whole.txt").stat().st_mode == (tmp_path / "plain.txt").stat().st_mode
-    with pytest.raises(ResultsError, match="cannot write .*nowhere"):
+    with pytest.raises(ResultsError, match=r"cannot write .*nowhere"):
         write_whole(tmp_path / "nowhere" / "x.txt", "text")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["plain.txt", "whole.txt"]
