@@ -1,4 +1,4 @@
-"""Mistakes of plug-ins, told by the name of the plug-in: what it raised, or what it returned instead of what."""
+"""Mistakes of plug-ins, reported by the name of the plug-in: what it raised, or what it returned instead of what."""
 
 import sys
 import traceback
@@ -29,8 +29,8 @@ def blamed() -> Iterator[None]:
         frame = None if _root(type(error).__module__) in OURS else _foreign(error)
         if frame is None:
             raise
-        said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-        raise PluginError(f"plug-in {frame.name} raised {said} ({frame.filename}, line {frame.lineno})") from error
+        message = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+        raise PluginError(f"plug-in {frame.name} raised {message} ({frame.filename}, line {frame.lineno})") from error
 
 
 def expect(plugin: object, method: str, value: object, *shapes: Sequence[int]) -> Array:

@@ -27,7 +27,7 @@ class ExcitationError(IdentificationError):
     Parameters
     ----------
     message : str
-        What to tell.
+        The message.
     hidden : tuple of str
         Parameters that, left out, leave some that the motion does show.
     """

@@ -159,4 +159,4 @@ def test_names_that_are_taken_are_told(tmp_path, monkeypatch):
 def test_conflicts_are_listed(tmp_path, monkeypatch):
     install(tmp_path, "thief", "class Own: pass\n", "[idbench.estimators]\nOLS = thief:Own\n")
     listed = python("from experiments.cli import main; main(['list'])", tmp_path, monkeypatch)
-    assert "doubtful: estimators plug-in OLS is built in, thief (thief:Own) of the same name is not used" in listed
+    assert "warning: estimators plug-in OLS is built in, thief (thief:Own) of the same name is not used" in listed

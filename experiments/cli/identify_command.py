@@ -14,17 +14,17 @@ from rich.text import Text
 from experiments.cli.logs import Identify
 from experiments.cli.page import new_page, shown
 from experiments.cli.plugins import plugin_conflicts
-from experiments.cli.reading import Question, file_of, read, told_by
+from experiments.cli.reading import Question, file_of, read, stated_by
 from experiments.errors import ExperimentError, ResultsError
 from experiments.identification.consistent_robot import Written
 from experiments.identification.identification_text import print_identified, print_validated
 from experiments.identification.identified import Identified
-from experiments.identification.log_warnings import doubts_of_log
+from experiments.identification.log_warnings import warnings_of_log
 from experiments.identification.results import Place, beside, results_folder, tell_of, write_recording, write_summary
 from experiments.identification.subject import CLOSED_FORM, Subject, absolute
 from experiments.identification.validated import Validated
 from experiments.identification.verdict import Remedies, Verdict
-from experiments.identification.warnings import doubts_of_result, doubts_of_robot, helpful_moves
+from experiments.identification.warnings import helpful_moves, warnings_of_result, warnings_of_robot
 from experiments.recording.audience import Audience, Watching
 from identify import MODELS, ExcitationError, IdentificationError, LogError, MotionLog
 from identify.data.log_file import write_log
@@ -39,9 +39,9 @@ MOST_STARTS = 1000
 def identify(asked: Identify) -> None:
     """Identify a log, judge the result, write it."""
     page, models, out = new_page(), tuple(MODELS) if asked.model == "all" else (asked.model,), asked.out
-    path, said = file_of(asked.log), told_by(asked.log)
+    path, stated = file_of(asked.log), stated_by(asked.log)
     _require_label(asked.label)
-    subject = Subject(said.get("robot", CLOSED_FORM) if asked.robot is None else absolute(asked.robot), asked.parameters)
+    subject = Subject(stated.get("robot", CLOSED_FORM) if asked.robot is None else absolute(asked.robot), asked.parameters)
     _require_target(asked.write_mjcf, subject)
     place = None if out is None else Place(out, "identify", str(asked.log.absolute()), asked.force)
     if place:
@@ -50,14 +50,14 @@ def identify(asked: Identify) -> None:
         (), subject, models=models, chain=asked.chain, estimator=asked.estimator, name=asked.label
     )
     known, about_delay = read(path, Question(asked.torque, asked.torque_delay, asked.unwrap), named)
-    found, hidden = _shown(replace(named, logs=(known,), truth=_truth(said, named)))
+    found, hidden = _shown(replace(named, logs=(known,), truth=_truth(stated, named)))
     validated = _validated(found, asked, known)
-    doubts = [*hidden, *_doubts(validated), *plugin_conflicts()]
+    warnings = [*hidden, *_warnings(validated), *plugin_conflicts()]
     with asked.watching.audience() as audience, shown(page):
-        with _explained(doubts):
+        with _explained(warnings):
             print_identified(page, found, str(asked.log))
             print_validated(page, validated)
-        _say(page, [*doubts, *doubts_of_result(found), *_advice(validated, asked)])
+        _say(page, [*warnings, *warnings_of_result(found), *_advice(validated, asked)])
         if about_delay:
             page.print(about_delay)
         if place is not None:
@@ -71,7 +71,7 @@ def identify(asked: Identify) -> None:
 
 
 def _shown(found: Identified) -> tuple[Identified, list[str]]:
-    """Return the identification of what the log shows, and what is to be said of what it hides."""
+    """Return the identification of what the log shows, and what must be said of what it hides."""
     told = []
     leading = next(iter(found.outcomes.values()))
     while isinstance(leading, ExcitationError) and leading.hidden and len(leading.hidden) < len(found.basis.names):
@@ -132,16 +132,16 @@ def _require_target(target: Path | None, subject: Subject) -> None:
         raise ExperimentError(f"--write-mjcf {target} is the robot's own file: choose another name")
 
 
-def _doubts(validated: Validated) -> list[str]:
+def _warnings(validated: Validated) -> list[str]:
     """Return what is suspicious about the robot's file and the logs."""
     subject, second = validated.found.subject, validated.second
-    found = [*doubts_of_log(validated.found.logs[0], subject.tree), *doubts_of_robot(subject.robot)]
-    return found + ([f"{validated.name}: {doubt}" for doubt in doubts_of_log(second, subject.tree)] if second else [])
+    found = [*warnings_of_log(validated.found.logs[0], subject.tree), *warnings_of_robot(subject.robot)]
+    return found + ([f"{validated.name}: {warning}" for warning in warnings_of_log(second, subject.tree)] if second else [])
 
 
-def _truth(said: dict[str, Any], named: Identified) -> dict[str, float] | None:
+def _truth(stated: dict[str, Any], named: Identified) -> dict[str, float] | None:
     """Return the truth that the summary of a run states, if it is of the same parameters."""
-    truth: dict[str, float] | None = said.get("truth")
+    truth: dict[str, float] | None = stated.get("truth")
     return truth if truth and tuple(truth) == named.basis.names else None
 
 
@@ -150,9 +150,9 @@ def _validated(found: Identified, asked: Identify, known: MotionLog) -> Validate
     if asked.validate is None:
         return Validated(found)
     path = file_of(asked.validate)
-    said = known.torque if asked.torque or asked.torque_delay else None
+    stated = known.torque if asked.torque or asked.torque_delay else None
     try:
-        second, _ = read(path, Question(unwrap=asked.unwrap, otherwise=said, fallback=known.torque), found)
+        second, _ = read(path, Question(unwrap=asked.unwrap, otherwise=stated, fallback=known.torque), found)
     except (LogError, ExperimentError) as error:
         raise ExperimentError(f"--validate {error}" if str(path) in str(error) else f"--validate {path}: {error}") from error
     if _within(second, known):
@@ -168,17 +168,17 @@ def _within(one: MotionLog, other: MotionLog) -> bool:
 
 
 @contextmanager
-def _explained(doubts: Sequence[str]) -> Iterator[None]:
+def _explained(warnings: Sequence[str]) -> Iterator[None]:
     """Add to what goes wrong what is suspicious about the log."""
     try:
         yield
     except IdentificationError as error:
-        raise ExperimentError("; ".join([str(error), *(f"doubtful: {doubt}" for doubt in doubts)])) from error
+        raise ExperimentError("; ".join([str(error), *(f"warning: {warning}" for warning in warnings)])) from error
 
 
-def _say(page: Console, doubts: Sequence[str]) -> None:
-    for doubt in doubts:
-        page.print(Text(f"doubtful: {doubt}"), soft_wrap=True)
+def _say(page: Console, warnings: Sequence[str]) -> None:
+    for warning in warnings:
+        page.print(Text(f"warning: {warning}"), soft_wrap=True)
 
 
 def _write_mjcf(page: Console, found: Identified, path: Path) -> None:
@@ -189,7 +189,7 @@ def _write_mjcf(page: Console, found: Identified, path: Path) -> None:
     except (IdentificationError, BenchError) as error:
         raise ResultsError(f"--write-mjcf {path}: {error}; everything else is as printed") from error
     page.print(Text(f"written to {path}: the robot with the parameters of the {written.model} model"), soft_wrap=True)
-    _say(page, written.doubts)
+    _say(page, written.warnings)
 
 
 def _write_results(page: Console, place: Place, validated: Validated, watching: Watching, audience: Audience | None) -> None:
@@ -217,8 +217,8 @@ def _write_results(page: Console, place: Place, validated: Validated, watching: 
 def _judged(validated: Validated) -> dict[str, Any]:
     """Return what a summary.json says of a validation, verdicts included; why, if there is none."""
     try:
-        said = validated.summary()
+        stated = validated.summary()
     except IdentificationError as error:
         return {"on": validated.title, "models": {}, "failure": str(error)}
-    verdicts = {model: Verdict(validated, model).summary() for model in said["models"]}
-    return {**said, "models": {model: {**verdicts[model], **numbers} for model, numbers in said["models"].items()}}
+    verdicts = {model: Verdict(validated, model).summary() for model in stated["models"]}
+    return {**stated, "models": {model: {**verdicts[model], **numbers} for model, numbers in stated["models"].items()}}

@@ -7,7 +7,7 @@ import numpy as np
 
 from experiments.cli.logs import Export, Resample
 from experiments.cli.page import new_page, show
-from experiments.cli.reading import channel_of, told_by
+from experiments.cli.reading import channel_of, stated_by
 from experiments.errors import ExperimentError, ResultsError
 from experiments.identification.results import beside
 from experiments.identification.subject import CLOSED_FORM
@@ -31,7 +31,7 @@ def resample(asked: Resample) -> None:
     _write(made, asked.out, columns.joints)
     page.print(f"written to {asked.out}: torque {made.torque.meaning}, delay {made.torque.delay:g} s", soft_wrap=True)
     if widest > 2 / asked.fs:
-        page.print(f"doubtful: a gap of {widest:.3g} s was filled in, with positions and torques that nobody measured")
+        page.print(f"warning: a gap of {widest:.3g} s was filled in, with positions and torques that nobody measured")
     show(page)
 
 
@@ -50,7 +50,7 @@ def export(asked: Export) -> None:
 
 def _robot_of(folder: Path) -> str:
     """Return the option that names the robot of a results folder, where it is not the one by default."""
-    robot = told_by(folder).get("robot", CLOSED_FORM)
+    robot = stated_by(folder).get("robot", CLOSED_FORM)
     return "" if robot == CLOSED_FORM else f" --robot {shlex.quote(robot)}"
 
 

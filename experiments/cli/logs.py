@@ -63,7 +63,7 @@ class Identify:
 @final
 @dataclass(frozen=True)
 class DescribeRobot:
-    """Tell what can be identified of a robot: its joints, its base parameters, what its torques are made of."""
+    """Show what can be identified of a robot: its joints, its base parameters, what its torques are made of."""
 
     name: tyro.conf.Positional[str]
     """Name of a robot that ships, or a file that describes it (MJCF or URDF)."""

@@ -51,7 +51,7 @@ def print_plugins(console: Console) -> None:
             grid.add_row(f"  {name}", Text(table.summary(name)))
         console.print(Text(f"{table.point} (entry points: idbench.{table.point})", style="bold"), grid, sep="\n")
     for conflict in plugin_conflicts():
-        console.print(Text(f"doubtful: {conflict}"), soft_wrap=True)
+        console.print(Text(f"warning: {conflict}"), soft_wrap=True)
 
 
 def plugin_conflicts() -> list[str]:

@@ -14,7 +14,7 @@ EVERY = 15.0
 
 @contextmanager
 def progress_of(what: str) -> Iterator[Progress]:
-    """Give what hears the share of a work that is done, and shows it on the error stream; short works show nothing there."""
+    """Give what receives the share of a work that is done, and shows it on the error stream; short works show nothing there."""
     console, told = Console(stderr=True), time.monotonic()
 
     def show(share: float) -> None:

@@ -32,16 +32,16 @@ def file_of(log: Path) -> Path:
     return log / "log.parquet"
 
 
-def told_by(log: Path) -> dict[str, Any]:
+def stated_by(log: Path) -> dict[str, Any]:
     """Return what the summary of a results folder says of its run: robot, parameters, truth; nothing of a file."""
     path = log / "summary.json"
     if not path.is_file():
         return {}
     try:
-        said = json.loads(path.read_text())
-        names, values = said["parameters"], said["truth"]
+        stated = json.loads(path.read_text())
+        names, values = stated["parameters"], stated["truth"]
         known = None if values is None else dict(zip(names, map(float, values), strict=True))
-        return {"robot": str(said.get("robot") or said["scenario"]["robot"]), "truth": known}
+        return {"robot": str(stated.get("robot") or stated["scenario"]["robot"]), "truth": known}
     except (ValueError, KeyError, TypeError, OSError) as error:
         raise ExperimentError(f"{path} is no summary of a run ({error}): name the log itself, {log / 'log.parquet'}") from error
 
@@ -70,7 +70,7 @@ class Question:
 
 
 def read(path: Path, question: Question, named: Identified) -> tuple[MotionLog, str]:
-    """Return the log, its torque read as the options say, and what is to be said of its delay."""
+    """Return the log, its torque read as the options say, and what must be said of its delay."""
     columns, delay = read_columns(path), question.delay
     try:
         columns = columns.ordered(named.subject.robot.joints)
@@ -103,9 +103,9 @@ def read(path: Path, question: Question, named: Identified) -> tuple[MotionLog, 
     from identify.judge.delay import estimate_delay
 
     found = estimate_delay(log, named.basis, named.processing)
-    told = MotionLog(log.fs, log.q, log.tau, replace(channel, delay=found.delay))
+    log = MotionLog(log.fs, log.q, log.tau, replace(channel, delay=found.delay))
     sure = f"{1e3 * found.delay:.4g} ms, sigma {1e3 * found.sigma:.2g} ms (not in the sigmas above)"
-    return told, f"torque delay estimated from the log: {sure}"
+    return log, f"torque delay estimated from the log: {sure}"
 
 
 def _require_seconds(path: Path, t: Array) -> None:
@@ -135,9 +135,9 @@ def _turned(path: Path, q: Array, named: Identified, unwrap: bool) -> Array:
     return q
 
 
-def channel_of(said: TorqueChannel | None, meaning: Meaning, delay: str | None) -> TorqueChannel:
+def channel_of(stated: TorqueChannel | None, meaning: Meaning, delay: str | None) -> TorqueChannel:
     """Return the channel that a file and the options state together: another meaning voids the delay that the file states."""
-    stated = said or TorqueChannel(meaning)
+    stated = stated or TorqueChannel(meaning)
     return replace(stated, meaning=meaning, delay=_seconds(delay, stated.delay if stated.meaning == meaning else 0.0))
 
 

@@ -1,4 +1,4 @@
-"""The command that tells what can be identified of a robot."""
+"""The command that shows what can be identified of a robot."""
 
 import sys
 from math import isfinite
@@ -11,7 +11,7 @@ from experiments.cli.logs import DescribeRobot
 from experiments.cli.page import new_page, show
 from experiments.identification.budget import Budget
 from experiments.identification.subject import Subject, absolute
-from experiments.identification.warnings import doubts_of_robot
+from experiments.identification.warnings import warnings_of_robot
 from experiments.text import new_table, print_titled
 from sim.errors import BenchError
 from sim.trajectories import RandomMoves
@@ -21,7 +21,7 @@ MANY = 30
 
 
 def describe(asked: DescribeRobot) -> None:
-    """Tell what can be identified of a robot."""
+    """Show what can be identified of a robot."""
     subject, page = Subject(absolute(asked.name), asked.parameters), new_page()
     if subject.robot.n > MANY:
         sys.stderr.write(f"idbench: grouping the parameters of {subject.robot.n} joints takes a while\n")
@@ -33,8 +33,8 @@ def describe(asked: DescribeRobot) -> None:
         _print_budget(page, Budget(subject.robot, moves))
     except BenchError as error:  # the parameters are worth knowing all the same
         page.print(Text(f"no torque budget: {error}"), soft_wrap=True)
-    for doubt in doubts_of_robot(subject.robot):
-        page.print(Text(f"doubtful: {doubt}"), soft_wrap=True)
+    for warning in warnings_of_robot(subject.robot):
+        page.print(Text(f"warning: {warning}"), soft_wrap=True)
     show(page)
 
 
@@ -44,9 +44,9 @@ def _print_joints(page: Console, subject: Subject) -> None:
     model = found.model
     for j, joint in enumerate(tree.joints):
         values = model.dof_armature[j], model.dof_damping[j], model.dof_frictionloss[j]
-        carrier = tree.joints[joint.parent].name if joint.parent >= 0 else "ground"
+        parent = tree.joints[joint.parent].name if joint.parent >= 0 else "ground"
         ends = (f"{x:.4g}" if isfinite(x) else "" for x in joint.range)
-        grid.add_row(f"{j + 1} {joint.name}", joint.kind, carrier, *ends, *(f"{x:g}" if x else "" for x in values))
+        grid.add_row(f"{j + 1} {joint.name}", joint.kind, parent, *ends, *(f"{x:g}" if x else "" for x in values))
     print_titled(page, f"robot {tree.name}: {tree.n} joints on a base that is fixed to the ground", grid)
     if not any(joint.armature for joint in tree.joints):
         page.print(Text("the file gives no joint an armature; behind gears rotors weigh more than links: --armature all"))
@@ -60,7 +60,7 @@ def _print_parameters(page: Console, subject: Subject, truth: dict[str, float]) 
     made = dict(zip(base.names, map(base.grouping, range(len(base.names))), strict=True)) if base else {}
     for parameter, unit in zip(basis.names, basis.units, strict=True):
         grid.add_row(parameter, f"{truth[parameter]:.5g}", unit, *([made[parameter]] if made else []))
-    print_titled(page, f"{len(basis.names)} parameters that a motion can tell", grid)
+    print_titled(page, f"{len(basis.names)} parameters that a motion can identify", grid)
     if base is not None and base.without_effect:
         page.print(Text(f"no motion shows {', '.join(base.without_effect)}"), soft_wrap=True)
     page.print()

@@ -17,7 +17,7 @@ from experiments.identification.identification_text import print_identified
 from experiments.identification.results import Place, results_folder, tell_of, write_recording, write_summary
 from experiments.identification.scenario_run import ScenarioRun
 from experiments.identification.subject import absolute
-from experiments.identification.warnings import doubts_of_robot
+from experiments.identification.warnings import warnings_of_robot
 from experiments.paper.table2 import Table2
 from experiments.paper.table2_text import print_table2
 from experiments.recording.audience import Audience, Watching
@@ -55,8 +55,8 @@ def run(asked: Run) -> None:
             recording = _recording(described, audience, inner) if watching.rerun else None
             ran = replace(made, progress=progress, watch=recording.watch if recording else None)
             print_identified(page, ran.identified, f"Scenario {described.name}")
-            for doubt in [*doubts_of_robot(ran.run.robots[0]), *plugin_conflicts()]:
-                page.print(f"doubtful: {doubt}", soft_wrap=True)
+            for warning in [*warnings_of_robot(ran.run.robots[0]), *plugin_conflicts()]:
+                page.print(f"warning: {warning}", soft_wrap=True)
             write_log(ran.run.alone(), folder / "log.parquet")
             (folder / "scenario.toml").write_text(to_toml(described))
             write_summary(folder / "summary.json", ran.summary())
@@ -98,7 +98,7 @@ def _require_window(inner: tuple[float, float] | None, watching: Watching) -> No
 def _doubt_window(page: Console, inner: tuple[float, float] | None, recording: "RunRecording | None") -> None:
     if inner is not None and recording is not None and recording.base.inner is None:
         page.print(
-            f"doubtful: nothing lies inside the loop from {inner[0]:g} to {inner[1]:g} s: the drive has no currents, "
+            f"warning: nothing lies inside the loop from {inner[0]:g} to {inner[1]:g} s: the drive has no currents, "
             "or the run is shorter",
             soft_wrap=True,
         )
@@ -137,7 +137,7 @@ def _again(page: Console, folder: Path | None, index: int | None, method: int | 
     told = [*chosen.names, *(f"{s.axis.field} {s.label}" for s in chosen.settings)]
     page.print(Text(f"shown: method {number} of the study's {len(methods)}: {', '.join(told)}"), soft_wrap=True)
     for reason in dict.fromkeys(row["failure"] for row in rows if row["failure"]):
-        page.print(Text(f"doubtful: {reason}"), soft_wrap=True)
+        page.print(Text(f"warning: {reason}"), soft_wrap=True)
     scenario = replace(store.study.scenario_of(index), name=f"{store.study.name}-{index}")
     return ScenarioRun(scenario, *chosen.names, method=(chosen.chain, chosen.estimator))
 

@@ -51,10 +51,10 @@ def study(asked: Study) -> None:
     pooled = _pool(store, scheduler, workers, threads, width)
     with watching.audience() as audience, shown(page), pooled as pool, store.held(), _kept(store):
         recording = _recording(store, audience) if watching.rerun else None
-        hear = partial(_show, store, recording) if recording and audience else None
+        receive = partial(_show, store, recording) if recording and audience else None
         if pool is not None:
             with counting(store.study, sum(len(r) for r in store.missing(runs))) as watch:
-                run_missing(store, pool, runs, watch, hear)
+                run_missing(store, pool, runs, watch, receive)
         if recording and not audience:
             _show(store, recording)
         write_results(page, store, recording)

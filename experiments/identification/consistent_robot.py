@@ -18,7 +18,7 @@ SURE = 0.1
 """Sigma of what was left out, as a share of the least of the others."""
 
 SIGMAS = 3.0
-"""Departures from the estimate beyond this many sigma are told."""
+"""Departures from the estimate beyond this many sigma are messages."""
 
 
 @final
@@ -76,19 +76,19 @@ class Written:
         write_whole(path, rewritten(self.found.subject.name, self._values(), path.absolute().parent))
 
     @property
-    def doubts(self) -> list[str]:
+    def warnings(self) -> list[str]:
         """What is wrong about it."""
         found, names = self.consistent, self.found.subject.grouping.names
-        told = []
+        messages = []
         if not found.agrees:
             far = [f"{n} by {abs(d):.1f}" for n, d in zip(names, found.departure, strict=True) if abs(d) > SIGMAS]
-            told.append(
+            messages.append(
                 f"no bodies that can exist have the estimate of the {self.model} model: the nearest are {found.distance:.1f} "
                 f"sigma off{', ' + ', '.join(far) + ' sigma' if far else ''}"
             )
         if self.lost:
-            told.append(f"{', '.join(self.lost)} have no place in an MJCF file and are left out")
-        return told
+            messages.append(f"{', '.join(self.lost)} have no place in an MJCF file and are left out")
+        return messages
 
     @property
     def lost(self) -> dict[str, float]:

@@ -86,6 +86,6 @@ def print_validated(console: Console, validated: Validated) -> None:
 
 
 def _validation_cells(validated: Validated, model: str, j: int) -> tuple[str, str, str, str]:
-    told, off = validated.torques[model], validated.position_error(model)
-    R2 = f"{told.R2[j]:.5f}" if told.R2[j] > -WORTHLESS else f"<-{WORTHLESS:g}"
-    return f"{told.rms[j]:.2g}", percentage(told.percent[j]), R2, "" if off is None else f"{off[j]:.1e}"
+    validation, off = validated.torques[model], validated.position_error(model)
+    R2 = f"{validation.R2[j]:.5f}" if validation.R2[j] > -WORTHLESS else f"<-{WORTHLESS:g}"
+    return f"{validation.rms[j]:.2g}", percentage(validation.percent[j]), R2, "" if off is None else f"{off[j]:.1e}"

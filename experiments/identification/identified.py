@@ -76,7 +76,7 @@ class Identified:
 
     @property
     def label(self) -> str:
-        """What tells this identification from others of the same log."""
+        """What distinguishes this identification from others of the same log."""
         return self.name or f"{self.chain}-{self.estimator}"
 
     @property

@@ -15,7 +15,7 @@ STILL = 1e-3
 """A joint that travels less than this share of what the busiest does stands still, and trembles."""
 
 
-def doubts_of_log(log: MotionLog, tree: KinematicTree) -> list[str]:
+def warnings_of_log(log: MotionLog, tree: KinematicTree) -> list[str]:
     """Return what is suspicious about the positions of a log: degrees, millimetres, places that a joint cannot reach."""
     found = []
     for joint, q in zip(tree.joints, log.q.reshape(-1, log.n).T, strict=True):
@@ -41,7 +41,7 @@ def _reason(joint: Joint, ends: Array) -> str:
     return ""
 
 
-def doubts_of_base(tree: KinematicTree) -> list[str]:
+def warnings_of_base(tree: KinematicTree) -> list[str]:
     """Return whether a robot looks like one that does not stand fixed on the ground: legs and rotors start there."""
     first = [joint.name for joint in tree.joints if joint.parent == GROUND]
     if len(first) == 1:

@@ -79,9 +79,9 @@ def _experiment_of(folder: Path) -> str | None:
     if not (folder / "summary.json").is_file():
         return None
     try:
-        said = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-        named = said["scenario"]["name"] if said["experiment"] == "run" else said.get("path", said.get("log", ""))
-        return " ".join(filter(None, (str(said["experiment"]), str(named))))
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        named = summary["scenario"]["name"] if summary["experiment"] == "run" else summary.get("path", summary.get("log", ""))
+        return " ".join(filter(None, (str(summary["experiment"]), str(named))))
     except (OSError, ValueError, KeyError, TypeError):
         return "something whose summary.json cannot be read"
 

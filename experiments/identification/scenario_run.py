@@ -33,9 +33,9 @@ class ScenarioRun:
     method : tuple of Chain and AbstractEstimator, optional
         Both with settings of their own, instead of those that have the names.
     progress : callable, optional
-        Hears how much of the simulation is done.
+        Receives how much of the simulation is done.
     watch : Watch, optional
-        Hears what happens in it.
+        Receives what happens in it.
     parameters : Parameters
         Which parameters are identified.
     """

@@ -105,17 +105,17 @@ class Validated:
         }
 
     def _of(self, model: str) -> dict[str, Any]:
-        told, off = self.torques[model], self.position_error(model)
+        validation, off = self.torques[model], self.position_error(model)
         numbers = {
-            "torque_error_rms": told.rms,
-            "torque_error_percent": told.percent,
-            "noise_rms": told.noise,
-            "sigma_rms": told.open,
-            "unexplained_percent": told.percent_of_level(told.excess),
-            "R2": told.R2,
-            "standing_error_rms": told.standing,
-            "residual_correlation": told.correlation,
-            "residual_correlation_bound": told.bound,
+            "torque_error_rms": validation.rms,
+            "torque_error_percent": validation.percent,
+            "noise_rms": validation.noise,
+            "sigma_rms": validation.open,
+            "unexplained_percent": validation.percent_of_level(validation.excess),
+            "R2": validation.R2,
+            "standing_error_rms": validation.standing,
+            "residual_correlation": validation.correlation,
+            "residual_correlation_bound": validation.bound,
         }
         found: dict[str, Any] = {
             name: [float(x) if np.isfinite(x) else None for x in values] for name, values in numbers.items()

@@ -25,10 +25,10 @@ NEGLIGIBLE = 2e-3
 """Share of a sampling period by which a delay may be off without a word: a hundredth of the SCARA's Fv1 at 100 Hz."""
 
 SURE = 4.0
-"""A delay that differs from the stated one by so many sigma is told."""
+"""A delay that differs from the stated one by so many sigma is validation."""
 
 WORTH, TOLERABLE = 0.7, 20.0
-"""Options that bring the error below this share of what it was, and below these per cent, are told."""
+"""Options that bring the error below this share of what it was, and below these per cent, are validation."""
 
 
 @final
@@ -48,7 +48,7 @@ class Verdict:
     model: str
 
     @property
-    def told(self) -> Validation:
+    def validation(self) -> Validation:
         """Its errors."""
         return self.validated.torques[self.model]
 
@@ -57,7 +57,9 @@ class Verdict:
         """good, fair or poor; unsure where noise or sigma would hide a poor model."""
         if wrong_sign(self.validated.judged):
             return "poor"
-        beyond, hidden = (_worst(self.told.percent_of_level(x)) for x in (self.told.excess, self.told.expected))
+        beyond, hidden = (
+            _worst(self.validation.percent_of_level(x)) for x in (self.validation.excess, self.validation.expected)
+        )
         if beyond > FAIR:
             return "poor"
         if hidden > FAIR:
@@ -71,29 +73,29 @@ class Verdict:
         return [*wrong, *self._errors(), *self._left()]
 
     def _errors(self) -> Iterator[str]:
-        told, joints = self.told, self.validated.found.subject.robot.joints
-        share = told.excess if self.word in ("fair", "poor") else told.rms
-        j = int(np.nan_to_num(told.percent_of_level(share), posinf=np.inf).argmax())
-        worst = int(np.nan_to_num(told.percent, posinf=np.inf).argmax())
+        validation, joints = self.validation, self.validated.found.subject.robot.joints
+        share = validation.excess if self.word in ("fair", "poor") else validation.rms
+        j = int(np.nan_to_num(validation.percent_of_level(share), posinf=np.inf).argmax())
+        worst = int(np.nan_to_num(validation.percent, posinf=np.inf).argmax())
         others = ", the others by less" if len(joints) > 1 and j == worst else ""
-        yield f"the torque of {joints[j]} is off by {percent(told.percent[j])}{others}; {self._expected(j)}"
-        hidden = told.percent_of_level(told.expected)
+        yield f"the torque of {joints[j]} is off by {percent(validation.percent[j])}{others}; {self._expected(j)}"
+        hidden = validation.percent_of_level(validation.expected)
         worst = int(np.nan_to_num(hidden).argmax())
         if self.word == "unsure":
             yield f"noise and sigma make {percent(hidden[worst])} of the torque of {joints[worst]}: a wrong model could hide"
 
     def _expected(self, j: int) -> str:
-        noise, sigma = (self.told.percent_of_level(x)[j] for x in (self.told.noise, self.told.open))
+        noise, sigma = (self.validation.percent_of_level(x)[j] for x in (self.validation.noise, self.validation.open))
         known = f"noise of this log makes {percent(noise)}" if np.isfinite(noise) else "the noise of this log is not known"
         return f"{known}, sigma of the parameters {percent(sigma)}"
 
     def _left(self) -> Iterator[str]:
-        told, joints = self.told, self.validated.found.subject.robot.joints
-        beyond = told.percent_of_level(told.excess) > GOOD
-        coloured = [joint for joint, white, far in zip(joints, told.white, beyond, strict=True) if far and not white]
+        validation, joints = self.validation, self.validated.found.subject.robot.joints
+        beyond = validation.percent_of_level(validation.excess) > GOOD
+        coloured = [joint for joint, white, far in zip(joints, validation.white, beyond, strict=True) if far and not white]
         if coloured:
             yield f"what is left of {', '.join(coloured)} is no noise"
-        elif self.word == "good" and (told.rms <= MARGIN * told.expected).all():
+        elif self.word == "good" and (validation.rms <= MARGIN * validation.expected).all():
             yield "noise and sigma explain all of it"
         if isinstance(self.validated.replays[self.model], str):
             yield f"not simulated: {self.validated.replays[self.model]}"
@@ -122,15 +124,15 @@ class Remedies:
         if wrong_sign(found):
             return
         try:
-            told = estimate_delay(list(found.logs), found.basis, found.processing)
+            measured = estimate_delay(list(found.logs), found.basis, found.processing)
         except RangeError as error:
             yield f"the delay of the torque is far from what is taken, or it is none of this motion: {error}"
             return
         except IdentificationError:
             return
-        if abs(told.delay - stated) > max(SURE * told.sigma, NEGLIGIBLE / found.logs[0].fs):
+        if abs(measured.delay - stated) > max(SURE * measured.sigma, NEGLIGIBLE / found.logs[0].fs):
             yield (
-                f"the log says a torque delay of {1e3 * told.delay:.3g} ms (sigma {1e3 * told.sigma:.1g}), where "
+                f"the log says a torque delay of {1e3 * measured.delay:.3g} ms (sigma {1e3 * measured.sigma:.1g}), where "
                 f"{1e3 * stated:.3g} ms is taken: --torque-delay estimate"
             )
 

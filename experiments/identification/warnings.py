@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from experiments.identification.identified import Identified
-from experiments.identification.log_warnings import doubts_of_base, resting
+from experiments.identification.log_warnings import resting, warnings_of_base
 from experiments.identification.subject import Subject
 from identify import MotionLog, brisk_shares, showing_moves
 from identify.basis.parameter import NOT_NEGATIVE
@@ -16,8 +16,8 @@ WELL_EXPLAINED = 0.95
 """Share of a torque's variance that a model of the right robot explains on any log that is worth identifying."""
 
 USELESS = 0.5
-"""Share of a torque that one sigma of the parameters may make before the estimate is said to tell too little; a fifth of it is
-asked of what is recommended instead."""
+"""Share of a torque that one sigma of the parameters may make before the estimate is called useless; what is recommended
+instead makes a fifth of it at most."""
 
 ENOUGH = 4
 """Rows for each parameter beyond which a large sigma is no matter of too few of them."""
@@ -32,16 +32,16 @@ OPEN = 0.02
 """Share of a joint's torque on a brisk motion that one sigma of a parameter may make before it is said to be left open."""
 
 
-def doubts_of_result(found: Identified) -> list[str]:
+def warnings_of_result(found: Identified) -> list[str]:
     """Return what no healthy identification shows, and what the log leaves open."""
-    told = [*wrong_sign(found), *wrong_unit(found)]
+    messages = [*wrong_sign(found), *wrong_unit(found)]
     for name, estimate in found.estimates.items():
         friction = zip(found.basis.parameters, estimate.X, estimate.best_sigma, strict=True)
         negative = [p.name for p, x, sigma in friction if p.kind in NOT_NEGATIVE and _surely_negative(x, sigma)]
-        if negative and not told:
-            told.append(f"{', '.join(negative)} below zero in the {name} model: is the torque's meaning or delay wrong?")
-        told += list(_too_little(found, name)) or list(_badly_explained(found, name))
-    return told or _left_open(found)
+        if negative and not messages:
+            messages.append(f"{', '.join(negative)} below zero in the {name} model: is the torque's meaning or delay wrong?")
+        messages += list(_too_little(found, name)) or list(_badly_explained(found, name))
+    return messages or _left_open(found)
 
 
 def _too_little(found: Identified, name: str) -> Iterator[str]:
@@ -54,7 +54,7 @@ def _too_little(found: Identified, name: str) -> Iterator[str]:
     times = min(1000, int(np.ceil((shares[worst] / (USELESS / 5)) ** 2))) if np.isfinite(shares[worst]) else 1000
     longer = f"a log {times} times as long" if times < MUCH_LONGER else "a log that moves all joints, and longer"
     yield (
-        f"the {name} model tells too little: {int(estimate.row_count)} rows for {len(estimate.names)} parameters, Cond(W) "
+        f"the {name} model identifies too little: {int(estimate.row_count)} rows for {len(estimate.names)} parameters, Cond(W) "
         f"{float(estimate.condition_number):.2g}, one sigma of its parameters makes {100 * shares[worst]:.0f} % of the torque "
         f"of {found.subject.robot.joints[worst]}: take {f'the {others[0]} model' if others else longer}"
         + (f", or {longer}" if others else "")
@@ -67,15 +67,15 @@ def _badly_explained(found: Identified, name: str) -> Iterator[str]:
     poor = {j: share for j, share in enumerate(found.explained[name]) if not share >= WELL_EXPLAINED}
     if not poor:
         return
-    told = ", ".join(f"{_share(share)} of tau{j + 1}" for j, share in poor.items())
+    poorly = ", ".join(f"{_share(share)} of tau{j + 1}" for j, share in poor.items())
     others = [o for o, shares in found.explained.items() if all(shares[j] >= WELL_EXPLAINED for j in poor)]
     if others:
         yield (
-            f"the {name} model explains {told}, where the {others[0]} model explains at least {100 * WELL_EXPLAINED:.0f} %: "
+            f"the {name} model explains {poorly}, where the {others[0]} model explains at least {100 * WELL_EXPLAINED:.0f} %: "
             f"noise of the velocities, or too little motion of {', '.join(joints[j] for j in poor)}; take the {others[0]} model"
         )
     else:
-        yield f"the {name} model explains {told}: are units, signs, order of columns and the torque's delay right?"
+        yield f"the {name} model explains {poorly}: are units, signs, order of columns and the torque's delay right?"
 
 
 def _share(share: float) -> str:
@@ -93,11 +93,11 @@ def wrong_unit(found: Identified) -> list[str]:
     return [f"the torques are {measured / expected:.2g} times what the robot's file says of this motion: are they in N m?"]
 
 
-def doubts_of_robot(robot: Robot) -> list[str]:
+def warnings_of_robot(robot: Robot) -> list[str]:
     """Return what of a robot's file no parameter describes."""
     found = unmodelled(robot)
-    told = [f"the file of robot {robot.name!r} has {', '.join(found)}, which no parameter describes"] if found else []
-    return [*told, *doubts_of_base(kinematic_tree(robot))]
+    messages = [f"the file of robot {robot.name!r} has {', '.join(found)}, which no parameter describes"] if found else []
+    return [*messages, *warnings_of_base(kinematic_tree(robot))]
 
 
 def wrong_sign(found: Identified) -> list[str]:
@@ -132,7 +132,7 @@ def _work(log: MotionLog) -> float:
 
 
 def _left_open(found: Identified) -> list[str]:
-    """Return which base parameters the log leaves open so far that a brisk motion would show it, and what would tell them."""
+    """Return which base parameters the log leaves open so far that a brisk motion shows it, and the moves to make."""
     subject, (model, estimate) = found.subject, next(iter(found.estimates.items()))
     if subject.base is None:
         return []

@@ -55,10 +55,10 @@ def imperfections(table2: Scenario) -> list[Imperfection]:
     ripple = replace(ideal, drive=AveragedDrive(), ripple=table2.ripple)
     return [
         Imperfection("nothing", ideal, chain),
-        Imperfection("hold, not told", ideal, logged),
-        Imperfection(f"computing delay of {1e3 * delay.delay:g} ms, not told", replace(ideal, timing=delay), chain, prompt),
-        Imperfection("half a physics step of 1 ms, not told", replace(ideal, physics=coarse), chain, prompt),
-        Imperfection("half a physics step of 1 ms, told", replace(ideal, physics=coarse), chain),
+        Imperfection("hold, not given", ideal, logged),
+        Imperfection(f"computing delay of {1e3 * delay.delay:g} ms, not given", replace(ideal, timing=delay), chain, prompt),
+        Imperfection("half a physics step of 1 ms, not given", replace(ideal, physics=coarse), chain, prompt),
+        Imperfection("half a physics step of 1 ms, given", replace(ideal, physics=coarse), chain),
         Imperfection("quantization", replace(ideal, encoder=table2.encoder), chain),
         Imperfection("quantization, 20 bits", replace(ideal, encoder=IncrementalEncoder(lines=(2**18,))), chain),
         Imperfection("cogging and commutation", ripple, chain),

@@ -132,7 +132,7 @@ class Table1Motions:
     tolerance : float
         Motions are kept whose condition numbers are within this share of the paper's, in the chain itself.
     progress : callable, optional
-        Hears how much is done.
+        Receives how much is done.
     """
 
     motions: int

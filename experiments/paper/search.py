@@ -78,7 +78,7 @@ class Search:
                 raise ExperimentError(f"{name} = {getattr(self, name)} must be above 0")
 
     def run(self, robot: Robot, progress: Callable[[int, float], None] | None = None) -> Scenario:
-        """Return the scenario found; `progress` hears the number of every round and the distance that is left.
+        """Return the scenario found; `progress` receives the number of every round and the distance that is left.
 
         Raises
         ------

@@ -83,9 +83,9 @@ class Table2:
     scenario : Scenario
         The robot and its motion; realization k has seed + k.
     progress : callable, optional
-        Hears how much of the simulation is done.
+        Receives how much of the simulation is done.
     watch : Watch, optional
-        Hears what happens in the first realization.
+        Receives what happens in the first realization.
     """
 
     scenario: Scenario

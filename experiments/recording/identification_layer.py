@@ -28,7 +28,7 @@ from identify import (
 )
 
 EVERY = 0.5
-"""Time between the instants of running estimates [s]."""
+"""Time between the instants of recursive estimates [s]."""
 
 BINS = {"over_velocity": 41, "over_position": 240}
 """Bins of residuals: over position fine enough for a motor of many slots."""
@@ -37,7 +37,7 @@ RESOLUTION = 0.5
 """Distance of the frequencies of a spectrum [Hz]."""
 
 WIDEST = 0.5
-"""A running estimate is shown once its sigma has been below this share of the last one, and in the second half anyway."""
+"""A recursive estimate is shown once its sigma has been below this share of the last one, and in the second half anyway."""
 
 FLOOR = 1e-5
 """Amplitude density [N m/sqrt(Hz)], or [W/sqrt(Hz)], that a spectrum shows as 0 dB."""

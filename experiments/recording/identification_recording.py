@@ -46,7 +46,7 @@ class RunRecording:
         self.base = Base(recording_id(scenario.name, written.encode()), scenario.real_robot, scenario.fs, ROLES, audience)
         self.base.stream.describe(scenario=written, seed=str(scenario.seed), fs_hz=f"{scenario.fs:g}")
         if audience:  # so that the view holds the whole motion from the beginning
-            self.base.foretell(scenario.trajectory.sample(scenario.real_robot, scenario.fs).q)
+            self.base.make_room(scenario.trajectory.sample(scenario.real_robot, scenario.fs).q)
         self.watch = Watch(self.base.stretch, audience.every if audience else UNWATCHED, window)
 
     def end(self, run: Run) -> list[tuple[str, Stream]]:
@@ -55,7 +55,7 @@ class RunRecording:
         return [(BASE, self.base.stream), *([(INNER, self.base.inner)] if self.base.inner else [])]
 
     def finish(self, ran: ScenarioRun) -> list[tuple[str, Stream]]:
-        """Add what only the end tells, and the identification; return the streams by the name of their file."""
+        """Add what only the end of a run gives, and the identification; return the streams by the name of their file."""
         streams = self.end(ran.run)
         self.base.finish(about(ran.scenario.name, ran.scenario.origin, ROLES))
         if is_long([ran.run.alone()]):  # of which no rows are kept
@@ -114,5 +114,5 @@ def layer(
 
 
 def recording_id(name: str, content: bytes) -> str:
-    """Return a name and what tells its content from others: recordings of one id are shown as one."""
+    """Return a name and what distinguishes its content from others: recordings of one id are shown as one."""
     return f"{name}-{hashlib.sha256(content).hexdigest()[:10]}"

@@ -11,7 +11,7 @@ STILL = 1e-3
 """Speed [rad/s] up to which a joint is said to stand: a 16-bit encoder shows one step of it in a tenth of a second."""
 
 SLOW = ReversalMask().threshold
-"""Speed [rad/s] up to which its friction is in doubt."""
+"""Speed [rad/s] up to which its friction is in warning."""
 
 
 class Lanes:

@@ -100,12 +100,12 @@ class Base:
             now = slice(first, first + step)
             self.add(first, {p: x[now] for p, x in all_signals.items()}, dict.fromkeys(self._roles, log.q[now]), qd[now])
 
-    def foretell(self, q: Array) -> None:
+    def make_room(self, q: Array) -> None:
         """Draw the way of the tool along planned positions [rad], shape (time, joint), before anything moves."""
         self._arm.trace(q)
 
     def end(self, log: MotionLog, q: Array) -> None:
-        """Send what only the end tells: the torque that was logged, and the way of the tool along `q` [rad]."""
+        """Send what only the end of a run gives: the torque that was logged, and the way of the tool along `q` [rad]."""
         if "torque/log" not in self.stream.paths:
             self._curves(self.stream, "torque/log", time_columns(log.t, log.fs), log.tau)
         self._arm.trace(q)

@@ -17,7 +17,7 @@ FLOOR = 0.01
 
 
 def finish_table2(recording: RunRecording, table: Table2) -> list[tuple[str, Stream]]:
-    """Add what only the end tells to a recording of the first realization; return its streams by the name of their file."""
+    """Add what only the end of a run gives to the first realization's recording; return its streams by file name."""
     run, stream = table.run, recording.base.stream
     streams = recording.end(run)
     truth = list(table.truth.values())

@@ -115,7 +115,7 @@ def _require_workers(client: "Client") -> None:
 
 @contextmanager
 def _deaf() -> Iterator[None]:
-    """Let processes that begin meanwhile not hear Ctrl-C, which a terminal sends to all: this one tells them to end."""
+    """Let processes that begin meanwhile not receive Ctrl-C, which a terminal sends to all: this one tells them to end."""
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         yield

@@ -15,7 +15,7 @@ POLL = 0.2
 """How often [s] the progress is shown while shards are computed."""
 
 Watch = Callable[[float], None]
-"""Hears the number of runs that are done, parts of shards included."""
+"""Receives the number of runs that are done, parts of shards included."""
 
 
 class CancelledError(Exception):
@@ -55,13 +55,13 @@ class LocalPool:
         self._limits.restore_original_limits()
 
     def _run(self, runs: range) -> Shard:
-        def hear(share: float) -> None:
+        def receive(share: float) -> None:
             self._done[runs[0]] = share * len(runs)
             if self._stop.is_set():
                 raise CancelledError
 
         try:
-            return run_shard(self._study, runs, progress=hear)
+            return run_shard(self._study, runs, progress=receive)
         finally:
             self._done.pop(runs[0], None)
 
@@ -90,9 +90,9 @@ def run_missing(
     shard : int
         Most runs of a shard.
     watch : callable
-        Hears how many runs of this call are done.
+        Receives how many runs of this call are done.
     finished_shard : callable, optional
-        Hears the runs of every shard when it is kept.
+        Receives the runs of every shard when it is kept.
     """
     todo, pending, done = store.missing(shard), dict[Future[Shard], range](), 0
     while True:

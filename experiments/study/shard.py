@@ -41,7 +41,7 @@ def run_shard(study: Study, runs: range, *, threads: int = 1, progress: Progress
     threads : int
         Native threads of the simulation.
     progress : callable, optional
-        Hears the share of the simulation that is done.
+        Receives the share of the simulation that is done.
     """
     shard, scenarios, done = Shard(), {run: study.scenario_of(run) for run in runs}, 0
     for together in _groups(study, scenarios, shard):
@@ -87,7 +87,7 @@ def _simulate(
 
 
 def _part(progress: Progress | None, done: int, part: int, runs: int) -> Progress | None:
-    """Return what hears the share of `part` runs, and tells the share of all."""
+    """Return what receives the share of `part` runs, and tells the share of all."""
     return None if progress is None else lambda share: progress((done + share * part) / runs)
 
 

@@ -22,9 +22,9 @@ def write_shard(folder: Path, study: Study, runs: range, shard: Shard) -> None:
     """Write a finished shard: beside, and then renamed; raise ResultsError if that fails."""
     path = folder / f"runs-{runs[0]:010}-{runs[-1]:010}.parquet"
     beside = path.with_name(f".{path.name}.{os.getpid()}")
-    said = {"fingerprint": study.fingerprint, "versions": json.dumps(versions()), "seconds": json.dumps(shard.seconds)}
+    metadata = {"fingerprint": study.fingerprint, "versions": json.dumps(versions()), "seconds": json.dumps(shard.seconds)}
     try:
-        pq.write_table(pa.Table.from_pylist(shard.rows, schema=_schema(study).with_metadata(said)), beside)
+        pq.write_table(pa.Table.from_pylist(shard.rows, schema=_schema(study).with_metadata(metadata)), beside)
         with beside.open("rb+") as file:
             os.fsync(file.fileno())
         beside.replace(path)
@@ -53,10 +53,10 @@ def runs_of(path: Path) -> range:
 
 def require_of(path: Path, study: Study) -> None:
     """Raise StudyError unless a shard is of this study as it is now, made by the same versions, and whole."""
-    said = said_by(path)
-    if said.get("fingerprint") != study.fingerprint:
+    metadata = said_by(path)
+    if metadata.get("fingerprint") != study.fingerprint:
         raise StudyError(f"study.toml was changed since {path.name} was made: undo the change, or begin anew in another --out")
-    require_versions(json.loads(said["versions"]), f"the maker of {path.name}")
+    require_versions(json.loads(metadata["versions"]), f"the maker of {path.name}")
     expected = len(runs_of(path)) * len(study.methods) * len(study.models)
     if (rows := pq.read_metadata(path).num_rows) != expected:
         raise StudyError(f"{path} has {rows} rows, its name and the study say {expected}: remove it, and go on with --resume")
@@ -65,14 +65,14 @@ def require_of(path: Path, study: Study) -> None:
 def said_by(path: Path) -> dict[str, str]:
     """Return what a shard says of itself; raise StudyError if it is damaged."""
     try:
-        said = pq.read_schema(path).metadata or {}
+        metadata = pq.read_schema(path).metadata or {}
     except (OSError, pa.ArrowInvalid) as error:
         raise damaged(path, error) from error
-    return {key.decode(): value.decode() for key, value in said.items()}
+    return {key.decode(): value.decode() for key, value in metadata.items()}
 
 
 def damaged(path: Path, error: Exception) -> StudyError:
-    """Return what is to be said of a file that cannot be read."""
+    """Return what is to be metadata of a file that cannot be read."""
     return StudyError(f"{path} is damaged ({' '.join(str(error).split())}): remove it, and go on with --resume")
 
 

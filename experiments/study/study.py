@@ -165,7 +165,7 @@ class Study:
 
     @cached_property
     def fingerprint(self) -> str:
-        """What tells this study from any other."""
+        """What distinguishes this study from any other."""
         return hashlib.sha256(self.text.encode()).hexdigest()
 
     @cached_property

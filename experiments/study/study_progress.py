@@ -30,7 +30,7 @@ def watching(study: Study, todo: int) -> Iterator[Callable[[float], None]]:
             task = bar.add_task(study.name, total=todo)
             yield lambda done: bar.update(task, completed=done)
         return
-    yield _Lines(console, study.name, todo).hear
+    yield _Lines(console, study.name, todo).receive
 
 
 class _Lines:
@@ -40,7 +40,7 @@ class _Lines:
         self._console, self._name, self._todo = console, name, todo
         self._start = self._told = time.monotonic()
 
-    def hear(self, done: float) -> None:
+    def receive(self, done: float) -> None:
         """Say how far it is, if it is time to."""
         if time.monotonic() - self._told > EVERY:
             self._told = time.monotonic()

@@ -80,8 +80,8 @@ def _summary(store: Store, found: Sequence[Cell], seconds: dict[str, float]) -> 
 
 def _cell(cell: Cell) -> dict[str, Any]:
     chain, estimator, model = cell.names
-    said: dict[str, Any] = {"settings": dict(cell.settings), "chain": chain, "estimator": estimator, "model": model}
-    said |= {"runs": cell.runs, "failures": {reason: len(runs) for reason, runs in cell.failures.items()}}
+    summary: dict[str, Any] = {"settings": dict(cell.settings), "chain": chain, "estimator": estimator, "model": model}
+    summary |= {"runs": cell.runs, "failures": {reason: len(runs) for reason, runs in cell.failures.items()}}
     if cell.runs:
         numbers = {
             "truth": cell.truth.mean(axis=0),
@@ -94,5 +94,5 @@ def _cell(cell: Cell) -> dict[str, Any]:
             "coverage_high": cell.coverage_interval(cell.sigma)[:, 1],
             "paper_coverage": cell.coverage(cell.paper_sigma),
         }
-        said |= {name: [float(x) if isfinite(x) else None for x in values] for name, values in numbers.items()}
-    return said
+        summary |= {name: [float(x) if isfinite(x) else None for x in values] for name, values in numbers.items()}
+    return summary

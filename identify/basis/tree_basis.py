@@ -11,8 +11,8 @@ from identify.data.kinematics import KinematicTree
 def tree_basis(tree: KinematicTree) -> Basis:
     """Return links, armatures where the tree has them, viscous and Coulomb friction: the standard parameters, joint by joint.
 
-    Friction laws are added as to any basis, as in ``tree_basis(tree) + Offset()``. Standard parameters cannot all be told
-    apart: `BaseParameters` groups them.
+    Friction laws are added as to any basis, as in ``tree_basis(tree) + Offset()``. Standard parameters cannot all be
+    identified: `BaseParameters` groups them.
     """
     driven = tuple(j for j, joint in enumerate(tree.joints) if joint.armature)
     blocks = TreeLinks(tree), Armature(driven), ViscousFriction(), CoulombFriction()

@@ -1,4 +1,4 @@
-"""How the links of a tree move, each told in its own frame."""
+"""How the links of a tree move, each in its own frame."""
 
 from collections.abc import Iterator
 from functools import cached_property

@@ -24,7 +24,7 @@ CSV = ".csv"
 
 
 @dataclass(frozen=True, eq=False)
-class Columns:
+class LogColumns:
     """The columns of a file, as they are.
 
     Parameters
@@ -45,7 +45,7 @@ class Columns:
     torque: TorqueChannel | None
     joints: tuple[str, ...] = ()
 
-    def ordered(self, joints: Sequence[str]) -> "Columns":
+    def ordered(self, joints: Sequence[str]) -> "LogColumns":
         """Return the columns in the order of `joints`, where they have names.
 
         Raises
@@ -127,7 +127,7 @@ def read_log(path: Path, torque: TorqueChannel | None = None, joints: Sequence[s
     return MotionLog.at_times(found.t, found.q, found.tau, channel)
 
 
-def read_columns(path: Path) -> Columns:
+def read_columns(path: Path) -> LogColumns:
     """Read t, q and tau from a file, whatever their times; raise LogError as `read_log`.
 
     Joints may have names instead of numbers: q_elbow, tau_elbow. Columns qd1, qd2, ... are allowed and not used: velocities
@@ -151,7 +151,7 @@ def read_columns(path: Path) -> Columns:
         )
     numbers = {name: _numbers(path, table, name) for name in needed}
     q, tau = (np.stack([numbers[f"{letter}{end}"] for end in ends], axis=-1) for letter in ("q", "tau"))
-    return Columns(numbers["t"], q, tau, None if said is None else _channel(path, said), joints)
+    return LogColumns(numbers["t"], q, tau, None if said is None else _channel(path, said), joints)
 
 
 def _arrow() -> ModuleType:

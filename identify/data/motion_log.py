@@ -158,7 +158,7 @@ def sampling_frequency(t: Array) -> float:
     """Return fs [Hz] of the uniform times `t` [s], shape (time,); raise LogError if they are not uniform."""
     _require_finite("t", t[:, None])
     if len(t) < 2:
-        raise LogError(f"{len(t)} samples do not tell a sampling frequency; at least 2 are needed")
+        raise LogError(f"{len(t)} samples do not give a sampling frequency; at least 2 are needed")
     step = np.diff(t)
     if step.min() <= 0:
         k = int(np.argmin(step))

@@ -7,7 +7,7 @@ import numpy as np
 from identify.arrays import Array
 from identify.errors import IdentificationError
 from identify.estimators.estimate import Estimate
-from identify.rows.factors import UNSEEN
+from identify.rows.factors import NOT_SHOWN
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,7 @@ def _solution(R: Array, rows: int) -> tuple[Array, Array]:
     if rows <= p or not length.all():
         return np.full(p, np.nan), np.full(p, np.nan)
     values = np.linalg.svd(R[:p, :p] / length, compute_uv=False)
-    if values[-1] <= UNSEEN * values[0]:
+    if values[-1] <= NOT_SHOWN * values[0]:
         return np.full(p, np.nan), np.full(p, np.nan)
     inverse = np.linalg.inv(R[:p, :p])
     variance = R[p, p] ** 2 / (rows - p)

@@ -10,7 +10,7 @@ from identify.arrays import Array
 from identify.basis import Basis
 from identify.data.kinematics import KinematicTree
 from identify.parameters.base_parameters import BaseParameters, columns_at, random_states
-from identify.rows.factors import UNSEEN
+from identify.rows.factors import NOT_SHOWN
 
 ENOUGH = 0.2
 """Share of what a parameter adds of its own to the torques while all joints move, from which some of them will do."""
@@ -92,7 +92,7 @@ def _shown(basis: Basis, states: Array) -> Array:
     """Return the length of each column off all others, shape (b,)."""
     W = columns_at(basis, states)
     _, values, directions = np.linalg.svd(np.moveaxis(W, 1, -1).reshape(-1, len(basis.names)), full_matrices=False)
-    seen = values > UNSEEN * values[0]
-    hidden = np.sum(directions[~seen] ** 2, axis=0) > UNSEEN
+    seen = values > NOT_SHOWN * values[0]
+    hidden = np.sum(directions[~seen] ** 2, axis=0) > NOT_SHOWN
     spread = np.sqrt(np.sum((directions[seen] / values[seen][:, None]) ** 2, axis=0))
     return np.divide(1.0, spread, out=np.zeros(len(spread)), where=~hidden & (spread > 0))

@@ -16,7 +16,7 @@ QUIET = 0.02
 """Gain of the operator, as a share of that at rest, below which a frequency is above its band."""
 
 LEAST = 8
-"""Frequencies above the band that it takes to tell two kinds of noise."""
+"""Frequencies above the band that it takes to distinguish two kinds of noise."""
 
 FAINT = 1e-6
 """Frequencies at which a kind of noise is below this share of its largest say nothing of it."""
@@ -60,7 +60,7 @@ def row_noise(left: Instants, signals: Signals, chain: Chain) -> Array:
 
 
 def _impulses(log: MotionLog, chain: Chain) -> tuple[Array, Array]:
-    """Return what an impulse of the torque, and one of the position, leave in the torque's balance."""
+    """Return what an impulse of the torque, and one of the position, leave in the torque's residual."""
     fs = log.fs
     x = np.zeros(2 * int(np.ceil(chain.halo(fs, log.torque) * fs)) + 101)
     x[len(x) // 2] = 1.0

@@ -62,7 +62,7 @@ class Validation:
     rows : int array
         How many rows move.
     noise : Array
-        Rms of the noise of these rows, as what lies above their band tells it [N m] (`row_noise`); NaN if it does not.
+        Rms of the noise of these rows, from what lies above their band [N m] (`row_noise`); NaN if it does not.
     open : Array
         Rms of what sigma of the parameters makes of the torque there [N m]; 0 if their covariance is not given.
     """
@@ -101,7 +101,7 @@ class Validation:
 
     @property
     def white(self) -> npt.NDArray[np.bool_]:
-        """Whether the error is not to be told from noise."""
+        """Whether the error cannot be distinguished from noise."""
         return np.abs(self.correlation) <= self.bound
 
 

@@ -1,4 +1,4 @@
-"""Base parameters: the combinations of standard parameters that a motion can tell at all."""
+"""Base parameters: the combinations of standard parameters that a motion can identify."""
 
 from dataclasses import dataclass
 from functools import cached_property

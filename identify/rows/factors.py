@@ -12,7 +12,7 @@ import numpy.typing as npt
 from identify.arrays import Array
 from identify.errors import ExcitationError, IdentificationError
 
-UNSEEN = 1e-6
+NOT_SHOWN = 1e-6
 """A direction of the parameters, in columns scaled to unit length, is not shown when its singular value is below this share of
 the largest: it would take columns known to seven digits to identify it to 10 %, and no log gives those."""
 
@@ -63,7 +63,7 @@ class Factor:
     def rank(self) -> npt.NDArray[np.intp]:
         """Numerical rank of W with its columns scaled to unit length, shape (...)."""
         values = self._singular_values[..., 1, :]
-        return np.count_nonzero(values > UNSEEN * values[..., :1], axis=-1)
+        return np.count_nonzero(values > NOT_SHOWN * values[..., :1], axis=-1)
 
     @cached_property
     def status(self) -> npt.NDArray[np.intp]:
@@ -90,7 +90,7 @@ class Factor:
     def not_shown(self, run: tuple[int, ...] = ()) -> tuple[str, ...]:
         """Return the parameters of `run` that the motion does not show, alone or in some combination."""
         _, values, directions = np.linalg.svd(self._scaled[run])
-        null = directions[values <= UNSEEN * values.max()]
+        null = directions[values <= NOT_SHOWN * values.max()]
         share = np.abs(null).max(axis=0, initial=0.0)
         return tuple(name for name, s in zip(self.names, share, strict=True) if s > 1e-3)
 
@@ -99,7 +99,7 @@ class Factor:
         W, left = self._scaled[run], list(range(self.p))
         while left:
             _, values, directions = np.linalg.svd(W[:, left])
-            if values[-1] > UNSEEN * values[0]:
+            if values[-1] > NOT_SHOWN * values[0]:
                 break
             share = np.abs(directions[-1])
             left.pop(int(np.flatnonzero(share > 0.1 * share.max())[-1]))

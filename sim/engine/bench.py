@@ -31,8 +31,8 @@ from sim.trajectories import Reference
 T = TypeVar("T")
 
 BLOCK = 1e-3
-"""Time [s] over which the motion of the rotors may be foretold, for their back-EMF and ripple: with a jerk of 1000 rad/s^3 they
-are then off by 2e-7 rad and 5e-4 rad/s."""
+"""Time [s] over which the motion of the rotors may be predicted, for back-EMF and ripple: with a jerk of 1000 rad/s^3 they are
+then off by 2e-7 rad and 5e-4 rad/s."""
 
 
 class Bench:

@@ -16,7 +16,7 @@ from sim.trajectories import Reference
 from sim.trajectories.approach import approach
 
 Progress = Callable[[float], None]
-"""Hears the share of a run that is done."""
+"""Receives the share of a run that is done."""
 
 
 def simulate(  # noqa: PLR0913  # all but two by their names
@@ -45,11 +45,11 @@ def simulate(  # noqa: PLR0913  # all but two by their names
     threads : int
         Native threads; 0 for all processors. No bit depends on it.
     progress : callable, optional
-        Hears the share of the run that is done, about a hundred times.
+        Receives the share of the run that is done, about a hundred times.
     watch : Watch, optional
-        Hears what the first simulation does, while it runs. No bit depends on it.
+        Receives what the first simulation does, while it runs. No bit depends on it.
     throw : bool
-        Raise if a simulation fails while it runs; otherwise `Run.failures` tells why, and the others go on.
+        Raise if a simulation fails while it runs; otherwise `Run.failures` says why, and the others go on.
 
     Raises
     ------

@@ -72,15 +72,15 @@ class Watch:
 
     Parameters
     ----------
-    hear : callable
-        Hears every stretch, in order, while the run goes on.
+    receive : callable
+        Receives every stretch, in order, while the run goes on.
     every : float
         Length of a stretch [s]; by default the whole run is one.
     window : tuple of float, optional
         From when to when, on the time of the log [s], the signals inside the loop are given at their full rate.
     """
 
-    hear: Callable[[Stretch], None]
+    receive: Callable[[Stretch], None]
     every: float = np.inf
     window: tuple[float, float] | None = None
 
@@ -107,7 +107,7 @@ class Watcher:
     Parameters
     ----------
     watch : Watch
-        Who hears it.
+        Who receives it.
     fs, h : float
         Sampling frequency [Hz] and physics step [s].
     skipped : int
@@ -142,7 +142,7 @@ class Watcher:
             rows = _Rows.of(taken, drive, self._h)
             electric = rows.means(self._told, final, per_sample)
             inner = rows.inside(self._watch.window, self._h, self._skipped / self._fs) if self._watch.window else None
-        self._watch.hear(Stretch(self._told - self._skipped, reference, electric=electric, inner=inner, **parts))
+        self._watch.receive(Stretch(self._told - self._skipped, reference, electric=electric, inner=inner, **parts))
         self._told = final
 
 

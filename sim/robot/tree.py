@@ -30,14 +30,14 @@ def kinematic_tree(robot: Robot) -> KinematicTree:
         if not count:
             continue
         parent, position, rotation = _placement(model, body)
-        carrier = last[parent]
+        parent = last[parent]
         for k in range(first, first + count):
             at_first = k == first
             joints.append(
                 Joint(
                     name=robot.joints[k],
                     kind="slide" if robot.slides[k] else "hinge",
-                    parent=carrier,
+                    parent=parent,
                     position=position if at_first else np.zeros(3),
                     rotation=rotation if at_first else np.eye(3),
                     axis=model.jnt_axis[k],
@@ -48,8 +48,8 @@ def kinematic_tree(robot: Robot) -> KinematicTree:
                     massive=k == first + count - 1,
                 )
             )
-            carrier = k
-        last[body] = carrier
+            parent = k
+        last[body] = parent
     weightless = model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
     return KinematicTree(robot.name, tuple(joints), np.zeros(3) if weightless else model.opt.gravity)
 

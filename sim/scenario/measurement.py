@@ -39,8 +39,8 @@ class TorqueMeasurement:
             per_joint(getattr(self, name), n, f"torque.{name}") for name in ("gain_error", "offset", "noise", "resolution")
         )
         drawn = np.stack([rng.standard_normal(tau.shape[1:]) for rng in rngs])
-        said = (1 + gain) * tau + offset + noise * drawn
-        return np.where(step > 0, np.rint(said / np.where(step > 0, step, 1.0)) * step, said)
+        measured = (1 + gain) * tau + offset + noise * drawn
+        return np.where(step > 0, np.rint(measured / np.where(step > 0, step, 1.0)) * step, measured)
 
     def channel(self, delay: float, lag: float, fs: float) -> TorqueChannel:
         """Return what the log's torque means, when a command acts `delay` [s] after its sample and the torque `lag` later.

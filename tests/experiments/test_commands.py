@@ -159,7 +159,7 @@ def test_what_no_healthy_log_shows_is_said(csv, capsys):
     )
     assert main(["identify", str(csv), "--torque", "held", "--model", "explicit"]) == 0
     printed = capsys.readouterr().out
-    assert "doubtful: Fs2 below zero in the explicit model" in printed.replace("Fv2, ", "")
+    assert "warning: Fs2 below zero in the explicit model" in printed.replace("Fv2, ", "")
     assert "nothing of tau2: are units, signs" in printed
     assert "0 is assumed" in printed
 
@@ -199,7 +199,7 @@ def test_table2_on_a_short_motion(tmp_path, capsys, monkeypatch):
     scenario = replace(load("table2"), trajectory=trajectory, drive=AveragedDrive())
     path, out = tmp_path / "twin.toml", tmp_path / "out"
     path.write_text(to_toml(scenario))
-    few = [i for i in imperfections(scenario) if i.name in ("nothing", "hold, not told", "gain error of 2 %")]
+    few = [i for i in imperfections(scenario) if i.name in ("nothing", "hold, not given", "gain error of 2 %")]
     monkeypatch.setattr("experiments.paper.attribution.imperfections", lambda _: few)
     assert main(["table2", "--scenario", str(path), "--out", str(out)]) == 0
     printed = capsys.readouterr().out
@@ -217,7 +217,7 @@ def test_table2_on_a_short_motion(tmp_path, capsys, monkeypatch):
     alone = summary["attribution_percent"]
     np.testing.assert_allclose(alone["gain error of 2 %"]["explicit"], 2.0, atol=0.02)
     assert np.abs(alone["nothing"]["power"]).max() < 0.1
-    assert alone["hold, not told"]["power"][1] < -100
+    assert alone["hold, not given"]["power"][1] < -100
     assert len(list(out.glob("log*.parquet"))) == 4
 
 

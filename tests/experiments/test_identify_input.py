@@ -100,7 +100,7 @@ def test_legs_are_pointed_out(told):
     code, out, err = told("robot", path)
     assert code == 0, err
     assert "on a base that is fixed to the ground" in out
-    assert "doubtful: 4 chains of joints start at the ground" in out
+    assert "warning: 4 chains of joints start at the ground" in out
 
 
 @pytest.mark.parametrize("field", ["damping", "frictionloss", "armature"])

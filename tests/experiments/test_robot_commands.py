@@ -13,13 +13,13 @@ from sim.scenario.scenario_file import load, to_toml
 def test_robot_tells_what_can_be_identified(told):
     code, out, _ = told("robot", "scara")
     assert code == 0
-    assert "8 parameters that a motion can tell" in out
+    assert "8 parameters that a motion can identify" in out
     code, out, _ = told("robot", Robot.path("scara"))
     assert code == 0
     assert "ZZ1 + Ia1 + 0.25 M2" in out
     assert "no motion shows" in out
     code, out, _ = told("robot", "puma560", "--armature", "all", "--add", "offset")
-    assert "58 parameters that a motion can tell" in out  # 36 + 4 rotors of their own + 18 of friction
+    assert "58 parameters that a motion can identify" in out  # 36 + 4 rotors of their own + 18 of friction
     assert "torque budget" in out
     assert "97.6" in out
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from experiments.identification.identified import Identified
-from experiments.identification.log_warnings import doubts_of_log
+from experiments.identification.log_warnings import warnings_of_log
 from experiments.identification.parameters import Parameters
 from experiments.identification.subject import Subject
 from experiments.identification.validated import Validated
 from experiments.identification.verdict import Remedies, Verdict
-from experiments.identification.warnings import doubts_of_result
+from experiments.identification.warnings import warnings_of_result
 from identify import MotionLog
 from identify.data.log_file import read_log
 
@@ -48,7 +48,7 @@ def without(letters):
 def test_the_right_model_is_good_and_noise_explains_all_of_it(pair):
     verdict = Verdict(validated(pair), "explicit")
     assert verdict.word == "good"
-    assert (verdict.told.excess == 0).all()
+    assert (verdict.validation.excess == 0).all()
 
 
 def test_noise_of_the_log_is_no_fault_of_the_model(pair):
@@ -56,7 +56,7 @@ def test_noise_of_the_log_is_no_fault_of_the_model(pair):
     rng = np.random.default_rng(1)
     noisy = [torques(log, lambda tau: tau + 0.1 * level(log) * rng.standard_normal(tau.shape)) for log in pair]  # noqa: B023
     verdict = Verdict(validated(noisy), "explicit")
-    assert verdict.told.percent.max() > 1
+    assert verdict.validation.percent.max() > 1
     assert verdict.word == "good"
     assert any("noise and sigma explain all of it" in reason for reason in verdict.reasons)
 
@@ -65,7 +65,7 @@ def test_noise_of_the_log_is_no_fault_of_the_model(pair):
 def test_models_without_friction_or_rotors_are_poor(pair, letters):
     verdict = Verdict(validated(pair, without(letters)), "explicit")
     assert verdict.word == "poor"
-    assert verdict.told.percent_of_level(verdict.told.excess).max() > 10
+    assert verdict.validation.percent_of_level(verdict.told.excess).max() > 10
 
 
 def test_a_joint_of_the_wrong_sign_is_poor_by_its_torque(pair):
@@ -104,23 +104,23 @@ def test_a_starved_power_model_is_told_to_be_so_and_the_explicit_one_recommended
     found = Identified((part,), Subject(PUMA), models=("explicit", "power"))
     rows, p = int(found.estimates["power"].row_count), len(found.basis.names)
     assert p < rows < 4 * p
-    told = [doubt for doubt in doubts_of_result(found) if "tells too little" in doubt]
-    assert any(f"the power model tells too little: {rows} rows for {p} parameters" in doubt for doubt in told)
-    assert not any("units" in doubt for doubt in doubts_of_result(found))
+    told = [warning for warning in warnings_of_result(found) if "identifies too little" in warning]
+    assert any(f"the power model identifies too little: {rows} rows for {p} parameters" in warning for warning in told)
+    assert not any("units" in warning for warning in warnings_of_result(found))
 
 
 def test_torques_in_other_units_are_pointed_out(pair):
     milli = [torques(log, lambda tau: 1000 * tau) for log in pair]
-    told = doubts_of_result(validated(milli).found)
-    assert any("are they in N m?" in doubt for doubt in told)
-    assert not any("are they in N m?" in doubt for doubt in doubts_of_result(validated(pair).found))
+    told = warnings_of_result(validated(milli).found)
+    assert any("are they in N m?" in warning for warning in told)
+    assert not any("are they in N m?" in warning for warning in warnings_of_result(validated(pair).found))
 
 
 def test_a_dead_torque_column_is_poor_and_named(pair):
     dead = [torques(log, lambda tau: tau * [1, 0, 1, 1, 1, 1]) for log in pair]
     made = validated(dead)
     assert Verdict(made, "explicit").word == "poor"
-    assert doubts_of_log(dead[0], made.found.subject.tree) == ["the torque of joint2 never changes: is it logged?"]
+    assert warnings_of_log(dead[0], made.found.subject.tree) == ["the torque of joint2 never changes: is it logged?"]
 
 
 def test_a_delay_beyond_the_range_that_is_looked_at_is_told(pair):

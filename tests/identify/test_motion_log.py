@@ -90,7 +90,7 @@ def test_times_that_are_not_uniform_are_refused(t, message):
 
 
 def test_one_sample_tells_no_frequency():
-    with pytest.raises(LogError, match="1 samples do not tell"):
+    with pytest.raises(LogError, match="1 samples do not give"):
         MotionLog.at_times(np.zeros(1), Q[:1], Q[:1], CHANNEL)
 
 

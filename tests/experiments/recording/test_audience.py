@@ -150,7 +150,7 @@ def test_a_host_that_cannot_be_one_does_not_answer(complaint, out):
 
 def test_a_window_in_which_nothing_lies_is_told(out, capsys):
     assert main(["run", "ideal", "--inner", "1", "2", "--out", str(out)]) == 0
-    assert "doubtful: nothing lies inside the loop from 1 to 2 s" in capsys.readouterr().out
+    assert "warning: nothing lies inside the loop from 1 to 2 s" in capsys.readouterr().out
 
 
 def test_no_viewer_is_nobody():
