@@ -15,6 +15,9 @@ from identify.signals.stencils import slide
 ORDER = 6
 """Differences of the positions after which next to nothing of a motion is left, and of white noise much."""
 
+NEGLIGIBLE = 1e-4
+"""Share of the squared residuals below which noise of the positions counts as none: it makes 0.005 % of sigma."""
+
 LEAST = 32
 """Samples that it takes to estimate the noise of positions."""
 
@@ -53,7 +56,8 @@ def noise_levels(parts: Sequence[Rows], factors: Factors, fit: Fit, linear: Sequ
     share = np.minimum(1.0, np.divide(squares, made, out=np.ones_like(squares), where=made > 0))
     rest = np.maximum(squares - made, 0.0)
     variance = np.divide(rest, free, out=np.full(free.shape, np.nan), where=free > 0)
-    return NoiseLevels(np.sqrt(variance), position * np.sqrt(share))
+    seen = np.nan_to_num(made / np.where(squares > 0, squares, np.nan)) > NEGLIGIBLE
+    return NoiseLevels(np.sqrt(variance), np.where(seen.any(axis=-1, keepdims=True), position * np.sqrt(share), 0.0))
 
 
 def _leverage(factors: Factors, fit: Fit) -> Array:

@@ -131,20 +131,16 @@ def covariance(rows: RowMap, G: Array, levels: NoiseLevels, linear: Linearizatio
     """
     signals = rows.signals
     of_c, of_e = rows.adjoint(G)
-    total = np.zeros((*G.shape[:-2], G.shape[-1], G.shape[-1]))
-    of_torque = _through_B(rows, of_c)
-    for j, z in enumerate(of_torque):
-        total += _squared(signals.torque_adjoint(z), levels.torque[..., j])
+    total = _summed_squares(signals.torque_adjoint(_through_B(rows, of_c)), levels.torque)
     if levels.position.any():
         of_c = signals.torque.average(of_c)
         of_torque = _through_B(_smooth(rows), of_c)
-        for i in range(len(of_torque)):
-            q, qd, qdd = (_times(of_torque, x[..., i, :]) for x in (linear.stiffness, linear.damping, linear.inertia))
-            if of_e is not None:
-                momentum = _momentum(_smooth(rows), linear)[..., i, :]
-                qd = qd + np.sum(of_e * momentum[..., None, :, :] - of_c * signals.s(momentum)[..., None, :, :], axis=-2)
-                qdd = np.zeros_like(qd)
-            total += _squared(signals.position_adjoint((q, qd, qdd)), levels.position[..., i])
+        q, qd, qdd = (_times(of_torque, slopes) for slopes in (linear.stiffness, linear.damping, linear.inertia))
+        if of_e is not None:
+            momentum = _momentum(_smooth(rows), linear)
+            qd = qd + _times(np.swapaxes(of_e, -2, -3), momentum)
+            qd, qdd = qd - _times(np.swapaxes(of_c, -2, -3), signals.s(momentum)), np.zeros_like(qd)
+        total = total + _summed_squares(signals.position_adjoint((q, qd, qdd)), levels.position)
     return total
 
 
@@ -160,18 +156,22 @@ def smoothed(x: Array, fs: float) -> Array:
     return scipy.signal.savgol_filter(x, window, 2, mode="nearest") if window > 3 else x
 
 
-def _through_B(rows: RowMap, of_c: Array) -> list[Array]:
-    """Return what every torque counts for, joint by joint, shape (..., m, time): B' of what every row does."""
-    found: dict[int, Array] = {}
+def _through_B(rows: RowMap, of_c: Array) -> Array:
+    """Return what every torque counts for, shape (..., joint, m, time): B' of what every row does."""
+    joints = 1 + max(joint for _, joint in rows.B)
+    total = np.zeros((*of_c.shape[:-3], joints, of_c.shape[-3], of_c.shape[-1]))
     for (row, joint), B in rows.B.items():
-        part = of_c[..., row, :] * (B if isinstance(B, float) else rows.signals.torque.average(B)[..., None, :])
-        found[joint] = found[joint] + part if joint in found else part
-    return [found[joint] for joint in sorted(found)]
+        factor = B if isinstance(B, float) else rows.signals.torque.average(B)[..., None, :]
+        total[..., joint, :, :] += of_c[..., row, :] * factor
+    return total
 
 
-def _times(of_torque: list[Array], slopes: Array) -> Array:
-    """Return the sum over joints of what their torque counts for, (..., m, time), times slopes (..., joint, time)."""
-    return np.sum([z * slopes[..., j, :][..., None, :] for j, z in enumerate(of_torque)], axis=0)
+def _times(counts: Array, slopes: Array) -> Array:
+    """Return sums over k of counts (..., k, m, time) times slopes (..., k, joint, time), shape (..., joint, m, time)."""
+    total = np.zeros((*counts.shape[:-3], slopes.shape[-2], *counts.shape[-2:]))
+    for k in range(counts.shape[-3]):
+        total += counts[..., k, None, :, :] * slopes[..., k, :, None, :]
+    return total
 
 
 def _momentum(rows: RowMap, linear: Linearization) -> Array:
@@ -184,8 +184,9 @@ def _momentum(rows: RowMap, linear: Linearization) -> Array:
     return total
 
 
-def _squared(H: Array, level: Array) -> Array:
-    return level[..., None, None] ** 2 * np.matmul(H, np.swapaxes(H, -1, -2))
+def _summed_squares(H: Array, level: Array) -> Array:
+    """Return the sum over joints of level^2 H H', shape (..., m, m), for H of shape (..., joint, m, time)."""
+    return np.sum(level[..., None, None] ** 2 * np.matmul(H, np.swapaxes(H, -1, -2)), axis=-3)
 
 
 def torque_variance(rows: RowMap, level: Array, *, masked: bool = True) -> Array:

@@ -65,7 +65,7 @@ def test_noise_of_the_log_is_no_fault_of_the_model(pair):
 def test_models_without_friction_or_rotors_are_poor(pair, letters):
     verdict = Verdict(validated(pair, without(letters)), "explicit")
     assert verdict.word == "poor"
-    assert verdict.validation.percent_of_level(verdict.told.excess).max() > 10
+    assert verdict.validation.percent_of_level(verdict.validation.excess).max() > 10
 
 
 def test_a_joint_of_the_wrong_sign_is_poor_by_its_torque(pair):
