@@ -19,6 +19,7 @@ from identify.rows.noise_propagation import NoiseLevels, covariance, position_va
 from identify.rows.pieces import is_long, pieces
 from identify.rows.row_map import RowMap
 from identify.rows.rows import Rows
+from identify.signals.signals import Signals
 from identify.signals.state import State
 
 Weights = Literal["measured", "own"]
@@ -89,6 +90,11 @@ class Problem:
         """Y, W and what belongs to them; raise IdentificationError if the logs are too long for their rows to be kept."""
         self.require_rows()
         return self.prepared.stacked(self.model)
+
+    @property
+    def signals(self) -> tuple[Signals, ...]:
+        """Motion, torque and mask weights of each log; of long ones those of some pieces."""
+        return self.prepared.signals
 
     @property
     def parts(self) -> tuple[Rows, ...]:
