@@ -118,7 +118,7 @@ class Identified:
         squares = self._torque_squares
         if not self.problem.long:
             rows = self.problem.rows
-            squares = squares - np.sum(rows.by_kind(rows.Y), axis=-1) ** 2 / rows.by_kind(rows.Y).shape[-1]
+            squares = squares - np.sum(rows.by_kind(rows.Y), axis=-1) ** 2 / np.maximum(rows.count, 1)
         factors = self.problem.factors
         return {name: 1 - factors.squares(e.X) / np.maximum(squares, 1e-300) for name, e in self.estimates.items()}
 

@@ -49,7 +49,7 @@ class Validated:
     @cached_property
     def unseen(self) -> MotionLog:
         """The motion on which it is judged; of a long one the beginning."""
-        return manageable(split(self.found.logs[0])[1] if self.second is None else self.second)
+        return manageable([split(self.found.logs[0])[1] if self.second is None else self.second])[0]
 
     @property
     def title(self) -> str:

@@ -25,10 +25,10 @@ NEGLIGIBLE = 2e-3
 """Share of a sampling period by which a delay may be off without a word: a hundredth of the SCARA's Fv1 at 100 Hz."""
 
 SURE = 4.0
-"""A delay that differs from the stated one by so many sigma is validation."""
+"""A delay that differs from the stated one by more than so many sigma is reported."""
 
 WORTH, TOLERABLE = 0.7, 20.0
-"""Options that bring the error below this share of what it was, and below these per cent, are validation."""
+"""Options are recommended if they bring the error below this share of what it was, and below so many per cent."""
 
 
 @final

@@ -128,7 +128,8 @@ class Estimate:
     @property
     def relative_sigma_percent(self) -> Array:
         """%sigma of section 7.3, 100 sigma / |X|, shape (..., p)."""
-        return 100 * self.sigma / np.abs(self.X)
+        zero = self.X == 0
+        return np.where(zero, np.inf, 100 * self.sigma / np.where(zero, 1.0, np.abs(self.X)))
 
     @property
     def status(self) -> npt.NDArray[np.intp]:

@@ -105,6 +105,8 @@ def attempt_each(
     with blamed():  # what one model's rows lack, such as the joints of the basis, all lack
         for each in problems.values():
             _ = each.parts
+    for signals in problem.signals:
+        signals.state.forget()
     return {name: _outcome(each, estimator, throw) for name, each in problems.items()}
 
 

@@ -12,6 +12,7 @@ from identify.basis import Basis
 from identify.data.motion_log import MotionLog
 from identify.errors import IdentificationError, LogError
 from identify.estimators.prepared import Prepared
+from identify.estimators.variance_function import floor_of, reciprocal_root
 from identify.models import AbstractModel
 from identify.rows.chain import Chain
 from identify.rows.factors import Factors
@@ -23,11 +24,6 @@ from identify.signals.signals import Signals
 from identify.signals.state import State
 
 Weights = Literal["measured", "own"]
-
-FLOOR = 0.01
-"""Share of the mean variance of a kind's rows that is added to that of each: near standstill friction is no longer what the
-model says, and rows of the power model would count most there. Errors with encoder and torque noise change by 6 % at most
-between 0 and 0.03; those of exact logs fall from 0.4 to 0.04 %."""
 
 Influence = Callable[[Rows], Array]
 """Rows of a problem -> G, shape (..., rows, p), with which X = G' Y to first order."""
@@ -131,11 +127,21 @@ class Problem:
     def row_scale(self, rows: Rows) -> Array | None:
         """Return what divides rows by their noise without a mask, shape (..., r); None if all of a kind are alike."""
         variance = self.row_variance(rows)
-        if variance is None:
-            return None
-        variance = variance + FLOOR * np.mean(variance, axis=-1, keepdims=True)
-        known = np.isfinite(variance) & (variance > 0)
-        return 1 / np.sqrt(np.where(known, variance, 1.0))
+        return None if variance is None else reciprocal_root(variance, self.floor)
+
+    @cached_property
+    def floor(self) -> Array:
+        """Variance that is added to that of every row, since not all residuals are noise, shape (...): see `floor_of`."""
+        variances = [self._known_variance(part) for part in self.parts]
+        mean = np.mean(np.concatenate(variances, axis=-1), axis=-1)
+        scaled = zip(self.parts, variances, strict=True)
+        X = Factors.merged([part.scaled_factors(reciprocal_root(x, mean)) for part, x in scaled]).fit().X
+        squares = [(part.Y - part.predicted(X)) ** 2 for part in self.parts]
+        return floor_of(np.concatenate(squares, axis=-1), np.concatenate(variances, axis=-1))
+
+    def _known_variance(self, rows: Rows) -> Array:
+        variance = self.row_variance(rows)
+        return np.ones(rows.Y.shape) if variance is None else variance
 
     def row_variance(self, rows: Rows) -> Array | None:
         """Return the variance that the noise of the logs would give rows without a mask, shape (..., r).
@@ -172,7 +178,7 @@ class Problem:
         1 where B is constant, since noise levels are those of such rows; elsewhere what the model does not explain counts, too.
         """
         squares, expected = np.zeros(()), np.zeros(())
-        for part in self.parts:
+        for part in self.parts if self.long else [self.rows]:
             variance = self.row_variance(part)
             if variance is None:
                 return np.ones(X.shape[:-1])
@@ -214,9 +220,14 @@ class Problem:
         weights : {"measured", "own"}
             Whether instants are weighted as in the measured logs, or by the mask of the other log.
         """
+        self.require_rows("rows at another log need those of this one, and ")
         logs = [log] if isinstance(log, MotionLog) else list(log)
-        if len(logs) != len(self.logs) or any(a.q.shape != b.q.shape for a, b in zip(logs, self.logs, strict=True)):
-            raise LogError("rows at other logs need one log for each of the problem's, of the same length and joints")
+        if len(logs) != len(self.logs) or any(
+            (a.q.shape, a.fs) != (b.q.shape, b.fs) for a, b in zip(logs, self.logs, strict=True)
+        ):
+            raise LogError(
+                "rows at other logs need one log for each of the problem's, of the same length, frequency and joints"
+            )
         if weights not in ("measured", "own"):
             raise IdentificationError(f"weights = {weights!r} is none of 'measured', 'own'")
         measured = self.prepared.signals if weights == "measured" else [None] * len(logs)

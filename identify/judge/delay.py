@@ -23,6 +23,9 @@ RANGE = (-0.02, 0.05)
 BLOCKS = 16
 """Stretches of the log of which each is left out once, to see how much the delay depends on it."""
 
+TINY = 1e-300
+"""Squares below this count as this: of torques that are explained exactly."""
+
 _COARSE = 15
 """Delays of a first look, which brackets the smallest misfit."""
 
@@ -74,7 +77,7 @@ def estimate_delay(
     ExcitationError
         If the motion does not show the parameters.
     """
-    logs = [manageable(one) for one in ([log] if isinstance(log, MotionLog) else log)]
+    logs = manageable([log] if isinstance(log, MotionLog) else list(log))
     if any(one.q.ndim != 2 for one in logs):
         raise LogError("the delay is estimated from one run, or a sequence of them: give the runs one by one")
     if not within[0] < within[1]:
@@ -117,7 +120,7 @@ class _Search:
 
     def _misfit(self, delay: float) -> float:
         factors = self._at(delay).factors
-        return float(np.sum(factors.rows * np.log(factors.squares(factors.fit(2).X))))
+        return float(np.sum(factors.rows * np.log(np.maximum(factors.squares(factors.fit(2).X), TINY))))
 
     def _sigma(self, delay: float) -> float:
         """Return the jackknife's standard deviation of a Gauss-Newton step from the optimum, blocks of time left out."""

@@ -3,8 +3,11 @@
 from abc import ABC, abstractmethod
 from typing import final
 
+import numpy as np
+
 from identify.arrays import Array, Columns
 from identify.basis import Basis
+from identify.blame import expect
 from identify.models.equations import Equations, Factors
 from identify.signals.signals import Signals
 from identify.signals.state import State
@@ -29,9 +32,11 @@ class AbstractModel(ABC):
     def equations(self, basis: Basis, signals: Signals) -> Equations:
         """Return the model's equations at every sample, their columns averaged over the same windows as the torque."""
         state, average = signals.state, signals.torque.average
+        shape = (*state.q.shape[:-2], state.q.shape[-1])
+        B = {at: float(x) if np.ndim(x) == 0 else expect(self, "B", x, shape) for at, x in self.B(state).items()}
         return Equations(
             signals,
-            self.B(state),
+            B,
             {address: average(column) for address, column in self.c(basis, state).items()},
             {address: average(column) for address, column in self.e(basis, state).items()},
             basis.names,

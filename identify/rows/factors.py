@@ -234,8 +234,8 @@ class Factors:
         level = np.sqrt(self.squares(X) / np.maximum(self.rows, 1))
         # Noise-free rows leave residuals of rounding; weights below 1e-12 of the measurements would mean nothing.
         mean = np.sum(self.R[..., -1] ** 2, axis=(-2, -1)) / np.maximum(np.sum(self.rows, axis=-1), 1)
-        floor = 1e-12 * np.sqrt(mean)[..., None]
-        return np.where(np.isfinite(level), np.maximum(level, np.maximum(floor, 1e-300)), 1.0)
+        floor = np.where(mean > 0, 1e-12 * np.sqrt(mean), 1.0)[..., None]
+        return np.where(np.isfinite(level), np.maximum(level, floor), 1.0)
 
 
 def triangular(joined: Array) -> Array:

@@ -158,7 +158,7 @@ def smoothed(x: Array, fs: float) -> Array:
 
 def _through_B(rows: RowMap, of_c: Array) -> Array:
     """Return what every torque counts for, shape (..., joint, m, time): B' of what every row does."""
-    joints = 1 + max(joint for _, joint in rows.B)
+    joints = rows.signals.log.n
     total = np.zeros((*of_c.shape[:-3], joints, of_c.shape[-3], of_c.shape[-1]))
     for (row, joint), B in rows.B.items():
         factor = B if isinstance(B, float) else rows.signals.torque.average(B)[..., None, :]
@@ -219,7 +219,7 @@ def position_variance(rows: RowMap, level: Array, linear: Linearization, *, mask
 
         h''^2 g^2 + 4 h'^2 g'^2 + h^2 g''^2 + 2 h h'' g g''
 
-    remains, as products of h and h' with opposite symmetry cancel where g changes slowly.
+    remains (the first two terms with a rate kernel, which has one derivative less), as products of h and h' with opposite symmetry cancel where g changes slowly.
 
     Parameters
     ----------

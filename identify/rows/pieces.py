@@ -21,9 +21,10 @@ def is_long(logs: Sequence[MotionLog]) -> bool:
     return all(log.q.ndim == 2 for log in logs) and sum(log.samples * log.n**2 for log in logs) > LONG
 
 
-def manageable(log: MotionLog) -> MotionLog:
-    """Return a log, or the beginning of one whose rows would be too many to be kept."""
-    return log.part(0, int(LONG / log.n**2)) if is_long([log]) else log
+def manageable(logs: Sequence[MotionLog]) -> list[MotionLog]:
+    """Return logs, or the beginning of each where their rows would be too many to be kept."""
+    share = LONG / sum(log.samples * log.n**2 for log in logs)
+    return [log.part(0, int(share * log.samples)) for log in logs] if is_long(logs) else list(logs)
 
 
 def pieces(chain: Chain, logs: Sequence[MotionLog]) -> list[MotionLog]:

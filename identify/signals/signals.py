@@ -1,9 +1,8 @@
 """The signals that identification models are made of: motion, torque and mask weights of one log."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from math import ceil
-from typing import Self
 
 import numpy as np
 
@@ -79,10 +78,6 @@ class Signals:
         impulse = np.zeros(2 * ceil(self.differentiator.halo(self.fs) * self.fs - 1e-9) + 1)
         impulse[len(impulse) // 2] = 1.0
         return float(np.linalg.norm(self.s(impulse)))
-
-    def part(self, first: int, end: int) -> Self:
-        """Return the signals of the samples from `first` to before `end` alone."""
-        return replace(self, log=self.log.part(first, end))
 
     @property
     def reach(self) -> int:

@@ -62,6 +62,11 @@ class State:
             self._shared[key] = make(self)
         return self._shared[key]
 
+    def forget(self) -> None:
+        """Drop what was computed once for all: it takes far more memory than the motion, and is not needed twice."""
+        self._turned.clear()
+        self._shared.clear()
+
     @cached_property
     def _shared(self) -> dict[object, Any]:
         return {}

@@ -95,6 +95,8 @@ def test_what_needs_rows_takes_the_beginning_of_a_long_log(noisy, truth, monkeyp
     monkeypatch.setattr(identify.rows.pieces, "LONG", 4 * 2000)
     beginning = noisy.part(0, 2000)
     assert estimate_delay(noisy, scara()).delay == estimate_delay(beginning, scara()).delay
-    judged = (Problem((log,), scara(), MODELS.create("explicit"), idbench_chain()) for log in (manageable(noisy), beginning))
+    judged = (
+        Problem((log,), scara(), MODELS.create("explicit"), idbench_chain()) for log in (manageable([noisy])[0], beginning)
+    )
     one, two = (validate(problem, truth) for problem in judged)
     np.testing.assert_array_equal(one.rms, two.rms)

@@ -1,0 +1,39 @@
+"""How the variance of rows depends on what noise makes of them."""
+
+import numpy as np
+import pytest
+
+from identify.estimators.variance_function import LEAST, MOST, floor_of, reciprocal_root
+
+
+@pytest.fixture
+def variance(rng):
+    return np.exp(rng.normal(size=(200, 400)))
+
+
+def test_a_floor_is_found(variance, rng):
+    """Over 200 runs of 400 rows each; the ratio of two fitted numbers is known to some per cent."""
+    mean = variance.mean(axis=-1, keepdims=True)
+    squares = (variance + 0.5 * mean) * rng.standard_normal(variance.shape) ** 2
+    assert np.median(floor_of(squares, variance) / mean[:, 0]) == pytest.approx(0.5, rel=0.1)
+
+
+def test_pure_noise_has_next_to_none_and_equal_residuals_the_most(variance, rng):
+    mean = variance.mean(axis=-1)
+    noise = rng.standard_normal(variance.shape) ** 2
+    assert np.median(floor_of(variance * noise, variance) / mean) < 0.05
+    np.testing.assert_allclose(floor_of(np.ones_like(variance), variance), MOST * mean)
+
+
+def test_a_run_does_not_touch_the_others_and_bad_ones_have_a_value(variance):
+    squares = variance.copy()
+    squares[3] = np.nan
+    found = floor_of(squares, variance)
+    np.testing.assert_array_equal(found[7], floor_of(squares[7], variance[7]))
+    assert np.isfinite(found).all()
+    assert (found >= LEAST * variance.mean(axis=-1)).all()
+
+
+def test_reciprocal_roots():
+    scale = reciprocal_root(np.array([[3.0, 8.0], [0.0, 0.0], [np.nan, 1.0]]), np.array([1.0, 0.0, 1.0]))
+    np.testing.assert_allclose(scale, [[1 / 2, 1 / 3], [1, 1], [1, 1 / np.sqrt(2)]])
