@@ -219,7 +219,8 @@ def position_variance(rows: RowMap, level: Array, linear: Linearization, *, mask
 
         h''^2 g^2 + 4 h'^2 g'^2 + h^2 g''^2 + 2 h h'' g g''
 
-    remains (the first two terms with a rate kernel, which has one derivative less), as products of h and h' with opposite symmetry cancel where g changes slowly.
+    remains (the first two terms with a rate kernel, which has one derivative less), as products of h and h' with opposite
+    symmetry cancel where g changes slowly.
 
     Parameters
     ----------
