@@ -69,10 +69,10 @@ from identify.parameters.base_parameters import BaseParameters as BaseParameters
 from identify.parameters.base_parameters import transfer as transfer
 from identify.parameters.consistent import Consistent as Consistent
 from identify.parameters.consistent import consistent_parameters as consistent_parameters
-from identify.rows.chain import CHAINS as CHAINS
 from identify.rows.chain import Chain as Chain
-from identify.rows.chain import idbench_chain as idbench_chain
-from identify.rows.chain import paper_chain as paper_chain
+from identify.rows.chains import CHAINS as CHAINS
+from identify.rows.chains import idbench_chain as idbench_chain
+from identify.rows.chains import paper_chain as paper_chain
 from identify.rows.factors import Status as Status
 from identify.rows.noise_propagation import NoiseLevels as NoiseLevels
 from identify.rows.operators import OPERATORS as OPERATORS

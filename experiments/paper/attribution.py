@@ -1,4 +1,4 @@
-"""What does each imperfection do to each parameter, alone? Everything else is ideal, and told to identification.
+"""What does each imperfection do to each parameter, alone? Everything else is ideal, and given to identification.
 
 Expected: what shifts the torque in time (hold, computing delay, half a physics step) turns inertia into viscous friction, most
 where friction is small; quantization and ripple are noise; standstill touches the friction of the dynamic models and leaves

@@ -12,7 +12,8 @@ from identify.estimators.estimator import AbstractEstimator
 from identify.estimators.problem import Problem
 from identify.estimators.weighted_least_squares import WeightedLeastSquares
 from identify.models import AbstractModel, ExplicitModel
-from identify.rows.chain import Chain, idbench_chain
+from identify.rows.chain import Chain
+from identify.rows.chains import idbench_chain
 
 
 def identify(

@@ -12,11 +12,11 @@ from identify.basis import Basis
 from identify.data.motion_log import MotionLog
 from identify.errors import IdentificationError, LogError
 from identify.estimators.prepared import Prepared
-from identify.estimators.variance_function import floor_of, reciprocal_root
+from identify.estimators.variance_function import floor_of, reciprocal_root, rectified
 from identify.models import AbstractModel
 from identify.rows.chain import Chain
 from identify.rows.factors import Factors
-from identify.rows.noise_propagation import NoiseLevels, covariance, position_variance, torque_variance
+from identify.rows.noise_propagation import NoiseLevels, covariance, position_variance, smoothed, torque_variance
 from identify.rows.pieces import is_long, pieces
 from identify.rows.row_map import RowMap
 from identify.rows.rows import Rows
@@ -161,12 +161,12 @@ class Problem:
         return np.swapaxes(variance, -1, -2).reshape(*variance.shape[:-2], -1)
 
     def _at_rest(self, part: RowMap) -> Array:
-        """Return what noise of the velocities makes of the columns c where joints stand, shape (..., kind, count).
+        """Return what noise of the velocities makes of the columns c where joints hardly move, shape (..., kind, count).
 
-        Friction turns noise into power, Fs |qd|, of one sign: a bias.
+        Friction turns noise into power, Fs |qd|, of one sign: a bias, that of a velocity of E|qd + noise| - |qd|.
         """
         signals, X = part.signals, self.prepared.explicit_fit.X
-        speed = np.sqrt(2 / np.pi) * self.noise.position[..., None] * signals.gain * (1 - signals.weight)
+        speed = rectified(smoothed(signals.state.qd, signals.fs), self.noise.position[..., None] * signals.gain)
         found = np.zeros(part.inside.shape)
         for (row, name), column in self.model.c(self.basis, State(signals.state.q, speed, signals.s)).items():
             found[..., row, :] += column * X[..., self.names.index(name), None]

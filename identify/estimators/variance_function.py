@@ -1,6 +1,7 @@
 """How the variance of rows depends on what noise makes of them, as residuals show it."""
 
 import numpy as np
+import scipy
 
 from identify.arrays import Array
 
@@ -50,3 +51,12 @@ def reciprocal_root(variance: Array, floor: Array) -> Array:
     evened = variance + floor[..., None]
     known = np.isfinite(evened) & (evened > 0)
     return 1 / np.sqrt(np.where(known, evened, 1.0))
+
+
+def rectified(x: Array, sigma: Array) -> Array:
+    """Return E|x + n| - |x| for normal n of standard deviation sigma, 2 sigma (phi(u) - u Q(u)) with u = |x| / sigma."""
+    known = np.isfinite(sigma) & (sigma > 0)
+    scale = np.where(known, sigma, 1.0)
+    u = np.abs(x) / scale
+    density = np.exp(-(u**2) / 2) / np.sqrt(2 * np.pi)
+    return np.where(known, 2 * scale * (density - u * scipy.special.ndtr(-u)), 0.0)

@@ -13,7 +13,8 @@ from identify.data.motion_log import MotionLog
 from identify.errors import LogError, RangeError, SettingError
 from identify.estimators.problem import Problem
 from identify.models import ExplicitModel
-from identify.rows.chain import Chain, idbench_chain
+from identify.rows.chain import Chain
+from identify.rows.chains import idbench_chain
 from identify.rows.pieces import manageable
 from identify.rows.rows import Rows
 

@@ -1,6 +1,6 @@
 """From a log to a linear system: every choice of signal processing, in Hz, s and rad/s."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import final
 
 import numpy as np
@@ -9,16 +9,15 @@ from identify.arrays import require_not_negative
 from identify.basis import Basis
 from identify.data.motion_log import MotionLog, TorqueChannel
 from identify.errors import LogError, SettingError
-from identify.models import AbstractModel
-from identify.plugins import PluginTable
+from identify.models.model import AbstractModel
 from identify.rows.grid import Grid
-from identify.rows.operators import AbstractOperator, FirLowPass, IirLowPass
+from identify.rows.operators.operator import AbstractOperator
 from identify.rows.rows import Rows
-from identify.signals.differentiators import AbstractDifferentiator, CentralDifference
-from identify.signals.masks import AbstractMask, NoMask, ReversalMask
-from identify.signals.prefilters import AbstractPrefilter, ButterworthPrefilter, NoPrefilter
+from identify.signals.differentiators.differentiator import AbstractDifferentiator
+from identify.signals.masks.mask import AbstractMask
+from identify.signals.prefilters.prefilter import AbstractPrefilter
 from identify.signals.signals import Signals
-from identify.signals.torques import AbstractAlignment, AsLogged, ByChannel
+from identify.signals.torques.torque import AbstractAlignment
 
 
 @final
@@ -96,29 +95,3 @@ class Chain:
                 f"trim = {self.trim:g} s is shorter than the {halo:.3g} s that this chain looks: raise it, or leave it out"
             )
         return self.trim
-
-
-def paper_chain() -> Chain:
-    """The paper's own steps: Butterworth on q and tau, 2-point differences, Matlab's IIR decimate (sections 6.2, 7.2)."""
-    return Chain(ButterworthPrefilter(8.0), CentralDifference(2), AsLogged(), NoMask(), IirLowPass(4.0))
-
-
-def idbench_chain() -> Chain:
-    """No prefilter, 6th-order differences, torque aligned by its channel, reversals masked, FIR low-pass."""
-    return Chain(NoPrefilter(), CentralDifference(6), ByChannel(), ReversalMask(), FirLowPass())
-
-
-def paper_masked_chain() -> Chain:
-    """The paper's own steps, with the instants near reversals and standstill left out, as its school does."""
-    return replace(paper_chain(), mask=ReversalMask())
-
-
-CHAINS: PluginTable[Chain] = PluginTable(
-    "chains",
-    Chain,
-    {
-        "paper": paper_chain,
-        "paper_masked": paper_masked_chain,
-        "idbench": idbench_chain,
-    },
-)

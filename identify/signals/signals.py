@@ -9,11 +9,11 @@ import numpy as np
 from identify.arrays import Array
 from identify.blame import expect
 from identify.data.motion_log import MotionLog
-from identify.signals.differentiators import AbstractDifferentiator
-from identify.signals.masks import AbstractMask
-from identify.signals.prefilters import AbstractPrefilter
+from identify.signals.differentiators.differentiator import AbstractDifferentiator
+from identify.signals.masks.mask import AbstractMask
+from identify.signals.prefilters.prefilter import AbstractPrefilter
 from identify.signals.state import State
-from identify.signals.torques import AbstractAlignment, AbstractTorque
+from identify.signals.torques.torque import AbstractAlignment, AbstractTorque
 
 
 @dataclass(frozen=True, eq=False)

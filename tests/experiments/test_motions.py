@@ -10,7 +10,7 @@ from experiments.errors import ExperimentError
 from experiments.paper.motions import COMPARED, Errors, Pace, Table1Motions
 from experiments.paper.table1 import PAPER
 from identify import IirLowPass, ReversalMask
-from identify.rows.chain import CHAINS
+from identify.rows.chains import CHAINS
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,5 @@
 """Putting the torque of a log on the time of the columns, or not."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import final
@@ -11,21 +10,13 @@ from identify.plugins import PluginTable
 from identify.signals.torques.averaged_torque import AveragedTorque
 from identify.signals.torques.held_torque import HeldTorque
 from identify.signals.torques.instantaneous_torque import InstantaneousTorque
-from identify.signals.torques.torque import AbstractTorque
+from identify.signals.torques.torque import AbstractAlignment, AbstractTorque
 
 TORQUES: dict[Meaning, Callable[[Array, float, float], AbstractTorque]] = {
     "instantaneous": InstantaneousTorque,
     "held": HeldTorque,
     "averaged": AveragedTorque,
 }
-
-
-class AbstractAlignment(ABC):
-    """How the torque of a log is read."""
-
-    @abstractmethod
-    def align(self, tau: Array, channel: TorqueChannel, fs: float) -> AbstractTorque:
-        """Return the torque `tau` [N m], shape (..., joint, time), of `channel`, on the time of the columns."""
 
 
 @final

@@ -1,4 +1,4 @@
-"""What a torque channel becomes once it stands on the time of the columns."""
+"""The torque of a log on the time of the columns, and what puts it there."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import final
 
 from identify.arrays import Array
+from identify.data.motion_log import TorqueChannel
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,3 +56,11 @@ class AbstractTorque(ABC):
     @abstractmethod
     def _covariance(self, x: Array, tau: Array) -> Array | float:
         """Return the mean of a product over the window of every sample, less the product of the means."""
+
+
+class AbstractAlignment(ABC):
+    """How the torque of a log is read."""
+
+    @abstractmethod
+    def align(self, tau: Array, channel: TorqueChannel, fs: float) -> AbstractTorque:
+        """Return the torque `tau` [N m], shape (..., joint, time), of `channel`, on the time of the columns."""

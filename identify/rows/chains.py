@@ -1,0 +1,37 @@
+"""The chains that ship, and their table."""
+
+from dataclasses import replace
+
+from identify.plugins import PluginTable
+from identify.rows.chain import Chain
+from identify.rows.operators import FirLowPass, IirLowPass
+from identify.signals.differentiators import CentralDifference
+from identify.signals.masks import NoMask, ReversalMask
+from identify.signals.prefilters import ButterworthPrefilter, NoPrefilter
+from identify.signals.torques import AsLogged, ByChannel
+
+
+def paper_chain() -> Chain:
+    """The paper's own steps: Butterworth on q and tau, 2-point differences, Matlab's IIR decimate (sections 6.2, 7.2)."""
+    return Chain(ButterworthPrefilter(8.0), CentralDifference(2), AsLogged(), NoMask(), IirLowPass(4.0))
+
+
+def idbench_chain() -> Chain:
+    """No prefilter, 6th-order differences, torque aligned by its channel, reversals masked, FIR low-pass."""
+    return Chain(NoPrefilter(), CentralDifference(6), ByChannel(), ReversalMask(), FirLowPass())
+
+
+def paper_masked_chain() -> Chain:
+    """The paper's own steps, with the instants near reversals and standstill left out, as its school does."""
+    return replace(paper_chain(), mask=ReversalMask())
+
+
+CHAINS: PluginTable[Chain] = PluginTable(
+    "chains",
+    Chain,
+    {
+        "paper": paper_chain,
+        "paper_masked": paper_masked_chain,
+        "idbench": idbench_chain,
+    },
+)
