@@ -74,7 +74,7 @@ class Signals:
 
     @cached_property
     def gain(self) -> float:
-        """Standard deviation of ds/dt over that of s, for white noise s [1/s]."""
+        """Standard deviation of the derivative of white noise, over that of the noise [1/s]."""
         impulse = np.zeros(2 * ceil(self.differentiator.halo(self.fs) * self.fs - 1e-9) + 1)
         impulse[len(impulse) // 2] = 1.0
         return float(np.linalg.norm(self.s(impulse)))

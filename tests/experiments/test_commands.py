@@ -73,8 +73,7 @@ def test_a_csv_is_identified_with_what_its_torque_means(csv, capsys, truth, tmp_
     summary = json.loads((out / "summary.json").read_text())
     assert summary["truth"] is None
     assert summary["models"]["explicit"]["relative_error_percent"] is None
-    # Slow rows count most in the power model, and MuJoCo softens friction there: 0.11 % of Fv2.
-    np.testing.assert_allclose(summary["models"]["power"]["estimate"], truth, rtol=2e-3)
+    np.testing.assert_allclose(summary["models"]["power"]["estimate"], truth, rtol=1e-3)
     assert min(summary["models"]["power"]["explained_share"]) > 0.999
     assert sorted(x.name for x in out.iterdir()) == [
         "log.parquet",
