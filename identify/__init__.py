@@ -97,6 +97,6 @@ from identify.signals.signals import Signals as Signals
 from identify.signals.state import State as State
 from identify.signals.torques import ALIGNMENTS as ALIGNMENTS
 from identify.signals.torques import AbstractAlignment as AbstractAlignment
-from identify.signals.torques import AbstractTorque as AbstractTorque
 from identify.signals.torques import AsLogged as AsLogged
 from identify.signals.torques import ByChannel as ByChannel
+from identify.signals.torques import Torque as Torque

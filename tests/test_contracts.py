@@ -29,6 +29,7 @@ from identify import (
     scara,
 )
 from identify.rows.grid import Grid
+from identify.rows.rows import Rows
 from sim.controllers import CONTROLLERS, Task
 from sim.drives import DRIVES
 from sim.encoders import ENCODERS
@@ -143,7 +144,8 @@ def test_operators_agree_with_their_step_and_halo(name, log):
     operator = OPERATORS.create(name)
     chain = idbench_chain()
     equations = PowerModel().equations(scara(), chain.signals(log))
-    rows = operator.rows(equations, Grid.inside(log.samples, log.fs, 3.0, operator.step(log.fs)))
+    grid = Grid.inside(log.samples, log.fs, 3.0, operator.step(log.fs))
+    rows = Rows.of(equations, operator.map(equations, equations.weight, grid))
     assert len(rows.Y) == (log.samples - 600) // operator.step(log.fs)
     assert rows.W.shape == (len(rows.Y), 8)
     assert rows.valid.dtype == bool

@@ -28,7 +28,7 @@ from experiments.identification.warnings import helpful_moves, warnings_of_resul
 from experiments.recording.audience import Audience, Watching
 from identify import MODELS, ExcitationError, IdentificationError, LogError, MotionLog
 from identify.data.log_file import write_log
-from identify.rows.pieces import is_long
+from identify.rows.long_logs import is_long
 from sim.errors import BenchError
 from sim.robot.robot import Robot
 

@@ -11,7 +11,7 @@ import numpy as np
 from experiments.identification.consistent_robot import Written
 from experiments.identification.identified import Identified
 from identify import Array, Basis, ExplicitModel, IdentificationError, MotionLog, Problem, State, Validation, split, validate
-from identify.rows.pieces import manageable
+from identify.rows.long_logs import manageable
 from sim.engine.replay import Replay, replay
 from sim.errors import BenchError
 

@@ -68,7 +68,7 @@ class Layer:
         self._log, self._chain, self._at = found.logs[0], found.processing, f"identify/{found.label}"
         methods = {path.strip("/").split("/")[1] for path in known if path.strip("/").startswith("identify/")}
         self._shade = len(methods - {found.label})
-        self._signals = found.problem.prepared.signals[0]
+        self._signals = found.problem.signals[0]
         self._highest = 0.0
 
     def send(self) -> None:

@@ -16,7 +16,7 @@ from experiments.recording.motion_layer import Base
 from experiments.recording.stream import Stream
 from experiments.recording.texts import about
 from identify import measured_state
-from identify.rows.pieces import is_long
+from identify.rows.long_logs import is_long
 from sim.engine.run import Run
 from sim.engine.watch import Watch
 from sim.scenario.scenario import Scenario

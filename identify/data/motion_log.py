@@ -6,8 +6,8 @@ from typing import Literal, Self, get_args
 import numpy as np
 import numpy.typing as npt
 
-from identify.arrays import Array, frozen, require_finite, require_positive
-from identify.errors import LogError, SettingError, TimeError
+from identify.arrays import Array, frozen
+from identify.errors import LogError, SettingError, TimeError, require_finite, require_positive
 
 Meaning = Literal["instantaneous", "held", "averaged"]
 

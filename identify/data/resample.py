@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from identify.arrays import Array, require_positive
+from identify.arrays import Array
 from identify.data.motion_log import MotionLog, TorqueChannel
-from identify.errors import LogError
+from identify.errors import LogError, require_positive
 
 MOST_SAMPLES = 1e8
 """Samples above which a frequency is taken for a slip."""

@@ -72,8 +72,8 @@ class Estimate:
         inverse = fit.factor.inverse(problem.factors.together.status == Status.OK)
 
         def weights(rows: Rows) -> Array:
-            weight, scale = np.tile(fit.weight, len(rows.time) // rows.kinds), problem.row_scale(rows) if scaled else None
-            return weight if scale is None else weight * scale
+            weight = np.tile(fit.weight, len(rows.time) // rows.kinds)
+            return weight * problem.row_weights.of(rows) if scaled and problem.row_weights else weight
 
         def influence(rows: Rows) -> Array:
             return np.matmul(rows.W * (weights(rows) ** 2)[..., None], inverse)

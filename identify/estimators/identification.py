@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 
 from identify.arrays import Array
-from identify.basis import Basis
+from identify.basis.basis import Basis
 from identify.blame import blamed
 from identify.data.motion_log import MotionLog
 from identify.errors import IdentificationError
@@ -11,7 +11,8 @@ from identify.estimators.estimate import Estimate
 from identify.estimators.estimator import AbstractEstimator
 from identify.estimators.problem import Problem
 from identify.estimators.weighted_least_squares import WeightedLeastSquares
-from identify.models import AbstractModel, ExplicitModel
+from identify.models.explicit import ExplicitModel
+from identify.models.model import AbstractModel
 from identify.rows.chain import Chain
 from identify.rows.chains import idbench_chain
 

@@ -7,7 +7,8 @@ import numpy as np
 
 from identify.arrays import Array
 from identify.rows.factors import Factors, Fit, Status
-from identify.rows.noise_propagation import Linearization, NoiseLevels, position_variance, torque_variance
+from identify.rows.linearization import Linearization
+from identify.rows.noise_propagation import NoiseLevels, position_variance, torque_variance
 from identify.rows.rows import Rows
 from identify.signals.signals import Signals
 from identify.signals.stencils import slide

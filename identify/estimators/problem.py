@@ -8,25 +8,28 @@ from typing import Literal, Self
 import numpy as np
 
 from identify.arrays import Array
-from identify.basis import Basis
+from identify.basis.basis import Basis
 from identify.data.motion_log import MotionLog
 from identify.errors import IdentificationError, LogError
-from identify.estimators.prepared import Prepared
-from identify.estimators.variance_function import floor_of, reciprocal_root, rectified
-from identify.models import AbstractModel
+from identify.estimators.noise_levels import noise_levels
+from identify.estimators.row_weights import RowWeights
+from identify.models.explicit import ExplicitModel
+from identify.models.model import AbstractModel
 from identify.rows.chain import Chain
-from identify.rows.factors import Factors
-from identify.rows.noise_propagation import NoiseLevels, covariance, position_variance, smoothed, torque_variance
-from identify.rows.pieces import is_long, pieces
-from identify.rows.row_map import RowMap
+from identify.rows.factors import Factors, Fit
+from identify.rows.linearization import Linearization
+from identify.rows.long_logs import is_long, piece_of
+from identify.rows.noise_propagation import NoiseLevels, covariance
 from identify.rows.rows import Rows
 from identify.signals.signals import Signals
-from identify.signals.state import State
 
 Weights = Literal["measured", "own"]
 
 Influence = Callable[[Rows], Array]
 """Rows of a problem -> G, shape (..., rows, p), with which X = G' Y to first order."""
+
+SAMPLED = 8
+"""Pieces of long logs from which noise is estimated and propagated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +48,6 @@ class Problem:
         Signal processing.
     simulate : callable, optional
         Returns the log of the robot with parameters X that repeats the motion (output error, DIDIM).
-    prepared : Prepared, optional
-        Signals and explicit rows, where other problems of the same logs have them already.
     """
 
     logs: tuple[MotionLog, ...]
@@ -54,14 +55,12 @@ class Problem:
     model: AbstractModel
     chain: Chain
     simulate: Callable[[Array], MotionLog] | None = None
-    prepared: Prepared = field(default=None, repr=False)  # type: ignore[assignment]  # made right after
+    _signals: tuple[Signals, ...] = field(default=(), repr=False)
+    _explicit: "Problem | None" = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         if not self.logs:
             raise LogError("there is no log to identify")
-        if self.prepared is None:
-            prepared = Prepared.of(self.logs, self.basis, self.chain, long=self.long)
-            object.__setattr__(self, "prepared", prepared)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -85,17 +84,24 @@ class Problem:
     def rows(self) -> Rows:
         """Y, W and what belongs to them; raise IdentificationError if the logs are too long for their rows to be kept."""
         self.require_rows()
-        return self.prepared.stacked(self.model)
+        return self._together
 
-    @property
+    @cached_property
     def signals(self) -> tuple[Signals, ...]:
-        """Motion, torque and mask weights of each log; of long ones those of some pieces."""
-        return self.prepared.signals
+        """Motion, torque and mask weights of each log; of long ones those of some pieces, evenly spread."""
+        if self._signals:
+            return self._signals
+        if not self.long:
+            return tuple(map(self.chain.signals, self.logs))
+        every = self._pieces
+        count = min(SAMPLED, len(every))
+        some = [every[i * len(every) // count] for i in range(count)]
+        return tuple(self.chain.signals(log.part(*piece)) for log, piece in some)
 
-    @property
+    @cached_property
     def parts(self) -> tuple[Rows, ...]:
         """The rows of each log; of long ones those of some pieces."""
-        return self.prepared.rows(self.model)
+        return tuple(self._rows_of(signals) for signals in self.signals)
 
     @cached_property
     def factors(self) -> Factors:
@@ -108,91 +114,33 @@ class Problem:
         return self._factors[1]
 
     @cached_property
-    def _factors(self) -> tuple[Factors, Factors]:
-        each = [(part.factors, self._scaled(part)) for part in self._all_parts()]
-        plain, scaled = zip(*each, strict=True)
-        return Factors.merged(plain), Factors.merged(scaled)
-
-    def _all_parts(self) -> Iterator[Rows]:
-        if not self.long:
-            yield self.rows
-            return
-        for piece in pieces(self.chain, self.logs):
-            yield self.chain.rows(self.chain.signals(piece), self.basis, self.model)
-
-    def _scaled(self, rows: Rows) -> Factors:
-        scale = self.row_scale(rows)
-        return rows.factors if scale is None else rows.scaled_factors(scale)
-
-    def row_scale(self, rows: Rows) -> Array | None:
-        """Return what divides rows by their noise without a mask, shape (..., r); None if all of a kind are alike."""
-        variance = self.row_variance(rows)
-        return None if variance is None else reciprocal_root(variance, self.floor)
+    def explicit(self) -> "Problem":
+        """The problem of the explicit model, whose rows show the noise of the logs."""
+        if isinstance(self.model, ExplicitModel):
+            return self
+        return self._explicit or replace(self, model=ExplicitModel(), _signals=self.signals)
 
     @cached_property
-    def floor(self) -> Array:
-        """Variance that is added to that of every row, since not all residuals are noise, shape (...): see `floor_of`."""
-        variances = [self._known_variance(part) for part in self.parts]
-        mean = np.mean(np.concatenate(variances, axis=-1), axis=-1)
-        scaled = zip(self.parts, variances, strict=True)
-        X = Factors.merged([part.scaled_factors(reciprocal_root(x, mean)) for part, x in scaled]).fit().X
-        squares = [(part.Y - part.predicted(X)) ** 2 for part in self.parts]
-        return floor_of(np.concatenate(squares, axis=-1), np.concatenate(variances, axis=-1))
-
-    def _known_variance(self, rows: Rows) -> Array:
-        variance = self.row_variance(rows)
-        return np.ones(rows.Y.shape) if variance is None else variance
-
-    def row_variance(self, rows: Rows) -> Array | None:
-        """Return the variance that the noise of the logs would give rows without a mask, shape (..., r).
-
-        None where B is constant: the torque's noise is then the same in all rows of a joint. (What little M(q) changes the
-        positions' noise from row to row is left out.)
-        """
-        if all(isinstance(B, float) for B in rows.maps[0].B.values()):
-            return None
-        return np.concatenate([self._variance(part) for part in rows.maps], axis=-1)
-
-    def _variance(self, part: RowMap) -> Array:
-        levels, linear = self.noise, self.prepared.linear(part.signals)
-        variance = torque_variance(part, levels.torque, masked=False)
-        variance = variance + position_variance(part, levels.position, linear, masked=False)
-        variance = variance + self._at_rest(part) ** 2
-        return np.swapaxes(variance, -1, -2).reshape(*variance.shape[:-2], -1)
-
-    def _at_rest(self, part: RowMap) -> Array:
-        """Return what noise of the velocities makes of the columns c where joints hardly move, shape (..., kind, count).
-
-        Friction turns noise into power, Fs |qd|, of one sign: a bias, that of a velocity of E|qd + noise| - |qd|.
-        """
-        signals, X = part.signals, self.prepared.explicit_fit.X
-        speed = rectified(smoothed(signals.state.qd, signals.fs), self.noise.position[..., None] * signals.gain)
-        found = np.zeros(part.inside.shape)
-        for (row, name), column in self.model.c(self.basis, State(signals.state.q, speed, signals.s)).items():
-            found[..., row, :] += column * X[..., self.names.index(name), None]
-        return part.kernel.apply(found)
-
-    def excess(self, X: Array, weights: Callable[[Rows], Array]) -> Array:
-        """Return how many times the squares of weighted residuals are what noise makes of them, at least 1, shape (...).
-
-        1 where B is constant, since noise levels are those of such rows; elsewhere what the model does not explain counts, too.
-        """
-        squares, expected = np.zeros(()), np.zeros(())
-        for part in self.parts if self.long else [self.rows]:
-            variance = self.row_variance(part)
-            if variance is None:
-                return np.ones(X.shape[:-1])
-            weight = weights(part) ** 2 * part.valid
-            squares = squares + np.sum(weight * (part.Y - part.predicted(X)) ** 2, axis=-1)
-            expected = expected + np.sum(weight * variance, axis=-1)
-        free = 1 - len(self.names) / np.maximum(self.factors.together.rows * self.prepared.share, len(self.names) + 1)
-        ratio = np.divide(squares, expected * free, out=np.ones_like(squares), where=expected > 0)
-        return np.maximum(ratio, 1.0)
-
-    @property
     def noise(self) -> NoiseLevels:
         """The noise of torques and positions, as the explicit model's rows show it."""
-        return self.prepared.noise
+        if self.explicit is not self:
+            return self.explicit.noise
+        linear = [self.linear(signals) for signals in self.signals]
+        return noise_levels(self.parts, self._together.factors, self._fit, linear)
+
+    def linear(self, signals: Signals) -> Linearization:
+        """Return the linearization of the explicit model about these signals."""
+        known = self.explicit._linear
+        if signals not in known:
+            return Linearization(signals, self.basis, self.explicit._fit.X)
+        return known[signals]
+
+    @cached_property
+    def row_weights(self) -> RowWeights | None:
+        """What rows are multiplied by where those of one kind differ in their noise; None if they are alike."""
+        if all(part.alike for rows in self.parts for part in rows.maps):
+            return None
+        return RowWeights(self.parts, self.model, self.noise, self.linear)
 
     def noise_covariance(self, influence: Influence) -> Array:
         """Return the covariance that the noise of the logs gives an estimate X = G' Y, shape (..., p, p).
@@ -206,9 +154,19 @@ class Problem:
         for part in self.parts if self.long else [self.rows]:
             G = influence(part)
             for k, rows in enumerate(part.maps):
-                linear = self.prepared.linear(rows.signals)
-                total = total + covariance(rows, G[..., part.of_log(k), :], self.noise, linear)
-        return total / self.prepared.share
+                total = total + covariance(rows, G[..., part.of_log(k), :], self.noise, self.linear(rows.signals))
+        return total / self._share
+
+    def excess(self, X: Array, weights: Callable[[Rows], Array]) -> Array:
+        """Return how many times the squares of weighted residuals are what noise makes of them, at least 1, shape (...).
+
+        1 where rows of a kind are alike, since noise levels are theirs; elsewhere what the model does not explain counts, too.
+        """
+        if self.row_weights is None:
+            return np.ones(X.shape[:-1])
+        p = len(self.names)
+        free = 1 - p / np.maximum(self.factors.together.rows * self._share, p + 1)
+        return self.row_weights.excess(X, weights, free)
 
     def at(self, log: MotionLog | Sequence[MotionLog], weights: Weights = "measured") -> Rows:
         """Return the rows of other logs, by the same chain, basis and model (instrumental variables, DIDIM).
@@ -219,25 +177,78 @@ class Problem:
             One for each log of this problem, of the same length.
         weights : {"measured", "own"}
             Whether instants are weighted as in the measured logs, or by the mask of the other log.
+
+        Raises
+        ------
+        LogError
+            If the logs are not as many, as long, or of the same frequency and joints.
+        IdentificationError
+            If the logs are too long for their rows to be kept, or `weights` is unknown.
         """
         self.require_rows("rows at another log need those of this one, and ")
         logs = [log] if isinstance(log, MotionLog) else list(log)
-        if len(logs) != len(self.logs) or any(
-            (a.q.shape, a.fs) != (b.q.shape, b.fs) for a, b in zip(logs, self.logs, strict=True)
-        ):
+        if [(one.q.shape, one.fs) for one in logs] != [(one.q.shape, one.fs) for one in self.logs]:
             raise LogError(
                 "rows at other logs need one log for each of the problem's, of the same length, frequency and joints"
             )
         if weights not in ("measured", "own"):
             raise IdentificationError(f"weights = {weights!r} is none of 'measured', 'own'")
-        measured = self.prepared.signals if weights == "measured" else [None] * len(logs)
+        measured = self.signals if weights == "measured" else [None] * len(logs)
         signals = [self.chain.signals(one, given) for one, given in zip(logs, measured, strict=True)]
-        return Rows.stack([self.chain.rows(one, self.basis, self.model) for one in signals])
+        return Rows.stack([self._rows_of(one) for one in signals])
 
-    def with_model(self, model: AbstractModel) -> Self:
+    def with_model(self, model: AbstractModel) -> "Problem":
         """Return the problem of another model, which shares all that the two have in common."""
-        return replace(self, model=model)
+        if isinstance(model, ExplicitModel):
+            return self.explicit
+        return replace(self, model=model, _signals=self.signals, _explicit=self.explicit)
 
     def with_basis(self, basis: Basis) -> Self:
         """Return the problem of another basis, such as one with other nonlinear parameters; signals are shared."""
-        return replace(self, basis=basis, prepared=self.prepared.with_basis(basis))
+        return replace(self, basis=basis, _signals=self.signals, _explicit=None)
+
+    def _rows_of(self, signals: Signals) -> Rows:
+        return self.chain.rows(signals, self.basis, self.model)
+
+    @cached_property
+    def _together(self) -> Rows:
+        """The rows of all parts."""
+        return Rows.stack(self.parts)
+
+    @cached_property
+    def _fit(self) -> Fit:
+        """The estimate by weighted least squares, from all parts."""
+        return self._together.factors.fit(2)
+
+    @cached_property
+    def _linear(self) -> dict[Signals, Linearization]:
+        """Linearizations about the signals of all parts."""
+        return {signals: Linearization(signals, self.basis, self._fit.X) for signals in self.signals}
+
+    @cached_property
+    def _pieces(self) -> list[tuple[MotionLog, tuple[int, int]]]:
+        """The log, first sample and end of every piece of long logs."""
+        return [(log, piece) for log in self.logs for piece in self.chain.pieces(log, piece_of(log))]
+
+    @cached_property
+    def _share(self) -> float:
+        """The share of all rows that the parts make."""
+        every = sum(self.chain.grid(log).count for log in self.logs)
+        return len(self._together.time) / self._together.kinds / every
+
+    @cached_property
+    def _factors(self) -> tuple[Factors, Factors]:
+        each = [(rows.factors, self._scaled(rows)) for rows in self._every()]
+        plain, scaled = zip(*each, strict=True)
+        return Factors.merged(plain), Factors.merged(scaled)
+
+    def _every(self) -> Iterator[Rows]:
+        """Yield all rows, those of long logs piece by piece."""
+        if not self.long:
+            yield self.rows
+            return
+        for log, piece in self._pieces:
+            yield self._rows_of(self.chain.signals(log.part(*piece)))
+
+    def _scaled(self, rows: Rows) -> Factors:
+        return rows.factors if self.row_weights is None else rows.factors_of(self.row_weights.of(rows))

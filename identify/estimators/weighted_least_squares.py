@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from identify.arrays import require_whole
+from identify.errors import require_whole
 from identify.estimators.estimate import Estimate
 from identify.estimators.estimator import AbstractEstimator, Need
 from identify.estimators.problem import Problem

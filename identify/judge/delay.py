@@ -8,14 +8,14 @@ import numpy.typing as npt
 import scipy
 
 from identify.arrays import Array
-from identify.basis import Basis
+from identify.basis.basis import Basis
 from identify.data.motion_log import MotionLog
 from identify.errors import LogError, RangeError, SettingError
 from identify.estimators.problem import Problem
-from identify.models import ExplicitModel
+from identify.models.explicit import ExplicitModel
 from identify.rows.chain import Chain
 from identify.rows.chains import idbench_chain
-from identify.rows.pieces import manageable
+from identify.rows.long_logs import manageable
 from identify.rows.rows import Rows
 
 RANGE = (-0.02, 0.05)

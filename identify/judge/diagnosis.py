@@ -7,11 +7,12 @@ import numpy as np
 import scipy
 
 from identify.arrays import Array
-from identify.basis import Basis
+from identify.basis.basis import Basis
 from identify.data.motion_log import MotionLog
-from identify.models import AbstractModel, Equations
+from identify.models.equations import Equations
+from identify.models.model import AbstractModel
 from identify.rows.chain import Chain
-from identify.rows.kernel import Kernel
+from identify.rows.grid import Kernel
 from identify.signals.signals import Signals
 from identify.signals.state import State
 

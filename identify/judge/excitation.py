@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from identify.arrays import Array
-from identify.basis import Basis
+from identify.basis.basis import Basis
 from identify.data.kinematics import KinematicTree
 from identify.parameters.base_parameters import BaseParameters, columns_at, random_states
 from identify.rows.factors import NOT_SHOWN

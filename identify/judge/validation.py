@@ -14,7 +14,7 @@ from identify.errors import LogError
 from identify.estimators.problem import Problem
 from identify.judge.diagnosis import instants
 from identify.judge.row_noise import row_noise
-from identify.models import ExplicitModel
+from identify.models.explicit import ExplicitModel
 from identify.rows.noise_propagation import torque_variance
 from identify.rows.operators import AbstractOperator
 from identify.rows.rows import Rows
@@ -128,7 +128,7 @@ def validate(unseen: Problem, X: Array, covariance: Array | None = None) -> Vali
         raise LogError(
             f"a motion is judged by itself, not {len(unseen.logs)} of shape {unseen.logs[0].q.shape}: give them one by one"
         )
-    signals, chain, basis = unseen.prepared.signals[0], unseen.chain, unseen.basis
+    signals, chain, basis = unseen.signals[0], unseen.chain, unseen.basis
     rows = unseen.with_model(ExplicitModel()).parts[0]
     left = instants(signals, basis, ExplicitModel(), chain, X)
     moving = [_Joint.of(rows, X, j) for j in range(basis.n)]

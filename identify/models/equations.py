@@ -1,16 +1,12 @@
 """A model's equations at every sample of a log."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from identify.arrays import Array, Columns
+from identify.arrays import Array, Columns, Multipliers
 from identify.signals.signals import Signals
-
-Factors = Mapping[tuple[int, int], Array | float]
-"""(row of an instant, joint) -> what the row multiplies the torque of the joint by: a signal (..., time), or a constant."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +26,7 @@ class Equations:
     """
 
     signals: Signals
-    B: Factors
+    B: Multipliers
     c: Columns
     e: Columns
     names: tuple[str, ...]

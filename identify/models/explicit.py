@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 from typing import final
 
-from identify.arrays import Columns
-from identify.basis import Basis
-from identify.models.equations import Factors
+from identify.arrays import Columns, Multipliers
+from identify.basis.basis import Basis
 from identify.models.model import AbstractModel, each_joint
 from identify.signals.state import State
 
@@ -15,7 +14,7 @@ from identify.signals.state import State
 class ExplicitModel(AbstractModel):
     """Explicit dynamic model, tau = D(q, qd, qdd) X (Eq. 5, 6)."""
 
-    def B(self, state: State) -> Factors:
+    def B(self, state: State) -> Multipliers:
         """Return ones: a row for each joint."""
         return each_joint(state)
 

@@ -5,10 +5,10 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Array, Columns
-from identify.basis import Basis
+from identify.arrays import Columns, Multipliers
+from identify.basis.basis import Basis
 from identify.blame import expect
-from identify.models.equations import Equations, Factors
+from identify.models.equations import Equations
 from identify.signals.signals import Signals
 from identify.signals.state import State
 
@@ -17,7 +17,7 @@ class AbstractModel(ABC):
     """An identification model B tau = [c + s e] X with s = d/dt: it takes B, c and e from a basis, and never filters."""
 
     @abstractmethod
-    def B(self, state: State) -> Factors:
+    def B(self, state: State) -> Multipliers:
         """Return what torques are multiplied by, (row of an instant, joint) -> (..., time) or a constant, where it is not 0."""
 
     @abstractmethod
@@ -43,6 +43,6 @@ class AbstractModel(ABC):
         )
 
 
-def each_joint(state: State) -> dict[tuple[int, int], Array | float]:
+def each_joint(state: State) -> Multipliers:
     """Return B of a model that has the torque of every joint in a row of its own."""
     return {(j, j): 1.0 for j in range(state.n)}

@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 from typing import final
 
-from identify.arrays import Columns
-from identify.basis import Basis
-from identify.models.equations import Factors
+from identify.arrays import Columns, Multipliers
+from identify.basis.basis import Basis
 from identify.models.model import AbstractModel
 from identify.signals.state import State
 
@@ -15,7 +14,7 @@ from identify.signals.state import State
 class PowerModel(AbstractModel):
     """Power model, qd' tau = [qd' Gamma_f + s h(q, qd)] X (Eq. 10, 23); over windows, the energy model (Eq. 11, 20)."""
 
-    def B(self, state: State) -> Factors:
+    def B(self, state: State) -> Multipliers:
         """Return qd': one row."""
         return {(0, j): state.qd[..., j, :] for j in range(state.n)}
 

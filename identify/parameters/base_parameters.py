@@ -7,7 +7,7 @@ from typing import Self, final
 import numpy as np
 
 from identify.arrays import Array
-from identify.basis import Basis
+from identify.basis.basis import Basis
 from identify.data.kinematics import KinematicTree
 from identify.errors import SettingError
 from identify.signals.state import State

@@ -1,14 +1,14 @@
 """From a log to a linear system: every choice of signal processing, in Hz, s and rad/s."""
 
 from dataclasses import dataclass
+from math import ceil
 from typing import final
 
 import numpy as np
 
-from identify.arrays import require_not_negative
-from identify.basis import Basis
+from identify.basis.basis import Basis
 from identify.data.motion_log import MotionLog, TorqueChannel
-from identify.errors import LogError, SettingError
+from identify.errors import LogError, SettingError, require_not_negative
 from identify.models.model import AbstractModel
 from identify.rows.grid import Grid
 from identify.rows.operators.operator import AbstractOperator
@@ -76,7 +76,18 @@ class Chain:
             hint = "; its axes are (time, joint), is it transposed?" if log.samples == basis.n else ""
             raise LogError(f"the log has {log.n} joints, the basis {basis.n}{hint}")
         grid = self.grid(log)
-        return self.operator.rows(model.equations(basis, signals), grid)
+        equations = model.equations(basis, signals)
+        return Rows.of(equations, self.operator.map(equations, equations.weight, grid))
+
+    def pieces(self, log: MotionLog, samples: int) -> list[tuple[int, int]]:
+        """Return first sample and end of pieces of a log, each with the samples that its rows look at.
+
+        The rows of all pieces are those of the log; each piece has those of some `samples`, at least one.
+        """
+        grid, reach = self.grid(log), ceil(self.margin(log) * log.fs - 1e-9)
+        rows = max(1, samples // grid.step)
+        starts = [(grid.first + row * grid.step - reach, min(rows, grid.count - row)) for row in range(0, grid.count, rows)]
+        return [(start, start + 2 * reach + count * grid.step) for start, count in starts]
 
     def halo(self, fs: float, channel: TorqueChannel) -> float:
         """Return how far [s] a row looks to either side of its instant, in a log at `fs` [Hz] with this torque channel."""

@@ -1,15 +1,12 @@
 """The linear map from samples to rows, and its adjoint."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, replace
+from typing import Protocol, Self
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.models.equations import Equations, Factors
-from identify.rows.grid import Grid
-from identify.rows.kernel import Kernel
+from identify.arrays import Array, Multipliers
+from identify.rows.grid import Grid, Kernel
 from identify.signals.signals import Signals
 
 
@@ -51,7 +48,7 @@ class RowMap:
     """
 
     signals: Signals
-    B: Factors
+    B: Multipliers
     grid: Grid
     kernel: Window
     rate_kernel: Kernel | None
@@ -64,34 +61,25 @@ class RowMap:
         """Number of rows, void ones included."""
         return self.outside.shape[-2] * self.outside.shape[-1]
 
-    def apply(self, equations: Equations) -> tuple[Array, Array]:
-        """Return the rows of B tau, shape (..., kind, count), and of the columns of c + s e, shape (..., k, count)."""
-        by_parts = self.rate_kernel is not None
-        parts = (equations.c,) if by_parts else (equations.c, equations.rates)
-        kind = [address[0] for address in equations.addresses]
-        both = self._weighted(equations, parts)
-        filtered = self.kernel.apply(both)
-        y, columns = filtered[..., : equations.kinds, :], filtered[..., equations.kinds :, :]
-        if self.rate_kernel is not None and equations.e:
-            place = [equations.addresses.index(address) for address in equations.e]
-            columns[..., place, :] += self.rate_kernel.apply(np.stack(list(equations.e.values()), axis=-2))
-        return y * self.outside, columns * self.outside[..., kind, :]
+    @property
+    def time(self) -> Array:
+        """Instant of the middle of what a row looks at [s], shape (count,)."""
+        length = len(self.response)
+        lag = ((length - 1) / 2 - (length - 1) // 2) / self.signals.fs
+        return (self.grid.first + self.grid.step * np.arange(self.grid.count)) / self.signals.fs + lag
+
+    @property
+    def alike(self) -> bool:
+        """Whether B is constant: noise of the torques is then the same in all rows of a kind, but for the mask."""
+        return all(isinstance(B, float) for B in self.B.values())
+
+    def unmasked(self) -> Self:
+        """Return the map as if nothing were masked."""
+        return replace(self, inside=np.ones_like(self.inside), outside=np.ones_like(self.outside))
 
     def measurement(self, y: Array) -> Array:
         """Return the rows of B tau, shape (..., kind, time), in the order of Y, shape (..., r)."""
-        rows = self.outside * self.kernel.apply(self.inside * y)
-        return np.swapaxes(rows, -1, -2).reshape(*rows.shape[:-2], -1)
-
-    def _weighted(self, equations: Equations, parts: tuple[Mapping[tuple[int, str], Array], ...]) -> Array:
-        """Return B tau and then the sums of the columns of `parts`, times the weights of the samples."""
-        n = equations.kinds
-        both = np.zeros((*equations.y.shape[:-2], n + len(equations.addresses), equations.y.shape[-1]))
-        np.multiply(equations.y, self.inside, out=both[..., :n, :])
-        for i, address in enumerate(equations.addresses):
-            found = [columns[address] for columns in parts if address in columns]
-            if found:
-                np.multiply(sum(found[1:], start=found[0]), self.inside[..., address[0], :], out=both[..., n + i, :])
-        return both
+        return in_order(self.outside * self.kernel.apply(self.inside * y))
 
     def adjoint(self, G: Array) -> tuple[Array, Array | None]:
         """Return the adjoint of K at sums of rows: what every sample of c, and of e, counts for in them.
@@ -110,3 +98,8 @@ class RowMap:
         rows = np.moveaxis(G.reshape(*runs, count, kinds, G.shape[-1]), (-3, -1), (-1, -3)) * self.outside[..., None, :, :]
         of_c = self.kernel.adjoint(rows, samples) * self.inside[..., None, :, :]
         return of_c, None if self.rate_kernel is None else self.rate_kernel.adjoint(rows, samples)
+
+
+def in_order(x: Array) -> Array:
+    """Return values of rows, shape (..., kind, count), in the order of Y: by time, then kind, shape (..., r)."""
+    return np.swapaxes(x, -1, -2).reshape(*x.shape[:-2], -1)

@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from identify.arrays import Array
-from identify.errors import LogError
+from identify.errors import LogError, SettingError
+from identify.models.equations import Equations
 from identify.rows.factors import Factors
-from identify.rows.row_map import RowMap
+from identify.rows.row_map import RowMap, in_order
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +47,19 @@ class Rows:
     names: tuple[str, ...]
     maps: tuple[RowMap, ...]
 
+    @classmethod
+    def of(cls, equations: Equations, to_rows: RowMap) -> Self:
+        """Return the rows that a map makes of a model's equations; raise SettingError where its columns are not finite."""
+        y, columns = _mapped(equations, to_rows)
+        _require_finite(columns, equations)
+        n, count, p = equations.kinds, to_rows.grid.count, len(equations.names)
+        parameter = [equations.names.index(name) for _, name in equations.addresses]
+        W = np.zeros((*y.shape[:-2], n, p, count))
+        W[..., [row for row, _ in equations.addresses], parameter, :] = columns
+        W = np.moveaxis(W, -1, -3).reshape(*y.shape[:-2], count * n, p)
+        time, valid = np.repeat(to_rows.time, n), in_order(to_rows.outside) > 0
+        return cls(in_order(y), W, valid, time, n, equations.names, (to_rows,))
+
     @property
     def group(self) -> npt.NDArray[np.intp]:
         """Kind of every row: the joint, from 0, or 0 for all rows of the power model, shape (r,)."""
@@ -63,16 +77,16 @@ class Rows:
     @cached_property
     def factors(self) -> Factors:
         """The triangular factors of [W Y], one for each kind."""
-        return self.scaled_factors(None)
+        return self.factors_of(None)
 
-    def scaled_factors(self, scale: Array | None) -> Factors:
-        """Return the triangular factors of rows multiplied by `scale`, shape (..., r), or as they are."""
+    def factors_of(self, weights: Array | None) -> Factors:
+        """Return the triangular factors of rows multiplied by `weights`, shape (..., r), or as they are."""
         p = len(self.names)
         joined = np.empty((*self.Y.shape[:-1], self.kinds, len(self.time) // self.kinds, p + 1))
         joined[..., :p] = np.swapaxes(self.W.reshape(*self.W.shape[:-2], -1, self.kinds, p), -2, -3)
         joined[..., p] = self.by_kind(self.Y)
-        if scale is not None:
-            joined *= self.by_kind(scale)[..., None]
+        if weights is not None:
+            joined *= self.by_kind(weights)[..., None]
         return Factors.of(joined, self.count, self.names)
 
     def predicted(self, X: Array) -> Array:
@@ -101,3 +115,30 @@ class Rows:
             names=first.names,
             maps=tuple(map_ for part in parts for map_ in part.maps),
         )
+
+
+def _mapped(equations: Equations, to_rows: RowMap) -> tuple[Array, Array]:
+    """Return the rows of B tau, shape (..., kind, count), and of the columns of c + s e, shape (..., k, count)."""
+    n, places, by_parts = equations.kinds, equations.addresses, to_rows.rate_kernel
+    parts = (equations.c, equations.rates) if by_parts is None else (equations.c,)
+    both = np.zeros((*equations.y.shape[:-2], n + len(places), equations.y.shape[-1]))
+    np.multiply(equations.y, to_rows.inside, out=both[..., :n, :])
+    for i, place in enumerate(places):
+        if found := [columns[place] for columns in parts if place in columns]:
+            np.multiply(sum(found[1:], start=found[0]), to_rows.inside[..., place[0], :], out=both[..., n + i, :])
+    filtered = to_rows.kernel.apply(both)
+    y, columns = filtered[..., :n, :], filtered[..., n:, :]
+    if by_parts is not None and equations.e:
+        late = [places.index(place) for place in equations.e]
+        columns[..., late, :] += by_parts.apply(np.stack(list(equations.e.values()), axis=-2))
+    return y * to_rows.outside, columns * to_rows.outside[..., [row for row, _ in places], :]
+
+
+def _require_finite(columns: Array, equations: Equations) -> None:
+    """Raise SettingError that names the columns which are not finite."""
+    if np.isfinite(columns).all():
+        return
+    finite = np.isfinite(columns).reshape(-1, *columns.shape[-2:])
+    lost = [name for i, (_, name) in enumerate(equations.addresses) if not finite[:, i].all()]
+    names = ", ".join(dict.fromkeys(lost))
+    raise SettingError(f"the columns of {names} are not finite on this motion: correct the block that makes them")

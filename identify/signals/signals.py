@@ -13,7 +13,7 @@ from identify.signals.differentiators.differentiator import AbstractDifferentiat
 from identify.signals.masks.mask import AbstractMask
 from identify.signals.prefilters.prefilter import AbstractPrefilter
 from identify.signals.state import State
-from identify.signals.torques.torque import AbstractAlignment, AbstractTorque
+from identify.signals.torques.torque import AbstractAlignment, Torque
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class Signals:
         return State.of(q, self.s)
 
     @cached_property
-    def torque(self) -> AbstractTorque:
+    def torque(self) -> Torque:
         """The prefiltered torque, aligned."""
         tau = self._prefiltered(self.log.tau * np.asarray(self.log.torque.gain))
         return self.alignment.align(tau, self.log.torque, self.fs)

@@ -14,9 +14,6 @@ from identify.arrays import Array
 REACH = 4
 """Samples to either side from which a value between two samples is interpolated: a polynomial of degree 7."""
 
-CELL = np.array([1.0, 22.0, 1.0]) / 24
-"""Weights that turn samples of a smooth signal into its mean over one sampling period around them, to fourth order."""
-
 
 def slide(x: Array, weights: Array, spacing: int = 1) -> Array:
     """Return sum_i weights[i] x[k + (i - m) spacing] for every k, with `weights` of odd length 2 m + 1."""
@@ -27,6 +24,11 @@ def slide(x: Array, weights: Array, spacing: int = 1) -> Array:
         comb = slice(start, None, spacing)
         result[..., comb] = scipy.ndimage.correlate1d(x[..., comb], weights, axis=-1, mode="nearest")
     return result
+
+
+def averaged(x: Array, variance: float) -> Array:
+    """Return the mean of `x` over a window of this variance [samples^2] around every sample, to fourth order."""
+    return slide(x, np.array([variance / 2, 1 - variance, variance / 2])) if variance else x
 
 
 def shift(x: Array, samples: float) -> Array:

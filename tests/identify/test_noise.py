@@ -23,7 +23,8 @@ from identify import (
     paper_chain,
     scara,
 )
-from identify.rows.noise_propagation import Linearization, covariance, position_variance, torque_variance
+from identify.rows.linearization import Linearization
+from identify.rows.noise_propagation import covariance, position_variance, torque_variance
 
 TRUTH = (3.5, 0.05, 0.5, 0.06, 0.12, 0.005, 0.01, 0.1)
 
@@ -213,7 +214,7 @@ def test_two_logs_are_worth_two(log):
     np.testing.assert_array_equal(*parts)
     whole = double.problem.noise_covariance(double.influence)
     half = sum(
-        covariance(rows, G, double.problem.noise, double.problem.prepared.linear(rows.signals))
+        covariance(rows, G, double.problem.noise, double.problem.linear(rows.signals))
         for rows, G in zip(double.rows.maps[:1], parts[:1], strict=True)
     )
     np.testing.assert_allclose(whole, 2 * half, rtol=1e-9)

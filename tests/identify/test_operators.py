@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from identify import CentralDifference, FirLowPass, IirLowPass, LogError, ModulatingFunctions, SettingError, Windows
+from identify import CentralDifference, FirLowPass, IirLowPass, LogError, ModulatingFunctions, Rows, SettingError, Windows
 from identify.models.equations import Equations
 from identify.rows.operators import OPERATORS
 
@@ -40,7 +40,8 @@ def equations(y, c, e, weight, t=T):
 
 def at(operator, sentence):
     """Return the rows of equations, TRIM away from both ends."""
-    return operator.rows(sentence, operator.grid(sentence.y.shape[-1], sentence.signals.fs, TRIM))
+    grid = operator.grid(sentence.y.shape[-1], sentence.signals.fs, TRIM)
+    return Rows.of(sentence, operator.map(sentence, sentence.weight, grid))
 
 
 def precision(operator):

@@ -26,7 +26,7 @@ from identify import (
     identify,
     scara,
 )
-from identify.rows import pieces
+from identify.rows import long_logs
 
 
 @dataclass(frozen=True)
@@ -147,13 +147,13 @@ def test_a_basis_may_be_exchanged_and_signals_stay(log):
     problem = Problem((log,), scara(), ExplicitModel(), idbench_chain())
     other = problem.with_basis(Basis(2, (ViscousFriction(), CoulombFriction())))
     assert other.names == ("Fv1", "Fv2", "Fs1", "Fs2")
-    assert other.prepared.signals is problem.prepared.signals
+    assert other.signals is problem.signals
     assert other.rows.W.shape[-1] == 4
 
 
 def test_an_estimator_that_needs_rows_is_refused_a_log_too_long_for_them(log, monkeypatch):
     """It would have been handed triangular factors, and would have returned another X without a word."""
-    monkeypatch.setattr(pieces, "LONG", 1000)
+    monkeypatch.setattr(long_logs, "LONG", 1000)
     problem = Problem((log,), scara(), ExplicitModel(), idbench_chain())
     with pytest.raises(IdentificationError, match="Irls needs rows, and the rows of 4600 samples of 2 joints are too many"):
         estimate(problem, Irls())

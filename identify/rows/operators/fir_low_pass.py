@@ -7,9 +7,9 @@ from typing import final
 
 import scipy
 
-from identify.arrays import Array, frozen, require_below_nyquist, require_positive
-from identify.rows.grid import Grid
-from identify.rows.kernel import Kernel
+from identify.arrays import Array, frozen
+from identify.errors import require_below_nyquist, require_positive
+from identify.rows.grid import Grid, Kernel
 from identify.rows.operators.low_pass import AbstractLowPass, decimation
 from identify.rows.row_map import Window
 

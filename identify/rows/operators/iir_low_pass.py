@@ -8,7 +8,8 @@ from typing import final
 import numpy as np
 import scipy
 
-from identify.arrays import Array, frozen, require_below_nyquist, require_positive, require_whole
+from identify.arrays import Array, frozen
+from identify.errors import require_below_nyquist, require_positive, require_whole
 from identify.rows.grid import Grid
 from identify.rows.operators.low_pass import AbstractLowPass, decimation
 from identify.rows.row_map import Window

@@ -8,7 +8,7 @@ import numpy as np
 
 from identify.arrays import Array
 from identify.models.equations import Equations
-from identify.rows.grid import Grid
+from identify.rows.grid import Grid, Kernel
 from identify.rows.operators.operator import AbstractOperator
 from identify.rows.row_map import RowMap, Window
 
@@ -29,7 +29,7 @@ class AbstractLowPass(AbstractOperator):
         """Return f_p of w B tau and of w (c + s e); a row is void if all it looks at is masked."""
         fs = equations.signals.fs
         reach = ceil(self.halo(fs) * fs - 1e-9)
-        seen = grid.weighted_sums(weight, np.ones(2 * reach + 1), reach)
+        seen = Kernel(np.ones(2 * reach + 1), reach, grid).apply(weight)
         valid = (seen > 0).astype(np.float64)
         return RowMap(equations.signals, equations.B, grid, self.window(fs, grid), None, weight, valid, self.response(fs))
 

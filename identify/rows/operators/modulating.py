@@ -5,8 +5,7 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import require_positive, require_whole
-from identify.errors import SettingError
+from identify.errors import SettingError, require_positive, require_whole
 from identify.rows.operators.weak_form import AbstractWeakForm, Kernels
 
 

@@ -7,8 +7,7 @@ import numpy as np
 
 from identify.arrays import Array
 from identify.models.equations import Equations
-from identify.rows.grid import Grid
-from identify.rows.kernel import Kernel
+from identify.rows.grid import Grid, Kernel
 from identify.rows.operators.operator import AbstractOperator
 from identify.rows.row_map import RowMap
 
@@ -46,8 +45,8 @@ class AbstractWeakForm(AbstractOperator):
         length = len(kernels.integral)
         before = (length - 1) // 2
         integral, derivative = (Kernel(kernel, before, grid) for kernel in kernels)
-        touched = grid.weighted_sums((weight == 0).astype(np.float64), np.ones(length), before)
-        mean = grid.weighted_sums(weight, np.full(length, 1 / length), before)
+        touched = Kernel(np.ones(length), before, grid).apply((weight == 0).astype(np.float64))
+        mean = Kernel(np.full(length, 1 / length), before, grid).apply(weight)
         outside = mean * (touched == 0)
         ones, by_parts = np.ones_like(weight), derivative if equations.e else None
         return RowMap(equations.signals, equations.B, grid, integral, by_parts, ones, outside, kernels.integral)

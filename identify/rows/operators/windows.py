@@ -5,8 +5,8 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Array, require_positive
-from identify.errors import SettingError
+from identify.arrays import Array
+from identify.errors import SettingError, require_positive
 from identify.rows.operators.weak_form import AbstractWeakForm, Kernels
 
 

@@ -7,7 +7,8 @@ from typing import final
 import numpy as np
 import scipy
 
-from identify.arrays import Array, require_not_negative, require_positive
+from identify.arrays import Array
+from identify.errors import require_not_negative, require_positive
 from identify.signals.masks.mask import AbstractMask
 
 

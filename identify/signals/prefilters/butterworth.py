@@ -6,7 +6,8 @@ from typing import final
 
 import scipy
 
-from identify.arrays import Array, frozen, require_below_nyquist, require_positive, require_whole
+from identify.arrays import Array, frozen
+from identify.errors import require_below_nyquist, require_positive, require_whole
 from identify.signals.prefilters.prefilter import AbstractPrefilter
 from identify.signals.zero_phase import forward_backward, settling_time
 

@@ -3,64 +3,98 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import final
+from typing import NamedTuple, final
+
+import numpy as np
 
 from identify.arrays import Array
-from identify.data.motion_log import TorqueChannel
+from identify.data.motion_log import Meaning, TorqueChannel
+from identify.signals.stencils import REACH, averaged, shift, slide
+
+_DIFFERENCE = np.array([-0.5, 0.0, 0.5])
 
 
+class Reading(NamedTuple):
+    """What a torque sample says about the time around it, in sampling periods T = 1/fs."""
+
+    middle: float
+    """Where the middle of what it speaks for lies after t_k + delay [T]."""
+
+    torque: float
+    """Variance of the window over which the aligned torque is to be averaged [T^2]: 1/12 for a period."""
+
+    columns: float
+    """Variance of the window over which the columns of a model are to be averaged [T^2]."""
+
+
+READINGS: dict[Meaning, Reading] = {
+    "instantaneous": Reading(0.0, 0.0, 0.0),
+    "held": Reading(0.5, 1 / 12, 0.0),
+    "averaged": Reading(0.5, 0.0, 1 / 12),
+}
+"""A torque that was averaged is compared with columns averaged over the same period. What a sampled motion shows of a held one,
+a staircase, is its content below fs/2: the samples, T/2 later, smoothed by the hold, whose gain sin(w T/2) / (w T/2) is that of
+a mean over one period; the columns stay as they are. (To average staircase and columns over one period instead takes the
+accelerations for smooth within it, which they are not: an error of (w T)^2 times 1/24 - (1/2 - delay/T)^2 / 2.)"""
+
+
+@final
 @dataclass(frozen=True, eq=False)
-class AbstractTorque(ABC):
-    """The measured torque as a mean over one window around every sample instant.
-
-    The window is one sampling period for a torque that was averaged, and the instant itself otherwise; `average` puts the
-    columns of a model over the same window, so that B tau = [c + s e] X is compared with itself.
+class Torque:
+    """The measured torque at every sample instant, so that B tau = [c + s e] X is compared with itself.
 
     Parameters
     ----------
     tau : Array, shape (..., joint, time)
         Logged torque [N m].
+    meaning : {"instantaneous", "held", "averaged"}
+        What a sample means, as `TorqueChannel` has it.
     delay : float
         [s]; what sample k speaks for begins at t_k + delay.
     fs : float
-        [Hz]; T = 1/fs.
+        [Hz].
     """
 
     tau: Array
+    meaning: Meaning
     delay: float
     fs: float
 
-    @abstractmethod
+    @property
+    def _reading(self) -> Reading:
+        return READINGS[self.meaning]
+
+    @property
+    def _late(self) -> float:
+        """Samples by which the middle of what a sample speaks for is late."""
+        return self.delay * self.fs + self._reading.middle
+
     def halo(self) -> float:
-        """Return how far [s] the mean torque looks to either side."""
+        """Return how far [s] the mean torque and averaged columns look to either side."""
+        interpolated, window = (REACH + 1) * (self._late != 0), self._reading.torque + self._reading.columns > 0
+        return abs(self.delay) + (interpolated + window) / self.fs
 
     @cached_property
     def mean(self) -> Array:
         """Mean torque over the window of every sample, shape (..., joint, time) [N m]."""
-        return self._mean()
+        return averaged(shift(self.tau, -self._late), self._reading.torque)
 
-    @final
+    def average(self, x: Array) -> Array:
+        """Return the mean of `x`, shape (..., time), over the window of every sample, to fourth order."""
+        return averaged(x, self._reading.columns)
+
     def times(self, x: Array | float, joint: int) -> Array:
         """Return the mean of `x`, shape (..., time) or constant, times a joint's torque, over the window of every sample."""
         tau = self.mean[..., joint, :]
-        return x * tau if isinstance(x, float) else self.average(x) * tau + self._covariance(x, tau)
-
-    @abstractmethod
-    def average(self, x: Array) -> Array:
-        """Return the mean of `x`, shape (..., time), over the window of every sample."""
-
-    @abstractmethod
-    def _mean(self) -> Array:
-        """Return the mean torque over the window of every sample."""
-
-    @abstractmethod
-    def _covariance(self, x: Array, tau: Array) -> Array | float:
-        """Return the mean of a product over the window of every sample, less the product of the means."""
+        if isinstance(x, float) or not self._reading.columns:
+            return x * tau
+        covariance = self._reading.columns * slide(tau, _DIFFERENCE) * slide(x, _DIFFERENCE)
+        return self.average(x) * tau + covariance
 
 
 class AbstractAlignment(ABC):
     """How the torque of a log is read."""
 
     @abstractmethod
-    def align(self, tau: Array, channel: TorqueChannel, fs: float) -> AbstractTorque:
+    def align(self, tau: Array, channel: TorqueChannel, fs: float) -> Torque:
         """Return the torque `tau` [N m], shape (..., joint, time), of `channel`, on the time of the columns."""

@@ -1,0 +1,94 @@
+"""What rows whose noise differs are divided by in weighted least squares."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.basis.basis import Basis
+from identify.estimators.variance_function import floor_of, reciprocal_root, rectified
+from identify.models.model import AbstractModel
+from identify.rows.factors import Factors
+from identify.rows.linearization import Linearization, smoothed
+from identify.rows.noise_propagation import NoiseLevels, position_variance, torque_variance
+from identify.rows.row_map import RowMap, in_order
+from identify.rows.rows import Rows
+from identify.signals.signals import Signals
+from identify.signals.state import State
+
+
+@dataclass(frozen=True, eq=False)
+class RowWeights:
+    """Weights of the rows of a model that multiplies torques by something that varies, such as the power model.
+
+    Parameters
+    ----------
+    parts : tuple of Rows
+        Rows of each log, or of some pieces.
+    model : AbstractModel
+        Theirs.
+    noise : NoiseLevels
+        That of the logs.
+    linear : callable
+        Returns the explicit model's linearization about signals.
+    """
+
+    parts: tuple[Rows, ...]
+    model: AbstractModel
+    noise: NoiseLevels
+    linear: Callable[[Signals], Linearization]
+    _variances: WeakKeyDictionary[RowMap, Array] = field(default_factory=WeakKeyDictionary, repr=False)
+
+    def of(self, rows: Rows) -> Array:
+        """Return what rows are multiplied by, shape (..., r)."""
+        return reciprocal_root(self.variance(rows), self.floor)
+
+    def variance(self, rows: Rows) -> Array:
+        """Return the variance that the noise of the logs would give rows without a mask, shape (..., r)."""
+        for part in rows.maps:
+            if part not in self._variances:
+                self._variances[part] = self._variance(part.unmasked())
+        return np.concatenate([self._variances[part] for part in rows.maps], axis=-1)
+
+    @cached_property
+    def floor(self) -> Array:
+        """Variance that is added to that of every row, since not all residuals are noise, shape (...): see `floor_of`."""
+        variances = [self.variance(part) for part in self.parts]
+        every = np.concatenate(variances, axis=-1)
+        weights = [reciprocal_root(one, np.mean(every, axis=-1)) for one in variances]
+        X = Factors.merged([part.factors_of(weight) for part, weight in zip(self.parts, weights, strict=True)]).fit().X
+        squares = [(part.Y - part.predicted(X)) ** 2 for part in self.parts]
+        return floor_of(np.concatenate(squares, axis=-1), every)
+
+    def excess(self, X: Array, weights: Callable[[Rows], Array], free: Array) -> Array:
+        """Return how many times the squares of weighted residuals are what noise makes of them, at least 1, shape (...).
+
+        Of the estimate X, `free` the share of the residuals that its parameters do not take.
+        """
+        squares, expected = np.zeros(()), np.zeros(())
+        for part in self.parts:
+            weight = weights(part) ** 2 * part.valid
+            squares = squares + np.sum(weight * (part.Y - part.predicted(X)) ** 2, axis=-1)
+            expected = expected + np.sum(weight * self.variance(part), axis=-1)
+        ratio = np.divide(squares, expected * free, out=np.ones_like(squares), where=expected > 0)
+        return np.maximum(ratio, 1.0)
+
+    def _variance(self, rows: RowMap) -> Array:
+        linear = self.linear(rows.signals)
+        variance = torque_variance(rows, self.noise.torque) + position_variance(rows, self.noise.position, linear)
+        return in_order(variance + self._at_rest(rows, linear.basis, linear.X) ** 2)
+
+    def _at_rest(self, rows: RowMap, basis: Basis, X: Array) -> Array:
+        """Return what noise of the velocities makes of the columns c where joints hardly move, shape (..., kind, count).
+
+        Friction turns noise into power, Fs |qd|, of one sign: a bias, that of a velocity of E|qd + noise| - |qd|.
+        """
+        signals = rows.signals
+        speed = rectified(smoothed(signals.state.qd, signals.fs), self.noise.position[..., None] * signals.gain)
+        found = np.zeros(rows.inside.shape)
+        for (row, name), column in self.model.c(basis, State(signals.state.q, speed, signals.s)).items():
+            found[..., row, :] += column * X[..., basis.names.index(name), None]
+        return rows.kernel.apply(found)
