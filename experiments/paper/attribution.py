@@ -5,18 +5,22 @@ where friction is small; quantization and ripple are noise; standstill touches t
 the power model alone; a gain error scales everything.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TypeAlias
 
 from identify import Array, AsLogged, Chain, MotionLog, NoMask, TorqueChannel, idbench_chain, identify_each, scara
 from identify.models import ExplicitModel, PowerModel
 from sim.drives import AveragedDrive, SwitchedDrive
 from sim.encoders import IncrementalEncoder
-from sim.engine.simulation import Progress, simulate
+from sim.engine.simulation import simulate
 from sim.frictions import Stribeck
 from sim.robot.scara import scara_truth
 from sim.scenario.measurement import TorqueMeasurement
 from sim.scenario.scenario import Physics, Scenario, Timing
+
+Errors: TypeAlias = dict[str, Array]
+"""Model -> signed error of every parameter [%]."""
 
 COMPARED = {"explicit": ExplicitModel(), "power": PowerModel()}
 """The implicit model's errors are the explicit one's."""
@@ -70,18 +74,16 @@ def imperfections(table2: Scenario) -> list[Imperfection]:
     ]
 
 
-def attribution(table2: Scenario, progress: Progress | None = None) -> Iterator[tuple[str, dict[str, Array]]]:
-    """Yield, for every imperfection, the signed error [%] of every parameter in each model."""
-    found = imperfections(table2)
-    for k, imperfection in enumerate(found):
-        if progress:
-            progress(k / len(found))
-        yield imperfection.name, _errors(imperfection)
-
-
-def _errors(imperfection: Imperfection) -> dict[str, Array]:
-    run = simulate(imperfection.scenario)
-    log, truth = run.alone(), list(scara_truth(run.robots[0]).values())
-    told = MotionLog(log.fs, log.q, log.tau, imperfection.believed or log.torque)
-    estimates = identify_each(told, scara(), COMPARED, imperfection.chain)
+def errors_of(imperfection: Imperfection) -> Errors:
+    """Return the signed error [%] of every parameter in each model."""
+    log, truth = _ideal_but_for(imperfection.scenario)
+    believed = MotionLog(log.fs, log.q, log.tau, imperfection.believed or log.torque)
+    estimates = identify_each(believed, scara(), COMPARED, imperfection.chain)
     return {form: estimate.error_percent(truth) for form, estimate in estimates.items()}
+
+
+@lru_cache(maxsize=4)
+def _ideal_but_for(scenario: Scenario) -> tuple[MotionLog, list[float]]:
+    """Return the log of a scenario, which several imperfections may share, and the true parameters."""
+    run = simulate(scenario)
+    return run.alone(), list(scara_truth(run.robots[0]).values())

@@ -14,8 +14,9 @@ import numpy as np
 from experiments.errors import ExperimentError
 from experiments.identification.identified import Identified
 from experiments.identification.subject import Subject
-from experiments.paper.attribution import attribution
-from identify import CHAINS, Array, TorqueChannel
+from experiments.paper.attribution import Errors
+from experiments.paper.parallel_attribution import ParallelAttribution
+from identify import CHAINS, TorqueChannel
 from sim.engine.run import Run
 from sim.engine.simulation import Progress, simulate
 from sim.engine.watch import Watch
@@ -107,7 +108,12 @@ class Table2:
         """As many realizations as the power model needs."""
         first = self.scenario.seed
         seeds = range(first, first + max(REALIZATIONS.values()))
-        return simulate(self.scenario, seeds, progress=self.progress, watch=self.watch)
+        beside = self._attribution  # has begun, now that this process is busy
+        try:
+            return simulate(self.scenario, seeds, progress=self.progress, watch=self.watch)
+        except BaseException:
+            beside.stop()
+            raise
 
     @cached_property
     def truth(self) -> dict[str, float]:
@@ -130,9 +136,13 @@ class Table2:
         return self.scenario.quintic().rest
 
     @cached_property
-    def attribution(self) -> dict[str, dict[str, Array]]:
+    def attribution(self) -> dict[str, Errors]:
         """Signed error [%] of every parameter by every imperfection alone."""
-        return dict(attribution(self.scenario, self.progress))
+        return self._attribution.errors(self.progress)
+
+    @cached_property
+    def _attribution(self) -> ParallelAttribution:
+        return ParallelAttribution(self.scenario)
 
     def summary(self) -> dict[str, Any]:
         """Return summary.json: `models` holds processing `idbench`, `paper_processing` that of the paper."""
