@@ -8,16 +8,17 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from identify.arrays import Array
-from identify.basis.basis import Basis
-from identify.estimators.variance_function import floor_of, reciprocal_root, rectified
-from identify.models.model import AbstractModel
 from identify.rows.factors import Factors
-from identify.rows.linearization import Linearization, smoothed
+from identify.rows.linearization import Linearization
 from identify.rows.noise_propagation import NoiseLevels, position_variance, torque_variance
 from identify.rows.row_map import RowMap, in_order
 from identify.rows.rows import Rows
 from identify.signals.signals import Signals
-from identify.signals.state import State
+
+LEAST, MOST = 0.01, 10.0
+"""Range of b/a: residuals of some hundred rows do not show less, and more is as good as equal weights."""
+
+ROUNDS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +29,6 @@ class RowWeights:
     ----------
     parts : tuple of Rows
         Rows of each log, or of some pieces.
-    model : AbstractModel
-        Theirs.
     noise : NoiseLevels
         That of the logs.
     linear : callable
@@ -37,7 +36,6 @@ class RowWeights:
     """
 
     parts: tuple[Rows, ...]
-    model: AbstractModel
     noise: NoiseLevels
     linear: Callable[[Signals], Linearization]
     _variances: WeakKeyDictionary[RowMap, Array] = field(default_factory=WeakKeyDictionary, repr=False)
@@ -78,17 +76,46 @@ class RowWeights:
 
     def _variance(self, rows: RowMap) -> Array:
         linear = self.linear(rows.signals)
-        variance = torque_variance(rows, self.noise.torque) + position_variance(rows, self.noise.position, linear)
-        return in_order(variance + self._at_rest(rows, linear.basis, linear.X) ** 2)
+        return in_order(torque_variance(rows, self.noise.torque) + position_variance(rows, self.noise.position, linear))
 
-    def _at_rest(self, rows: RowMap, basis: Basis, X: Array) -> Array:
-        """Return what noise of the velocities makes of the columns c where joints hardly move, shape (..., kind, count).
 
-        Friction turns noise into power, Fs |qd|, of one sign: a bias, that of a velocity of E|qd + noise| - |qd|.
-        """
-        signals = rows.signals
-        speed = rectified(smoothed(signals.state.qd, signals.fs), self.noise.position[..., None] * signals.gain)
-        found = np.zeros(rows.inside.shape)
-        for (row, name), column in self.model.c(basis, State(signals.state.q, speed, signals.s)).items():
-            found[..., row, :] += column * X[..., basis.names.index(name), None]
-        return rows.kernel.apply(found)
+def floor_of(squares: Array, variance: Array) -> Array:
+    """Return m b/a of the variances a v + b m that explain squared residuals best, m the mean of v, shape (...).
+
+    v is what the noise of torques and positions makes of a row. What no noise is, such as cogging, or friction of another kind
+    near standstill, does not vanish where v does: with weights of v alone the slow rows of the power model, in which it is most
+    of the torque, would count most. a and b, not negative, are fitted with errors in proportion to the variances themselves.
+
+    Parameters
+    ----------
+    squares : Array, shape (..., r)
+        Squared residuals.
+    variance : Array, shape (..., r)
+        v.
+    """
+    mean = np.mean(variance, axis=-1, keepdims=True)
+    u = np.divide(variance, mean, out=np.ones_like(variance), where=mean > 0)
+    a = b = np.mean(squares, axis=-1, keepdims=True) / 2
+    for _ in range(ROUNDS):
+        size = np.maximum(a * u + b, 1e-12 * (a + b) + 1e-300)
+        ones, ramp, y = 1 / size, u / size, squares / size
+        a, b = _not_negative(ramp, ones, y)
+    share = np.divide(b, a, out=np.full(a.shape, MOST), where=a > 0)[..., 0]
+    return mean[..., 0] * np.clip(np.where(np.isfinite(share), share, 1.0), LEAST, MOST)
+
+
+def _not_negative(x: Array, z: Array, y: Array) -> tuple[Array, Array]:
+    """Return a and b, not negative, of the least squares a x + b z = y along the last axis, which they keep with length 1."""
+    xx, xz, zz, xy, zy = (np.sum(p * q, axis=-1, keepdims=True) for p, q in ((x, x), (x, z), (z, z), (x, y), (z, y)))
+    determinant = xx * zz - xz**2
+    regular = determinant > 1e-12 * xx * zz
+    a = np.divide(xy * zz - zy * xz, determinant, out=np.zeros_like(xx), where=regular)
+    b = np.divide(zy * xx - xy * xz, determinant, out=zy / zz, where=regular)
+    return np.where(b < 0, xy / xx, np.maximum(a, 0.0)), np.where(a < 0, zy / zz, np.maximum(b, 0.0))
+
+
+def reciprocal_root(variance: Array, floor: Array) -> Array:
+    """Return 1 / sqrt(v + floor), shape (..., r), for a floor of shape (...); 1 where that is not known."""
+    evened = variance + floor[..., None]
+    known = np.isfinite(evened) & (evened > 0)
+    return 1 / np.sqrt(np.where(known, evened, 1.0))
