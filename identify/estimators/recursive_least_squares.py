@@ -7,7 +7,7 @@ import numpy as np
 from identify.arrays import Array
 from identify.errors import IdentificationError
 from identify.estimators.estimate import Estimate
-from identify.rows.factors import NOT_SHOWN
+from identify.rows.factors import Factor, Status
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,24 +54,14 @@ def recursive_least_squares(estimate: Estimate, t: Array, halo: float = 0.0) -> 
     rows = (np.concatenate([given.W, given.Y[:, None]], axis=1) * weights[:, None])[order]
     valid = np.cumsum(given.valid[order])
     until = np.searchsorted(given.time[order] + halo, t, side="right")
-    p = len(estimate.names)
-    R, X, sigma, before = np.zeros((p + 1, p + 1)), *np.full((2, len(t), p), np.nan), 0
+    p, before = len(estimate.names), 0
+    R = np.zeros((len(t) + 1, p + 1, p + 1))
     for k, now in enumerate(until):
-        R = np.linalg.qr(np.concatenate([R, rows[before:now]]), mode="r")  # type: ignore[assignment]  # R alone
-        X[k], sigma[k] = _solution(R, int(valid[now - 1]) if now else 0)
+        R[k + 1] = np.linalg.qr(np.concatenate([R[k], rows[before:now]]), mode="r")
         before = int(now)
+    factor = Factor(R[1:], np.concatenate([[0], valid])[until], estimate.names)
+    solvable = factor.status == Status.OK
+    X = factor.solution(solvable)
+    variance = factor.squares(X) / np.maximum(factor.rows - p, 1)
+    sigma = np.sqrt(variance[:, None] * np.diagonal(factor.inverse(solvable), axis1=-2, axis2=-1))
     return Recursive(t, X, sigma * estimate.best_sigma / estimate.sigma)
-
-
-def _solution(R: Array, rows: int) -> tuple[Array, Array]:
-    """Return X and sigma of a triangular factor of [W Y], NaN if it does not determine them."""
-    p = len(R) - 1
-    length = np.linalg.norm(R[:p, :p], axis=0)
-    if rows <= p or not length.all():
-        return np.full(p, np.nan), np.full(p, np.nan)
-    values = np.linalg.svd(R[:p, :p] / length, compute_uv=False)
-    if values[-1] <= NOT_SHOWN * values[0]:
-        return np.full(p, np.nan), np.full(p, np.nan)
-    inverse = np.linalg.inv(R[:p, :p])
-    variance = R[p, p] ** 2 / (rows - p)
-    return inverse @ R[:p, p], np.sqrt(variance * np.sum(inverse**2, axis=1))
