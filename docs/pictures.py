@@ -48,7 +48,7 @@ class Picture:
     at: float = 0.3
 
 
-DELAY = ("run delay --out OUT", "identify OUT --torque held --torque-delay 0 --label untold")
+DELAY = ("run delay --out OUT", "identify OUT --torque held --torque-delay 0 --label no-delay")
 COGGING = ("run ripple --out OUT --inner 10 10.02",)
 GAIN = ("run gain --out OUT",)
 

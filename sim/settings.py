@@ -55,7 +55,7 @@ def settings(cls: C) -> C:
     The docstring below a field is its description. A ValueError of `__post_init__` is reported as well.
     """
     made = dataclass(frozen=True, config=_CHECKED)(cls)
-    made.__init__ = _reporting(made.__init__, made)  # type: ignore[method-assign]  # pydantic's own, told in our words
+    made.__init__ = _reporting(made.__init__, made)  # type: ignore[method-assign]  # pydantic's own errors, in our words
     return made  # type: ignore[return-value]
 
 
@@ -91,16 +91,16 @@ def _complaint(detail: Any, cls: type, where: str) -> str:
         location[0] = [*fields_of(cls), *map(str, range(location[0] + 1))][location[0]]
     owner = _owner(cls, [part for part in location[:-1] if isinstance(part, str)])
     key = ".".join(filter(None, [where, _written(location)]))
-    told = description(owner, next((part for part in reversed(location) if isinstance(part, str)), ""))
+    meaning = description(owner, next((part for part in reversed(location) if isinstance(part, str)), ""))
     if kind in ("unexpected_keyword_argument", "unexpected_positional_argument"):
         known = list(fields_of(owner))
         hint = did_you_mean(str(location[-1]), known)
         return f"unknown key {key!r}{hint}; " + (f"known: {', '.join(known)}" if known else "this kind has no settings")
     if kind in ("missing", "missing_argument"):
-        return f"key {key!r} is missing" + (f": {told}" if told else "")
+        return f"key {key!r} is missing" + (f": {meaning}" if meaning else "")
     if kind == "value_error":
         return ": ".join(filter(None, [key, str(detail["ctx"]["error"])]))
-    return f"{key} = {detail['input']!r:.60}: {_allowed(detail)}" + (f" ({told})" if told else "")
+    return f"{key} = {detail['input']!r:.60}: {_allowed(detail)}" + (f" ({meaning})" if meaning else "")
 
 
 def _written(location: list[Any]) -> str:
@@ -133,8 +133,8 @@ def fields_of(cls: type) -> dict[str, Any]:
 
 def description(cls: type, key: str) -> str:
     """Return what a field is, with its unit and range, in one line."""
-    told = (_docstrings(owner)[key] for owner in cls.__mro__ if key in _docstrings(owner))
-    return " ".join(next(told, "").split()).rstrip(".")
+    texts = (_docstrings(owner)[key] for owner in cls.__mro__ if key in _docstrings(owner))
+    return " ".join(next(texts, "").split()).rstrip(".")
 
 
 @cache

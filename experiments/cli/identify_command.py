@@ -71,18 +71,20 @@ def identify(asked: Identify) -> None:
 
 
 def _shown(found: Identified) -> tuple[Identified, list[str]]:
-    """Return the identification of what the log shows, and what must be said of what it hides."""
-    told = []
+    """Return the identification of what the log shows, and notes on what it does not show."""
+    notes = []
     leading = next(iter(found.outcomes.values()))
     while isinstance(leading, ExcitationError) and leading.hidden and len(leading.hidden) < len(found.basis.names):
         moves = helpful_moves(found.subject, found.logs[0], leading.hidden)
-        told.append(f"this log does not show {', '.join(leading.hidden)}: left out, as if zero{f' ({moves})' if moves else ''}")
+        notes.append(
+            f"this log does not show {', '.join(leading.hidden)}: left out, as if zero{f' ({moves})' if moves else ''}"
+        )
         fewer = replace(found.subject.asked, without=(*found.subject.asked.without, *leading.hidden))
         subject = Subject(found.subject.name, fewer)
         truth = None if found.truth is None else {name: found.truth[name] for name in subject.basis.names}
         found = replace(found, subject=subject, truth=truth)
         leading = next(iter(found.outcomes.values()))
-    return found, told
+    return found, notes
 
 
 def _advice(validated: Validated, asked: Identify) -> list[str]:

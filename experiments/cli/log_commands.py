@@ -43,8 +43,8 @@ def export(asked: Export) -> None:
     for path in logs:
         log, target = read_log(path), (asked.out or asked.folder) / f"{path.stem}.csv"
         _write(log, target, force=asked.force)
-        said = f"--torque {log.torque.meaning} --torque-delay {log.torque.delay:g}{_robot_of(asked.folder)}"
-        page.print(f"written to {target}; uv run idbench identify {target} {said}", soft_wrap=True)
+        options = f"--torque {log.torque.meaning} --torque-delay {log.torque.delay:g}{_robot_of(asked.folder)}"
+        page.print(f"written to {target}; uv run idbench identify {target} {options}", soft_wrap=True)
     show(page)
 
 

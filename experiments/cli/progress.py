@@ -15,14 +15,14 @@ EVERY = 15.0
 @contextmanager
 def progress_of(what: str) -> Iterator[Progress]:
     """Give what receives the share of a work that is done, and shows it on the error stream; short works show nothing there."""
-    console, told = Console(stderr=True), time.monotonic()
+    console, reported = Console(stderr=True), time.monotonic()
 
     def show(share: float) -> None:
-        nonlocal told
+        nonlocal reported
         if console.is_terminal:
             console.print(f"{what}: {share:4.0%}", end="\r", highlight=False)
-        elif time.monotonic() - told > EVERY:
-            told = time.monotonic()
+        elif time.monotonic() - reported > EVERY:
+            reported = time.monotonic()
             console.print(f"{what}: {share:.0%}", highlight=False, soft_wrap=True)
 
     yield show

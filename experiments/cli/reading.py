@@ -70,7 +70,7 @@ class Question:
 
 
 def read(path: Path, question: Question, named: Identified) -> tuple[MotionLog, str]:
-    """Return the log, its torque read as the options say, and what must be said of its delay."""
+    """Return the log, its torque read as the options say, and notes on its delay."""
     columns, delay = read_columns(path), question.delay
     try:
         columns = columns.ordered(named.subject.robot.joints)

@@ -17,7 +17,7 @@ from sim.errors import BenchError
 from sim.trajectories import RandomMoves
 
 MANY = 30
-"""Joints from which on it is said that grouping takes its time: it grows with their cube."""
+"""Joints from which on a line says that grouping takes its time: it grows with their cube."""
 
 
 def describe(asked: DescribeRobot) -> None:

@@ -134,8 +134,8 @@ def _again(page: Console, folder: Path | None, index: int | None, method: int | 
         if known
         else f"run {index} of {folder}, which the study has not finished yet"
     )
-    told = [*chosen.names, *(f"{s.axis.field} {s.label}" for s in chosen.settings)]
-    page.print(Text(f"shown: method {number} of the study's {len(methods)}: {', '.join(told)}"), soft_wrap=True)
+    words = [*chosen.names, *(f"{s.axis.field} {s.label}" for s in chosen.settings)]
+    page.print(Text(f"shown: method {number} of the study's {len(methods)}: {', '.join(words)}"), soft_wrap=True)
     for reason in dict.fromkeys(row["failure"] for row in rows if row["failure"]):
         page.print(Text(f"warning: {reason}"), soft_wrap=True)
     scenario = replace(store.study.scenario_of(index), name=f"{store.study.name}-{index}")

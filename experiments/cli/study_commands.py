@@ -114,6 +114,6 @@ def _kept(store: Store) -> Iterator[None]:
         yield
     except (KeyboardInterrupt, SystemExit):
         kept = store.study.size - sum(len(r) for r in store.missing(LARGEST_SHARD))
-        said = f"{kept:,} of {store.study.size:,} runs are kept; go on with: uv run idbench study --resume {store.folder}"
-        sys.stderr.write(f"\nidbench: {said}\n")
+        message = f"{kept:,} of {store.study.size:,} runs are kept; go on with: uv run idbench study --resume {store.folder}"
+        sys.stderr.write(f"\nidbench: {message}\n")
         raise

@@ -56,7 +56,7 @@ def _cells(estimate: Estimate, found: Identified, i: int) -> tuple[str, str, str
 
 
 def print_validated(console: Console, validated: Validated) -> None:
-    """Print how well torques of an unseen motion are predicted, what the simulated robot does on it, and verdicts."""
+    """Print how well torques of a held-out motion are predicted, what the simulated robot does on it, and verdicts."""
     try:
         torques = validated.torques
     except IdentificationError as error:

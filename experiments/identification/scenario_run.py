@@ -49,7 +49,7 @@ class ScenarioRun:
     parameters: Parameters = Parameters()  # noqa: RUF009  # frozen
 
     def __post_init__(self) -> None:
-        # What is wrong with names, or a robot that is no SCARA, is told before the simulation.
+        # What is wrong with names, or a robot that is no SCARA, is reported before the simulation.
         Identified((), self.subject, chain=self.chain, estimator=self.estimator)
         self.subject.truth(self.scenario.real_robot)
 

@@ -29,7 +29,7 @@ FAR_OFF = 30.0
 """Factor between measured and expected torques that no missing rotor or friction makes in the joint that carries most."""
 
 OPEN = 0.02
-"""Share of a joint's torque on a brisk motion that one sigma of a parameter may make before it is said to be left open."""
+"""Share of a joint's torque on a brisk motion that one sigma of a parameter may make before it counts as left open."""
 
 
 def warnings_of_result(found: Identified) -> list[str]:

@@ -90,7 +90,7 @@ Watched = Annotated[Watching, tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcomman
 
 
 class Audience:
-    """A viewer that watches; when it goes, that is said once, and the work goes on.
+    """A viewer that watches; when it goes, one line says so, and the work goes on.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ from experiments.recording.stream import Stream
 from identify import Array, ReversalMask
 
 STILL = 1e-3
-"""Speed [rad/s] up to which a joint is said to stand: a 16-bit encoder shows one step of it in a tenth of a second."""
+"""Speed [rad/s] up to which a joint counts as standing: a 16-bit encoder shows one step of it in a tenth of a second."""
 
 SLOW = ReversalMask().threshold
 """Speed [rad/s] up to which its friction is in warning."""

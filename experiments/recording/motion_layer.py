@@ -74,7 +74,7 @@ class Base:
         signals, poses : mapping of str to Array, shape (time, joint)
             Curves by their path, and positions [rad] of the arms by their role.
         qd : Array, shape (time, joint)
-            Velocities [rad/s] by which joints are said to stand.
+            Velocities [rad/s] by which joints count as standing.
         limited : Array, shape (time, joint), optional
             Share of each sample for which a drive was at a limit of its.
         """

@@ -42,7 +42,7 @@ STATES: dict[str, Color] = {
 """What a joint does, its drive at a limit, and what identification makes of the instant."""
 
 FORM_WIDTHS = {"explicit": 3.5}
-"""Widths of the curves of models, 1.5 unless it is said here: the implicit model's lie on those of the explicit one."""
+"""Widths of the curves of models, 1.5 unless given here: the implicit model's lie on those of the explicit one."""
 
 
 def joint_colors(n: int) -> list[Color]:

@@ -90,8 +90,8 @@ def _sigmas(cells: Sequence[Cell]) -> str:
         if not np.isfinite(ours).any():
             continue
         span = f"single parameters {np.nanmin(ours):.0f} to {np.nanmax(ours):.0f} %"
-        told = f" with chain {chain}" if len(chains) > 1 else ""
-        shares.append(f"{np.nanmean(ours):.0f} %{told} ({span}; the paper's sigma {np.nanmean(theirs):.0f} %)")
+        whose = f" with chain {chain}" if len(chains) > 1 else ""
+        shares.append(f"{np.nanmean(ours):.0f} %{whose} ({span}; the paper's sigma {np.nanmean(theirs):.0f} %)")
     if not shares:
         return "There is no corrected sigma."
     return f"Two corrected sigma hold the truth in {' and '.join(shares)} of cases, where 95 % is right."
@@ -112,9 +112,9 @@ def combination(cell: Cell) -> str:
 def method(cell: Cell, among: Sequence[Cell]) -> str:
     """Return how a cell was identified: its model, and chain and estimator where those of other cells differ."""
     chain, estimator, model = cell.names
-    told = [f"chain {chain}"] if any(other.names[0] != chain for other in among) else []
-    told += [estimator] if any(other.names[1] != estimator for other in among) else []
-    return f"{model} ({', '.join(told)})" if told else model
+    words = [f"chain {chain}"] if any(other.names[0] != chain for other in among) else []
+    words += [estimator] if any(other.names[1] != estimator for other in among) else []
+    return f"{model} ({', '.join(words)})" if words else model
 
 
 def where(cell: Cell, among: Sequence[Cell]) -> str:

@@ -45,7 +45,7 @@ class Joint:
     anchor : array_like, shape (3,)
         A point of a hinge's axis in the frame of the link [m].
     zero : float
-        Position [rad or m] at which the frames are placed as said.
+        Position [rad or m] at which the frames are placed like this.
     range : tuple of float
         Lowest and highest position [rad or m]; infinite without limits.
     armature : bool

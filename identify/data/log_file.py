@@ -137,7 +137,7 @@ def read_columns(path: Path) -> LogColumns:
     _require_header(path, names)
     if not table.num_rows:
         raise LogError(f"{path} holds no samples")
-    said, table = (table.schema.metadata or {}).get(_TORQUE), table.rename_columns(names)
+    stated, table = (table.schema.metadata or {}).get(_TORQUE), table.rename_columns(names)
     n = sum(bool(re.fullmatch(r"q\d+", name)) for name in names)
     joints = () if n else tuple(name.removeprefix("q_") for name in names if name.startswith("q_"))
     n = max(n, 1)
@@ -151,7 +151,7 @@ def read_columns(path: Path) -> LogColumns:
         )
     numbers = {name: _numbers(path, table, name) for name in needed}
     q, tau = (np.stack([numbers[f"{letter}{end}"] for end in ends], axis=-1) for letter in ("q", "tau"))
-    return LogColumns(numbers["t"], q, tau, None if said is None else _channel(path, said), joints)
+    return LogColumns(numbers["t"], q, tau, None if stated is None else _channel(path, stated), joints)
 
 
 def _arrow() -> ModuleType:
@@ -223,9 +223,11 @@ def _culprit(column: "pa.ChunkedArray[Any]") -> str:
     return ""
 
 
-def _channel(path: Path, said: bytes) -> TorqueChannel:
+def _channel(path: Path, stated: bytes) -> TorqueChannel:
     try:
-        known = json.loads(said)
+        known = json.loads(stated)
         return TorqueChannel(known["meaning"], known["delay"], known["gain"])
     except (ValueError, KeyError, TypeError) as error:
-        raise LogError(f"{path} says of its torque {said.decode(errors='replace')!r}, which makes no torque channel") from error
+        raise LogError(
+            f"{path} states {stated.decode(errors='replace')!r} of its torque, which makes no torque channel"
+        ) from error

@@ -16,7 +16,7 @@ ENOUGH = 0.2
 """Share of what a parameter adds of its own to the torques while all joints move, from which some of them will do."""
 
 MOST_JOINTS = 3
-"""Joints of a move; what more of them must show together is said to need all."""
+"""Joints of a move; what takes more of them counts as needing all."""
 
 STATES = 200
 """Random states of a move."""

@@ -105,14 +105,14 @@ class Validation:
         return np.abs(self.correlation) <= self.bound
 
 
-def validate(unseen: Problem, X: Array, covariance: Array | None = None) -> Validation:
+def validate(held_out: Problem, X: Array, covariance: Array | None = None) -> Validation:
     """Return how well the parameters `X`, with their `covariance`, predict the torques of a log, by the explicit model.
 
     Both sides go through the same chain. What its mask leaves out is judged apart.
 
     Parameters
     ----------
-    unseen : Problem
+    held_out : Problem
         One log, with the robot and the chain by which it is judged.
     X : Array, shape (p,)
         Parameters of its basis.
@@ -124,12 +124,12 @@ def validate(unseen: Problem, X: Array, covariance: Array | None = None) -> Vali
     LogError
         If the log holds several runs, does not fit the basis, is too short for the chain, or a joint of it never moves.
     """
-    if len(unseen.logs) > 1 or unseen.logs[0].q.ndim != 2:
+    if len(held_out.logs) > 1 or held_out.logs[0].q.ndim != 2:
         raise LogError(
-            f"a motion is judged by itself, not {len(unseen.logs)} of shape {unseen.logs[0].q.shape}: give them one by one"
+            f"a motion is judged by itself, not {len(held_out.logs)} of shape {held_out.logs[0].q.shape}: give them one by one"
         )
-    signals, chain, basis = unseen.signals[0], unseen.chain, unseen.basis
-    rows = unseen.with_model(ExplicitModel()).parts[0]
+    signals, chain, basis = held_out.signals[0], held_out.chain, held_out.basis
+    rows = held_out.with_model(ExplicitModel()).parts[0]
     left = instants(signals, basis, ExplicitModel(), chain, X)
     moving = [_Joint.of(rows, X, j) for j in range(basis.n)]
     standing = chain.operator.map(left.equations, left.equations.weighted_as(1.0 - signals.weight), chain.grid(signals.log))

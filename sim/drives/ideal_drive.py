@@ -1,4 +1,4 @@
-"""A drive that does as it is told."""
+"""A drive that gives the commanded torque."""
 
 from typing import final
 

@@ -56,11 +56,11 @@ class Bounds:
             return {}
         found = dict[int, str]()
         for sim, j in np.argwhere(~(inside & slow)).tolist():
-            told = self._told(j, float(q[sim, j]), float(qd[sim, j]), bool(inside[sim, j]))
-            found.setdefault(sim, f"joint {self._joints[j]} {told}")
+            why = self._why(j, float(q[sim, j]), float(qd[sim, j]), bool(inside[sim, j]))
+            found.setdefault(sim, f"joint {self._joints[j]} {why}")
         return found
 
-    def _told(self, j: int, q: float, qd: float, inside: bool) -> str:
+    def _why(self, j: int, q: float, qd: float, inside: bool) -> str:
         if not np.isfinite([q, qd]).all():
             return "diverges"
         if inside:

@@ -65,13 +65,13 @@ def simulate(  # noqa: PLR0913  # all but two by their names
     watcher = Watcher(watch, scenario.fs, h, skipped) if watch else None
     with blamed():
         bench = Bench(scenario, robot, planned, seeds, vary or {}, threads, watcher)
-    step, told, bearable = 0, -1, 0 if throw else len(seeds) - 1
-    # Of simulations that diverge: they are told, and end, alone.
+    step, reported, bearable = 0, -1, 0 if throw else len(seeds) - 1
+    # Of simulations that diverge: each is reported, and ends, alone.
     with np.errstate(over="ignore", invalid="ignore"), blamed():
         while step < bench.steps and len(bench.failures) <= bearable:
             step += bench.advance(step)
-            if progress and 100 * step // bench.steps > told:
-                told = 100 * step // bench.steps
+            if progress and 100 * step // bench.steps > reported:
+                reported = 100 * step // bench.steps
                 progress(step / bench.steps)
     bench.tell(bench.steps)
     run = bench.run(skipped)

@@ -18,7 +18,7 @@ from sim.errors import BenchError, RobotError
 from sim.robot.motors import Array, Motors
 
 _log = mujoco.MjLogConfig.get()
-_log.logto_console = _log.logto_file = False  # what it warns of is looked at, and told, by the bench
+_log.logto_console = _log.logto_file = False  # what it warns of is checked and reported by the bench
 _log.set()
 
 FILES = (".xml", ".urdf")

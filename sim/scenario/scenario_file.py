@@ -171,8 +171,8 @@ def _explained(cls: type, key: str, value: Any) -> str:
     one = for_all_joints(cls, key) and len(value) == 1
     text = f"{key} = {_written(value[0] if one else value)}"
     allowed = limits(cls, key)
-    told = f"# {description(cls, key)}" + (f" ({allowed})" if allowed else "")
-    return f"{text}  {told}" if len(text) < LONG else f"{told}\n{text}"
+    comment = f"# {description(cls, key)}" + (f" ({allowed})" if allowed else "")
+    return f"{text}  {comment}" if len(text) < LONG else f"{comment}\n{text}"
 
 
 def _written(value: Any) -> str:

@@ -43,7 +43,7 @@ def logs(tmp_path_factory):
 
 
 @pytest.fixture
-def told(capsys, monkeypatch, tmp_path):
+def idbench(capsys, monkeypatch, tmp_path):
     """Run a command in an empty folder; return its code, what it printed, and its complaint."""
     monkeypatch.chdir(tmp_path)
 

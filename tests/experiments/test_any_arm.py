@@ -49,10 +49,10 @@ def test_well_excited_base_parameters_are_true_within_2_percent(arm, model):
 
 @pytest.mark.parametrize("model", MODELS.builtin)
 def test_torques_of_an_unseen_motion_are_foretold_within_1_percent(arm, model):
-    told = arm.torques[model]
-    assert told.percent.max() < 1
-    assert told.R2.min() > 0.9999
-    assert (told.standing > told.rms).all()  # where friction is not determined, and why it is told apart
+    found = arm.torques[model]
+    assert found.percent.max() < 1
+    assert found.R2.min() > 0.9999
+    assert (found.standing > found.rms).all()  # where friction is not determined, and why it is apart
     verdict = Verdict(arm, model)
     assert verdict.word == "good"
     assert "is off by" in verdict.reasons[0]

@@ -144,10 +144,10 @@ def test_a_header_may_have_spaces_and_quotes_and_velocities(csv):
 
 def test_a_log_with_a_gap_is_resampled_by_the_command_that_is_told(csv, tmp_path, complaint, monkeypatch):
     rewritten(csv, lambda lines: [*lines[:200], *lines[201:]])
-    told = complaint("identify", str(csv), "--torque", "held")
-    assert "a step of 0.02 s after t = 1.98 s" in told
+    found = complaint("identify", str(csv), "--torque", "held")
+    assert "a step of 0.02 s after t = 1.98 s" in found
     monkeypatch.chdir(tmp_path)
-    words = told.split("idbench resample ")[1].split()
+    words = found.split("idbench resample ")[1].split()
     assert main(["resample", *words]) == 0
     assert main(["identify", "uniform.parquet"]) == 0
 

@@ -1,4 +1,4 @@
-"""Logs and robots that are not what they seem are told in one line that says the likely cause."""
+"""Logs and robots that are not what they seem are refused or pointed out in one line that says the likely cause."""
 
 from importlib.metadata import files
 
@@ -24,63 +24,63 @@ def as_csv(logs, tmp_path):
     return write
 
 
-def test_times_in_milliseconds(told, as_csv):
-    code, _, err = told("identify", as_csv(t=lambda t: 1e3 * t), *NEEDED, "--torque", "held")
+def test_times_in_milliseconds(idbench, as_csv):
+    code, _, err = idbench("identify", as_csv(t=lambda t: 1e3 * t), *NEEDED, "--torque", "held")
     assert code == 2
     assert "has a sample every 4 s, if t is in s: is it in ms, microseconds or ns?" in err
 
 
-def test_wrapped_angles_are_refused_and_unwrapped_when_asked(told, as_csv):
+def test_wrapped_angles_are_refused_and_unwrapped_when_asked(idbench, as_csv):
     def wrapped(q):
         shifted = q + [0, 0, 0, np.pi, 0, 0]  # counted from another zero, joint 4 crosses the end of a turn
         return (shifted + np.pi) % (2 * np.pi) - np.pi - [0, 0, 0, np.pi, 0, 0]
 
     path = as_csv(q=wrapped)
-    code, _, err = told("identify", path, *NEEDED, "--torque", "held")
+    code, _, err = idbench("identify", path, *NEEDED, "--torque", "held")
     assert code == 2
     assert " jumps from " in err
     assert "Add --unwrap to count the turns" in err
-    code, _, err = told("identify", path, *NEEDED, "--torque", "held", "--unwrap")
+    code, _, err = idbench("identify", path, *NEEDED, "--torque", "held", "--unwrap")
     assert code == 0, err
 
 
-def test_torques_that_are_zero_throughout(told, as_csv):
-    code, _, err = told("identify", as_csv(tau=lambda tau: 0 * tau), *NEEDED, "--torque", "held")
+def test_torques_that_are_zero_throughout(idbench, as_csv):
+    code, _, err = idbench("identify", as_csv(tau=lambda tau: 0 * tau), *NEEDED, "--torque", "held")
     assert code == 2
     assert "all torques are 0: there is nothing to identify" in err
 
 
-def test_a_log_is_not_judged_on_itself(told, logs, tmp_path):
+def test_a_log_is_not_judged_on_itself(idbench, logs, tmp_path):
     log = read_log(logs / "first.parquet")
     from identify.data.log_file import write_log
 
     write_log(log.part(500, 3000), tmp_path / "part.parquet")
     for other in (logs / "first.parquet", tmp_path / "part.parquet"):
-        code, _, err = told("identify", logs / "first.parquet", *NEEDED, "--validate", other)
+        code, _, err = idbench("identify", logs / "first.parquet", *NEEDED, "--validate", other)
         assert code == 2
         assert "holds the motion that is identified: give one that it has not seen" in err
 
 
-def test_names_in_another_case_are_guessed(told, logs):
-    code, _, err = told("identify", logs / "first.parquet", "--robot", "puma560", "--estimator", "wls")
+def test_names_in_another_case_are_guessed(idbench, logs):
+    code, _, err = idbench("identify", logs / "first.parquet", "--robot", "puma560", "--estimator", "wls")
     assert code == 2
     assert "(did you mean 'WLS'?)" in err
 
 
-def test_one_models_failure_takes_nothing_from_the_others(told, logs, tmp_path):
+def test_one_models_failure_takes_nothing_from_the_others(idbench, logs, tmp_path):
     """A seventh of the log leaves the power model fewer rows than parameters; the explicit one has six times as many."""
     from identify.data.log_file import write_log
 
     log = read_log(logs / "first.parquet")
     write_log(log.part(0, int(0.14 * log.samples)), tmp_path / "short.parquet")
-    code, out, err = told("identify", "short.parquet", "--robot", "puma560", "--out", "found", "--no-rerun")
+    code, out, err = idbench("identify", "short.parquet", "--robot", "puma560", "--out", "found", "--no-rerun")
     assert code == 0, err
     assert "power: no estimate: " in out
     assert "rows are left" in out
     assert "tau6 explained" in out
 
 
-def test_a_file_that_cannot_be_written_costs_nothing_else(told, logs, monkeypatch):
+def test_a_file_that_cannot_be_written_costs_nothing_else(idbench, logs, monkeypatch):
     from identify import IdentificationError
 
     def impossible(*args):
@@ -88,41 +88,41 @@ def test_a_file_that_cannot_be_written_costs_nothing_else(told, logs, monkeypatc
 
     monkeypatch.setattr("experiments.identification.consistent_robot.consistent_parameters", impossible)
     words = "--write-mjcf", "out.xml", "--out", "found", "--no-rerun"
-    code, out, err = told("identify", logs / "first.parquet", *NEEDED, *words)
+    code, out, err = idbench("identify", logs / "first.parquet", *NEEDED, *words)
     assert code == 2
     assert "--write-mjcf out.xml: link 2 cannot exist; everything else is as printed" in err
     assert "tau6 explained" in out
     assert "written to found" in out
 
 
-def test_legs_are_pointed_out(told):
+def test_legs_are_pointed_out(idbench):
     (path,) = [f.locate() for f in files("example-robot-data") or () if str(f).endswith("solo_description/robots/solo12.urdf")]
-    code, out, err = told("robot", path)
+    code, out, err = idbench("robot", path)
     assert code == 0, err
     assert "on a base that is fixed to the ground" in out
     assert "warning: 4 chains of joints start at the ground" in out
 
 
 @pytest.mark.parametrize("field", ["damping", "frictionloss", "armature"])
-def test_joints_that_would_drive_themselves_are_refused(told, tmp_path, field):
+def test_joints_that_would_drive_themselves_are_refused(idbench, tmp_path, field):
     body = f'<joint name="hip" {field}="-0.1"/><geom size="0.1" pos="0.1 0 0"/>'
     (tmp_path / "r.xml").write_text(f"<mujoco><worldbody><body>{body}</body></worldbody></mujoco>")
-    code, _, err = told("robot", "r.xml")
+    code, _, err = idbench("robot", "r.xml")
     assert code == 2
     assert f"joint hip has {field} = -0.1, which must be 0 or above" in err
 
 
-def test_a_payload_that_no_arm_carries(told, tmp_path):
+def test_a_payload_that_no_arm_carries(idbench, tmp_path):
     (tmp_path / "pay.toml").write_text('name = "pay"\ntrajectory = "brisk"\n[payload]\nmass = 1e6\n')
-    code, _, err = told("run", "pay.toml")
+    code, _, err = idbench("run", "pay.toml")
     assert code == 2
     assert "payload.mass = 1000000.0: must be less than or equal to 100000" in err
 
 
-def test_all_that_is_wrong_in_a_scenario_is_told_at_once(told, tmp_path):
+def test_all_that_is_wrong_in_a_scenario_is_told_at_once(idbench, tmp_path):
     text = 'name = "m"\ndrive = 3\nrobot = 4\n[controller]\nkind = "pdd"\n[encoder]\nkind = "incremental"\nlinez = 3\n'
     (tmp_path / "m.toml").write_text(text)
-    code, _, err = told("run", "m.toml")
+    code, _, err = idbench("run", "m.toml")
     assert code == 2
     for part in (
         "controller.kind = 'pdd'",
@@ -135,18 +135,18 @@ def test_all_that_is_wrong_in_a_scenario_is_told_at_once(told, tmp_path):
     assert "'drive' is missing" not in err
 
 
-def test_simulations_that_hardly_end_are_asked_about(told, tmp_path):
+def test_simulations_that_hardly_end_are_asked_about(idbench, tmp_path):
     (tmp_path / "fine.toml").write_text('name = "fine"\ntrajectory = "brisk"\n[physics]\nstep = 1e-9\n')
-    code, _, err = told("run", "fine.toml")
+    code, _, err = idbench("run", "fine.toml")
     assert code == 2
     assert "makes 4.6e+10 physics steps of 1e-09 s: hours or days; if you mean it, add --yes" in err
 
 
-def test_grids_that_hardly_end_are_refused_at_once(told, tmp_path):
+def test_grids_that_hardly_end_are_refused_at_once(idbench, tmp_path):
     axes = "".join(
         f'[[axes]]\nfield = "friction.{x}"\nlowest = 0.1\nhighest = 1.0\ncount = 10000\n' for x in ("coulomb", "viscous")
     )
     (tmp_path / "g.toml").write_text(f'name = "g"\nquestion = "?"\nscenario = "ideal"\nmotion = "shared"\n{axes}')
-    code, _, err = told("study", "g.toml", "--yes")
+    code, _, err = idbench("study", "g.toml", "--yes")
     assert code == 2
     assert "the grid has 100,000,000 combinations, more than 1,000,000" in err

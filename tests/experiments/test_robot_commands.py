@@ -10,23 +10,23 @@ from sim.robot.tree import standard_parameters
 from sim.scenario.scenario_file import load, to_toml
 
 
-def test_robot_tells_what_can_be_identified(told):
-    code, out, _ = told("robot", "scara")
+def test_robot_tells_what_can_be_identified(idbench):
+    code, out, _ = idbench("robot", "scara")
     assert code == 0
     assert "8 parameters that a motion can identify" in out
-    code, out, _ = told("robot", Robot.path("scara"))
+    code, out, _ = idbench("robot", Robot.path("scara"))
     assert code == 0
     assert "ZZ1 + Ia1 + 0.25 M2" in out
     assert "no motion shows" in out
-    code, out, _ = told("robot", "puma560", "--armature", "all", "--add", "offset")
+    code, out, _ = idbench("robot", "puma560", "--armature", "all", "--add", "offset")
     assert "58 parameters that a motion can identify" in out  # 36 + 4 rotors of their own + 18 of friction
     assert "torque budget" in out
     assert "97.6" in out
 
 
-def test_identify_validates_and_writes_the_file(told, logs, tmp_path):
+def test_identify_validates_and_writes_the_file(idbench, logs, tmp_path):
     words = "--robot", "puma560", "--validate", logs / "second.parquet", "--write-mjcf", "out.xml", "--out", "results"
-    code, out, err = told("identify", logs / "first.parquet", *words, "--no-rerun")
+    code, out, err = idbench("identify", logs / "first.parquet", *words, "--no-rerun")
     assert code == 0, err
     assert "explicit: good: the torque of joint" in out
     assert "standing and turning, where friction is not determined: joint1" in out
@@ -41,49 +41,49 @@ def test_identify_validates_and_writes_the_file(told, logs, tmp_path):
     assert len(summary["validation"]["models"]["explicit"]["position_error_rms"]) == 6
 
 
-def test_without_a_second_log_the_end_of_the_first_is_held_out(told, logs):
-    code, out, _ = told("identify", logs / "first.parquet", "--robot", "puma560", "--model", "explicit")
+def test_without_a_second_log_the_end_of_the_first_is_held_out(idbench, logs):
+    code, out, _ = idbench("identify", logs / "first.parquet", "--robot", "puma560", "--model", "explicit")
     assert code == 0
     assert "the last quarter of the log, by a fit of the rest" in out
 
 
-def test_run_takes_any_robot(told, tmp_path):
+def test_run_takes_any_robot(idbench, tmp_path):
     arm = load("arm")
     scenario = replace(arm, name="short", fs=250.0, trajectory=replace(arm.trajectory, moves=10))
     (tmp_path / "short.toml").write_text(to_toml(scenario))
-    code, out, err = told("run", "short.toml", "--robot", "puma560", "--out", "mine")
+    code, out, err = idbench("run", "short.toml", "--robot", "puma560", "--out", "mine")
     assert code == 0, err
     summary = json.loads((tmp_path / "mine" / "summary.json").read_text())
     assert summary["robot"] == "puma560"
     assert len(summary["truth"]) == 52
-    code, out, err = told("identify", "mine", "--model", "explicit", "--label", "again")
+    code, out, err = idbench("identify", "mine", "--model", "explicit", "--label", "again")
     assert code == 0, err
     assert "added to the recording" in out
 
 
-def test_a_fixed_trajectory_of_another_robot_is_replaced(told, tmp_path):
+def test_a_fixed_trajectory_of_another_robot_is_replaced(idbench, tmp_path):
     (tmp_path / "two.toml").write_text(to_toml(replace(load("ideal"), name="two", fs=100.0)))
-    code, out, err = told("run", "two.toml", "--robot", "panda", "--no-rerun")
+    code, out, err = idbench("run", "two.toml", "--robot", "panda", "--no-rerun")
     assert code == 0, err
     assert "is none for robot panda: it makes the random moves of scenario arm" in out
     assert (tmp_path / "runs" / "two-panda" / "summary.json").exists()
 
 
-def test_parameters_can_be_left_out_and_laws_added(told, logs):
+def test_parameters_can_be_left_out_and_laws_added(idbench, logs):
     words = "identify", logs / "first.parquet", "--robot", "puma560", "--model", "explicit"
-    code, out, _ = told(*words, "--without", "XXR6", "XY6", "--add", "offset")
+    code, out, _ = idbench(*words, "--without", "XXR6", "XY6", "--add", "offset")
     assert code == 0
     assert "off6" in out
     assert "\n XXR6 " not in out
-    code, _, err = told(*words, "--without", "XXX")
+    code, _, err = idbench(*words, "--without", "XXX")
     assert code == 2
     assert "no parameter XXX" in err
-    code, _, err = told(*words, "--add", "armature")
+    code, _, err = idbench(*words, "--add", "armature")
     assert code == 2
     assert "--add armature: that is no law of a joint's friction; known: viscous, coulomb, offset" in err
 
 
-def test_joints_by_name_are_put_in_order_and_unknown_ones_refused(told, logs, tmp_path):
+def test_joints_by_name_are_put_in_order_and_unknown_ones_refused(idbench, logs, tmp_path):
     from pyarrow import csv, parquet
 
     table = parquet.read_table(logs / "first.parquet")
@@ -93,51 +93,51 @@ def test_joints_by_name_are_put_in_order_and_unknown_ones_refused(told, logs, tm
     names = [name.replace("tau", "tau_joint").replace("q", "q_joint") for name in columns]
     csv.write_csv(mixed.rename_columns(names), tmp_path / "named.csv")
     words = "--robot", "puma560", "--model", "explicit", "--torque", "held", "--torque-delay", "0.000659"
-    code, out, err = told("identify", "named.csv", *words)
+    code, out, err = idbench("identify", "named.csv", *words)
     assert code == 0, err
-    _, plain, _ = told("identify", logs / "first.parquet", *words)
+    _, plain, _ = idbench("identify", logs / "first.parquet", *words)
     assert next(x for x in out.splitlines() if " MYR3 " in x) == next(x for x in plain.splitlines() if " MYR3 " in x)
     csv.write_csv(mixed.rename_columns([name.replace("joint3", "elbow") for name in names]), tmp_path / "other.csv")
-    code, _, err = told("identify", "other.csv", *words)
+    code, _, err = idbench("identify", "other.csv", *words)
     assert code == 2
     assert "missing: joint3; not the robot's: elbow" in err
 
 
-def test_the_closed_form_is_written_too(told, tmp_path):
+def test_the_closed_form_is_written_too(idbench, tmp_path):
     """ZZR1 ... of the paper are base parameters of the links: bodies that have them are found."""
-    code, _, err = told("run", "ideal", "--no-rerun", "--out", "mine")
+    code, _, err = idbench("run", "ideal", "--no-rerun", "--out", "mine")
     assert code == 0, err
-    code, _, err = told("identify", "mine/log.parquet", "--write-mjcf", "out.xml")
+    code, _, err = idbench("identify", "mine/log.parquet", "--write-mjcf", "out.xml")
     assert code == 0, err
     made = standard_parameters(Robot.load(str(tmp_path / "out.xml")))
     assert made["ZZ1"] + made["Ia1"] + 0.25 * made["M2"] == pytest.approx(3.5, rel=1e-3)
     assert 0.5 * made["MX2"] == pytest.approx(0.12, rel=1e-2)
 
 
-def test_a_file_without_motors_ranges_and_room_is_described_simulated_and_judged(told, arm):
-    code, out, err = told("robot", "arm.xml")
+def test_a_file_without_motors_ranges_and_room_is_described_simulated_and_judged(idbench, arm):
+    code, out, err = idbench("robot", "arm.xml")
     assert code == 0, err
     assert "torque budget" in out
     for name in ("first", "second"):
-        code, out, err = told("run", f"{name}.toml", "--robot", "arm.xml", "--out", name, "--no-rerun")
+        code, out, err = idbench("run", f"{name}.toml", "--robot", "arm.xml", "--out", name, "--no-rerun")
         assert code == 0, err
         assert "has no motors (dcmotor elements of MJCF): its drives are ideal" in out
-    code, out, err = told("export", "first")
+    code, out, err = idbench("export", "first")
     assert f"--robot {arm}" in out
     words = "--validate", "second", "--write-mjcf", "out.xml", "--model", "explicit", "--out", "found", "--no-rerun"
-    code, out, err = told("identify", "first", *words)
+    code, out, err = idbench("identify", "first", *words)
     assert code == 0, err
     assert "explicit: good" in out
     summary = json.loads((arm.parent / "found" / "summary.json").read_text())
     assert max(summary["validation"]["models"]["explicit"]["position_error_rms"]) < 1e-3
 
 
-def test_an_offset_is_no_error_of_the_simulated_robot(told, changed):
+def test_an_offset_is_no_error_of_the_simulated_robot(idbench, changed):
     path = changed(tau=lambda tau: tau + [5, -8, 4, 1, -1, 0.5])
     words = "identify", path, "--robot", "puma560", "--model", "explicit"
-    _, out, _ = told(*words)
+    _, out, _ = idbench(*words)
     assert "with --add offset the worst joint's error falls from" in out
-    code, out, err = told(*words, "--add", "offset", "--out", "found", "--no-rerun", "--write-mjcf", "out.xml")
+    code, out, err = idbench(*words, "--add", "offset", "--out", "found", "--no-rerun", "--write-mjcf", "out.xml")
     assert code == 0, err
     assert "explicit: good" in out
     assert "off1, off2, off3, off4, off5, off6 have no place in an MJCF file and are left out" in out
@@ -145,26 +145,26 @@ def test_an_offset_is_no_error_of_the_simulated_robot(told, changed):
     assert max(summary["validation"]["models"]["explicit"]["position_error_rms"]) < 1e-3
 
 
-def test_what_is_left_out_is_zero_in_the_file(told, logs, tmp_path):
+def test_what_is_left_out_is_zero_in_the_file(idbench, logs, tmp_path):
     words = "--robot", "puma560", "--model", "explicit", "--without", "Fs6", "--write-mjcf", "out.xml"
-    code, _, err = told("identify", logs / "first.parquet", *words)
+    code, _, err = idbench("identify", logs / "first.parquet", *words)
     assert code == 0, err
     made = standard_parameters(Robot.load(str(tmp_path / "out.xml")))
     assert made["Fs6"] == pytest.approx(0, abs=1e-3)
     assert made["Fs5"] == pytest.approx(0.86, rel=0.02)
-    code, _, err = told("identify", logs / "first.parquet", "--robot", "scara", "--without", "ZZR1")
+    code, _, err = idbench("identify", logs / "first.parquet", "--robot", "scara", "--without", "ZZR1")
     assert code == 2
 
 
-def test_names_of_joints_survive_resampling_and_other_columns_do_not_matter(told, logs, tmp_path):
+def test_names_of_joints_survive_resampling_and_other_columns_do_not_matter(idbench, logs, tmp_path):
     from pyarrow import csv, parquet
 
     table = parquet.read_table(logs / "first.parquet").replace_schema_metadata({})
     names = [name.replace("tau", "tau_joint").replace("q", "q_joint") for name in table.column_names]
     csv.write_csv(table.rename_columns(names), tmp_path / "named.csv")
-    code, _, err = told("resample", "named.csv", "--fs", "200", "--out", "even.parquet", "--torque", "averaged")
+    code, _, err = idbench("resample", "named.csv", "--fs", "200", "--out", "even.parquet", "--torque", "averaged")
     assert code == 0, err
     assert "tau_joint6" in parquet.read_table(tmp_path / "even.parquet").column_names
     csv.write_csv(table.append_column("q_wanted1", table["q1"]), tmp_path / "more.csv")
     words = "--robot", "puma560", "--torque", "held", "--model", "explicit"
-    assert told("identify", "more.csv", *words)[0] == 0
+    assert idbench("identify", "more.csv", *words)[0] == 0

@@ -17,43 +17,43 @@ from sim.robot.robot import Robot
         ("gone.xml", "gone.xml': No such file or directory"),
     ],
 )
-def test_robots_that_do_not_fit(told, logs, robot, message):
-    code, out, err = told("identify", logs / "first.parquet", "--robot", robot)
+def test_robots_that_do_not_fit(idbench, logs, robot, message):
+    code, out, err = idbench("identify", logs / "first.parquet", "--robot", robot)
     assert code == 2
     assert message in err
     assert not out
     assert err.count("\n") == 1
 
 
-def test_a_log_in_degrees_is_pointed_out(told, changed):
+def test_a_log_in_degrees_is_pointed_out(idbench, changed):
     path = changed(q=np.rad2deg)
-    _, out, err = told("identify", path, "--robot", "puma560", "--model", "explicit")
+    _, out, err = idbench("identify", path, "--robot", "puma560", "--model", "explicit")
     assert "are positions logged in degrees? They must be in rad" in out + err
 
 
-def test_positions_out_of_range_are_pointed_out(told, changed):
+def test_positions_out_of_range_are_pointed_out(idbench, changed):
     path = changed(q=lambda q: q + 10)
-    _, out, err = told("identify", path, "--robot", "puma560", "--model", "explicit")
+    _, out, err = idbench("identify", path, "--robot", "puma560", "--model", "explicit")
     assert "out of its range" in out + err
     assert "are joints in the order of the robot's file, and counted from its zero in its direction?" in out + err
 
 
-def test_torques_of_the_wrong_sign_are_pointed_out(told, changed):
-    code, out, _ = told("identify", changed(tau=np.negative), "--robot", "puma560", "--model", "explicit")
+def test_torques_of_the_wrong_sign_are_pointed_out(idbench, changed):
+    code, out, _ = idbench("identify", changed(tau=np.negative), "--robot", "puma560", "--model", "explicit")
     assert code == 0
     assert "friction drives joint1, joint2, joint3, joint4, joint5, joint6 in the explicit model" in out
     assert "the torques of the log take out" in out
-    code, out, _ = told(
+    code, out, _ = idbench(
         "identify", changed(tau=lambda tau: tau * [1, 1, 1, 1, 1, -1]), "--robot", "puma560", "--model", "explicit"
     )
     assert "friction drives joint6 in the explicit model: does the torque have the wrong sign" in out
 
 
-def test_a_joint_that_stands_is_told_with_the_move_that_helps(told, changed):
+def test_a_joint_that_stands_is_told_with_the_move_that_helps(idbench, changed):
     def hold(x):
         return np.where(np.arange(6) == 5, 0.0, x)
 
-    code, out, err = told("identify", changed(q=hold), "--robot", "puma560", "--model", "explicit")
+    code, out, err = idbench("identify", changed(q=hold), "--robot", "puma560", "--model", "explicit")
     assert code == 0, err
     assert "this log does not show" in out
     assert "left out, as if zero (joint6 never moves in this log: move it)" in out
@@ -61,7 +61,7 @@ def test_a_joint_that_stands_is_told_with_the_move_that_helps(told, changed):
     assert "\n Fv6 " not in out
 
 
-def test_files_are_not_written_where_they_would_be_lost(told, logs, tmp_path):
+def test_files_are_not_written_where_they_would_be_lost(idbench, logs, tmp_path):
     (tmp_path / "own.xml").write_text(Robot.path("puma560").read_text())
     words = "identify", logs / "first.parquet", "--robot", "own.xml", "--write-mjcf"
     for target, message in (
@@ -69,36 +69,36 @@ def test_files_are_not_written_where_they_would_be_lost(told, logs, tmp_path):
         ("out.txt", "its name must end with .xml"),
         ("no/such/out.xml", "there is no folder no/such"),
     ):
-        code, out, err = told(*words, target)
+        code, out, err = idbench(*words, target)
         assert code == 2
         assert message in err
         assert not out
 
 
 @pytest.mark.parametrize("extra", ['<joint name="[red]a" stiffness="5"/>', '<joint name="a[/x]" stiffness="5"/>'])
-def test_names_are_printed_as_they_are_and_springs_told(told, tmp_path, extra):
+def test_names_are_printed_as_they_are_and_springs_told(idbench, tmp_path, extra):
     site = '<actuator><motor site="s" gear="1 0 0 0 0 0" forcerange="-1 1"/></actuator>'
     (tmp_path / "r.xml").write_text(
         f'<mujoco><worldbody><body>{extra}<geom size="0.1"/><site name="s"/></body></worldbody>{site}</mujoco>'
     )
-    code, out, err = told("robot", "r.xml")
+    code, out, err = idbench("robot", "r.xml")
     assert code == 0, err
     assert extra.split('"')[1] in out
     assert "has springs at" in out
-    code, _, err = told("robot", "r.xml", "--without", "XXR1" if "XXR1" in out else "XX1", "Fv1", "Fs1", "MX1", "MY1")
+    code, _, err = idbench("robot", "r.xml", "--without", "XXR1" if "XXR1" in out else "XX1", "Fv1", "Fs1", "MX1", "MY1")
     assert code == 2
 
 
-def test_no_parameter_left_is_told(told):
-    code, _, err = told("robot", "scara", "--without", "ZZR1", "Fv1", "Fs1", "ZZ2", "LMX2", "LMY2", "Fv2", "Fs2")
+def test_no_parameter_left_is_told(idbench):
+    code, _, err = idbench("robot", "scara", "--without", "ZZR1", "Fv1", "Fs1", "ZZ2", "LMX2", "LMY2", "Fv2", "Fs2")
     assert code == 2
     assert "there is no parameter left" in err
 
 
-def test_a_slide_in_millimetres_is_pointed_out(told, tmp_path, arm):
-    code, _, err = told("run", "second.toml", "--robot", "arm.xml", "--out", "run", "--no-rerun")
+def test_a_slide_in_millimetres_is_pointed_out(idbench, tmp_path, arm):
+    code, _, err = idbench("run", "second.toml", "--robot", "arm.xml", "--out", "run", "--no-rerun")
     assert code == 0, err
     log = read_log(tmp_path / "run" / "log.parquet")
     write_log(MotionLog(log.fs, log.q * [1, 1000], log.tau, log.torque), tmp_path / "mm.parquet")
-    _, out, err = told("identify", "mm.parquet", "--robot", "arm.xml", "--model", "explicit")
+    _, out, err = idbench("identify", "mm.parquet", "--robot", "arm.xml", "--model", "explicit")
     assert "are positions logged in millimetres? They must be in m" in out + err

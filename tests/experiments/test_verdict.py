@@ -85,16 +85,16 @@ def test_noise_that_could_hide_a_wrong_model_leaves_it_unsure(pair):
 
 def test_a_wrong_delay_is_named_by_the_log_itself(pair):
     """8 ms too late: small in the torque, not in friction."""
-    (told,) = Remedies(validated([late(log, 8) for log in pair])).delay()
-    assert "where 8.66 ms is taken: --torque-delay estimate" in told
-    assert "the log says a torque delay of 0.6" in told
+    (found,) = Remedies(validated([late(log, 8) for log in pair])).delay()
+    assert "where 8.66 ms is taken: --torque-delay estimate" in found
+    assert "the log says a torque delay of 0.6" in found
     assert not list(Remedies(validated(pair)).delay())
 
 
 def test_options_are_advised_that_help_and_by_how_much(pair):
     moved = [torques(log, lambda tau: tau + 0.2 * level(pair[0])) for log in pair]
-    told = list(Remedies(validated(moved)).options())
-    assert [text.split()[1:3] for text in told] == [["--add", "offset"]]
+    found = list(Remedies(validated(moved)).options())
+    assert [text.split()[1:3] for text in found] == [["--add", "offset"]]
     assert not list(Remedies(validated(pair)).options())
 
 
@@ -104,15 +104,15 @@ def test_a_starved_power_model_is_told_to_be_so_and_the_explicit_one_recommended
     found = Identified((part,), Subject(PUMA), models=("explicit", "power"))
     rows, p = int(found.estimates["power"].row_count), len(found.basis.names)
     assert p < rows < 4 * p
-    told = [warning for warning in warnings_of_result(found) if "identifies too little" in warning]
-    assert any(f"the power model identifies too little: {rows} rows for {p} parameters" in warning for warning in told)
+    warnings = [warning for warning in warnings_of_result(found) if "identifies too little" in warning]
+    assert any(f"the power model identifies too little: {rows} rows for {p} parameters" in warning for warning in warnings)
     assert not any("units" in warning for warning in warnings_of_result(found))
 
 
 def test_torques_in_other_units_are_pointed_out(pair):
     milli = [torques(log, lambda tau: 1000 * tau) for log in pair]
-    told = warnings_of_result(validated(milli).found)
-    assert any("are they in N m?" in warning for warning in told)
+    warnings = warnings_of_result(validated(milli).found)
+    assert any("are they in N m?" in warning for warning in warnings)
     assert not any("are they in N m?" in warning for warning in warnings_of_result(validated(pair).found))
 
 
@@ -126,8 +126,8 @@ def test_a_dead_torque_column_is_poor_and_named(pair):
 def test_a_delay_beyond_the_range_that_is_looked_at_is_told(pair):
     """Torques logged 80 ms late: the best delay of the range lies at its end, and that is said."""
     shifted = [torques(log, lambda tau: np.roll(tau, 20, axis=0)) for log in pair]
-    (told,) = Remedies(validated(shifted)).delay()
-    assert "the torque fits best at an end of the range" in told
+    (found,) = Remedies(validated(shifted)).delay()
+    assert "the torque fits best at an end of the range" in found
 
 
 def test_a_single_wild_sample_does_not_excuse_itself_by_the_sigma_it_makes(pair):

@@ -1,4 +1,4 @@
-"""Mistakes of plug-ins are told by their names: what they raised, where, and what they returned instead of what."""
+"""Mistakes of plug-ins are reported by their names: what they raised, where, and what they returned instead of what."""
 
 from dataclasses import dataclass, replace
 
@@ -23,7 +23,7 @@ from identify import (
 
 @dataclass(frozen=True)
 class Law(AbstractFriction):
-    """A law that does what it is told."""
+    """A law that does what the test says."""
 
     do: object = None
     symbol = "Fx"
@@ -35,7 +35,7 @@ class Law(AbstractFriction):
 
 @dataclass(frozen=True)
 class Solver(AbstractEstimator):
-    """An estimator that does what it is told."""
+    """An estimator that does what the test says."""
 
     do: object = None
 

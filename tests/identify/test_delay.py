@@ -18,7 +18,7 @@ from sim.trajectories import RandomMoves
 SIXTEEN = IncrementalEncoder(lines=2**14)
 
 
-def untold(run):
+def without_delay(run):
     log = run.alone()
     return MotionLog(log.fs, log.q, log.tau, TorqueChannel("held"))
 
@@ -30,7 +30,7 @@ def test_a_known_delay_is_found_with_16_bits(delay, seed):
     scenario = load("ideal")
     if seed is not None:
         scenario = replace(scenario, trajectory=RandomMoves(seed=seed))
-    found = estimate_delay(untold(simulate(replace(scenario, encoder=SIXTEEN, timing=Timing(delay=delay)))), scara())
+    found = estimate_delay(without_delay(simulate(replace(scenario, encoder=SIXTEEN, timing=Timing(delay=delay)))), scara())
     assert abs(found.delay - delay) < 5e-5
     assert abs(found.delay - delay) < 5 * found.sigma
     assert found.sigma < 5e-5
@@ -48,7 +48,7 @@ def test_its_sigma_is_its_scatter():
 
 def test_the_lag_of_a_current_loop_is_found_as_well():
     run = simulate(replace(load("ideal"), drive=AveragedDrive(bandwidth=200.0), timing=Timing(delay=0.003)))
-    assert estimate_delay(untold(run), scara()).delay == pytest.approx(0.003 + 1 / (2 * np.pi * 200), abs=5e-5)
+    assert estimate_delay(without_delay(run), scara()).delay == pytest.approx(0.003 + 1 / (2 * np.pi * 200), abs=5e-5)
 
 
 def test_several_logs_have_one_delay(log):

@@ -1,4 +1,4 @@
-"""Closed loops with a held torque and a known computing delay, exact encoder: told and untold to identification."""
+"""Closed loops with a held torque and a known computing delay, exact encoder: known and not known to identification."""
 
 from dataclasses import replace
 

@@ -102,9 +102,9 @@ def test_columns_may_be_separated_as_programs_do(tmp_path, text):
 )
 def test_odd_files_are_told_in_one_line(tmp_path, text, message):
     (tmp_path / "log.csv").write_bytes(text)
-    with pytest.raises(LogError, match=message) as told:
+    with pytest.raises(LogError, match=message) as found:
         read_log(tmp_path / "log.csv", TorqueChannel("held"))
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(found.value)
 
 
 def test_without_pyarrow_it_says_what_is_missing(written, monkeypatch):

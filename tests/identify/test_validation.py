@@ -13,16 +13,16 @@ def judged(log, X, covariance=None):
 
 
 def test_the_truth_foretells_ideal_data(log, truth):
-    told = judged(log, truth)
-    assert (told.percent < 1e-3).all()
-    assert (1 - told.R2 < 1e-9).all()
-    assert np.isfinite(told.standing).all()
+    found = judged(log, truth)
+    assert (found.percent < 1e-3).all()
+    assert (1 - found.R2 < 1e-9).all()
+    assert np.isfinite(found.standing).all()
 
 
 def test_a_gain_error_is_told_in_percent(log, truth):
-    told = judged(log, 1.05 * truth)
-    np.testing.assert_allclose(told.percent, 5, rtol=1e-3)
-    assert not told.white.any()
+    found = judged(log, 1.05 * truth)
+    np.testing.assert_allclose(found.percent, 5, rtol=1e-3)
+    assert not found.white.any()
 
 
 def test_noise_is_told_by_its_rms_and_is_white(log, truth, rng):
@@ -30,11 +30,11 @@ def test_noise_is_told_by_its_rms_and_is_white(log, truth, rng):
     sigma = np.array([0.5, 0.025])
     noisy = MotionLog(log.fs, log.q, log.tau + sigma * rng.standard_normal(log.tau.shape), CHANNEL)
     chain = idbench_chain()
-    told = judged(noisy, truth)
+    found = judged(noisy, truth)
     passed = np.sqrt(np.sum(chain.operator.response(log.fs) ** 2))
     # Rows of which the mask takes a part are smaller: at most as large as those of all.
-    assert (told.rms < 1.1 * sigma * passed).all()
-    assert (told.rms > 0.5 * sigma * passed).all()
+    assert (found.rms < 1.1 * sigma * passed).all()
+    assert (found.rms > 0.5 * sigma * passed).all()
 
 
 def test_white_noise_is_mostly_called_white(log, truth):
@@ -51,9 +51,9 @@ def test_what_stands_is_judged_apart(log, truth):
     chain = idbench_chain()
     standing = chain.mask.weight(chain.signals(log).state.qd, log.fs).T == 0
     wrong = MotionLog(log.fs, log.q, log.tau + standing * [0.4, 0.08], CHANNEL)
-    told = judged(wrong, truth)
-    assert (told.percent < 1e-3).all()
-    assert (told.standing > [0.05, 0.01]).all()
+    found = judged(wrong, truth)
+    assert (found.percent < 1e-3).all()
+    assert (found.standing > [0.05, 0.01]).all()
 
 
 def test_a_joint_that_never_moves_is_named(log, truth):
@@ -73,9 +73,9 @@ def test_the_end_of_a_log_is_held_out(log):
 def test_the_noise_of_a_log_is_read_off_above_its_band(log, truth, sigma):
     """White noise of the torques, by another route: what a low-pass of unit gain and the mask leave of it, to a fifth."""
     noise = sigma * np.random.default_rng(5).standard_normal(log.tau.shape)
-    told = judged(MotionLog(log.fs, log.q, log.tau + noise, CHANNEL), truth)
-    np.testing.assert_allclose(told.noise, told.rms, rtol=0.2)  # the truth leaves nothing else
-    assert (told.excess == 0).all()
+    found = judged(MotionLog(log.fs, log.q, log.tau + noise, CHANNEL), truth)
+    np.testing.assert_allclose(found.noise, found.rms, rtol=0.2)  # the truth leaves nothing else
+    assert (found.excess == 0).all()
 
 
 def test_a_wrong_model_does_not_pass_for_noise(log, truth):
@@ -90,9 +90,9 @@ def test_sigma_of_the_parameters_is_expected_too(log, truth):
     """A covariance of one parameter: the rms of its column times its sigma."""
     C = np.zeros((8, 8))
     C[4, 4] = 0.01**2
-    told = judged(log, truth, C)
+    found = judged(log, truth, C)
     off = judged(log, truth + 0.01 * np.eye(8)[4])
-    np.testing.assert_allclose(told.open, off.rms, rtol=1e-3)
+    np.testing.assert_allclose(found.open, off.rms, rtol=1e-3)
 
 
 def test_slow_sampling_leaves_the_noise_unknown(log, truth):

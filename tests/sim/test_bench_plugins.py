@@ -1,4 +1,4 @@
-"""Plug-ins of the bench that return something else than they promise are told by name, before anything goes wrong with it."""
+"""Plug-ins of the bench that return something else than promised are reported by name, before anything goes wrong with it."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ from sim.settings import settings
 
 @settings
 class Controller(AbstractController):
-    """Starts what it is told."""
+    """Starts what it is given."""
 
     made: object = None
 

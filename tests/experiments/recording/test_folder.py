@@ -111,8 +111,8 @@ def test_a_full_disk_leaves_the_layers_that_were_there(copied, complaint, monkey
 
 def test_a_run_and_a_study_of_one_name_do_not_share_a_folder(tmp_path, complaint, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for file, command, said in (("study.toml", "run", "holds a study"), ("scenario.toml", "study", "holds a run")):
+    for file, command, printed in (("study.toml", "run", "holds a study"), ("scenario.toml", "study", "holds a run")):
         (tmp_path / "runs" / "ripple").mkdir(parents=True, exist_ok=True)
         (tmp_path / "runs" / "ripple" / file).write_text("")
-        assert f"runs/ripple {said}: choose another --out" in complaint(command, "ripple")
+        assert f"runs/ripple {printed}: choose another --out" in complaint(command, "ripple")
         (tmp_path / "runs" / "ripple" / file).unlink()

@@ -104,9 +104,9 @@ def test_a_viewer_closed_while_the_run_goes_on_is_told_once(viewer, tmp_path, re
     process = run(start, client, out, "--connect", "URL", "--out", "OUT", "--pace", f"{PACE}")
     assert until(lambda: reached(client) > 1, process)
     window.terminate()
-    printed, said = process.communicate()
+    printed, err = process.communicate()
     assert process.returncode == 0
-    assert len([line for line in said.splitlines() if not line.startswith("simulating")]) == 1
-    assert "has gone; the work goes on without it" in said
+    assert len([line for line in err.splitlines() if not line.startswith("simulating")]) == 1
+    assert "has gone; the work goes on without it" in err
     assert "written to" in printed
     reading.verify(out / "recording.rrd")

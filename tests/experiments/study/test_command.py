@@ -56,8 +56,8 @@ def test_the_report_is_one_file_with_everything_in_it(done):
     assert not page.loads
     assert "script" not in page.tags
     summary = json.loads((done / "summary.json").read_text())
-    for said in ("Does it work?", "idbench run --from", "SeedSequence(0", "mujoco", "lines = ", *summary["parameters"]):
-        assert said in text
+    for printed in ("Does it work?", "idbench run --from", "SeedSequence(0", "mujoco", "lines = ", *summary["parameters"]):
+        assert printed in text
     assert summary["answer"].split(";")[0].split("(p")[0] in text
 
 
@@ -117,8 +117,8 @@ def test_number_of_seeds(file, tmp_path, bare):
 
 def test_a_thousand_million_runs_are_asked_for_twice(file, complaint, tmp_path, monkeypatch, bare):
     out = ("--out", str(tmp_path / "out"))
-    said = complaint("study", str(file), "--seeds", "1000000000", *out)
-    assert "2,000,000,000 runs, more than 100,000: if you mean it, add --yes" in said
+    printed = complaint("study", str(file), "--seeds", "1000000000", *out)
+    assert "2,000,000,000 runs, more than 100,000: if you mean it, add --yes" in printed
     assert not (tmp_path / "out").exists()
     monkeypatch.setattr(study_commands, "MANY", 3)
     assert "18 runs, more than 3" in complaint("study", str(file), *out)
@@ -155,8 +155,8 @@ def test_a_scheduler_may_be_anywhere(file, tmp_path, undisturbed, bare):
 
 def test_an_unreachable_scheduler_leaves_nothing(file, tmp_path, complaint, monkeypatch):
     monkeypatch.setattr("experiments.study.cluster.PATIENCE", 1.0)
-    said = complaint("study", str(file), "--scheduler", "tcp://127.0.0.1:9", "--out", str(tmp_path / "out"))
-    assert "cannot reach the scheduler tcp://127.0.0.1:9" in said
+    printed = complaint("study", str(file), "--scheduler", "tcp://127.0.0.1:9", "--out", str(tmp_path / "out"))
+    assert "cannot reach the scheduler tcp://127.0.0.1:9" in printed
     assert not (tmp_path / "out").exists()
 
 
@@ -221,11 +221,11 @@ def test_odd_studies_end_in_a_report(tmp_path, axis, failed, capfd):
     """Values of several kinds, words that look like markup, runs that all fail, no sigma, a truth of 0."""
     (tmp_path / "odd.toml").write_text(f"{ODD}\n[[axes]]\n{axis}\n")
     code = main(["study", str(tmp_path / "odd.toml"), "--out", str(tmp_path / "out")])
-    said = capfd.readouterr()
-    assert "Is [/b] [red]fine?" in said.out
-    assert ("\nfailed: " in said.out) == bool(failed)
+    printed = capfd.readouterr()
+    assert "Is [/b] [red]fine?" in printed.out
+    assert ("\nfailed: " in printed.out) == bool(failed)
     assert code == (2 if failed == 4 else 0)
-    assert ("no run of study odd gave an estimate: 2 times" in said.err) == (failed == 4)
+    assert ("no run of study odd gave an estimate: 2 times" in printed.err) == (failed == 4)
     cells = json.loads((tmp_path / "out" / "summary.json").read_text())["cells"]
     assert sum(sum(cell["failures"].values()) for cell in cells) == failed
     assert sum(cell["runs"] for cell in cells) + failed == 4

@@ -122,12 +122,12 @@ def test_the_answer_names_the_better_model_and_both_sigmas(rng):
     error = rng.normal(0, 1, (60, 2))
     group = [cell(error, "explicit", settings={"fs": f}) for f in (1.0, 2.0)]
     worse = [cell(3 * error, "power", settings={"fs": f}) for f in (1.0, 2.0)]
-    said = answer([group[0], worse[0], group[1], worse[1]])
-    assert said.startswith("Least error in 2 of 2 combinations: explicit, surely less than all others in 2 (p < 0.01)")
-    assert said.count(". ") == 1  # two sentences
+    printed = answer([group[0], worse[0], group[1], worse[1]])
+    assert printed.startswith("Least error in 2 of 2 combinations: explicit, surely less than all others in 2 (p < 0.01)")
+    assert printed.count(". ") == 1  # two sentences
     few = [cell(error[:4], "explicit"), cell(3 * error[:4], "power")]
     assert answer(few).startswith("Least error in 1 of 1 combinations: explicit (too few runs for a test)")
-    assert "Two corrected sigma hold the truth in" in said
+    assert "Two corrected sigma hold the truth in" in printed
 
 
 def test_an_answer_without_estimates():
@@ -149,8 +149,8 @@ def test_the_best_is_what_the_test_says_is_best(rng):
     error = rng.normal(0, 0.01, (30, 2))
     wild = error.copy()
     wild[0] = 10.0
-    said = answer([cell(wild), cell(3 * error, "power")])
-    assert said.startswith("Least error in 1 of 1 combinations: explicit, surely less than all others in 1")
+    printed = answer([cell(wild), cell(3 * error, "power")])
+    assert printed.startswith("Least error in 1 of 1 combinations: explicit, surely less than all others in 1")
 
 
 def test_the_better_model_is_the_one_that_the_test_finds_whatever_the_tails(rng):
