@@ -1,6 +1,5 @@
 """What errors of the positions do to the torques that a robot's model predicts."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,6 +13,9 @@ from identify.signals.state import State
 
 STEP_Q, STEP_QD = 1e-3, 0.05
 """Steps [rad, rad/s] of central differences: torques are sines of positions, and squares of velocities."""
+
+RATE = 50.0
+"""Least frequency [Hz] at which slopes are computed; between they are interpolated, as motion has hardly more than 5 Hz."""
 
 SMOOTHING = 0.15
 """Time [s] over which velocities are smoothed, by parabolas, before noise is propagated through them."""
@@ -53,40 +55,38 @@ class Linearization:
             unit = np.zeros_like(state.q)
             unit[..., i, :] = 1.0
             momentum = self.basis.momentum(State(state.q, unit, self.signals.s))
-            found.append(self._summed(momentum))
+            found.append(self._summed(momentum, state.q))
         return np.stack(found, axis=-2)
 
     @cached_property
     def damping(self) -> Array:
         """Derivative of the torques by the velocities: Coriolis torques and friction."""
-        state = self.signals.state
-        qd = smoothed(state.qd, self.signals.fs)
-        sliding = np.where(np.abs(qd) < SLIDING, np.copysign(SLIDING, qd), qd)
-        return self._slopes(lambda step: (state.q, sliding + step), STEP_QD)
+        qd = smoothed(self.signals.state.qd, self.signals.fs)
+        return self._slopes(np.where(np.abs(qd) < SLIDING, np.copysign(SLIDING, qd), qd), 0.0, STEP_QD)
 
     @cached_property
     def stiffness(self) -> Array:
         """Derivative of the torques by the positions: gravity, and inertia that depends on them."""
-        state = self.signals.state
-        return self._slopes(lambda step: (state.q + step, state.qd), STEP_Q)
+        return self._slopes(self.signals.state.qd, STEP_Q, 0.0)
 
-    def _slopes(self, moved: Callable[[Array], tuple[Array, Array]], step: float) -> Array:
-        """Return central differences of the torques by each joint's position or velocity; `moved` adds steps to one of them."""
-        found = []
-        for i in range(self.basis.n):
-            steps = np.zeros((self.basis.n, 1))
-            steps[i] = step
-            ahead, behind = (self._torques(*moved(sign * steps)) for sign in (1.0, -1.0))
-            found.append((ahead - behind) / (2 * step))
-        return np.stack(found, axis=-2)
+    def _slopes(self, qd: Array, step_q: float, step_qd: float) -> Array:
+        """Return central differences of the torques by each joint's position or velocity, whichever has a step."""
+        state, samples = self.signals.state, qd.shape[-1]
+        some = np.unique(np.append(np.arange(0, samples, max(1, int(self.signals.fs / RATE))), samples - 1))
+        q, qd, qdd = (x[..., some] for x in (state.q, qd, state.qdd))
 
-    def _torques(self, q: Array, qd: Array) -> Array:
-        qdd = self.signals.state.qdd
-        return self._summed(self.basis.explicit(State(q, qd, lambda _: qdd)))
+        def torques(step: Array) -> Array:
+            return self._summed(self.basis.explicit(State(q + step_q * step, qd + step_qd * step, lambda _: qdd)), q)
 
-    def _summed(self, columns: Columns) -> Array:
-        """Return columns times X, shape (..., joint, time)."""
-        total = np.zeros_like(self.signals.state.q)
+        units = np.eye(self.basis.n)[..., None]
+        found = np.stack([torques(unit) - torques(-unit) for unit in units], axis=-2) / (2 * (step_q + step_qd))
+        if len(some) == samples:
+            return found
+        return np.asarray(scipy.interpolate.interp1d(some, found)(np.arange(samples)), dtype=np.float64)
+
+    def _summed(self, columns: Columns, q: Array) -> Array:
+        """Return columns at positions `q` times X, shape (..., joint, time)."""
+        total = np.zeros_like(q)
         for (row, name), column in columns.items():
             total[..., row, :] += column * self.X[..., self.basis.names.index(name), None]
         return total
