@@ -140,7 +140,7 @@ class Problem:
         """What rows are multiplied by where those of one kind differ in their noise; None if they are alike."""
         if all(part.alike for rows in self.parts for part in rows.maps):
             return None
-        return RowWeights(self.parts, self.noise, self.linear)
+        return RowWeights(self.parts, self.model, self.noise, self.linear)
 
     def noise_covariance(self, influence: Influence) -> Array:
         """Return the covariance that the noise of the logs gives an estimate X = G' Y, shape (..., p, p).

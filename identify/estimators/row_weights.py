@@ -6,19 +6,21 @@ from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
+import scipy
 
 from identify.arrays import Array
+from identify.estimators.two_levels import two_levels
+from identify.models.model import AbstractModel
 from identify.rows.factors import Factors
-from identify.rows.linearization import Linearization
+from identify.rows.linearization import Linearization, smoothed
 from identify.rows.noise_propagation import NoiseLevels, position_variance, torque_variance
 from identify.rows.row_map import RowMap, in_order
 from identify.rows.rows import Rows
 from identify.signals.signals import Signals
+from identify.signals.state import State
 
 LEAST, MOST = 0.01, 10.0
 """Range of b/a: residuals of some hundred rows do not show less, and more is as good as equal weights."""
-
-ROUNDS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +31,8 @@ class RowWeights:
     ----------
     parts : tuple of Rows
         Rows of each log, or of some pieces.
+    model : AbstractModel
+        Theirs.
     noise : NoiseLevels
         That of the logs.
     linear : callable
@@ -36,6 +40,7 @@ class RowWeights:
     """
 
     parts: tuple[Rows, ...]
+    model: AbstractModel
     noise: NoiseLevels
     linear: Callable[[Signals], Linearization]
     _variances: WeakKeyDictionary[RowMap, Array] = field(default_factory=WeakKeyDictionary, repr=False)
@@ -76,7 +81,20 @@ class RowWeights:
 
     def _variance(self, rows: RowMap) -> Array:
         linear = self.linear(rows.signals)
-        return in_order(torque_variance(rows, self.noise.torque) + position_variance(rows, self.noise.position, linear))
+        variance = torque_variance(rows, self.noise.torque) + position_variance(rows, self.noise.position, linear)
+        return in_order(variance + self._at_rest(rows, linear) ** 2)
+
+    def _at_rest(self, rows: RowMap, linear: Linearization) -> Array:
+        """Return what noise of the velocities makes of the columns c where joints hardly move, shape (..., kind, count).
+
+        Friction turns noise into power, Fs |qd|, of one sign: a bias, that of a velocity of E|qd + noise| - |qd|.
+        """
+        signals, basis = rows.signals, linear.basis
+        speed = rectified(smoothed(signals.state.qd, signals.fs), self.noise.position[..., None] * signals.gain)
+        found = np.zeros(rows.inside.shape)
+        for (row, name), column in self.model.c(basis, State(signals.state.q, speed, signals.s)).items():
+            found[..., row, :] += column * linear.X[..., basis.names.index(name), None]
+        return rows.kernel.apply(found)
 
 
 def floor_of(squares: Array, variance: Array) -> Array:
@@ -95,23 +113,9 @@ def floor_of(squares: Array, variance: Array) -> Array:
     """
     mean = np.mean(variance, axis=-1, keepdims=True)
     u = np.divide(variance, mean, out=np.ones_like(variance), where=mean > 0)
-    a = b = np.mean(squares, axis=-1, keepdims=True) / 2
-    for _ in range(ROUNDS):
-        size = np.maximum(a * u + b, 1e-12 * (a + b) + 1e-300)
-        ones, ramp, y = 1 / size, u / size, squares / size
-        a, b = _not_negative(ramp, ones, y)
-    share = np.divide(b, a, out=np.full(a.shape, MOST), where=a > 0)[..., 0]
+    a, b = two_levels(u, np.ones_like(u), squares)
+    share = np.divide(b, a, out=np.full(a.shape, MOST), where=a > 0)
     return mean[..., 0] * np.clip(np.where(np.isfinite(share), share, 1.0), LEAST, MOST)
-
-
-def _not_negative(x: Array, z: Array, y: Array) -> tuple[Array, Array]:
-    """Return a and b, not negative, of the least squares a x + b z = y along the last axis, which they keep with length 1."""
-    xx, xz, zz, xy, zy = (np.sum(p * q, axis=-1, keepdims=True) for p, q in ((x, x), (x, z), (z, z), (x, y), (z, y)))
-    determinant = xx * zz - xz**2
-    regular = determinant > 1e-12 * xx * zz
-    a = np.divide(xy * zz - zy * xz, determinant, out=np.zeros_like(xx), where=regular)
-    b = np.divide(zy * xx - xy * xz, determinant, out=zy / zz, where=regular)
-    return np.where(b < 0, xy / xx, np.maximum(a, 0.0)), np.where(a < 0, zy / zz, np.maximum(b, 0.0))
 
 
 def reciprocal_root(variance: Array, floor: Array) -> Array:
@@ -119,3 +123,12 @@ def reciprocal_root(variance: Array, floor: Array) -> Array:
     evened = variance + floor[..., None]
     known = np.isfinite(evened) & (evened > 0)
     return 1 / np.sqrt(np.where(known, evened, 1.0))
+
+
+def rectified(x: Array, sigma: Array) -> Array:
+    """Return E|x + n| - |x| for normal n of standard deviation sigma, 2 sigma (phi(u) - u Q(u)) with u = |x| / sigma."""
+    known = np.isfinite(sigma) & (sigma > 0)
+    scale = np.where(known, sigma, 1.0)
+    u = np.abs(x) / scale
+    density = np.exp(-(u**2) / 2) / np.sqrt(2 * np.pi)
+    return np.where(known, 2 * scale * (density - u * scipy.special.ndtr(-u)), 0.0)

@@ -114,8 +114,7 @@ def torque_variance(rows: RowMap, level: Array) -> Array:
     squares = np.zeros(rows.inside.shape)
     for (row, joint), B in rows.B.items():
         squares[..., row, :] += (level[..., joint, None] * rows.inside[..., row, :] * B) ** 2
-    wide = rows.signals.torque_adjoint(np.pad(rows.response, rows.signals.reach))
-    return rows.outside**2 * _window(rows.grid, wide**2).apply(squares)
+    return rows.outside**2 * _window(rows.grid, torque_window(rows) ** 2).apply(squares)
 
 
 def position_variance(rows: RowMap, level: Array, linear: Linearization) -> Array:
@@ -137,14 +136,34 @@ def position_variance(rows: RowMap, level: Array, linear: Linearization) -> Arra
     linear : Linearization
         Of the explicit model.
     """
+    total = sum(variance for variance, _ in position_parts(rows, level, linear))
+    return np.maximum(total, 0.0)
+
+
+def position_parts(rows: RowMap, level: Array, linear: Linearization) -> list[tuple[Array, Array]]:
+    """Return the terms of `position_variance`, shape (..., kind, count), and the windows that make them, shape (length,)."""
     signals = rows.signals
     g0 = level[..., None, :, None] * rows.inside[..., :, None, :] * _momentum(rows, linear)
     g1 = signals.s(g0)
     g2 = signals.s(g1)
     h0, h1, h2 = _responses(rows)
-    terms = (h2**2, g0**2), (4 * h1**2, g1**2), (h0**2, g2**2), (2 * h0 * h2, g0 * g2)
-    total = sum(_window(rows.grid, h).apply(np.sum(g, axis=-2)) for h, g in terms)
-    return rows.outside**2 * np.maximum(total, 0.0)
+
+    def squares(h: Array, g: Array) -> Array:
+        return rows.outside**2 * _window(rows.grid, h).apply(np.sum(g, axis=-2))
+
+    mixed = squares(4 * h1**2, g1**2) + squares(2 * h0 * h2, g0 * g2)
+    return [(squares(h2**2, g0**2), h2), (mixed, h1), (squares(h0**2, g2**2), h0)]
+
+
+def torque_window(rows: RowMap) -> Array:
+    """Return the weights of the torques around a row in it, prefilter and alignment included, shape (length,)."""
+    return rows.signals.torque_adjoint(np.pad(rows.response, rows.signals.reach))
+
+
+def correlations(window: Array, step: int) -> Array:
+    """Return the correlation of sums of white noise over a window with those 0, 1, 2 ... times `step` later, shape (lag,)."""
+    shifted = [window[: len(window) - lag] @ window[lag:] for lag in range(0, len(window), step)]
+    return np.array(shifted) / max(float(shifted[0]), 1e-300)
 
 
 def _responses(rows: RowMap) -> tuple[Array, Array, Array]:

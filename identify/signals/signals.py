@@ -72,6 +72,13 @@ class Signals:
         """Return dx/dt of `x`, shape (..., time)."""
         return self.differentiator.derivative(x, self.fs)
 
+    @cached_property
+    def gain(self) -> float:
+        """Standard deviation of the derivative of white noise, over that of the noise [1/s]."""
+        impulse = np.zeros(2 * ceil(self.differentiator.halo(self.fs) * self.fs - 1e-9) + 1)
+        impulse[len(impulse) // 2] = 1.0
+        return float(np.linalg.norm(self.s(impulse)))
+
     @property
     def reach(self) -> int:
         """Samples to either side that prefilter and alignment of the torque look at."""

@@ -12,6 +12,7 @@ from identify import (
     OPERATORS,
     ButterworthPrefilter,
     Estimate,
+    FirLowPass,
     MotionLog,
     NoiseLevels,
     NoPrefilter,
@@ -120,6 +121,20 @@ def test_the_noise_of_an_encoder_is_found(bits, log):
     counted = MotionLog(log.fs, np.round(log.q / step) * step, log.tau, log.torque)
     found = Problem((counted,), scara(), EVERY["explicit"], idbench_chain()).noise.position
     np.testing.assert_allclose(found, step / np.sqrt(12), rtol=0.2)
+
+
+def test_torque_noise_is_found_beside_stronger_noise_of_the_positions(log):
+    """Rows of up to 10 Hz, in which positions make most of the noise, not of what a motion tells: the rest of a difference of
+    two large numbers would be anything. 60 draws; between half and twice, as rows of changing weight are taken for even ones.
+    """
+    rng, sigma = np.random.default_rng(3), np.array([0.05, 0.0025])
+    q, tau = (x + s * rng.standard_normal((60, *x.shape)) for x, s in ((log.q, 2.8e-5), (log.tau, sigma)))
+    chain = replace(idbench_chain(), operator=FirLowPass(10.0, 10.0))
+    problem = Problem((MotionLog(log.fs, q, tau, log.torque),), scara(), EVERY["explicit"], chain)
+    parts = problem.parts[0].maps[0], problem.linear(problem.signals[0])
+    of_torque = torque_variance(parts[0], problem.noise.torque).sum(axis=-1)
+    assert (of_torque < position_variance(parts[0], problem.noise.position, parts[1]).sum(axis=-1)).all()
+    assert (np.abs(np.log2(np.median(problem.noise.torque, axis=0) / sigma)) < 1).all()
 
 
 def test_a_log_without_noise_of_its_positions_has_none(log):

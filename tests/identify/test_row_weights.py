@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identify.estimators.row_weights import LEAST, MOST, floor_of, reciprocal_root
+from identify.estimators.row_weights import LEAST, MOST, floor_of, reciprocal_root, rectified
 
 
 @pytest.fixture
@@ -37,3 +37,11 @@ def test_a_run_does_not_touch_the_others_and_bad_ones_have_a_value(variance):
 def test_reciprocal_roots():
     scale = reciprocal_root(np.array([[3.0, 8.0], [0.0, 0.0], [np.nan, 1.0]]), np.array([1.0, 0.0, 1.0]))
     np.testing.assert_allclose(scale, [[1 / 2, 1 / 3], [1, 1], [1, 1 / np.sqrt(2)]])
+
+
+def test_noise_is_rectified_where_it_is_larger_than_the_signal(rng):
+    """To what a million draws leave."""
+    x, n = np.array([0.0, 0.5, -1.0, 3.0, 10.0]), 0.7 * rng.standard_normal(10**6)
+    drawn = [np.mean(np.abs(one + n)) - abs(one) for one in x]
+    np.testing.assert_allclose(rectified(x, np.array(0.7)), drawn, atol=3e-3)
+    np.testing.assert_array_equal(rectified(x, np.array(0.0)), 0.0)
