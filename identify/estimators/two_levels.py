@@ -4,7 +4,7 @@ import numpy as np
 
 from identify.arrays import Array
 
-ROUNDS = 10
+ROUNDS = 6
 
 FAINT = 1e-3
 """Expectations below this share of the mean count as this: what is found there says more about the expectation."""

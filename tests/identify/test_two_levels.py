@@ -16,7 +16,7 @@ def shapes():
 def test_the_weak_one_is_found_below_the_strong_one(shapes, rng):
     """Of 300 periodograms; the sum of squares, known to 10 % from some 100 values that count, would not show 1e-4 of it.
 
-    To what ten rounds leave.
+    To what six rounds leave.
     """
     flat, steep = shapes
     squares = (2.0 * flat + steep) * rng.exponential(size=(300, 400))
