@@ -1,5 +1,6 @@
 """Commands that simulate."""
 
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -151,15 +152,15 @@ def table2(asked: Repeated) -> None:
     with watching.audience() as audience, shown(page):
         with results_folder(place) as folder, progress_of("simulating") as progress:
             recording = _recording(described, audience, asked.inner) if watching.rerun else None
-            table = Table2(described, progress, recording.watch if recording else None)
-            print_table2(page, table)
-            for i in range(len(table.run.seeds)):
-                write_log(table.run.alone(i), folder / f"log{i}.parquet")
-            write_summary(folder / "summary.json", table.summary())
-            if recording:
-                from experiments.recording.table2_recording import finish_table2
+            with closing(Table2(described, progress, recording.watch if recording else None)) as table:
+                print_table2(page, table)
+                for i in range(len(table.run.seeds)):
+                    write_log(table.run.alone(i), folder / f"log{i}.parquet")
+                write_summary(folder / "summary.json", table.summary())
+                if recording:
+                    from experiments.recording.table2_recording import finish_table2
 
-                lost = write_recording(folder, finish_table2(recording, table))
+                    lost = write_recording(folder, finish_table2(recording, table))
         tell_of(lost, asked.out)
         _doubt_window(page, asked.inner, recording)
         page.print(f"written to {asked.out}{watching.hint(asked.out)}", soft_wrap=True)

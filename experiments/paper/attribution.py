@@ -5,8 +5,9 @@ where friction is small; quantization and ripple are noise; standstill touches t
 the power model alone; a gain error scales everything.
 """
 
+import json
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache
 from typing import TypeAlias
 
 from identify import Array, AsLogged, Chain, MotionLog, NoMask, TorqueChannel, idbench_chain, identify_each, scara
@@ -18,6 +19,7 @@ from sim.frictions import Stribeck
 from sim.robot.scara import scara_truth
 from sim.scenario.measurement import TorqueMeasurement
 from sim.scenario.scenario import Physics, Scenario, Timing
+from sim.scenario.scenario_file import from_dict, to_dict
 
 Errors: TypeAlias = dict[str, Array]
 """Model -> signed error of every parameter [%]."""
@@ -76,14 +78,14 @@ def imperfections(table2: Scenario) -> list[Imperfection]:
 
 def errors_of(imperfection: Imperfection) -> Errors:
     """Return the signed error [%] of every parameter in each model."""
-    log, truth = _ideal_but_for(imperfection.scenario)
+    log, truth = _ideal_but_for(json.dumps(to_dict(imperfection.scenario)))
     believed = MotionLog(log.fs, log.q, log.tau, imperfection.believed or log.torque)
     estimates = identify_each(believed, scara(), COMPARED, imperfection.chain)
     return {form: estimate.error_percent(truth) for form, estimate in estimates.items()}
 
 
-@lru_cache(maxsize=4)
-def _ideal_but_for(scenario: Scenario) -> tuple[MotionLog, list[float]]:
-    """Return the log of a scenario, which several imperfections may share, and the true parameters."""
-    run = simulate(scenario)
+@cache
+def _ideal_but_for(scenario: str) -> tuple[MotionLog, list[float]]:
+    """Return the log of a scenario in JSON, which several imperfections may share, and the true parameters."""
+    run = simulate(from_dict(json.loads(scenario)))
     return run.alone(), list(scara_truth(run.robots[0]).values())

@@ -33,20 +33,7 @@ class ParallelAttribution:
     def __init__(self, table2: Scenario) -> None:
         self._imperfections = {one.name: one for one in imperfections(table2)}
         self._found: dict[str, Errors] = {}
-        # A session of its own: Ctrl-C, which a terminal sends to all of its processes, is for this one, which ends the other.
-        self._process = subprocess.Popen(
-            [
-                sys.executable,
-                "-P",
-                "-m",
-                "experiments.paper.parallel_attribution",
-            ],  # -P: not what lies in the working directory
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-            start_new_session=True,
-        )
+        self._process = _begun()
         self._reader = Thread(target=self._exchange, args=(json.dumps(to_dict(table2)),), daemon=True)
         self._reader.start()
 
@@ -65,24 +52,35 @@ class ParallelAttribution:
         return {name: self._found[name] for name in self._imperfections}
 
     def stop(self) -> None:
-        """End the process."""
-        self._process.kill()
-        self._process.wait()
+        """End the process; it may have ended."""
+        if self._process:
+            self._process.kill()
+            self._process.wait()
         self._reader.join()
 
     def _exchange(self, scenario: str) -> None:
         """Write the scenario to the process, and keep what it answers until it has all, or ends."""
-        stdin, stdout = self._process.stdin, self._process.stdout
-        if stdin is None or stdout is None:
+        if not self._process or not self._process.stdin or not self._process.stdout:
             return
-        with suppress(OSError, ValueError), stdout:  # it has ended, or was ended within a line
-            with stdin:
-                stdin.write(scenario)
-            for line in stdout:
+        with suppress(OSError, ValueError), self._process.stdout as answers:  # it has ended, or was ended within a line
+            with self._process.stdin as asked:
+                asked.write(scenario)
+            for line in answers:
                 name, errors = json.loads(line)
                 self._found.setdefault(name, {form: np.array(error) for form, error in errors.items()})
                 if self._imperfections.keys() <= self._found.keys():
                     return
+
+
+def _begun() -> subprocess.Popen[str] | None:
+    """Return a process that runs this file as a program, None if there can be none."""
+    pipe, words = subprocess.PIPE, ["-P", "-m", __spec__.name]  # -P: not what lies in the working directory
+    with suppress(OSError):
+        # A session of its own: Ctrl-C, which a terminal sends to all of its processes, is for this one, which ends the other.
+        return subprocess.Popen(
+            [sys.executable, *words], stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True, start_new_session=True
+        )
+    return None
 
 
 def lines(scenario: str) -> Iterator[str]:

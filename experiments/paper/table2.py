@@ -108,12 +108,8 @@ class Table2:
         """As many realizations as the power model needs."""
         first = self.scenario.seed
         seeds = range(first, first + max(REALIZATIONS.values()))
-        beside = self._attribution  # has begun, now that this process is busy
-        try:
-            return simulate(self.scenario, seeds, progress=self.progress, watch=self.watch)
-        except BaseException:
-            beside.stop()
-            raise
+        _ = self._attribution  # begins, now that this process is busy
+        return simulate(self.scenario, seeds, progress=self.progress, watch=self.watch)
 
     @cached_property
     def truth(self) -> dict[str, float]:
@@ -139,6 +135,11 @@ class Table2:
     def attribution(self) -> dict[str, Errors]:
         """Signed error [%] of every parameter by every imperfection alone."""
         return self._attribution.errors(self.progress)
+
+    def close(self) -> None:
+        """End what was begun and is not finished."""
+        if "_attribution" in self.__dict__:
+            self._attribution.stop()
 
     @cached_property
     def _attribution(self) -> ParallelAttribution:

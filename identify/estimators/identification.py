@@ -68,10 +68,11 @@ def identify_each(
     chain: Chain | None = None,
     estimator: AbstractEstimator | None = None,
     *,
+    simulate: Callable[[Array], MotionLog] | None = None,
     throw: bool = True,
 ) -> dict[str, Estimate]:
     """Identify with several models, by name, from the same signals; otherwise as `identify`."""
-    found = attempt_each(_problem(log, basis, ExplicitModel(), chain, None), models, estimator, throw=throw)
+    found = attempt_each(_problem(log, basis, ExplicitModel(), chain, simulate), models, estimator, throw=throw)
     for outcome in found.values():
         if isinstance(outcome, IdentificationError):
             raise outcome
@@ -99,6 +100,7 @@ def attempt_each(
     IdentificationError
         If the log or a setting allows no model an estimate.
     """
+    _require(problem, Problem, "a Problem, such as Problem((log,), basis, model, chain)")
     estimator = estimator or WeightedLeastSquares()
     _require(estimator, AbstractEstimator, 'an estimator, such as ESTIMATORS.create("OLS")')
     for model in models.values():

@@ -33,6 +33,9 @@ def noise_levels(parts: Sequence[Rows], factors: Factors, fit: Fit, linear: Sequ
     one of the rest.) White noise of variance sigma^2 gives row i the variance sigma^2 v_i, of which the fit takes the share
     l_i, its leverage, so that sigma^2 = squares / sum of v_i (1 - l_i). What the model does not explain counts as noise, too.
 
+    If the squares less those that the positions' noise should make are more than that, they are taken: rather too much than too
+    little, up to twice the torque's noise in bands beyond 10 Hz.
+
     Parameters
     ----------
     parts : sequence of Rows
@@ -92,11 +95,12 @@ def _leverage(factors: Factors, fit: Fit) -> Array:
 
 
 def position_noise(logs: Sequence[Signals]) -> Array:
-    """Return the standard deviation of white noise in the positions of logs [rad], shape (..., joint), while joints move.
+    """Return the standard deviation of white noise in the positions of logs [rad], shape (..., joint), where no mask is.
 
     From differences of order 6, whose variance is that of the noise times the sum of their squared weights (P. Hall, J. W. Kay
     and D. M. Titterington, "Asymptotically optimal difference-based estimation of variance in nonparametric regression",
-    Biometrika 77 (1990) 521-528). Counts of an encoder at rest are constant, and say nothing. 0 where too little moves.
+    Biometrika 77 (1990) 521-528). Counts of an encoder at rest are constant, and say nothing: without a mask they make it too
+    small. 0 where little is left.
     """
     weights = np.array([(-1.0) ** k * comb(ORDER, k) for k in range(ORDER + 1)])
     weights /= np.linalg.norm(weights)

@@ -61,6 +61,7 @@ class Problem:
     def __post_init__(self) -> None:
         if not self.logs:
             raise LogError("there is no log to identify")
+        _require_logs(self.logs)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -187,6 +188,7 @@ class Problem:
         """
         self.require_rows("rows at another log need those of this one, and ")
         logs = [log] if isinstance(log, MotionLog) else list(log)
+        _require_logs(logs)
         if [(one.q.shape, one.fs) for one in logs] != [(one.q.shape, one.fs) for one in self.logs]:
             raise LogError(
                 "rows at other logs need one log for each of the problem's, of the same length, frequency and joints"
@@ -252,3 +254,9 @@ class Problem:
 
     def _scaled(self, rows: Rows) -> Factors:
         return rows.factors if self.row_weights is None else rows.factors_of(self.row_weights.of(rows))
+
+
+def _require_logs(logs: Sequence[object]) -> None:
+    for log in logs:
+        if not isinstance(log, MotionLog):
+            raise LogError(f"{log!r:.60} is given where a MotionLog is needed, such as read_log(path)")

@@ -45,10 +45,13 @@ def recursive_least_squares(estimate: Estimate, t: Array, halo: float = 0.0) -> 
     Raises
     ------
     IdentificationError
-        If the estimate is not that of a single run, or no least-squares solution.
+        If the estimate is not that of a single run of one log, no least-squares solution, or its log too long for its rows to
+        be kept; if the instants decrease.
     """
-    if estimate.weights is None or estimate.X.ndim > 1:
-        raise IdentificationError("recursive least squares needs the rows of a least-squares estimate of one run")
+    if estimate.weights is None or estimate.X.ndim > 1 or len(estimate.problem.logs) > 1:
+        raise IdentificationError("recursive least squares needs the rows of a least-squares estimate of one run of one log")
+    if len(t) and np.diff(t, prepend=t[0]).min() < 0:
+        raise IdentificationError("the instants of recursive least squares must not decrease: sort them")
     given, weights = estimate.rows, estimate.weights(estimate.rows)
     order = np.argsort(given.time, kind="stable")
     rows = (np.concatenate([given.W, given.Y[:, None]], axis=1) * weights[:, None])[order]

@@ -123,11 +123,14 @@ def validate(held_out: Problem, X: Array, covariance: Array | None = None) -> Va
     ------
     LogError
         If the log holds several runs, does not fit the basis, is too short for the chain, or a joint of it never moves.
+    IdentificationError
+        If the log is too long for its rows to be kept.
     """
     if len(held_out.logs) > 1 or held_out.logs[0].q.ndim != 2:
         raise LogError(
             f"a motion is judged by itself, not {len(held_out.logs)} of shape {held_out.logs[0].q.shape}: give them one by one"
         )
+    held_out.require_rows("a motion is judged by its rows, and ")
     signals, chain, basis = held_out.signals[0], held_out.chain, held_out.basis
     rows = held_out.with_model(ExplicitModel()).parts[0]
     left = instants(signals, basis, ExplicitModel(), chain, X)

@@ -82,7 +82,7 @@ class Chain:
     def pieces(self, log: MotionLog, samples: int) -> list[tuple[int, int]]:
         """Return first sample and end of pieces of a log, each with the samples that its rows look at.
 
-        The rows of all pieces are those of the log; each piece has those of some `samples`, at least one.
+        The rows of all pieces are those of the log, to what a recursive filter forgets; each piece has those of some `samples`.
         """
         grid, reach = self.grid(log), ceil(self.margin(log) * log.fs - 1e-9)
         rows = max(1, samples // grid.step)

@@ -9,6 +9,7 @@ import numpy as np
 from identify.arrays import Array
 from identify.blame import expect
 from identify.data.motion_log import MotionLog
+from identify.errors import PluginError
 from identify.signals.differentiators.differentiator import AbstractDifferentiator
 from identify.signals.masks.mask import AbstractMask
 from identify.signals.prefilters.prefilter import AbstractPrefilter
@@ -59,7 +60,7 @@ class Signals:
     def torque(self) -> Torque:
         """The prefiltered torque, aligned."""
         tau = self._prefiltered(self.log.tau * np.asarray(self.log.torque.gain))
-        return self.alignment.align(tau, self.log.torque, self.fs)
+        return self._aligned(tau)
 
     @cached_property
     def weight(self) -> Array:
@@ -74,10 +75,11 @@ class Signals:
 
     @cached_property
     def gain(self) -> float:
-        """Standard deviation of the derivative of white noise, over that of the noise [1/s]."""
-        impulse = np.zeros(2 * ceil(self.differentiator.halo(self.fs) * self.fs - 1e-9) + 1)
+        """Standard deviation of the velocities that white noise of the positions makes, over that of the noise [1/s]."""
+        reach = ceil((self.prefilter.halo(self.fs) + self.differentiator.halo(self.fs)) * self.fs - 1e-9)
+        impulse = np.zeros(6 * reach + 101)
         impulse[len(impulse) // 2] = 1.0
-        return float(np.linalg.norm(self.s(impulse)))
+        return float(np.linalg.norm(self.s(self.prefilter.apply(impulse, self.fs))))
 
     @property
     def reach(self) -> int:
@@ -90,12 +92,18 @@ class Signals:
         Both act alike at all times, so that their adjoint is what they do in reversed time (away from the ends of the log).
         """
         back = self.prefilter.apply(z[..., ::-1], self.fs)
-        return self.alignment.align(back, self.log.torque, self.fs).mean[..., ::-1]
+        return self._aligned(back).mean[..., ::-1]
 
     def position_adjoint(self, z: tuple[Array, Array, Array]) -> Array:
         """Return the adjoint of q -> (q, s q, s^2 q), prefilter included, at three signals of shape (..., time)."""
         back = [x[..., ::-1] for x in z]
         return self.prefilter.apply(back[0] + self.s(back[1] + self.s(back[2])), self.fs)[..., ::-1]
+
+    def _aligned(self, tau: Array) -> Torque:
+        torque = self.alignment.align(tau, self.log.torque, self.fs)
+        if not isinstance(torque, Torque):
+            raise PluginError(f"plug-in {type(self.alignment).__name__}.align returned {torque!r:.60}, expected a Torque")
+        return torque
 
     def _prefiltered(self, x: Array) -> Array:
         signal = np.ascontiguousarray(np.swapaxes(x, -1, -2))

@@ -1,6 +1,7 @@
 """The attribution of Table 2 beside its simulation: no bit depends on which process computed what."""
 
 import json
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -61,7 +62,11 @@ def test_a_run_that_fails_ends_the_process(short, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("experiments.paper.table2.simulate", fail)
-    table = Table2(short)
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt), closing(Table2(short)) as table:
         _ = table.run
     assert table._attribution._process.poll() is not None
+
+
+def test_where_no_process_can_begin_this_one_does_it_all(short, alone, monkeypatch):
+    monkeypatch.setattr(parallel_attribution.sys, "executable", "/nowhere/python")
+    assert_same(ParallelAttribution(short).errors(), alone)

@@ -97,4 +97,7 @@ class AbstractAlignment(ABC):
 
     @abstractmethod
     def align(self, tau: Array, channel: TorqueChannel, fs: float) -> Torque:
-        """Return the torque `tau` [N m], shape (..., joint, time), of `channel`, on the time of the columns."""
+        """Return the torque `tau` [N m], shape (..., time), of `channel`, on the time of the columns.
+
+        It acts along the last axis alone: leading axes may be joints, runs, or none, and an array may be empty.
+        """
