@@ -5,6 +5,7 @@ import scipy
 
 from identify.arrays import Array
 from identify.data.motion_log import MotionLog
+from identify.estimators.two_levels import two_levels
 from identify.judge.diagnosis import Instants
 from identify.rows.chain import Chain
 from identify.signals.signals import Signals
@@ -20,8 +21,6 @@ LEAST = 8
 
 FAINT = 1e-6
 """Frequencies at which a kind of noise is below this share of its largest say nothing of it."""
-
-ROUNDS = 10
 
 
 def row_noise(left: Instants, signals: Signals, chain: Chain) -> Array:
@@ -55,7 +54,7 @@ def row_noise(left: Instants, signals: Signals, chain: Chain) -> Array:
     above &= (kinds > FAINT * kinds.max(axis=1, keepdims=True)).any(axis=0)
     if np.count_nonzero(above) < LEAST:
         return np.full(len(S), np.nan)
-    levels = np.array([_levels(kinds[:, above], s[above]) for s in S])
+    levels = np.stack(two_levels(kinds[0, above], kinds[1, above], S[:, above]), axis=-1)
     return np.sqrt(scipy.integrate.trapezoid(levels @ kinds * passed**2, f, axis=-1))
 
 
@@ -73,15 +72,3 @@ def _gain(impulse: Array, f: Array, fs: float) -> Array:
     """Return the size of the frequency response of an impulse response."""
     _, response = scipy.signal.freqz(impulse, worN=f, fs=fs)
     return np.abs(response)
-
-
-def _levels(kinds: Array, S: Array) -> Array:
-    """Return the levels, not negative, whose sum of kinds is nearest to S, in proportion to itself."""
-    if not S.max() > 0:
-        return np.zeros(len(kinds))
-    model = np.maximum(S, FAINT * S.max())
-    scale = kinds.max(axis=1)
-    for _ in range(ROUNDS):
-        found, _ = scipy.optimize.nnls((kinds / scale[:, None] / model).T, S / model)
-        model = np.maximum(found @ (kinds / scale[:, None]), FAINT * S.max())
-    return np.asarray(found / scale)
