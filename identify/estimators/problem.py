@@ -1,6 +1,6 @@
 """What an estimator is given."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, Self
@@ -107,12 +107,12 @@ class Problem:
     @cached_property
     def factors(self) -> Factors:
         """Triangular factors of the rows as they are, one for each kind."""
-        return self._factors[0]
+        return self._long_factors[0] if self.long else self.rows.factors
 
     @cached_property
     def scaled_factors(self) -> Factors:
         """Triangular factors of the rows, divided by what their noise is relative to that of others of their kind."""
-        return self._factors[1]
+        return self._long_factors[1] if self.long else self._scaled(self.rows)
 
     @cached_property
     def explicit(self) -> "Problem":
@@ -239,18 +239,11 @@ class Problem:
         return len(self._together.time) / self._together.kinds / every
 
     @cached_property
-    def _factors(self) -> tuple[Factors, Factors]:
-        each = [(rows.factors, self._scaled(rows)) for rows in self._every()]
-        plain, scaled = zip(*each, strict=True)
+    def _long_factors(self) -> tuple[Factors, Factors]:
+        """Factors of long logs, plain and scaled, of which each piece is made once for both."""
+        made = (self._rows_of(self.chain.signals(log.part(*piece))) for log, piece in self._pieces)
+        plain, scaled = zip(*((rows.factors, self._scaled(rows)) for rows in made), strict=True)
         return Factors.merged(plain), Factors.merged(scaled)
-
-    def _every(self) -> Iterator[Rows]:
-        """Yield all rows, those of long logs piece by piece."""
-        if not self.long:
-            yield self.rows
-            return
-        for log, piece in self._pieces:
-            yield self._rows_of(self.chain.signals(log.part(*piece)))
 
     def _scaled(self, rows: Rows) -> Factors:
         return rows.factors if self.row_weights is None else rows.factors_of(self.row_weights.of(rows))
