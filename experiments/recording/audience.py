@@ -138,11 +138,6 @@ class Audience:
         thread.join(GOODBYE)
 
 
-def left_behind() -> bool:
-    """Return whether something still waits for a viewer that hangs, which would keep the process from ending."""
-    return any(thread.name == LEAVING for thread in threading.enumerate())
-
-
 def _until_interrupted() -> None:
     sys.stderr.write("idbench: done; served until Ctrl-C\n")
     try:

@@ -6,6 +6,7 @@ from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
+import numpy.typing as npt
 import scipy
 
 from identify.arrays import Array
@@ -64,7 +65,8 @@ class RowWeights:
         weights = [reciprocal_root(one, np.mean(every, axis=-1)) for one in variances]
         X = Factors.merged([part.factors_of(weight) for part, weight in zip(self.parts, weights, strict=True)]).fit().X
         squares = [(part.Y - part.predicted(X)) ** 2 for part in self.parts]
-        return floor_of(np.concatenate(squares, axis=-1), every)
+        valid = np.concatenate([part.valid for part in self.parts], axis=-1)
+        return floor_of(np.concatenate(squares, axis=-1), every, valid)
 
     def excess(self, X: Array, weights: Callable[[Rows], Array], free: Array) -> Array:
         """Return how many times the squares of weighted residuals are what noise makes of them, at least 1, shape (...).
@@ -97,7 +99,7 @@ class RowWeights:
         return rows.kernel.apply(found)
 
 
-def floor_of(squares: Array, variance: Array) -> Array:
+def floor_of(squares: Array, variance: Array, valid: npt.NDArray[np.bool_]) -> Array:
     """Return m b/a of the variances a v + b m that explain squared residuals best, m the mean of v, shape (...).
 
     v is what the noise of torques and positions makes of a row. What no noise is, such as cogging, or friction of another kind
@@ -110,10 +112,13 @@ def floor_of(squares: Array, variance: Array) -> Array:
         Squared residuals.
     variance : Array, shape (..., r)
         v.
+    valid : bool array, shape (..., r)
+        False for void rows, which say nothing.
     """
-    mean = np.mean(variance, axis=-1, keepdims=True)
+    count = np.maximum(np.sum(valid, axis=-1, keepdims=True), 1)
+    mean = np.sum(variance * valid, axis=-1, keepdims=True) / count
     u = np.divide(variance, mean, out=np.ones_like(variance), where=mean > 0)
-    a, b = two_levels(u, np.ones_like(u), squares)
+    a, b = two_levels(u * valid, np.where(valid, 1.0, 0.0), squares * valid)
     share = np.divide(b, a, out=np.full(a.shape, MOST), where=a > 0)
     return mean[..., 0] * np.clip(np.where(np.isfinite(share), share, 1.0), LEAST, MOST)
 

@@ -5,6 +5,8 @@ import pytest
 
 from identify.estimators.row_weights import LEAST, MOST, floor_of, reciprocal_root, rectified
 
+ALL = np.ones((200, 400), dtype=bool)
+
 
 @pytest.fixture
 def variance(rng):
@@ -15,21 +17,21 @@ def test_a_floor_is_found(variance, rng):
     """Over 200 runs of 400 rows each; the ratio of two fitted numbers is known to some per cent."""
     mean = variance.mean(axis=-1, keepdims=True)
     squares = (variance + 0.5 * mean) * rng.standard_normal(variance.shape) ** 2
-    assert np.median(floor_of(squares, variance) / mean[:, 0]) == pytest.approx(0.5, rel=0.1)
+    assert np.median(floor_of(squares, variance, ALL) / mean[:, 0]) == pytest.approx(0.5, rel=0.1)
 
 
 def test_pure_noise_has_next_to_none_and_equal_residuals_the_most(variance, rng):
     mean = variance.mean(axis=-1)
     noise = rng.standard_normal(variance.shape) ** 2
-    assert np.median(floor_of(variance * noise, variance) / mean) < 0.05
-    np.testing.assert_allclose(floor_of(np.ones_like(variance), variance), MOST * mean)
+    assert np.median(floor_of(variance * noise, variance, ALL) / mean) < 0.05
+    np.testing.assert_allclose(floor_of(np.ones_like(variance), variance, ALL), MOST * mean)
 
 
 def test_a_run_does_not_touch_the_others_and_bad_ones_have_a_value(variance):
     squares = variance.copy()
     squares[3] = np.nan
-    found = floor_of(squares, variance)
-    np.testing.assert_array_equal(found[7], floor_of(squares[7], variance[7]))
+    found = floor_of(squares, variance, ALL)
+    np.testing.assert_array_equal(found[7], floor_of(squares[7], variance[7], ALL[7]))
     assert np.isfinite(found).all()
     assert (found >= LEAST * variance.mean(axis=-1)).all()
 
@@ -45,3 +47,11 @@ def test_noise_is_rectified_where_it_is_larger_than_the_signal(rng):
     drawn = [np.mean(np.abs(one + n)) - abs(one) for one in x]
     np.testing.assert_allclose(rectified(x, np.array(0.7)), drawn, atol=3e-3)
     np.testing.assert_array_equal(rectified(x, np.array(0.0)), 0.0)
+
+
+def test_void_rows_say_nothing(variance, rng):
+    squares = (variance + variance.mean(axis=-1, keepdims=True)) * rng.standard_normal(variance.shape) ** 2
+    half = np.arange(variance.shape[-1]) % 2 == 0
+    valid = np.broadcast_to(half, variance.shape)
+    alone = floor_of(squares[:, half], variance[:, half], ALL[:, half])
+    np.testing.assert_allclose(floor_of(np.where(valid, squares, 0.0), variance, valid), alone, rtol=1e-9)
