@@ -54,7 +54,8 @@ class Signals:
         """Prefiltered positions and their derivatives."""
         q = self._prefiltered(self.log.q)
         expect(self.differentiator, "derivative", self.s(q), q.shape)
-        return State.of(q, self.s)
+        derivative, fs = self.differentiator.derivative, self.fs  # not self.s: a circle of references would outlive long pieces
+        return State.of(q, lambda x: derivative(x, fs))
 
     @cached_property
     def torque(self) -> Torque:
