@@ -11,7 +11,7 @@ from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.data.motion_log import MotionLog
 from identify.errors import IdentificationError, LogError
-from identify.estimators.noise_levels import noise_levels
+from identify.estimators.noise import noise_of
 from identify.estimators.row_weights import RowWeights
 from identify.models.explicit import ExplicitModel
 from identify.models.model import AbstractModel
@@ -19,7 +19,7 @@ from identify.rows.chain import Chain
 from identify.rows.factors import Factors, Fit
 from identify.rows.linearization import Linearization
 from identify.rows.long_logs import is_long, piece_of
-from identify.rows.noise_propagation import NoiseLevels, covariance
+from identify.rows.noise_propagation import NoisyRows
 from identify.rows.rows import Rows
 from identify.signals.signals import Signals
 
@@ -122,12 +122,11 @@ class Problem:
         return self._explicit or replace(self, model=ExplicitModel(), _signals=self.signals)
 
     @cached_property
-    def noise(self) -> NoiseLevels:
-        """The noise of torques and positions, as the explicit model's rows show it."""
+    def noise(self) -> NoisyRows:
+        """The noise of torques and positions, as the explicit model's rows show it, and what it makes of those of any model."""
         if self.explicit is not self:
             return self.explicit.noise
-        linear = [self.linear(signals) for signals in self.signals]
-        return noise_levels(self.parts, self._together.factors, self._fit, linear)
+        return noise_of(self.parts, self._together.factors, self._fit, self.linear)
 
     def linear(self, signals: Signals) -> Linearization:
         """Return the linearization of the explicit model about these signals."""
@@ -141,7 +140,7 @@ class Problem:
         """What rows are multiplied by where those of one kind differ in their noise; None if they are alike."""
         if all(part.alike for rows in self.parts for part in rows.maps):
             return None
-        return RowWeights(self.parts, self.model, self.noise, self.linear)
+        return RowWeights(self.parts, self.model, self.noise)
 
     def noise_covariance(self, influence: Influence) -> Array:
         """Return the covariance that the noise of the logs gives an estimate X = G' Y, shape (..., p, p).
@@ -155,7 +154,7 @@ class Problem:
         for part in self.parts if self.long else [self.rows]:
             G = influence(part)
             for k, rows in enumerate(part.maps):
-                total = total + covariance(rows, G[..., part.of_log(k), :], self.noise, self.linear(rows.signals))
+                total = total + self.noise.covariance(rows).of_sums(G[..., part.of_log(k), :])
         return total / self._share
 
     def excess(self, X: Array, weights: Callable[[Rows], Array]) -> Array:

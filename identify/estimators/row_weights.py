@@ -13,11 +13,10 @@ from identify.arrays import Array
 from identify.estimators.two_levels import two_levels
 from identify.models.model import AbstractModel
 from identify.rows.factors import Factors
-from identify.rows.linearization import Linearization, smoothed
-from identify.rows.noise_propagation import NoiseLevels, position_variance, torque_variance
+from identify.rows.linearization import smoothed
+from identify.rows.noise_propagation import NoisyRows
 from identify.rows.row_map import RowMap, in_order
 from identify.rows.rows import Rows
-from identify.signals.signals import Signals
 from identify.signals.state import State
 
 LEAST, MOST = 0.01, 10.0
@@ -34,16 +33,13 @@ class RowWeights:
         Rows of each log, or of some pieces.
     model : AbstractModel
         Theirs.
-    noise : NoiseLevels
+    noise : NoisyRows
         That of the logs.
-    linear : callable
-        Returns the explicit model's linearization about signals.
     """
 
     parts: tuple[Rows, ...]
     model: AbstractModel
-    noise: NoiseLevels
-    linear: Callable[[Signals], Linearization]
+    noise: NoisyRows
     _variances: WeakKeyDictionary[RowMap, Array] = field(default_factory=WeakKeyDictionary, repr=False)
 
     def of(self, rows: Rows) -> Array:
@@ -82,20 +78,18 @@ class RowWeights:
         return np.maximum(ratio, 1.0)
 
     def _variance(self, rows: RowMap) -> Array:
-        linear = self.linear(rows.signals)
-        variance = torque_variance(rows, self.noise.torque) + position_variance(rows, self.noise.position, linear)
-        return in_order(variance + self._at_rest(rows, linear) ** 2)
+        return self.noise.covariance(rows).variance + in_order(self._at_rest(rows) ** 2)
 
-    def _at_rest(self, rows: RowMap, linear: Linearization) -> Array:
+    def _at_rest(self, rows: RowMap) -> Array:
         """Return what noise of the velocities makes of the columns c where joints hardly move, shape (..., kind, count).
 
         Friction turns noise into power, Fs |qd|, of one sign: a bias, that of a velocity of E|qd + noise| - |qd|.
         """
-        signals, basis = rows.signals, linear.basis
-        speed = rectified(smoothed(signals.state.qd, signals.fs), self.noise.position[..., None] * signals.gain)
+        signals, linear = rows.signals, self.noise.linear(rows.signals)
+        speed = rectified(smoothed(signals.state.qd, signals.fs), self.noise.levels.position[..., None] * signals.gain)
         found = np.zeros(rows.inside.shape)
-        for (row, name), column in self.model.c(basis, State(signals.state.q, speed, signals.s)).items():
-            found[..., row, :] += column * linear.X[..., basis.names.index(name), None]
+        for (row, name), column in self.model.c(linear.basis, State(signals.state.q, speed, signals.s)).items():
+            found[..., row, :] += column * linear.X[..., linear.basis.names.index(name), None]
         return rows.kernel.apply(found)
 
 

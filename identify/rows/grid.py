@@ -40,9 +40,6 @@ class Grid:
 class Kernel:
     """The weights of the samples k - before, k - before + 1, ... in the row of sample k, for the rows of a grid.
 
-    Only the rows are computed: cut into frames of `step` samples, each is the sum of a few neighbouring frames, multiplied with
-    their parts of the weights. (Nine times faster than `scipy.signal.upfirdn`.)
-
     Parameters
     ----------
     weights : Array, shape (length,)
@@ -57,36 +54,41 @@ class Kernel:
     before: int
     grid: Grid
 
-    @property
-    def _parts(self) -> Array:
-        """The weights in frames, shape (frame of a row, step), padded with zeros."""
-        step = self.grid.step
-        return np.pad(self.weights, (0, -len(self.weights) % step)).reshape(-1, step)
-
     def apply(self, x: Array) -> Array:
         """Return the weighted sums of `x`, shape (..., time), at the rows, shape (..., count)."""
-        parts, count = self._parts, self.grid.count
-        frames = count + len(parts) - 1
-        start, length = self.grid.first - self.before, frames * self.grid.step
-        stretch = x[..., start : start + length]
-        if stretch.shape[-1] < length:  # beyond the last row's weights, where the parts are zero
-            stretch = np.pad(stretch, [(0, 0)] * (x.ndim - 1) + [(0, length - stretch.shape[-1])])
-        cut = np.swapaxes(stretch.reshape(*x.shape[:-1], frames, self.grid.step), -1, -2)
-        products = np.matmul(parts, cut)
-        sums = products[..., 0, :count].copy()
-        for i in range(1, len(parts)):
-            sums += products[..., i, i : i + count]
-        return sums
+        return windowed(x[..., None, :], self.weights[None, None], self.before, self.grid)[..., 0, :]
 
-    def adjoint(self, rows: Array, samples: int) -> Array:
-        """Return what each of `samples` samples counts for in sums of `rows`, shape (..., count), over the rows."""
-        parts, count, start = self._parts, self.grid.count, self.grid.first - self.before
-        beside = len(parts) - 1
-        padded = np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(beside, beside)])
-        # Frame f is made of the rows f - beside ... f, the last with the first part of the weights.
-        near = np.stack([padded[..., i : i + count + beside] for i in range(len(parts))], axis=-1)
-        frames = np.matmul(near, parts[::-1])
-        spread = np.zeros((*rows.shape[:-1], samples))
-        end = min(samples, start + (count + beside) * self.grid.step)
-        spread[..., start:end] = frames.reshape(*rows.shape[:-1], -1)[..., : end - start]
-        return spread
+
+def windowed(x: Array, weights: Array, before: int, grid: Grid) -> Array:
+    """Return weighted sums, over all `s` and the samples k - before ..., at the rows of a grid, shape (..., sum, count).
+
+    Only the rows are computed: cut into frames of `step` samples, each is the sum of a few neighbouring frames, multiplied with
+    their parts of the weights. (Nine times faster than `scipy.signal.upfirdn`.)
+
+    Parameters
+    ----------
+    x : Array, shape (..., s, time)
+        Signals.
+    weights : Array, shape (sum, s, length)
+        What they are multiplied by.
+    before : int
+        Samples ahead of the row's own that the weights begin.
+    grid : Grid
+        The rows.
+    """
+    sums, count, step = len(weights), grid.count, grid.step
+    parts = -(-weights.shape[-1] // step)
+    frames = count + parts - 1
+    start, length = grid.first - before, frames * step
+    stretch = x[..., start : start + length]
+    if stretch.shape[-1] < length:  # beyond the last row's weights, where the parts are zero
+        stretch = np.pad(stretch, [(0, 0)] * (x.ndim - 1) + [(0, length - stretch.shape[-1])])
+    cut = np.swapaxes(stretch.reshape(*x.shape[:-1], frames, step), -1, -2).reshape(*x.shape[:-2], -1, frames)
+    padded = np.zeros((*weights.shape[:2], parts * step))
+    padded[..., : weights.shape[-1]] = weights
+    split = np.swapaxes(padded.reshape(sums, -1, parts, step), 1, 2).reshape(sums * parts, -1)
+    products = np.matmul(split, cut).reshape(*x.shape[:-2], sums, parts, frames)
+    total = products[..., 0, :count].copy()
+    for i in range(1, parts):
+        total += products[..., i, i : i + count]
+    return total

@@ -1,4 +1,4 @@
-"""The linear map from samples to rows, and its adjoint."""
+"""The linear map from samples to rows."""
 
 from dataclasses import dataclass, replace
 from typing import Protocol, Self
@@ -15,9 +15,6 @@ class Window(Protocol):
 
     def apply(self, x: Array) -> Array:
         """Return the sums of `x`, shape (..., time), shape (..., count)."""
-
-    def adjoint(self, rows: Array, samples: int) -> Array:
-        """Return the adjoint at `rows`, shape (..., count), for `samples` samples."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,29 +72,26 @@ class RowMap:
 
     def unmasked(self) -> Self:
         """Return the map as if nothing were masked."""
+        if (self.inside == 1).all() and (self.outside == 1).all():
+            return self
         return replace(self, inside=np.ones_like(self.inside), outside=np.ones_like(self.outside))
 
     def measurement(self, y: Array) -> Array:
         """Return the rows of B tau, shape (..., kind, time), in the order of Y, shape (..., r)."""
         return in_order(self.outside * self.kernel.apply(self.inside * y))
 
-    def adjoint(self, G: Array) -> tuple[Array, Array | None]:
-        """Return the adjoint of K at sums of rows: what every sample of c, and of e, counts for in them.
-
-        Parameters
-        ----------
-        G : Array, shape (..., rows, m)
-            Weights of the rows in m sums.
-
-        Returns
-        -------
-        tuple of Array
-            Shape (..., m, kind, time) each; None for e without a rate kernel, as s e counts like c.
-        """
-        (*runs, kinds, count), samples = self.outside.shape, self.inside.shape[-1]
-        rows = np.moveaxis(G.reshape(*runs, count, kinds, G.shape[-1]), (-3, -1), (-1, -3)) * self.outside[..., None, :, :]
-        of_c = self.kernel.adjoint(rows, samples) * self.inside[..., None, :, :]
-        return of_c, None if self.rate_kernel is None else self.rate_kernel.adjoint(rows, samples)
+    def noisy_as(self, other: Self) -> bool:
+        """Return whether noise of the log reaches these rows as it does those of the map of another model."""
+        if self is other:
+            return True
+        if (
+            self.signals is not other.signals
+            or self.grid != other.grid
+            or not (self.alike and other.alike and self.B == other.B)
+        ):
+            return False
+        plain = self.rate_kernel is None and other.rate_kernel is None
+        return plain and np.array_equal(self.inside, other.inside) and np.array_equal(self.outside, other.outside)
 
 
 def in_order(x: Array) -> Array:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -70,7 +70,7 @@ class Rows:
         """Number of rows of every kind that are not void, shape (..., kind)."""
         return np.sum(self.by_kind(self.valid), axis=-1)
 
-    def by_kind(self, x: npt.NDArray[np.generic]) -> npt.NDArray[np.generic]:
+    def by_kind(self, x: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return values of all rows, shape (..., r), as (..., kind, instant)."""
         return np.swapaxes(x.reshape(*x.shape[:-1], -1, self.kinds), -1, -2)
 

@@ -14,7 +14,6 @@ from identify import (
     Estimate,
     FirLowPass,
     MotionLog,
-    NoiseLevels,
     NoPrefilter,
     Problem,
     TorqueChannel,
@@ -25,7 +24,7 @@ from identify import (
     scara,
 )
 from identify.rows.linearization import Linearization
-from identify.rows.noise_propagation import covariance, position_variance, torque_variance
+from identify.rows.noise_propagation import position_covariance, torque_covariance
 
 TRUTH = (3.5, 0.05, 0.5, 0.06, 0.12, 0.005, 0.01, 0.1)
 
@@ -52,11 +51,10 @@ def test_noise_of_the_torque_in_rows_out(operator, model, channel, log, rng):
     plain = rows_of(replace(log, torque=channel), model, chain)
     noisy = rows_of(MotionLog(log.fs, np.broadcast_to(log.q, draws.shape), log.tau + draws, channel), model, chain)
     G = rng.standard_normal((len(plain.Y), 3))
-    levels = NoiseLevels(np.array([0.3, 0.1]), np.zeros(2))
-    predicted = covariance(plain.maps[0], G, levels, linear(plain))
+    C = torque_covariance(plain.maps[0], np.array([0.3, 0.1]))
     made = (noisy.Y - plain.Y) @ G
-    np.testing.assert_allclose(np.sqrt(np.diag(predicted)), np.std(made, axis=0), rtol=0.15)
-    variance = np.swapaxes(torque_variance(plain.maps[0], levels.torque), -1, -2).reshape(-1)
+    np.testing.assert_allclose(np.sqrt(np.diag(C.of_sums(G))), np.std(made, axis=0), rtol=0.15)
+    variance = C.variance
     seen = plain.valid & (variance > 0.01 * variance.max())
     assert np.mean(np.var(noisy.Y - plain.Y, axis=0)[seen] / variance[seen]) == pytest.approx(1, abs=0.05)
 
@@ -77,10 +75,9 @@ def test_noise_of_the_positions_in_rows_out(operator, model, channel, log, truth
     noisy = rows_of(MotionLog(log.fs, draws, np.broadcast_to(log.tau, draws.shape), channel), model, chain)
     error = noisy.Y - noisy.W @ truth - (plain.Y - plain.W @ truth)
     G = rng.standard_normal((len(plain.Y), 3))
-    levels = NoiseLevels(np.zeros(2), level)
-    predicted = covariance(plain.maps[0], G, levels, linear(plain))
-    np.testing.assert_allclose(np.sqrt(np.diag(predicted)), np.std(error @ G, axis=0), rtol=0.17)
-    variance = np.swapaxes(position_variance(plain.maps[0], level, linear(plain)), -1, -2).reshape(-1)
+    C = position_covariance(plain.maps[0], level, linear(plain))
+    np.testing.assert_allclose(np.sqrt(np.diag(C.of_sums(G))), np.std(error @ G, axis=0), rtol=0.17)
+    variance = C.variance
     seen = plain.valid & (variance > 0.01 * variance.max())
     assert np.median(np.var(error, axis=0)[seen] / variance[seen]) == pytest.approx(1, abs=0.2)
 
@@ -96,21 +93,30 @@ def test_a_prefilter_is_counted_too(log, rng):
     plain = rows_of(log, "explicit", chain)
     noisy = rows_of(MotionLog(log.fs, np.broadcast_to(log.q, draws.shape), log.tau + draws, log.torque), "explicit", chain)
     G = rng.standard_normal((len(plain.Y), 3))
-    predicted = covariance(plain.maps[0], G, NoiseLevels(np.ones(2), np.zeros(2)), linear(plain))
+    predicted = torque_covariance(plain.maps[0], np.ones(2)).of_sums(G)
     np.testing.assert_allclose(np.sqrt(np.diag(predicted)), np.std((noisy.Y - plain.Y) @ G, axis=0), rtol=0.15)
 
 
-@pytest.mark.parametrize("operator", OPERATORS.builtin)
-@pytest.mark.parametrize("model", MODELS.builtin)
-def test_the_adjoint_is_that_of_the_map(operator, model, log, rng):
-    """<K x, g> = <x, K' g>, by the rows of B tau, which are linear in it, away from the ends of the log."""
-    rows = rows_of(log, model, replace(idbench_chain(), operator=OPERATORS.create(operator))).maps[0]
-    kinds, samples = rows.inside.shape
-    inner = np.zeros(samples)
-    inner[700:-700] = 1.0
-    y, g = inner * rng.standard_normal((kinds, samples)), rng.standard_normal((rows.rows, 1))
-    left, right = rows.measurement(y) @ g[:, 0], np.sum(rows.adjoint(g)[0][0] * y)
-    assert left == pytest.approx(right, rel=1e-9)
+def test_a_banded_covariance_is_that_of_its_sums(log, rng):
+    """Against the whole matrix, put together from the bands: sums of rows, variances, and the expected spectrum by its sum."""
+    plain = rows_of(log, "implicit", idbench_chain())
+    C = torque_covariance(plain.maps[0], np.array([0.3, 0.1])) + position_covariance(
+        plain.maps[0], np.full(2, 1e-4), linear(plain)
+    )
+    lags, count, kinds = C.bands.shape[:3]
+    whole = np.zeros((count, kinds, count, kinds))
+    for lag in range(lags):
+        for i in range(count - lag):
+            whole[i, :, i + lag], whole[i + lag, :, i] = C.bands[lag, i], C.bands[lag, i].T
+    whole = whole.reshape(count * kinds, -1)
+    G = rng.standard_normal((len(plain.Y), 3))
+    np.testing.assert_allclose(C.of_sums(G), G.T @ whole @ G, rtol=1e-9)
+    np.testing.assert_allclose(C.variance, np.diag(whole), rtol=1e-12)
+    one = whole[::kinds, ::kinds]
+    DFT = np.fft.fft(np.eye(count), 2 * count)[:, : count + 1]
+    np.testing.assert_allclose(C.spectrum[0], np.diag(DFT.conj().T @ one @ DFT).real, rtol=1e-6, atol=1e-9 * C.spectrum.max())
+    seen = plain.valid.nonzero()[0]
+    assert np.linalg.eigvalsh(whole[np.ix_(seen, seen)]).min() > 0
 
 
 @pytest.mark.parametrize("bits", [12, 14, 16])
@@ -119,7 +125,7 @@ def test_the_noise_of_an_encoder_is_found(bits, log):
     so leave less in the rows, by up to a fifth at 16 bits, than white noise does."""
     step = 2 * np.pi / 2**bits
     counted = MotionLog(log.fs, np.round(log.q / step) * step, log.tau, log.torque)
-    found = Problem((counted,), scara(), EVERY["explicit"], idbench_chain()).noise.position
+    found = Problem((counted,), scara(), EVERY["explicit"], idbench_chain()).noise.levels.position
     np.testing.assert_allclose(found, step / np.sqrt(12), rtol=0.2)
 
 
@@ -131,15 +137,16 @@ def test_torque_noise_is_found_beside_stronger_noise_of_the_positions(log):
     q, tau = (x + s * rng.standard_normal((60, *x.shape)) for x, s in ((log.q, 2.8e-5), (log.tau, sigma)))
     chain = replace(idbench_chain(), operator=FirLowPass(10.0, 10.0))
     problem = Problem((MotionLog(log.fs, q, tau, log.torque),), scara(), EVERY["explicit"], chain)
-    parts = problem.parts[0].maps[0], problem.linear(problem.signals[0])
-    of_torque = torque_variance(parts[0], problem.noise.torque).sum(axis=-1)
-    assert (of_torque < position_variance(parts[0], problem.noise.position, parts[1]).sum(axis=-1)).all()
-    assert (np.abs(np.log2(np.median(problem.noise.torque, axis=0) / sigma)) < 1).all()
+    rows, levels = problem.rows, problem.noise.levels
+    of_torque = torque_covariance(rows.maps[0], levels.torque).variance
+    of_position = position_covariance(rows.maps[0], levels.position, problem.linear(problem.signals[0])).variance
+    assert (rows.by_kind(of_torque).sum(axis=-1) < rows.by_kind(of_position).sum(axis=-1)).all()
+    assert (np.abs(np.log2(np.median(levels.torque, axis=0) / sigma)) < 1).all()
 
 
 def test_a_log_without_noise_of_its_positions_has_none(log):
     """What is left of a motion after six differences is below a thousandth of a 16-bit encoder's noise."""
-    found = Problem((log,), scara(), EVERY["explicit"], idbench_chain()).noise.position
+    found = Problem((log,), scara(), EVERY["explicit"], idbench_chain()).noise.levels.position
     assert (found < 1e-3 * 2 * np.pi / 2**16 / np.sqrt(12)).all()
 
 
@@ -197,7 +204,7 @@ def test_the_corrected_sigma_is_the_scatter(sigma, estimator, log):
 def test_the_level_of_each_joint_is_found(log, mask):
     """From some 280 rows a level is known to 4 %; the mean of 300 to 0.3 %, 1 % is left to the leverage of correlated rows."""
     chain = replace(idbench_chain(), mask=MASKS.create(mask))
-    levels = identify(noisy(log, (0.5, 0.025)), scara(), EVERY["power"], chain).problem.noise.torque
+    levels = identify(noisy(log, (0.5, 0.025)), scara(), EVERY["power"], chain).problem.noise.levels.torque
     np.testing.assert_allclose(np.sqrt(np.mean(levels**2, axis=0)), (0.5, 0.025), rtol=0.013)
     assert levels.std(axis=0) / levels.mean(axis=0) == pytest.approx(0.045, abs=0.015)
 
@@ -215,7 +222,7 @@ def test_what_comes_before_the_operator_is_not_counted_twice(log, operator, pref
     """
     chain = replace(idbench_chain(), prefilter=prefilter, operator=OPERATORS.create(operator))
     found = identify(noisy(replace(log, torque=channel), (300.0, 300.0), 100), scara(), EVERY["explicit"], chain)
-    np.testing.assert_allclose(np.sqrt(np.mean(found.problem.noise.torque**2, axis=0)), 300.0, rtol=0.04)
+    np.testing.assert_allclose(np.sqrt(np.mean(found.problem.noise.levels.torque**2, axis=0)), 300.0, rtol=0.04)
     rms = np.sqrt(np.mean(found.corrected_sigma**2, axis=0))
     np.testing.assert_allclose(rms, found.X.std(axis=0), rtol=0.28)  # four times what 100 draws leave
 
@@ -228,10 +235,7 @@ def test_two_logs_are_worth_two(log):
     parts = [influence[..., double.rows.of_log(k), :] for k in (0, 1)]
     np.testing.assert_array_equal(*parts)
     whole = double.problem.noise_covariance(double.influence)
-    half = sum(
-        covariance(rows, G, double.problem.noise, double.problem.linear(rows.signals))
-        for rows, G in zip(double.rows.maps[:1], parts[:1], strict=True)
-    )
+    half = double.problem.noise.covariance(double.rows.maps[0]).of_sums(parts[0])
     np.testing.assert_allclose(whole, 2 * half, rtol=1e-9)
     np.testing.assert_allclose(2 * double.corrected_covariance, single.corrected_covariance, rtol=0.1)
 

@@ -60,7 +60,7 @@ class IirLowPass(AbstractLowPass):
 
 @dataclass(frozen=True, eq=False)
 class _Recursion:
-    """A filter run forward and backward, which is its own adjoint."""
+    """A filter run forward and backward."""
 
     sections: Array
     grid: Grid
@@ -68,12 +68,6 @@ class _Recursion:
     def apply(self, x: Array) -> Array:
         """Return the filtered samples of the grid."""
         return forward_backward(self.sections, x)[..., self.grid.samples]
-
-    def adjoint(self, rows: Array, samples: int) -> Array:
-        """Return `rows` as samples, with zeros between them, filtered."""
-        spread = np.zeros((*rows.shape[:-1], samples))
-        spread[..., self.grid.samples] = rows
-        return forward_backward(self.sections, spread)
 
 
 @lru_cache(maxsize=16)

@@ -1,15 +1,16 @@
 """The noise of a log: of positions from their differences, of torques from what the explicit model leaves over."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import comb
 
 import numpy as np
 
 from identify.arrays import Array
 from identify.estimators.two_levels import two_levels
+from identify.rows.banded import BandedCovariance
 from identify.rows.factors import Factors, Fit, Status
 from identify.rows.linearization import Linearization
-from identify.rows.noise_propagation import NoiseLevels, correlations, position_parts, torque_variance, torque_window
+from identify.rows.noise_propagation import NoiseLevels, NoisyRows, position_covariance, torque_covariance
 from identify.rows.rows import Rows
 from identify.signals.signals import Signals
 from identify.signals.stencils import slide
@@ -24,17 +25,14 @@ LEAST = 32
 """Samples that it takes to estimate the noise of positions."""
 
 
-def noise_levels(parts: Sequence[Rows], factors: Factors, fit: Fit, linear: Sequence[Linearization]) -> NoiseLevels:
-    """Return the noise of logs as the rows of their explicit model show it.
+def noise_of(parts: Sequence[Rows], factors: Factors, fit: Fit, linear: Callable[[Signals], Linearization]) -> NoisyRows:
+    """Return the noise of logs as the rows of their explicit model show it, NaN in runs that cannot be solved.
 
     How much of the squared residuals of a joint is noise of the torque, and how much that of positions, their spectrum says: it
     is explained, as well as may be, by a T(f) + b P(f), with T what white noise of the torques leaves in these rows, and P what
     that of the positions does. (P lies at high frequencies, where a motion tells little: a small error of P would be a large
     one of the rest.) White noise of variance sigma^2 gives row i the variance sigma^2 v_i, of which the fit takes the share
     l_i, its leverage, so that sigma^2 = squares / sum of v_i (1 - l_i). What the model does not explain counts as noise, too.
-
-    If the squares less those that the positions' noise should make are more than that, they are taken: rather too much than too
-    little, up to twice the torque's noise in bands beyond 10 Hz.
 
     Parameters
     ----------
@@ -44,47 +42,43 @@ def noise_levels(parts: Sequence[Rows], factors: Factors, fit: Fit, linear: Sequ
         Of all these rows.
     fit : Fit
         Their weighted least-squares solution.
-    linear : sequence of Linearization
-        Of the explicit model, log by log.
-
-    Returns
-    -------
-    NoiseLevels
-        NaN in runs that cannot be solved.
+    linear : callable
+        Returns the linearization of the explicit model about signals.
     """
-    position = position_noise([one.signals for one in linear])
-    found = [_part(rows, rows.Y - rows.predicted(fit.X), position, there) for rows, there in zip(parts, linear, strict=True)]
-    white, made, *spectra = (np.concatenate(each, axis=-1) for each in zip(*found, strict=True))
-    a, b = two_levels(*spectra)
-    of_torque, of_position = a * np.sum(white, axis=-1), b * np.sum(made, axis=-1)
-    squares, made = factors.squares(fit.X), np.sum(made, axis=-1)
-    share = np.divide(of_torque, of_torque + of_position, out=np.ones_like(of_torque), where=of_torque + of_position > 0)
-    rest = np.maximum(share * squares, squares - made)
-    free = np.sum(white, axis=-1) - _leverage(factors, fit) * white.max(axis=-1)
-    variance = np.divide(rest, free, out=np.full(free.shape, np.nan), where=free > 0)
-    most = np.minimum(1.0, np.divide(squares, made, out=np.ones_like(squares), where=made > 0))
-    shown = np.nan_to_num(made / np.where(squares > 0, squares, np.nan)) > NEGLIGIBLE
-    return NoiseLevels(np.sqrt(variance), np.where(shown.any(axis=-1, keepdims=True), position * np.sqrt(most), 0.0))
+    maps = [rows.maps[0] for rows in parts]
+    position = position_noise([each.signals for each in maps])
+    white = [torque_covariance(each, np.ones_like(position)) for each in maps]
+    made = [position_covariance(each, position, linear(each.signals)) for each in maps]
+    squares, of_position = factors.squares(fit.X), np.sum(_by_kind(parts, made), axis=-1)
+    shown = np.nan_to_num(of_position / np.where(squares > 0, squares, np.nan)) > NEGLIGIBLE
+    rest = np.where(shown, _torque_share(parts, fit.X, white, made), 1.0) * squares
+    of_torque = _by_kind(parts, white)
+    free = np.sum(of_torque, axis=-1) - _leverage(factors, fit) * of_torque.max(axis=-1)
+    torque = np.sqrt(np.divide(rest, free, out=np.full(free.shape, np.nan), where=free > 0))
+    most = np.minimum(1.0, np.divide(squares, of_position, out=np.ones_like(squares), where=of_position > squares))
+    levels = NoiseLevels(torque, np.where(shown.any(axis=-1, keepdims=True), position * np.sqrt(most), 0.0))
+    found = NoisyRows(levels, linear)
+    if np.array_equal(levels.position, position):
+        found.known.update((each, w.scaled(torque) + m) for each, w, m in zip(maps, white, made, strict=True))
+    return found
 
 
-def _part(rows: Rows, residual: Array, position: Array, linear: Linearization) -> tuple[Array, ...]:
-    """Return variances of rows by unit noise of torques and by that of positions, their spectra, and the residual's."""
-    to_rows, step = rows.maps[0], rows.maps[0].grid.step
-    white = torque_variance(to_rows, np.ones_like(position))
-    made = position_parts(to_rows, position, linear)
-    of_torque = _spectrum(white, correlations(torque_window(to_rows), step))
-    of_position = sum(_spectrum(np.maximum(variance, 0.0), correlations(window, step)) for variance, window in made)
-    rho = rows.by_kind(residual)
-    seen = np.abs(np.fft.rfft(rho, 2 * rho.shape[-1])) ** 2
-    return white, np.maximum(sum(variance for variance, _ in made), 0.0), of_torque, np.asarray(of_position), seen
+def _by_kind(parts: Sequence[Rows], covariances: Sequence[BandedCovariance]) -> Array:
+    """Return the variances of rows, shape (..., kind, instant)."""
+    return np.concatenate([rows.by_kind(C.variance) for rows, C in zip(parts, covariances, strict=True)], axis=-1)
 
 
-def _spectrum(variance: Array, correlation: Array) -> Array:
-    """Return the expected |DFT|^2, at twice as many frequencies, of rows with these variances and correlations over rows."""
-    n = variance.shape[-1]
-    pairs = np.fft.irfft(np.abs(np.fft.rfft(np.sqrt(variance), 2 * n)) ** 2, 2 * n)[..., :n]
-    lags = pairs * np.pad(correlation[:n], (0, max(0, n - len(correlation))))
-    return np.maximum(2 * np.fft.rfft(lags, 2 * n).real - lags[..., :1], 0.0)
+def _torque_share(
+    parts: Sequence[Rows], X: Array, white: Sequence[BandedCovariance], made: Sequence[BandedCovariance]
+) -> Array:
+    """Return the share of the squared residuals that noise of the torque makes, as their spectrum says, shape (..., kind)."""
+    residuals = [rows.by_kind(rows.Y - rows.predicted(X)) for rows in parts]
+    seen = np.concatenate([np.abs(np.fft.rfft(rho, 2 * rho.shape[-1])) ** 2 for rho in residuals], axis=-1)
+    T, P = (np.concatenate([C.spectrum for C in each], axis=-1) for each in (white, made))
+    a, b = two_levels(T, P, seen)
+    of_torque, of_position = a * np.sum(_by_kind(parts, white), axis=-1), b * np.sum(_by_kind(parts, made), axis=-1)
+    both = of_torque + of_position
+    return np.divide(of_torque, both, out=np.ones_like(both), where=both > 0)
 
 
 def _leverage(factors: Factors, fit: Fit) -> Array:

@@ -1,0 +1,97 @@
+"""The covariance of rows, of which only those near each other in time are correlated."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from identify.arrays import Array
+from identify.rows.grid import Grid, windowed
+
+
+@dataclass(frozen=True, eq=False)
+class BandedCovariance:
+    """Covariance C of the rows of one log. Leading axes are runs.
+
+    Parameters
+    ----------
+    bands : Array, shape (..., lag, instant, kind, kind)
+        Covariance of the row of a kind at an instant with that of another kind `lag` instants later.
+    """
+
+    bands: Array
+
+    @classmethod
+    def of(cls, grid: Grid, windows: Sequence[Array], signals: Sequence[Array], outside: Array) -> Self:
+        """Return the covariance of rows that are sums over unit white noise n of several sources:
+
+            row of sample k = outside sum over sources and t of n(t) sum over d of windows[d](t - k) signals[d](t)
+
+        Parameters
+        ----------
+        grid : Grid
+            The rows.
+        windows : sequence of Array, shape (length,)
+            With the sample of a row in the middle.
+        signals : sequence of Array, shape (..., kind, source, time)
+            As many.
+        outside : Array, shape (..., kind, instant)
+            Weights of the rows.
+        """
+        early, G, found = np.stack(windows), np.stack(signals), []
+        terms, length = early.shape
+        before, lags = (length - 1) // 2, min(grid.count, -(-length // grid.step))
+        late = np.zeros((lags, terms, length))
+        for lag, window in enumerate(late):
+            window[:, lag * grid.step :] = early[:, : length - lag * grid.step]
+        products = (early[:, None] * late[:, None]).reshape(lags, -1, length)
+        for kind in range(G.shape[-3]):  # all at once would take too much memory
+            pairs = np.einsum("d...st,e...bst->...bdet", G[..., kind, :, :], G)
+            found.append(windowed(pairs.reshape(*pairs.shape[:-3], -1, pairs.shape[-1]), products, before, grid))
+        bands = np.moveaxis(np.stack(found, axis=-4), (-4, -3), (-2, -1))
+        beyond = np.concatenate([outside, np.zeros((*outside.shape[:-1], lags - 1))], axis=-1)  # no row is later than the last
+        later = np.moveaxis(sliding_window_view(beyond, grid.count, axis=-1), -3, -1)
+        return cls(bands * np.swapaxes(outside, -1, -2)[..., None, :, :, None] * later[..., None, :])
+
+    def __add__(self, other: Self) -> Self:
+        few, many = sorted((self.bands, other.bands), key=lambda bands: bands.shape[-4])
+        total = many.copy()
+        total[..., : few.shape[-4], :, :, :] += few
+        return type(self)(total)
+
+    def scaled(self, level: Array) -> Self:
+        """Return the covariance of rows multiplied by a level for each kind, shape (..., kind)."""
+        return type(self)(self.bands * (level[..., :, None] * level[..., None, :])[..., None, None, :, :])
+
+    @property
+    def variance(self) -> Array:
+        """Variance of every row, in the order of Y: by time, then kind, shape (..., r)."""
+        own = np.diagonal(self.bands[..., 0, :, :, :], axis1=-2, axis2=-1)
+        return own.reshape(*own.shape[:-2], -1)
+
+    @property
+    def spectrum(self) -> Array:
+        """Expected |DFT|^2 of the rows of every kind, at twice as many frequencies, shape (..., kind, frequency)."""
+        lags, count = self.bands.shape[-4:-2]
+        sums = np.diagonal(np.sum(self.bands, axis=-3), axis1=-2, axis2=-1)
+        correlations = np.zeros((*sums.shape[:-2], sums.shape[-1], 2 * count))
+        correlations[..., :lags] = np.swapaxes(sums, -1, -2)
+        return np.maximum(2 * np.fft.rfft(correlations).real - correlations[..., :1], 0.0)
+
+    def of_sums(self, G: Array) -> Array:
+        """Return G' C G, shape (..., m, m): the covariance of sums of rows with weights G, shape (..., r, m)."""
+        lags, count, kinds = self.bands.shape[-4:-1]
+        G = G.reshape(*G.shape[:-2], count, kinds, G.shape[-1])
+        total = np.zeros(())
+        for lag in range(lags):
+            later = np.matmul(self.bands[..., lag, : count - lag, :, :], G[..., lag:, :, :])
+            sums = np.matmul(np.swapaxes(_flat(G[..., : count - lag, :, :]), -1, -2), _flat(later))
+            total = total + (sums + np.swapaxes(sums, -1, -2) if lag else sums)
+        return total
+
+
+def _flat(x: Array) -> Array:
+    """Return an array of shape (..., instant, kind, m) as (..., rows, m)."""
+    return x.reshape(*x.shape[:-3], -1, x.shape[-1])
