@@ -1,6 +1,6 @@
 """The array type that every stage shares."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -14,6 +14,13 @@ Columns: TypeAlias = Mapping[tuple[int, str], Array]
 Multipliers: TypeAlias = Mapping[tuple[int, int], Array | float]
 """B of a model, where it is not 0: (row of an instant, joint) -> what the row multiplies the torque of the joint by: a signal
 (..., time), or a constant."""
+
+
+def combined(columns: Columns, names: Sequence[str], X: Array, total: Array) -> Array:
+    """Add columns times their parameters X, shape (..., p), of these names, to `total`, shape (..., row, time); return it."""
+    for (row, name), column in columns.items():
+        total[..., row, :] += column * X[..., names.index(name), None]
+    return total
 
 
 def frozen(values: npt.ArrayLike) -> Array:

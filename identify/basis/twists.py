@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from functools import cached_property
 from typing import NamedTuple
+from weakref import proxy
 
 import numpy as np
 
@@ -96,7 +97,7 @@ class Twists:
     """
 
     def __init__(self, tree: KinematicTree, state: State) -> None:
-        self._tree, self._state = tree, state
+        self._tree, self._state = tree, proxy(state)  # the state keeps its twists: a circle would outlive long logs' pieces
         self._placements = [Placement(joint, state.q[..., j, :]) for j, joint in enumerate(tree.joints)]
 
     def _links(self) -> Iterator[tuple[int, int, Placement]]:

@@ -150,12 +150,15 @@ class Problem:
         influence : callable
             Returns G, shape (..., rows, p), of rows of this problem.
         """
-        total = np.zeros(())
+        total, bias = np.zeros(()), np.zeros(())
         for part in self.parts if self.long else [self.rows]:
             G = influence(part)
             for k, rows in enumerate(part.maps):
-                total = total + self.noise.covariance(rows).of_sums(G[..., part.of_log(k), :])
-        return total / self._share
+                own = G[..., part.of_log(k), :]
+                total = total + self.noise.covariance(rows).of_sums(own)
+                if self.row_weights is not None:
+                    bias = bias + np.matmul(np.swapaxes(own, -1, -2), self.row_weights.bias(rows)[..., None]) / self._share
+        return total / self._share + np.matmul(bias, np.swapaxes(bias, -1, -2)) if bias.ndim else total / self._share
 
     def excess(self, X: Array, weights: Callable[[Rows], Array]) -> Array:
         """Return how many times the squares of weighted residuals are what noise makes of them, at least 1, shape (...).

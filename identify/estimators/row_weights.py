@@ -9,13 +9,13 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from identify.arrays import Array
+from identify.arrays import Array, combined
 from identify.estimators.two_levels import two_levels
 from identify.models.model import AbstractModel
 from identify.rows.factors import Factors
 from identify.rows.linearization import smoothed
 from identify.rows.noise_propagation import NoisyRows
-from identify.rows.row_map import RowMap, in_order
+from identify.rows.row_map import RowMap
 from identify.rows.rows import Rows
 from identify.signals.state import State
 
@@ -77,20 +77,18 @@ class RowWeights:
         ratio = np.divide(squares, expected * free, out=np.ones_like(squares), where=expected > 0)
         return np.maximum(ratio, 1.0)
 
-    def _variance(self, rows: RowMap) -> Array:
-        return self.noise.covariance(rows).variance + in_order(self._at_rest(rows) ** 2)
+    def bias(self, rows: RowMap) -> Array:
+        """Return what noise of the velocities makes of W X where joints hardly move, shape (..., r).
 
-    def _at_rest(self, rows: RowMap) -> Array:
-        """Return what noise of the velocities makes of the columns c where joints hardly move, shape (..., kind, count).
-
-        Friction turns noise into power, Fs |qd|, of one sign: a bias, that of a velocity of E|qd + noise| - |qd|.
+        Friction turns noise into power, Fs |qd|, of one sign: that of a velocity of E|qd + noise| - |qd|.
         """
         signals, linear = rows.signals, self.noise.linear(rows.signals)
         speed = rectified(smoothed(signals.state.qd, signals.fs), self.noise.levels.position[..., None] * signals.gain)
-        found = np.zeros(rows.inside.shape)
-        for (row, name), column in self.model.c(linear.basis, State(signals.state.q, speed, signals.s)).items():
-            found[..., row, :] += column * linear.X[..., linear.basis.names.index(name), None]
-        return rows.kernel.apply(found)
+        columns = self.model.c(linear.basis, State(signals.state.q, speed, signals.s))
+        return rows.measurement(combined(columns, linear.basis.names, linear.X, np.zeros(rows.inside.shape)))
+
+    def _variance(self, rows: RowMap) -> Array:
+        return self.noise.covariance(rows).variance + self.bias(rows) ** 2
 
 
 def floor_of(squares: Array, variance: Array, valid: npt.NDArray[np.bool_]) -> Array:

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from identify.arrays import Array, Columns, Multipliers
+from identify.arrays import Array, Columns, Multipliers, combined
 from identify.signals.signals import Signals
 
 
@@ -77,8 +77,4 @@ class Equations:
 
     def predicted(self, X: Array) -> Array:
         """Return (c + s e) X at every sample, shape (..., row, time), for parameters of shape (..., p)."""
-        total = np.zeros(self.y.shape)
-        for columns in (self.c, self.rates):
-            for (row, name), column in columns.items():
-                total[..., row, :] += column * X[..., self.names.index(name), None]
-        return total
+        return combined(self.rates, self.names, X, combined(self.c, self.names, X, np.zeros(self.y.shape)))

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from identify.data.motion_log import MotionLog
 
-PIECE = 3e5
-"""Samples times joints squared of a piece: columns grow with the joints squared, and take some 50 MB."""
+PIECE = 6e5
+"""Samples times joints squared of a piece: columns grow with the joints squared, and take some 100 MB."""
 
 LONG = 1e7
 """Samples times joints squared, of all logs of a fit, beyond which rows are not kept."""
