@@ -2,6 +2,9 @@
 
 from identify.estimators.estimate import Estimate as Estimate
 from identify.estimators.estimator import AbstractEstimator as AbstractEstimator
+from identify.estimators.generalized_least_squares import (
+    GeneralizedLeastSquares as GeneralizedLeastSquares,
+)
 from identify.estimators.ordinary_least_squares import (
     OrdinaryLeastSquares as OrdinaryLeastSquares,
 )
@@ -17,5 +20,6 @@ ESTIMATORS: PluginTable[AbstractEstimator] = PluginTable(
     {
         "OLS": OrdinaryLeastSquares,
         "WLS": WeightedLeastSquares,
+        "GLS": GeneralizedLeastSquares,
     },
 )

@@ -30,6 +30,8 @@ class Estimate:
         Returns G of rows, shape (..., rows, p), with which X = G' Y to first order; without it there is no corrected sigma.
     weights : callable, optional
         Returns what rows were multiplied by, shape (..., rows), where X is a least-squares solution.
+    honest : Array, shape (..., p, p), optional
+        Covariance of the error of X that the noise of the logs makes, if the estimator knows it; by default from `influence`.
     """
 
     problem: Problem
@@ -37,6 +39,7 @@ class Estimate:
     covariance: Array
     influence: Influence | None = None
     weights: Callable[[Rows], Array] | None = None
+    honest: Array | None = None
 
     @classmethod
     def judge(
@@ -102,11 +105,14 @@ class Estimate:
         X = G' Y, and each row is a linear function of the samples of a log, whose torques and positions are noisy. So X is such
         a function, too: rows may overlap, be weighted or multiplied by velocities, and joints may differ.
         """
+        if self.honest is not None:
+            return self.honest
         if self.influence is None:
             return np.full(self.covariance.shape, np.nan)
         found = self.problem.noise_covariance(self.influence)
         if self.weights is not None:
             found = found * self.problem.excess(self.X, self.weights)[..., None, None]
+        found = found + self.problem.bias_covariance(self.influence)
         return np.where((self.status == Status.OK)[..., None, None], found, np.nan)
 
     @property

@@ -10,7 +10,7 @@ from identify.estimators.two_levels import two_levels
 from identify.rows.banded import BandedCovariance
 from identify.rows.factors import Factors, Fit, Status
 from identify.rows.linearization import Linearization
-from identify.rows.noise_propagation import NoiseLevels, NoisyRows, position_covariance, torque_covariance
+from identify.rows.noise_propagation import NoiseLevels, NoisyRows, position_paths, torque_paths
 from identify.rows.rows import Rows
 from identify.signals.signals import Signals
 from identify.signals.stencils import slide
@@ -47,8 +47,8 @@ def noise_of(parts: Sequence[Rows], factors: Factors, fit: Fit, linear: Callable
     """
     maps = [rows.maps[0] for rows in parts]
     position = position_noise([each.signals for each in maps])
-    white = [torque_covariance(each, np.ones_like(position)) for each in maps]
-    made = [position_covariance(each, position, linear(each.signals)) for each in maps]
+    white = [torque_paths(each).covariance(np.ones_like(position)) for each in maps]
+    made = [position_paths(each, linear(each.signals)).covariance(position) for each in maps]
     squares, of_position = factors.squares(fit.X), np.sum(_by_kind(parts, made), axis=-1)
     shown = np.nan_to_num(of_position / np.where(squares > 0, squares, np.nan)) > NEGLIGIBLE
     rest = np.where(shown, _torque_share(parts, fit.X, white, made), 1.0) * squares

@@ -1,6 +1,6 @@
 """What an estimator is given."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, Self
@@ -12,6 +12,7 @@ from identify.basis.basis import Basis
 from identify.data.motion_log import MotionLog
 from identify.errors import IdentificationError, LogError
 from identify.estimators.noise import noise_of
+from identify.estimators.restricted_likelihood import likely_noise
 from identify.estimators.row_weights import RowWeights
 from identify.models.explicit import ExplicitModel
 from identify.models.model import AbstractModel
@@ -20,6 +21,7 @@ from identify.rows.factors import Factors, Fit
 from identify.rows.linearization import Linearization
 from identify.rows.long_logs import is_long, piece_of
 from identify.rows.noise_propagation import NoisyRows
+from identify.rows.row_map import RowMap
 from identify.rows.rows import Rows
 from identify.signals.signals import Signals
 
@@ -104,6 +106,14 @@ class Problem:
         """The rows of each log; of long ones those of some pieces."""
         return tuple(self._rows_of(signals) for signals in self.signals)
 
+    def every_part(self) -> Iterator[Rows]:
+        """Yield the rows of each log, or of every piece of long ones."""
+        if not self.long:
+            yield from self.parts
+            return
+        for log, piece in self._pieces:
+            yield self._rows_of(self.chain.signals(log.part(*piece)))
+
     @cached_property
     def factors(self) -> Factors:
         """Triangular factors of the rows as they are, one for each kind."""
@@ -128,6 +138,13 @@ class Problem:
             return self.explicit.noise
         return noise_of(self.parts, self._together.factors, self._fit, self.linear)
 
+    @cached_property
+    def likely_noise(self) -> NoisyRows:
+        """The noise whose levels make the explicit model's rows most likely, from their covariance."""
+        if self.explicit is not self:
+            return self.explicit.likely_noise
+        return likely_noise(self.parts, self.noise.levels, self.linear)
+
     def linear(self, signals: Signals) -> Linearization:
         """Return the linearization of the explicit model about these signals."""
         known = self.explicit._linear
@@ -150,15 +167,26 @@ class Problem:
         influence : callable
             Returns G, shape (..., rows, p), of rows of this problem.
         """
-        total, bias = np.zeros(()), np.zeros(())
+        total = np.zeros(())
+        for rows, G in self._influences(influence):
+            total = total + self.noise.covariance(rows).of_sums(G)
+        return total / self._share
+
+    def bias_covariance(self, influence: Influence) -> Array:
+        """Return the square of the bias that noise of velocities near zero gives an estimate X = G' Y, shape (..., p, p)."""
+        if self.row_weights is None:
+            return np.zeros(())
+        bias = np.zeros(())
+        for rows, G in self._influences(influence):
+            bias = bias + np.matmul(np.swapaxes(G, -1, -2), self.row_weights.bias(rows)[..., None]) / self._share
+        return np.matmul(bias, np.swapaxes(bias, -1, -2))
+
+    def _influences(self, influence: Influence) -> Iterator[tuple[RowMap, Array]]:
+        """Yield the rows of each log with their G."""
         for part in self.parts if self.long else [self.rows]:
             G = influence(part)
             for k, rows in enumerate(part.maps):
-                own = G[..., part.of_log(k), :]
-                total = total + self.noise.covariance(rows).of_sums(own)
-                if self.row_weights is not None:
-                    bias = bias + np.matmul(np.swapaxes(own, -1, -2), self.row_weights.bias(rows)[..., None]) / self._share
-        return total / self._share + np.matmul(bias, np.swapaxes(bias, -1, -2)) if bias.ndim else total / self._share
+                yield rows, G[..., part.of_log(k), :]
 
     def excess(self, X: Array, weights: Callable[[Rows], Array]) -> Array:
         """Return how many times the squares of weighted residuals are what noise makes of them, at least 1, shape (...).
@@ -243,8 +271,7 @@ class Problem:
     @cached_property
     def _long_factors(self) -> tuple[Factors, Factors]:
         """Factors of long logs, plain and scaled, of which each piece is made once for both."""
-        made = (self._rows_of(self.chain.signals(log.part(*piece))) for log, piece in self._pieces)
-        plain, scaled = zip(*((rows.factors, self._scaled(rows)) for rows in made), strict=True)
+        plain, scaled = zip(*((rows.factors, self._scaled(rows)) for rows in self.every_part()), strict=True)
         return Factors.merged(plain), Factors.merged(scaled)
 
     def _scaled(self, rows: Rows) -> Factors:

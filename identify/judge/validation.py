@@ -15,7 +15,7 @@ from identify.estimators.problem import Problem
 from identify.judge.diagnosis import instants
 from identify.judge.row_noise import row_noise
 from identify.models.explicit import ExplicitModel
-from identify.rows.noise_propagation import torque_covariance
+from identify.rows.noise_propagation import torque_paths
 from identify.rows.operators import AbstractOperator
 from identify.rows.rows import Rows
 
@@ -180,7 +180,7 @@ class _Joint:
     @classmethod
     def of(cls, rows: Rows, X: Array, joint: int) -> "_Joint":
         own = rows.group == joint
-        spread = np.sqrt(torque_covariance(rows.maps[0], np.ones(rows.kinds)).variance[own])
+        spread = np.sqrt(torque_paths(rows.maps[0]).covariance(np.ones(rows.kinds)).variance[own])
         return cls(rows.Y[own], (rows.Y - rows.predicted(X))[own], rows.W[own], rows.valid[own], spread)
 
     def judged(self) -> tuple[float, float, float, float, int]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
 from identify.arrays import Array
@@ -51,9 +52,7 @@ class BandedCovariance:
             pairs = np.einsum("d...st,e...bst->...bdet", G[..., kind, :, :], G)
             found.append(windowed(pairs.reshape(*pairs.shape[:-3], -1, pairs.shape[-1]), products, before, grid))
         bands = np.moveaxis(np.stack(found, axis=-4), (-4, -3), (-2, -1))
-        beyond = np.concatenate([outside, np.zeros((*outside.shape[:-1], lags - 1))], axis=-1)  # no row is later than the last
-        later = np.moveaxis(sliding_window_view(beyond, grid.count, axis=-1), -3, -1)
-        return cls(bands * np.swapaxes(outside, -1, -2)[..., None, :, :, None] * later[..., None, :])
+        return cls(bands * _pairs(outside, lags))
 
     def __add__(self, other: Self) -> Self:
         few, many = sorted((self.bands, other.bands), key=lambda bands: bands.shape[-4])
@@ -64,6 +63,16 @@ class BandedCovariance:
     def scaled(self, level: Array) -> Self:
         """Return the covariance of rows multiplied by a level for each kind, shape (..., kind)."""
         return type(self)(self.bands * (level[..., :, None] * level[..., None, :])[..., None, None, :, :])
+
+    def times(self, factor: Array) -> Self:
+        """Return the covariance times a number for each run, shape (...)."""
+        return type(self)(self.bands * factor[..., None, None, None, None])
+
+    def kept(self, rows: npt.NDArray[np.bool_]) -> Self:
+        """Return the covariance with zeros for rows that are not kept, shape (..., r)."""
+        lags, count, kinds = self.bands.shape[-4:-1]
+        by_row = np.swapaxes(rows.reshape(*rows.shape[:-1], count, kinds), -1, -2).astype(np.float64)
+        return type(self)(self.bands * _pairs(by_row, lags))
 
     @property
     def variance(self) -> Array:
@@ -90,6 +99,13 @@ class BandedCovariance:
             sums = np.matmul(np.swapaxes(_flat(G[..., : count - lag, :, :]), -1, -2), _flat(later))
             total = total + (sums + np.swapaxes(sums, -1, -2) if lag else sums)
         return total
+
+
+def _pairs(outside: Array, lags: int) -> Array:
+    """Return products of weights, shape (..., kind, instant), of rows with those of later ones, as bands; 0 beyond the last."""
+    beyond = np.concatenate([outside, np.zeros((*outside.shape[:-1], lags - 1))], axis=-1)
+    later = np.moveaxis(sliding_window_view(beyond, outside.shape[-1], axis=-1), -3, -1)
+    return np.swapaxes(outside, -1, -2)[..., None, :, :, None] * later[..., None, :]
 
 
 def _flat(x: Array) -> Array:

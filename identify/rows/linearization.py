@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from identify.arrays import Array, Columns, combined, frozen
+from identify.arrays import Array, combined, frozen
 from identify.basis.basis import Basis
 from identify.signals.signals import Signals
 from identify.signals.state import State
@@ -65,25 +65,38 @@ class Linearization:
         return self._known[key]
 
     def _slopes(self, some: slice) -> Slopes:
-        """Return M(q) from the momenta at unit velocities, and central differences of the torques, joint by joint."""
-        state, n = self.signals.state, self.basis.n
-        q, qd, qdd = (x[..., some] for x in (state.q, state.qd, state.qdd))
+        state = self.signals.state
         slow = smoothed(state.qd, self.signals.fs)[..., some]
-        slides = np.where(np.abs(slow) < SLIDING, np.copysign(SLIDING, slow), slow)
-        unit, still = np.eye(n).reshape(n, *[1] * (q.ndim - 2), n, 1), np.zeros((n, *q.shape))
-        # All in one go: the columns of trees take as long for one sample as for hundreds.
-        q_steps, qd_steps = STEP_Q * unit, STEP_QD * unit
-        turned = np.concatenate([q + still, q + still, q + q_steps, q - q_steps])
-        moved = np.concatenate([slides + qd_steps, slides - qd_steps, qd + still, qd + still])
-        there = State(turned, moved, lambda _: np.broadcast_to(qdd, turned.shape))
-        faster, slower, ahead, behind = np.split(self._torques(self.basis.explicit(there), turned), 4)
-        at_rest = State(q + still, unit + still, self.signals.s)
-        inertia = self._torques(self.basis.momentum(at_rest), at_rest.q)
-        found = inertia, (faster - slower) / (2 * STEP_QD), (ahead - behind) / (2 * STEP_Q)
-        return Slopes(*(np.moveaxis(x, 0, -2) for x in found))
+        return slopes(self.basis, self.X, *(x[..., some] for x in (state.q, state.qd, state.qdd)), slow)
 
-    def _torques(self, columns: Columns, q: Array) -> Array:
-        return combined(columns, self.basis.names, self.X, np.zeros_like(q))
+
+def slopes(basis: Basis, X: Array, q: Array, qd: Array, qdd: Array, slow: Array) -> Slopes:
+    """Return M(q) from the momenta at unit velocities, and central differences of the torques, joint by joint.
+
+    Parameters
+    ----------
+    basis : Basis
+        The robot.
+    X : Array, shape (..., p)
+        Its parameters.
+    q, qd, qdd : Array, shape (..., joint, time)
+        The motion.
+    slow : Array, shape (..., joint, time)
+        Velocities at which damping is taken.
+    """
+    n = basis.n
+    slides = np.where(np.abs(slow) < SLIDING, np.copysign(SLIDING, slow), slow)
+    unit, still = np.eye(n).reshape(n, *[1] * (q.ndim - 2), n, 1), np.zeros((n, *q.shape))
+    # All in one go: the columns of trees take as long for one sample as for hundreds.
+    q_steps, qd_steps = STEP_Q * unit, STEP_QD * unit
+    turned = np.concatenate([q + still, q + still, q + q_steps, q - q_steps])
+    moved = np.concatenate([slides + qd_steps, slides - qd_steps, qd + still, qd + still])
+    there = State(turned, moved, lambda _: np.broadcast_to(qdd, turned.shape))
+    faster, slower, ahead, behind = np.split(combined(basis.explicit(there), basis.names, X, np.zeros_like(turned)), 4)
+    at_rest = State(q + still, unit + still, lambda x: x)
+    inertia = combined(basis.momentum(at_rest), basis.names, X, np.zeros_like(at_rest.q))
+    found = inertia, (faster - slower) / (2 * STEP_QD), (ahead - behind) / (2 * STEP_Q)
+    return Slopes(*(np.moveaxis(x, 0, -2) for x in found))
 
 
 def smoothed(x: Array, fs: float) -> Array:

@@ -65,65 +65,75 @@ class NoisyRows:
         for other, found in self.known.items():
             if rows.noisy_as(other):
                 return found
-        found = torque_covariance(rows, self.levels.torque)
+        found = torque_paths(rows).covariance(self.levels.torque)
         if self.levels.position.any():
-            found = found + position_covariance(rows, self.levels.position, self.linear(rows.signals))
+            found = found + position_paths(rows, self.linear(rows.signals)).covariance(self.levels.position)
         self.known[rows] = found
         return found
 
 
-def torque_covariance(rows: RowMap, level: Array) -> BandedCovariance:
-    """Return the covariance that white noise of the torques gives rows.
-
-    A row weighs the torques by its response times w B. Prefilter and alignment act on the response, as if w and B were constant
-    over the little that they look at.
+@dataclass(frozen=True, eq=False)
+class Paths:
+    """How unit noise of each joint reaches rows: see `BandedCovariance.of`.
 
     Parameters
     ----------
-    rows : RowMap
-        How samples become rows.
-    level : Array, shape (..., joint)
-        Standard deviation of the noise [N m].
+    grid : Grid
+        The rows, among the samples of the signals.
+    windows : list of Array, shape (length,)
+        What rows sum.
+    signals : list of Array, shape (..., kind, joint, time)
+        What they multiply the noise by, as many.
+    outside : Array, shape (..., kind, instant)
+        Weights of the rows.
+    """
+
+    grid: Grid
+    windows: list[Array]
+    signals: list[Array]
+    outside: Array
+
+    def covariance(self, level: Array) -> BandedCovariance:
+        """Return the covariance that noise of these standard deviations, shape (..., joint), gives the rows."""
+        leveled = [signal * level[..., None, :, None] for signal in self.signals]
+        return BandedCovariance.of(self.grid, self.windows, leveled, self.outside)
+
+    def each(self) -> list[BandedCovariance]:
+        """Return the covariances that unit noise gives the rows, joint by joint."""
+        joints = range(self.signals[0].shape[-2])
+        single = [[signal[..., j : j + 1, :] for signal in self.signals] for j in joints]
+        return [BandedCovariance.of(self.grid, self.windows, signals, self.outside) for signals in single]
+
+
+def torque_paths(rows: RowMap) -> Paths:
+    """Return how noise of the torques reaches rows.
+
+    A row weighs the torques by its response times w B. Prefilter and alignment act on the response, as if w and B were constant
+    over the little that they look at.
     """
     signals = rows.signals
     windows, grid, some = _thinned([signals.torque_adjoint(np.pad(rows.response, signals.reach))], rows)
     inside = rows.inside[..., some]
     torques = np.zeros((*inside.shape[:-1], signals.log.n, inside.shape[-1]))
     for (row, joint), B in rows.B.items():
-        torques[..., row, joint, :] = inside[..., row, :] * (
-            B if isinstance(B, float) else signals.torque.average(B)[..., some]
-        )
-    return BandedCovariance.of(grid, windows, [_leveled(torques, level)], rows.outside)
+        factor = B if isinstance(B, float) else signals.torque.average(B)[..., some]
+        torques[..., row, joint, :] = inside[..., row, :] * factor
+    return Paths(grid, windows, [torques], rows.outside)
 
 
-def position_covariance(rows: RowMap, level: Array, linear: Linearization) -> BandedCovariance:
-    """Return the covariance that white noise of the positions gives rows.
+def position_paths(rows: RowMap, linear: Linearization) -> Paths:
+    """Return how noise of the positions reaches rows.
 
     The rows of every model are, to first order, those of B times the explicit model's error, so that one linearization serves
     all. A row of response h sums h w B (M s^2 + D s + K) n over time, M, D and K being inertia, damping and stiffness. By parts
 
         h w B (M s^2 + D s + K) n -> [h'' w B M + h' (2 (w B M)' - w B D) + h ((w B M)'' - (w B D)' + w B K)] n
-
-    Parameters
-    ----------
-    rows : RowMap
-        How samples become rows.
-    level : Array, shape (..., joint)
-        Standard deviation of the noise [rad].
-    linear : Linearization
-        Of the explicit model.
     """
     windows, grid, some = _thinned(_responses(rows), rows)
     inertia, damping, stiffness = _through_B(rows, np.stack(linear.at(some)), some)
     fs = rows.signals.fs / some.step
     s = partial(CentralDifference(spacing=1 / fs).derivative, fs=fs)
-    parts = (stiffness - s(damping - s(inertia)), damping - 2 * s(inertia), inertia)
-    return BandedCovariance.of(grid, windows, [_leveled(part, level) for part in parts], rows.outside)
-
-
-def _leveled(parts: Array, level: Array) -> Array:
-    """Return what sources of unit noise are multiplied by, shape (..., kind, joint, time), of noise of these levels."""
-    return parts * level[..., None, :, None]
+    return Paths(grid, windows, [stiffness - s(damping - s(inertia)), damping - 2 * s(inertia), inertia], rows.outside)
 
 
 def _through_B(rows: RowMap, slopes: Array, some: slice) -> Array:

@@ -65,6 +65,11 @@ class Rows:
         """Kind of every row: the joint, from 0, or 0 for all rows of the power model, shape (r,)."""
         return np.tile(np.arange(self.kinds), len(self.time) // self.kinds)
 
+    @property
+    def joined(self) -> Array:
+        """[W Y], shape (..., r, p + 1)."""
+        return np.concatenate([self.W, self.Y[..., None]], axis=-1)
+
     @cached_property
     def count(self) -> npt.NDArray[np.intp]:
         """Number of rows of every kind that are not void, shape (..., kind)."""

@@ -24,7 +24,7 @@ from identify import (
     scara,
 )
 from identify.rows.linearization import Linearization
-from identify.rows.noise_propagation import position_covariance, torque_covariance
+from identify.rows.noise_propagation import position_paths, torque_paths
 
 TRUTH = (3.5, 0.05, 0.5, 0.06, 0.12, 0.005, 0.01, 0.1)
 
@@ -51,7 +51,7 @@ def test_noise_of_the_torque_in_rows_out(operator, model, channel, log, rng):
     plain = rows_of(replace(log, torque=channel), model, chain)
     noisy = rows_of(MotionLog(log.fs, np.broadcast_to(log.q, draws.shape), log.tau + draws, channel), model, chain)
     G = rng.standard_normal((len(plain.Y), 3))
-    C = torque_covariance(plain.maps[0], np.array([0.3, 0.1]))
+    C = torque_paths(plain.maps[0]).covariance(np.array([0.3, 0.1]))
     made = (noisy.Y - plain.Y) @ G
     np.testing.assert_allclose(np.sqrt(np.diag(C.of_sums(G))), np.std(made, axis=0), rtol=0.15)
     variance = C.variance
@@ -75,7 +75,7 @@ def test_noise_of_the_positions_in_rows_out(operator, model, channel, log, truth
     noisy = rows_of(MotionLog(log.fs, draws, np.broadcast_to(log.tau, draws.shape), channel), model, chain)
     error = noisy.Y - noisy.W @ truth - (plain.Y - plain.W @ truth)
     G = rng.standard_normal((len(plain.Y), 3))
-    C = position_covariance(plain.maps[0], level, linear(plain))
+    C = position_paths(plain.maps[0], linear(plain)).covariance(level)
     np.testing.assert_allclose(np.sqrt(np.diag(C.of_sums(G))), np.std(error @ G, axis=0), rtol=0.17)
     variance = C.variance
     seen = plain.valid & (variance > 0.01 * variance.max())
@@ -93,16 +93,15 @@ def test_a_prefilter_is_counted_too(log, rng):
     plain = rows_of(log, "explicit", chain)
     noisy = rows_of(MotionLog(log.fs, np.broadcast_to(log.q, draws.shape), log.tau + draws, log.torque), "explicit", chain)
     G = rng.standard_normal((len(plain.Y), 3))
-    predicted = torque_covariance(plain.maps[0], np.ones(2)).of_sums(G)
+    predicted = torque_paths(plain.maps[0]).covariance(np.ones(2)).of_sums(G)
     np.testing.assert_allclose(np.sqrt(np.diag(predicted)), np.std((noisy.Y - plain.Y) @ G, axis=0), rtol=0.15)
 
 
 def test_a_banded_covariance_is_that_of_its_sums(log, rng):
     """Against the whole matrix, put together from the bands: sums of rows, variances, and the expected spectrum by its sum."""
     plain = rows_of(log, "implicit", idbench_chain())
-    C = torque_covariance(plain.maps[0], np.array([0.3, 0.1])) + position_covariance(
-        plain.maps[0], np.full(2, 1e-4), linear(plain)
-    )
+    of_torque, of_position = torque_paths(plain.maps[0]), position_paths(plain.maps[0], linear(plain))
+    C = of_torque.covariance(np.array([0.3, 0.1])) + of_position.covariance(np.full(2, 1e-4))
     lags, count, kinds = C.bands.shape[:3]
     whole = np.zeros((count, kinds, count, kinds))
     for lag in range(lags):
@@ -138,8 +137,8 @@ def test_torque_noise_is_found_beside_stronger_noise_of_the_positions(log):
     chain = replace(idbench_chain(), operator=FirLowPass(10.0, 10.0))
     problem = Problem((MotionLog(log.fs, q, tau, log.torque),), scara(), EVERY["explicit"], chain)
     rows, levels = problem.rows, problem.noise.levels
-    of_torque = torque_covariance(rows.maps[0], levels.torque).variance
-    of_position = position_covariance(rows.maps[0], levels.position, problem.linear(problem.signals[0])).variance
+    of_torque = torque_paths(rows.maps[0]).covariance(levels.torque).variance
+    of_position = position_paths(rows.maps[0], problem.linear(problem.signals[0])).covariance(levels.position).variance
     assert (rows.by_kind(of_torque).sum(axis=-1) < rows.by_kind(of_position).sum(axis=-1)).all()
     assert (np.abs(np.log2(np.median(levels.torque, axis=0) / sigma)) < 1).all()
 
@@ -234,7 +233,7 @@ def test_two_logs_are_worth_two(log):
     influence = double.influence(double.rows)  # of weights that the noise of both logs made
     parts = [influence[..., double.rows.of_log(k), :] for k in (0, 1)]
     np.testing.assert_array_equal(*parts)
-    whole = double.problem.noise_covariance(double.influence)
+    whole = double.problem.noise_covariance(double.influence, double.problem.noise)
     half = double.problem.noise.covariance(double.rows.maps[0]).of_sums(parts[0])
     np.testing.assert_allclose(whole, 2 * half, rtol=1e-9)
     np.testing.assert_allclose(2 * double.corrected_covariance, single.corrected_covariance, rtol=0.1)

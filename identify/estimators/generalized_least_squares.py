@@ -1,0 +1,84 @@
+"""Generalized least squares."""
+
+from dataclasses import dataclass
+from typing import ClassVar, final
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from identify.arrays import Array, frozen
+from identify.estimators.estimate import Estimate
+from identify.estimators.estimator import AbstractEstimator, Need
+from identify.estimators.problem import Problem
+from identify.estimators.restricted_likelihood import likely
+from identify.rows.block_tridiagonal import Blocks
+from identify.rows.factors import Factor, Status, triangular
+from identify.rows.noise_propagation import NoisyRows
+from identify.rows.row_map import RowMap
+from identify.rows.rows import Rows
+from identify.rows.whitening import Whitening, parts_of
+
+LEAST = 1e-4
+"""Share of the mean variance of rows that is white at least."""
+
+
+@final
+@dataclass(frozen=True)
+class GeneralizedLeastSquares(AbstractEstimator):
+    """Generalized least squares (GLS), X = argmin (Y - W X)' C^-1 (Y - W X), with C the covariance that noise gives the rows.
+
+    Noise of an encoder, twice differentiated, grows with the square of the frequency, and rows share that of neighbouring
+    instants and other joints. Weighted least squares takes them for independent, and leaves a factor of four. C follows from
+    the noise of each joint's torque and position (`NoisyRows`), whose levels make the explicit model's rows most likely
+    (`likely_noise`). Rows of a model that multiplies torques by something that varies, such as the power model, have some white
+    error beside that, as much as their residuals ask for.
+    """
+
+    needs: ClassVar[frozenset[Need]] = frozenset({"factors"})
+
+    def solve(self, problem: Problem) -> Estimate:
+        """Return the estimate; of logs too long for their rows to be kept, pieces count as independent."""
+        whitened = _Whitened(problem.likely_noise, _shares(problem))
+        parts = [triangular(whitened(rows)) for rows in problem.every_part()]
+        factor = Factor(triangular(np.concatenate(parts, axis=-2)), problem.factors.together.rows, problem.names)
+        solvable = problem.factors.together.status == Status.OK
+        inverse = factor.inverse(solvable)
+
+        def influence(rows: Rows) -> Array:
+            return np.matmul(whitened.solved(rows), inverse)
+
+        covariance = frozen(inverse + problem.bias_covariance(influence))
+        return Estimate(problem, frozen(factor.solution(solvable)), covariance, influence, honest=covariance)
+
+
+def _shares(problem: Problem) -> Array | None:
+    """Return how much of what noise makes of the rows, and of white noise beside it, makes them most likely, shape (..., 2)."""
+    if problem.row_weights is None:
+        return None
+    found = [parts_of(rows.maps[0], problem.likely_noise) for rows in problem.parts]
+    lags = max(C.bands.shape[-4] for C, _, _ in found)
+    units = [[Blocks.of(C, lags), Blocks.of(white, lags)] for C, white, _ in found]
+    joined = [rows.joined * kept[..., None] for rows, (_, _, kept) in zip(problem.parts, found, strict=True)]
+    runs = joined[0].shape[:-2]
+    return likely(units, joined, np.broadcast_to([1.0, 0.1], (*runs, 2)), np.full(2, LEAST))
+
+
+class _Whitened:
+    """Rows [W Y] made independent, and C^-1 W, log by log."""
+
+    def __init__(self, noise: NoisyRows, shares: Array | None) -> None:
+        self._noise, self._shares = noise, shares
+        self._known: WeakKeyDictionary[RowMap, Whitening] = WeakKeyDictionary()
+
+    def __call__(self, rows: Rows) -> Array:
+        parts = [self._of(to_rows).whiten(rows.joined[..., rows.of_log(k), :]) for k, to_rows in enumerate(rows.maps)]
+        return np.concatenate(parts, axis=-2)
+
+    def solved(self, rows: Rows) -> Array:
+        parts = [self._of(to_rows).solve(rows.W[..., rows.of_log(k), :]) for k, to_rows in enumerate(rows.maps)]
+        return np.concatenate(parts, axis=-2)
+
+    def _of(self, rows: RowMap) -> Whitening:
+        if rows not in self._known:
+            self._known[rows] = Whitening.of(rows, self._noise, self._shares)
+        return self._known[rows]

@@ -1,0 +1,146 @@
+"""Motion and parameters that together make a log most likely."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import scipy
+
+from identify.arrays import Array
+from identify.basis.basis import Basis
+from identify.errors import IdentificationError
+from identify.estimators.likelihood.cells import HELD, Cells
+from identify.estimators.likelihood.normal_equations import Noise, NormalEquations
+from identify.rows.linearization import SLIDING, smoothed
+from identify.rows.noise_propagation import NoiseLevels
+from identify.signals.masks.reversal import ReversalMask
+from identify.signals.state import State
+
+ROUNDS, STEPS = 4, 6
+"""Rounds, in each of which mask and levels are frozen, and Gauss-Newton steps of each."""
+
+SETTLED = 0.02
+"""Change of the parameters, in sigma, at which they count as settled."""
+
+PROBES = 4
+"""Random signs by which the leverage of the torques is estimated."""
+
+MASK = ReversalMask(threshold=0.1, width=0.02, taper=0.02)
+"""Where the sign of a velocity is no model of friction."""
+
+
+@dataclass(frozen=True, eq=False)
+class JointFit:
+    """Parameters and motions of logs, together.
+
+    Parameters
+    ----------
+    logs : tuple of Cells
+        Of one run each.
+    basis : Basis
+        The robot.
+    X : Array, shape (p,)
+        Parameters.
+    motions : tuple of Array, shape (node, 2, joint)
+        q [rad] and qd [rad/s] at the nodes of each log.
+    levels : NoiseLevels
+        Noise of torques and positions.
+    covariance : Array, shape (p, p)
+        Of the error of X.
+    """
+
+    logs: tuple[Cells, ...]
+    basis: Basis
+    X: Array
+    motions: tuple[Array, ...]
+    levels: NoiseLevels
+    covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @classmethod
+    def start(cls, logs: tuple[Cells, ...], basis: Basis, X: Array, levels: NoiseLevels) -> "JointFit":
+        """Return where to begin: logged positions and their differences at the nodes."""
+        return cls(logs, basis, X, tuple(_begin(cells) for cells in logs), levels)
+
+    def solved(self, floor: Array) -> "JointFit":
+        """Return the fit whose likelihood is greatest; levels of the torques, not below `floor`, are found as well.
+
+        Raises
+        ------
+        IdentificationError
+            If it diverges, or the log does not determine the motion.
+        """
+        now = self
+        for _ in range(ROUNDS):
+            before, noises = now, [now._noise(k) for k in range(len(now.logs))]
+            for _ in range(STEPS):
+                now, moved = now._step(noises)
+                if moved < SETTLED:
+                    break
+            now = replace(now, levels=now._levels(noises, floor))
+            if np.abs(now.X - before.X).max() == 0 or _sigmas(now.X - before.X, now.covariance) < SETTLED:
+                break
+        return now
+
+    def _step(self, noises: list[Noise]) -> tuple["JointFit", float]:
+        """Return the fit after a Gauss-Newton step, and how far the parameters moved [sigma]."""
+        systems = [
+            NormalEquations.of(cells, self.basis, self.X, z, noise)
+            for cells, z, noise in zip(self.logs, self.motions, noises, strict=True)
+        ]
+        parts = [system.solved() for system in systems]
+        S = sum(system.corner - V.T @ V for system, (V, _, _) in zip(systems, parts, strict=True))
+        b = sum(system.b_X - V.T @ y for system, (V, y, _) in zip(systems, parts, strict=True))
+        covariance = np.linalg.pinv(np.asarray(S), hermitian=True)
+        dX = covariance @ b
+        motions = []
+        for z, (V, y, L) in zip(self.motions, parts, strict=True):
+            dz, _ = scipy.linalg.lapack.dtbtrs(L, y - V @ dX, uplo="L", trans="T")
+            motions.append(z + dz.reshape(z.shape))
+        moved = _sigmas(dX, covariance)
+        if not np.isfinite(moved) or not all(np.isfinite(z).all() for z in motions):
+            raise IdentificationError(
+                "motion and parameters together diverge: take GLS, or check torque, units and delay of the log"
+            )
+        return replace(self, X=self.X + dX, motions=tuple(motions), covariance=covariance), moved
+
+    def _noise(self, k: int) -> Noise:
+        """Return the standard deviations of a log's cells: torques count for little where friction's sign is not known."""
+        cells, z = self.logs[k], self.motions[k]
+        q, qd, qdd = cells.motion(z, 0.5)
+        weight = MASK.weight(smoothed(qd, cells.log.fs), cells.log.fs)
+        lost = (1 - weight) * self._friction(q, qdd)
+        mean = self.levels.torque[:, None] * np.ones_like(weight)
+        half = np.hypot(HELD * self.levels.torque[:, None], cells.rough)
+        return Noise(mean + lost, half + lost, self.levels.position)
+
+    def _friction(self, q: Array, qdd: Array) -> Array:
+        """Return the torque by which friction jumps where a joint turns, shape (joint, 1) [N m]."""
+        still = np.zeros_like(q[:, :1])
+        there = [State(q[:, :1], still + v, lambda _: qdd[:, :1]) for v in (SLIDING, -SLIDING)]
+        ahead, back = (self._torques(state) for state in there)
+        return np.maximum(np.abs(ahead - back), 1e-3 * np.abs(self.X).max() * 0 + 1e-12)
+
+    def _torques(self, state: State) -> Array:
+        total = np.zeros_like(state.q)
+        for (row, name), column in self.basis.explicit(state).items():
+            total[row] += column * self.X[self.basis.names.index(name)]
+        return total
+
+    def _levels(self, noises: list[Noise], floor: Array) -> NoiseLevels:
+        return self.levels
+
+
+def _sigmas(dX: Array, covariance: Array) -> float:
+    """Return the largest change of a parameter, in sigma."""
+    return float(np.max(np.abs(dX) / np.sqrt(np.maximum(np.diag(covariance), 1e-300))))
+
+
+def _begin(cells: Cells) -> Array:
+    """Return positions and velocities at the nodes of a log, by parabolas through its positions."""
+    fs, q = cells.log.fs, cells.log.q.T
+    slow = smoothed(np.gradient(q, 1 / fs, axis=-1), fs)
+    t = np.arange(cells.log.samples) / fs
+    nodes = np.arange(cells.count + 1) / fs + cells.delay
+    inside = np.clip(nodes, t[0], t[-1])
+    beyond = nodes - inside
+    qd = np.stack([np.interp(inside, t, x) for x in slow], axis=-1)
+    return np.stack([np.stack([np.interp(inside, t, x) for x in q], axis=-1) + qd * beyond[:, None], qd], axis=1)

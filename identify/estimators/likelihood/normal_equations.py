@@ -1,0 +1,173 @@
+"""The normal equations of a motion and the robot's parameters together."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from identify.arrays import Array
+from identify.basis.basis import Basis
+from identify.errors import IdentificationError
+from identify.estimators.likelihood.cells import GAUSS, Cells, hermite
+from identify.rows.linearization import slopes
+from identify.signals.state import State
+
+CHUNK = 2000
+"""Cells whose columns are made at once: those of all would take too much memory."""
+
+RATE = 50.0
+"""Frequency [Hz] at which the torques' slopes are computed; between they are interpolated."""
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Standard deviations of what a log's cells say, shape (joint, cell) where they vary.
+
+    Parameters
+    ----------
+    mean, half : Array, shape (joint, cell)
+        Of the mean torque, and of half the difference of both Gauss points [N m].
+    position : Array, shape (joint,)
+        Of the positions [rad].
+    """
+
+    mean: Array
+    half: Array
+    position: Array
+
+
+@dataclass(eq=False)
+class NormalEquations:
+    """A [dz; dX] = b, with A block-tridiagonal in the nodes and bordered by the parameters.
+
+    Parameters
+    ----------
+    band : Array, shape (4 n, 2 n nodes)
+        A_zz, its lower half as `scipy.linalg.cholesky_banded` has it.
+    border : Array, shape (2 n nodes, p)
+        A_zX.
+    corner : Array, shape (p, p)
+        A_XX.
+    b_z, b_X : Array, shape (2 n nodes,), (p,)
+        The right-hand side.
+    cost : float
+        Sum of the squared residuals over their variances.
+    """
+
+    band: Array
+    border: Array
+    corner: Array
+    b_z: Array
+    b_X: Array
+    cost: float = 0.0
+
+    @classmethod
+    def of(cls, cells: Cells, basis: Basis, X: Array, z: Array, noise: Noise) -> "NormalEquations":
+        """Return those of a log at the parameters X and the motion z, shape (node, 2, joint)."""
+        n, p, size = basis.n, len(X), z.size
+        found = cls(np.zeros((4 * n, size)), np.zeros((size, p)), np.zeros((p, p)), np.zeros(size), np.zeros(p))
+        found._add_positions(cells, z, noise.position)
+        for part in _chunks(cells.count):
+            found._add_torques(cells, basis, X, z, noise, part)
+        return found
+
+    def solved(self) -> tuple[Array, Array, Array]:
+        """Return L^-1 A_zX, L^-1 b_z, and the factor L of A_zz in bands."""
+        try:
+            L = scipy.linalg.cholesky_banded(self.band, lower=True, overwrite_ab=True, check_finite=False)
+        except np.linalg.LinAlgError:
+            raise IdentificationError(
+                "the motion is not determined by this log: positions and torques that change are needed; take WLS"
+            ) from None
+        both = np.column_stack([self.border, self.b_z])
+        z, info = scipy.linalg.lapack.dtbtrs(L, both, uplo="L", overwrite_b=True)
+        if info:
+            raise IdentificationError(f"the motion is not determined by this log (dtbtrs: {info}): take WLS")
+        return z[:, :-1], z[:, -1], L
+
+    def _add_positions(self, cells: Cells, z: Array, sigma: Array) -> None:
+        cell, place = cells.places
+        n, w = len(sigma), hermite(place, cells.period)[0]
+        ends = np.stack([z[cell, 0], z[cell, 1], z[cell + 1, 0], z[cell + 1, 1]])
+        left = (cells.log.q[cells.seen] - np.einsum("ks,ksj->sj", w, ends)) / sigma**2
+        self.cost += float(np.sum((left * sigma) ** 2))
+        where = [2 * n * cell[:, None] + n * k + np.arange(n) for k in range(4)]
+        for k in range(4):
+            np.add.at(self.b_z, where[k], w[k][:, None] * left)
+            for m in range(k + 1):
+                np.add.at(self.band, (np.full_like(where[m], n * (k - m)), where[m]), (w[k] * w[m])[:, None] / sigma**2)
+
+    def _add_torques(self, cells: Cells, basis: Basis, X: Array, z: Array, noise: Noise, part: slice) -> None:
+        n, count = basis.n, part.stop - part.start
+        nodes = z[part.start : part.stop + 1]
+        points = [cells.motion(nodes, s) for s in GAUSS]
+        D = np.stack([_columns(basis, *point) for point in points])  # (point, cell, joint, p)
+        J = np.stack(
+            [
+                _by_nodes(slope, hermite(s, cells.period))
+                for s, slope in zip(GAUSS, _slopes_of(cells, basis, X, nodes), strict=True)
+            ]
+        )
+        wanted = [tau[:, part].T for tau in cells.torque]
+        for sign, tau, sigma in ((1.0, wanted[0], noise.mean), (-1.0, wanted[1], noise.half)):
+            # Mean of both points, and half of what the second has more than the first.
+            scale = sign / sigma[:, part].T[..., None]
+            W, H = ((x[1] + sign * x[0]) / 2 * np.abs(scale) for x in (D, J))
+            rho = tau * np.abs(scale[..., 0]) - np.matmul(W, X)
+            self.cost += float(np.sum(rho**2))
+            self._add_cells(part.start, np.swapaxes(H, -1, -2), W, rho)
+            del W, H
+        del n, count
+
+    def _add_cells(self, first: int, H: Array, W: Array, rho: Array) -> None:
+        """Add residuals rho, shape (cell, joint), with slopes H, (cell, 4 n, joint), by nodes and W, (cell, joint, p), by X."""
+        count, width = H.shape[:2]
+        own, step = np.matmul(H, np.swapaxes(H, -1, -2)), width // 2
+        stop = step * (count - 1) + 1
+        for i in range(width):
+            for j in range(i + 1):
+                at = step * first + j
+                self.band[i - j, at : at + stop : step] += own[:, i, j]
+        crossed, right = np.matmul(H, W), np.matmul(H, rho[..., None])[..., 0]
+        for half in (0, 1):
+            begin = step * (first + half)
+            rows = slice(begin, begin + step * count)
+            self.border[rows] += crossed[:, half * step : (half + 1) * step].reshape(step * count, -1)
+            self.b_z[rows] += right[:, half * step : (half + 1) * step].reshape(-1)
+        flat = W.reshape(-1, W.shape[-1])
+        self.corner += flat.T @ flat
+        self.b_X += flat.T @ rho.reshape(-1)
+
+
+def _chunks(count: int) -> Iterator[slice]:
+    for start in range(0, count, CHUNK):
+        yield slice(start, min(start + CHUNK, count))
+
+
+def _columns(basis: Basis, q: Array, qd: Array, qdd: Array) -> Array:
+    """Return D(q, qd, qdd), shape (cell, joint, p)."""
+    found = np.zeros((q.shape[-1], basis.n, len(basis.names)))
+    for (row, name), column in basis.explicit(State(q, qd, lambda _: qdd)).items():
+        found[:, row, basis.names.index(name)] = column
+    return found
+
+
+def _slopes_of(cells: Cells, basis: Basis, X: Array, z: Array) -> list[list[Array]]:
+    """Return stiffness, damping and inertia in cells, shape (cell, joint, joint), at both points: those of the middle."""
+    count, step = len(z) - 1, max(1, int(cells.log.fs / RATE))
+    some = np.unique(np.append(np.arange(0, count, step), count - 1))
+    q, qd, qdd = (x[..., some] for x in cells.motion(z, 0.5))
+    found = slopes(basis, X, q, qd, qdd, qd)
+    between = np.interp(np.arange(count), some, np.arange(len(some)))
+    low = np.minimum(between.astype(np.intp), max(0, len(some) - 2))
+    share = between - low
+    high = np.minimum(low + 1, len(some) - 1)
+    full = [np.moveaxis(x[..., low] * (1 - share) + x[..., high] * share, -1, 0) for x in found]
+    return [[full[2], full[1], full[0]]] * 2
+
+
+def _by_nodes(slope: list[Array], weights: tuple[Array, Array, Array]) -> Array:
+    """Return slopes of the torques by (q0, qd0, q1, qd1) of all joints, shape (cell, joint, 4 n)."""
+    total = sum(s[:, :, None, :] * w[:, None] for s, w in zip(slope, weights, strict=True))
+    return np.asarray(total).reshape(*slope[0].shape[:2], -1)

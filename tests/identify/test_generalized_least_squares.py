@@ -1,0 +1,159 @@
+"""Generalized least squares, and the noise levels that it finds."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identify import (
+    MODELS,
+    OPERATORS,
+    GeneralizedLeastSquares,
+    MotionLog,
+    Problem,
+    idbench_chain,
+    identify,
+    identify_each,
+    scara,
+)
+from identify.estimators.restricted_likelihood import likely_noise
+from identify.rows import long_logs
+from identify.rows.block_tridiagonal import Blocks, Cholesky
+from identify.rows.noise_propagation import NoiseLevels, NoisyRows
+from identify.rows.whitening import Whitening
+
+EVERY = {name: MODELS.create(name) for name in MODELS.builtin}
+GLS = GeneralizedLeastSquares()
+BITS16 = 2 * np.pi / 2**16 / np.sqrt(12)
+
+
+def noisy(log, position, torque, draws=100):
+    """Return runs of a log with white noise [rad], [N m]."""
+    rng = np.random.default_rng(11)
+    q, tau = (x + s * rng.standard_normal((draws, *x.shape)) for x, s in ((log.q, position), (log.tau, torque)))
+    return MotionLog(log.fs, q, tau, log.torque)
+
+
+def dense(C):
+    """Return a banded covariance of one run as a matrix."""
+    lags, count, kinds = C.bands.shape[:3]
+    whole = np.zeros((count, kinds, count, kinds))
+    for lag in range(lags):
+        for i in range(count - lag):
+            whole[i, :, i + lag], whole[i + lag, :, i] = C.bands[lag, i], C.bands[lag, i].T
+    return whole.reshape(count * kinds, -1)
+
+
+@pytest.fixture
+def whitened(log):
+    """Return the rows of an implicit problem with their whitening, and their covariance as a matrix."""
+    problem = Problem((log,), scara(), EVERY["implicit"], idbench_chain())
+    noise = NoisyRows(NoiseLevels(np.array([0.1, 0.01]), np.full(2, 1e-4)), problem.linear)
+    whitening = Whitening.of(problem.rows.maps[0], noise)
+    return problem.rows, whitening, dense(whitening.C)
+
+
+def test_block_tridiagonal_algebra_is_that_of_the_whole_matrix(whitened, rng):
+    """Products, solutions, and the trace of an inverse times the matrix: the number of its rows."""
+    rows, whitening, C = whitened
+    kept = np.flatnonzero(whitening.kept)
+    C, x = C[np.ix_(kept, kept)], rng.standard_normal((len(rows.Y), 3))
+    np.testing.assert_allclose(whitening.solve(x)[kept], np.linalg.solve(C, x[kept]), rtol=1e-6, atol=1e-9)
+    z = whitening.whiten(x)
+    np.testing.assert_allclose(z.T @ z, x[kept].T @ np.linalg.solve(C, x[kept]), rtol=1e-9)
+    blocks = whitening.blocks
+    product = blocks.times(blocks.cut(x * whitening.kept[:, None])).reshape(-1, 3)[: len(x)]
+    np.testing.assert_allclose(product[kept], C @ x[kept], rtol=1e-9, atol=1e-15)
+    assert Cholesky.of(blocks).traces([blocks])[..., 0] == pytest.approx(len(kept))
+
+
+def test_a_matrix_that_is_not_positive_is_refused():
+    with pytest.raises(IdentificationError, match=r"covariance of the rows is singular.*take WLS"):
+        Cholesky.of(Blocks(np.array([[[1.0, 2.0], [2.0, 1.0]]]), np.zeros((0, 2, 2))))
+
+
+@pytest.mark.parametrize("model", MODELS.builtin)
+def test_it_solves_the_normal_equations_with_the_covariance_of_the_rows(model, log):
+    """(W' C^-1 W)^-1 W' C^-1 Y by dense matrices; G' W = 1, and its covariance is that of the noise through G."""
+    found = identify(noisy(log, BITS16, (0.02, 0.001), 1).part(0, log.samples), scara(), EVERY[model], estimator=GLS)
+    rows, G = found.rows, found.influence(found.rows)[0]
+    np.testing.assert_allclose(G.T @ rows.W[0], np.eye(8), atol=1e-6)
+    np.testing.assert_allclose(G.T @ rows.Y[0], found.X[0], rtol=1e-6)
+    if model != "power":  # whose rows have noise of their own
+        C = found.problem.likely_noise.covariance(rows.maps[0])
+        C = dense(replace(C, bands=C.bands[0]))
+        np.testing.assert_allclose(np.diag(G.T @ C @ G), found.sigma[0] ** 2, rtol=1e-6)
+
+
+@pytest.mark.parametrize("torque", [(0.0, 0.0), (0.02, 0.001), (0.1, 0.005)])
+def test_levels_are_found(torque, log):
+    """Positions to 10 %, as torque noise hides them; torques to 5 %, or below 0.001 and 5e-5 N m where there is none."""
+    problem = identify(noisy(log, BITS16, torque), scara(), EVERY["power"], estimator=GLS).problem
+    levels = problem.likely_noise.levels
+    np.testing.assert_allclose(np.sqrt(np.mean(levels.position**2, axis=0)), BITS16, rtol=0.1)
+    rms = np.sqrt(np.mean(levels.torque**2, axis=0))
+    if torque[0]:
+        np.testing.assert_allclose(rms, torque, rtol=0.05)
+    else:
+        assert (rms < (1e-3, 5e-5)).all()
+
+
+@pytest.mark.parametrize(
+    ("position", "torque", "most"),
+    [(BITS16, (0.0, 0.0), 0.25), (4 * BITS16, (0.0, 0.0), 0.3), (BITS16, (0.1, 0.1), 1.02), (0.0, (0.1, 0.005), 1.02)],
+)
+def test_errors_against_weighted_least_squares(position, torque, most, log, truth):
+    """Typical error over 100 draws, and sigma within a quarter, for the models whose rows are torques."""
+    draws = noisy(log, position, torque)
+    models = {name: EVERY[name] for name in ("explicit", "implicit")}
+    weighted, general = (identify_each(draws, scara(), models, **how) for how in ({}, {"estimator": GLS}))
+    for name, found in general.items():
+        error, other = (np.sqrt(np.mean((each.X - truth) ** 2, axis=0)) for each in (found, weighted[name]))
+        assert np.exp(np.mean(np.log(error / other))) < most
+        assert np.sqrt(np.mean(((found.X - truth) / found.corrected_sigma) ** 2)) == pytest.approx(1, abs=0.25)
+        np.testing.assert_array_equal(found.sigma, found.corrected_sigma)
+
+
+@pytest.mark.parametrize("operator", OPERATORS.builtin)
+def test_every_operator_has_a_covariance_to_solve_with(operator, log, truth):
+    chain = replace(idbench_chain(), operator=OPERATORS.create(operator))
+    found = identify(noisy(log, BITS16, (0.01, 0.001), 20), scara(), EVERY["explicit"], chain, GLS)
+    assert np.sqrt(np.mean(((found.X - truth) / found.sigma) ** 2)) < 1.5
+
+
+def test_a_run_that_cannot_be_solved_leaves_the_others(log):
+    one = noisy(log, BITS16, (0.1, 0.005), 1)
+    both = MotionLog(log.fs, np.concatenate([one.q, 0 * one.q]), np.concatenate([one.tau, one.tau]), log.torque)
+    alone, found = (identify(x, scara(), EVERY["explicit"], estimator=GLS, throw=False) for x in (one, both))
+    assert np.isnan(found.X[1]).all()
+    np.testing.assert_allclose(found.X[0], alone.X[0], rtol=1e-9)
+
+
+def test_a_log_without_any_noise_is_solved(log, truth):
+    """Levels end at their least; nothing is singular."""
+    found = identify(log, scara(), EVERY["explicit"], estimator=GLS)
+    np.testing.assert_allclose(found.X, truth, rtol=1e-3)
+    assert np.isfinite(found.sigma).all()
+
+
+def test_two_logs_are_worth_two_and_long_ones_come_in_pieces(log, monkeypatch):
+    one = noisy(log, BITS16, (0.1, 0.005), 1).part(0, log.samples)
+    single = MotionLog(log.fs, one.q[0], one.tau[0], log.torque)
+    sigma = identify(single, scara(), EVERY["explicit"], estimator=GLS).sigma
+    double = identify([single, single], scara(), EVERY["explicit"], estimator=GLS)
+    np.testing.assert_allclose(np.sqrt(2) * double.sigma, sigma, rtol=0.1)
+    monkeypatch.setattr(long_logs, "LONG", 1e4)
+    monkeypatch.setattr(long_logs, "PIECE", 4e3)
+    pieces = identify(single, scara(), EVERY["explicit"], estimator=GLS)
+    assert pieces.problem.long
+    np.testing.assert_allclose(pieces.sigma, sigma, rtol=0.25)
+    assert (np.abs(pieces.X - double.X) < 3 * sigma).all()
+
+
+def test_levels_do_not_depend_on_where_they_begin(log):
+    problem = Problem((noisy(log, BITS16, (0.1, 0.005), 1).part(0, log.samples),), scara(), EVERY["explicit"], idbench_chain())
+    found = [
+        likely_noise(problem.parts, NoiseLevels(np.full((1, 2), 0.03 * x), np.full((1, 2), 3e-5 * x)), problem.linear).levels
+        for x in (0.3, 3.0)
+    ]
+    np.testing.assert_allclose(found[0].torque, found[1].torque, rtol=0.02)
