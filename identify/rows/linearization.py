@@ -67,7 +67,7 @@ class Linearization:
     def _slopes(self, some: slice) -> Slopes:
         state = self.signals.state
         slow = smoothed(state.qd, self.signals.fs)[..., some]
-        return slopes(self.basis, self.X, *(x[..., some] for x in (state.q, state.qd, state.qdd)), slow)
+        return slopes(self.basis, self.X, state.q[..., some], state.qd[..., some], state.qdd[..., some], slow)
 
 
 def slopes(basis: Basis, X: Array, q: Array, qd: Array, qdd: Array, slow: Array) -> Slopes:

@@ -9,6 +9,7 @@ from identify import (
     MODELS,
     OPERATORS,
     GeneralizedLeastSquares,
+    IdentificationError,
     MotionLog,
     Problem,
     idbench_chain,

@@ -195,8 +195,9 @@ def test_the_corrected_sigma_is_the_scatter(sigma, estimator, log):
         rms = np.sqrt(np.mean(found.corrected_sigma**2, axis=0))
         np.testing.assert_allclose(rms, scatter, rtol=0.16, err_msg=name)
         off.append(found.sigma.mean(axis=0) / scatter)
-    assert np.min(off) < 0.85
-    assert estimator == "WLS" or np.max(off) > 2
+    if estimator != "GLS":  # whose own sigma is that
+        assert np.min(off) < 0.85
+    assert estimator != "OLS" or np.max(off) > 2
 
 
 @pytest.mark.parametrize("mask", MASKS.builtin)
