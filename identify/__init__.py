@@ -39,6 +39,7 @@ from identify.estimators import ESTIMATORS as ESTIMATORS
 from identify.estimators import AbstractEstimator as AbstractEstimator
 from identify.estimators import Estimate as Estimate
 from identify.estimators import GeneralizedLeastSquares as GeneralizedLeastSquares
+from identify.estimators import MaximumLikelihood as MaximumLikelihood
 from identify.estimators import OrdinaryLeastSquares as OrdinaryLeastSquares
 from identify.estimators import Problem as Problem
 from identify.estimators import WeightedLeastSquares as WeightedLeastSquares

@@ -5,6 +5,9 @@ from identify.estimators.estimator import AbstractEstimator as AbstractEstimator
 from identify.estimators.generalized_least_squares import (
     GeneralizedLeastSquares as GeneralizedLeastSquares,
 )
+from identify.estimators.maximum_likelihood import (
+    MaximumLikelihood as MaximumLikelihood,
+)
 from identify.estimators.ordinary_least_squares import (
     OrdinaryLeastSquares as OrdinaryLeastSquares,
 )
@@ -21,5 +24,6 @@ ESTIMATORS: PluginTable[AbstractEstimator] = PluginTable(
         "OLS": OrdinaryLeastSquares,
         "WLS": WeightedLeastSquares,
         "GLS": GeneralizedLeastSquares,
+        "ML": MaximumLikelihood,
     },
 )

@@ -11,7 +11,7 @@ from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.data.motion_log import MotionLog
 from identify.errors import IdentificationError, LogError
-from identify.estimators.noise import noise_of
+from identify.estimators.noise import noise_of, position_noise
 from identify.estimators.restricted_likelihood import likely_noise
 from identify.estimators.row_weights import RowWeights
 from identify.models.explicit import ExplicitModel
@@ -20,7 +20,7 @@ from identify.rows.chain import Chain
 from identify.rows.factors import Factors, Fit
 from identify.rows.linearization import Linearization
 from identify.rows.long_logs import is_long, piece_of
-from identify.rows.noise_propagation import NoisyRows
+from identify.rows.noise_propagation import NoiseLevels, NoisyRows
 from identify.rows.row_map import RowMap
 from identify.rows.rows import Rows
 from identify.signals.signals import Signals
@@ -143,7 +143,8 @@ class Problem:
         """The noise whose levels make the explicit model's rows most likely, from their covariance."""
         if self.explicit is not self:
             return self.explicit.likely_noise
-        return likely_noise(self.parts, self.noise.levels, self.linear)
+        start = NoiseLevels(self.noise.levels.torque, position_noise(self.signals))
+        return likely_noise(self.parts, start, self.linear)
 
     def linear(self, signals: Signals) -> Linearization:
         """Return the linearization of the explicit model about these signals."""

@@ -20,7 +20,7 @@ def logs(robot):
     return q.reshape(RUNS, -1, 2), tau.reshape(RUNS, -1, 2)
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS.builtin)
+@pytest.mark.parametrize("estimator", ["OLS", "WLS", "GLS"])
 @pytest.mark.parametrize("sigma", [(0.5, 0.025), (0.025, 0.5)], ids=["first", "second"])
 def test_two_corrected_sigma_hold_the_truth_in_93_to_97_percent(estimator, sigma, logs, truth):
     """For every parameter and model; 95.4 % is right, and 1500 runs tell it to 0.5 %. The paper's sigma does not do that."""
@@ -37,4 +37,5 @@ def test_two_corrected_sigma_hold_the_truth_in_93_to_97_percent(estimator, sigma
         share = np.concatenate(inside[name]).mean(axis=0)
         assert share.min() >= 0.93, (name, share)
         assert share.max() <= 0.97, (name, share)
-    assert min(np.concatenate(found).mean(axis=0).min() for found in papers.values()) < 0.9
+    if estimator != "GLS":  # whose own sigma is that
+        assert min(np.concatenate(found).mean(axis=0).min() for found in papers.values()) < 0.9

@@ -24,6 +24,9 @@ SETTLED = 0.02
 PROBES = 4
 """Random signs by which the leverage of the torques is estimated."""
 
+UNKNOWN = 5.0
+"""Noise of the torque where friction's sign is not known, over the jump of friction there."""
+
 MASK = ReversalMask(threshold=0.1, width=0.02, taper=0.02)
 """Where the sign of a velocity is no model of friction."""
 
@@ -87,13 +90,11 @@ class JointFit:
             for cells, z, noise in zip(self.logs, self.motions, noises, strict=True)
         ]
         parts = [system.solved() for system in systems]
-        S = sum(system.corner - V.T @ V for system, (V, _, _) in zip(systems, parts, strict=True))
-        b = sum(system.b_X - V.T @ y for system, (V, y, _) in zip(systems, parts, strict=True))
-        covariance = np.linalg.pinv(np.asarray(S), hermitian=True)
-        dX = covariance @ b
+        covariance, b = _reduced(systems, parts)
+        dX = covariance @ b[:, 0]
         motions = []
         for z, (V, y, L) in zip(self.motions, parts, strict=True):
-            dz, _ = scipy.linalg.lapack.dtbtrs(L, y - V @ dX, uplo="L", trans="T")
+            dz, _ = scipy.linalg.lapack.dtbtrs(L, y[:, 0] - V @ dX, uplo="L", trans="T")
             motions.append(z + dz.reshape(z.shape))
         moved = _sigmas(dX, covariance)
         if not np.isfinite(moved) or not all(np.isfinite(z).all() for z in motions):
@@ -110,14 +111,14 @@ class JointFit:
         lost = (1 - weight) * self._friction(q, qdd)
         mean = self.levels.torque[:, None] * np.ones_like(weight)
         half = np.hypot(HELD * self.levels.torque[:, None], cells.rough)
-        return Noise(mean + lost, half + lost, self.levels.position)
+        return Noise(mean + lost, half + lost, self.levels.position, weight == 1)
 
     def _friction(self, q: Array, qdd: Array) -> Array:
         """Return the torque by which friction jumps where a joint turns, shape (joint, 1) [N m]."""
         still = np.zeros_like(q[:, :1])
         there = [State(q[:, :1], still + v, lambda _: qdd[:, :1]) for v in (SLIDING, -SLIDING)]
         ahead, back = (self._torques(state) for state in there)
-        return np.maximum(np.abs(ahead - back), 1e-3 * np.abs(self.X).max() * 0 + 1e-12)
+        return UNKNOWN * np.abs(ahead - back)
 
     def _torques(self, state: State) -> Array:
         total = np.zeros_like(state.q)
@@ -126,7 +127,27 @@ class JointFit:
         return total
 
     def _levels(self, noises: list[Noise], floor: Array) -> NoiseLevels:
-        return self.levels
+        """Return the levels with those of the torques from what is left over, and the share of it that the unknowns take."""
+        rng, n = np.random.default_rng(0), self.basis.n
+        signs = [rng.choice([-1.0, 1.0], (PROBES, n, cells.count)) for cells in self.logs]
+        systems = [
+            NormalEquations.of(cells, self.basis, self.X, z, noise, each)
+            for cells, z, noise, each in zip(self.logs, self.motions, noises, signs, strict=True)
+        ]
+        parts = [system.solved() for system in systems]
+        covariance, b = _reduced(systems, parts)
+        taken = sum(np.sum(y[:, 1:] ** 2, axis=0) for _, y, _ in parts) + np.sum(b[:, 1:] * (covariance @ b[:, 1:]), axis=0)
+        known = sum(np.count_nonzero(noise.known, axis=-1) for noise in noises)
+        free = np.maximum(known - np.asarray(taken).reshape(n, -1).mean(axis=1), 1e-3 * known)
+        squares = sum(system.squares for system in systems) / free
+        return replace(self.levels, torque=np.maximum(self.levels.torque * np.sqrt(squares), floor))
+
+
+def _reduced(systems: list[NormalEquations], parts: list[tuple[Array, Array, Array]]) -> tuple[Array, Array]:
+    """Return the covariance of the parameters, and their right-hand sides, with the motions eliminated."""
+    S = sum(system.corner - V.T @ V for system, (V, _, _) in zip(systems, parts, strict=True))
+    b = sum(system.b_parameters - V.T @ y for system, (V, y, _) in zip(systems, parts, strict=True))
+    return np.linalg.pinv(np.asarray(S), hermitian=True), np.asarray(b)
 
 
 def _sigmas(dX: Array, covariance: Array) -> float:

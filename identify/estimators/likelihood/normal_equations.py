@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 import scipy
 
 from identify.arrays import Array
@@ -30,11 +31,14 @@ class Noise:
         Of the mean torque, and of half the difference of both Gauss points [N m].
     position : Array, shape (joint,)
         Of the positions [rad].
+    known : bool array, shape (joint, cell)
+        Where the sign of friction is known.
     """
 
     mean: Array
     half: Array
     position: Array
+    known: npt.NDArray[np.bool_]
 
 
 @dataclass(eq=False)
@@ -49,8 +53,10 @@ class NormalEquations:
         A_zX.
     corner : Array, shape (p, p)
         A_XX.
-    b_z, b_X : Array, shape (2 n nodes,), (p,)
-        The right-hand side.
+    b_nodes, b_parameters : Array, shape (2 n nodes, 1 + m), (p, 1 + m)
+        The right-hand side, and m of `signs`.
+    squares : Array, shape (joint,)
+        Sums of the squared residuals of the mean torques over their variances, where friction's sign is known.
     cost : float
         Sum of the squared residuals over their variances.
     """
@@ -58,33 +64,41 @@ class NormalEquations:
     band: Array
     border: Array
     corner: Array
-    b_z: Array
-    b_X: Array
+    b_nodes: Array
+    b_parameters: Array
+    squares: Array
     cost: float = 0.0
 
     @classmethod
-    def of(cls, cells: Cells, basis: Basis, X: Array, z: Array, noise: Noise) -> "NormalEquations":
-        """Return those of a log at the parameters X and the motion z, shape (node, 2, joint)."""
+    def of(cls, cells: Cells, basis: Basis, X: Array, z: Array, noise: Noise, signs: Array | None = None) -> "NormalEquations":
+        """Return those of a log at the parameters X and the motion z, shape (node, 2, joint).
+
+        With random `signs`, shape (k, joint, cell), also right-hand sides of residuals that are one of them, for each joint:
+        their products with the solutions show how much of the mean torques' residuals the unknowns take (M. F. Hutchinson,
+        "A stochastic estimator of the trace of the influence matrix", Communications in Statistics 19 (1990) 433-450).
+        """
         n, p, size = basis.n, len(X), z.size
-        found = cls(np.zeros((4 * n, size)), np.zeros((size, p)), np.zeros((p, p)), np.zeros(size), np.zeros(p))
+        right = 1 + (0 if signs is None else len(signs) * n)
+        zeros = np.zeros((4 * n, size)), np.zeros((size, p)), np.zeros((p, p)), np.zeros((size, right)), np.zeros((p, right))
+        found = cls(*zeros, np.zeros(n))
         found._add_positions(cells, z, noise.position)
         for part in _chunks(cells.count):
-            found._add_torques(cells, basis, X, z, noise, part)
+            found._add_torques(cells, basis, X, z, noise, part, signs)
         return found
 
     def solved(self) -> tuple[Array, Array, Array]:
-        """Return L^-1 A_zX, L^-1 b_z, and the factor L of A_zz in bands."""
+        """Return L^-1 A_zX, L^-1 b_nodes, and the factor L of A_zz in bands."""
         try:
             L = scipy.linalg.cholesky_banded(self.band, lower=True, overwrite_ab=True, check_finite=False)
         except np.linalg.LinAlgError:
             raise IdentificationError(
                 "the motion is not determined by this log: positions and torques that change are needed; take WLS"
             ) from None
-        both = np.column_stack([self.border, self.b_z])
+        both, p = np.concatenate([self.border, self.b_nodes], axis=1), self.border.shape[1]
         z, info = scipy.linalg.lapack.dtbtrs(L, both, uplo="L", overwrite_b=True)
         if info:
             raise IdentificationError(f"the motion is not determined by this log (dtbtrs: {info}): take WLS")
-        return z[:, :-1], z[:, -1], L
+        return z[:, :p], z[:, p:], L
 
     def _add_positions(self, cells: Cells, z: Array, sigma: Array) -> None:
         cell, place = cells.places
@@ -94,12 +108,13 @@ class NormalEquations:
         self.cost += float(np.sum((left * sigma) ** 2))
         where = [2 * n * cell[:, None] + n * k + np.arange(n) for k in range(4)]
         for k in range(4):
-            np.add.at(self.b_z, where[k], w[k][:, None] * left)
+            np.add.at(self.b_nodes[:, 0], where[k], w[k][:, None] * left)
             for m in range(k + 1):
                 np.add.at(self.band, (np.full_like(where[m], n * (k - m)), where[m]), (w[k] * w[m])[:, None] / sigma**2)
 
-    def _add_torques(self, cells: Cells, basis: Basis, X: Array, z: Array, noise: Noise, part: slice) -> None:
-        n, count = basis.n, part.stop - part.start
+    def _add_torques(
+        self, cells: Cells, basis: Basis, X: Array, z: Array, noise: Noise, part: slice, signs: Array | None
+    ) -> None:
         nodes = z[part.start : part.stop + 1]
         points = [cells.motion(nodes, s) for s in GAUSS]
         D = np.stack([_columns(basis, *point) for point in points])  # (point, cell, joint, p)
@@ -112,16 +127,22 @@ class NormalEquations:
         wanted = [tau[:, part].T for tau in cells.torque]
         for sign, tau, sigma in ((1.0, wanted[0], noise.mean), (-1.0, wanted[1], noise.half)):
             # Mean of both points, and half of what the second has more than the first.
-            scale = sign / sigma[:, part].T[..., None]
-            W, H = ((x[1] + sign * x[0]) / 2 * np.abs(scale) for x in (D, J))
-            rho = tau * np.abs(scale[..., 0]) - np.matmul(W, X)
+            scale = 1 / sigma[:, part].T
+            W, H = ((x[1] + sign * x[0]) / 2 * scale[..., None] for x in (D, J))
+            rho = (tau * scale - np.matmul(W, X))[..., None]
             self.cost += float(np.sum(rho**2))
+            if sign > 0:
+                known = noise.known[:, part].T
+                self.squares += np.sum(rho[..., 0] ** 2 * known, axis=0)
+            if signs is not None:
+                others = np.zeros((*rho.shape[:2], rho.shape[1] * len(signs)))
+                for j in range(basis.n * (sign > 0)):
+                    others[:, j, j * len(signs) : (j + 1) * len(signs)] = signs[:, j, part].T * known[:, j : j + 1]
+                rho = np.concatenate([rho, others], axis=-1)
             self._add_cells(part.start, np.swapaxes(H, -1, -2), W, rho)
-            del W, H
-        del n, count
 
     def _add_cells(self, first: int, H: Array, W: Array, rho: Array) -> None:
-        """Add residuals rho, shape (cell, joint), with slopes H, (cell, 4 n, joint), by nodes and W, (cell, joint, p), by X."""
+        """Add residuals rho, shape (cell, joint, right), with slopes H, (cell, 4 n, joint), by nodes and W, (cell, joint, p), by X."""
         count, width = H.shape[:2]
         own, step = np.matmul(H, np.swapaxes(H, -1, -2)), width // 2
         stop = step * (count - 1) + 1
@@ -129,15 +150,15 @@ class NormalEquations:
             for j in range(i + 1):
                 at = step * first + j
                 self.band[i - j, at : at + stop : step] += own[:, i, j]
-        crossed, right = np.matmul(H, W), np.matmul(H, rho[..., None])[..., 0]
+        crossed, right = np.matmul(H, W), np.matmul(H, rho)
         for half in (0, 1):
             begin = step * (first + half)
             rows = slice(begin, begin + step * count)
             self.border[rows] += crossed[:, half * step : (half + 1) * step].reshape(step * count, -1)
-            self.b_z[rows] += right[:, half * step : (half + 1) * step].reshape(-1)
+            self.b_nodes[rows] += right[:, half * step : (half + 1) * step].reshape(step * count, -1)
         flat = W.reshape(-1, W.shape[-1])
         self.corner += flat.T @ flat
-        self.b_X += flat.T @ rho.reshape(-1)
+        self.b_parameters += flat.T @ rho.reshape(len(flat), -1)
 
 
 def _chunks(count: int) -> Iterator[slice]:

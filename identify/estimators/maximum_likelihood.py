@@ -1,0 +1,81 @@
+"""Maximum likelihood of motion and parameters together."""
+
+from dataclasses import dataclass
+from typing import ClassVar, final
+
+import numpy as np
+
+from identify.arrays import frozen
+from identify.data.motion_log import MotionLog
+from identify.errors import IdentificationError
+from identify.estimators.estimate import Estimate
+from identify.estimators.estimator import AbstractEstimator, Need
+from identify.estimators.generalized_least_squares import GeneralizedLeastSquares
+from identify.estimators.likelihood.cells import Cells
+from identify.estimators.likelihood.joint_fit import JointFit
+from identify.estimators.noise import position_noise
+from identify.estimators.problem import Problem
+from identify.estimators.restricted_likelihood import EXACT, SMALLEST
+from identify.models.explicit import ExplicitModel
+from identify.rows.factors import Status
+from identify.rows.noise_propagation import NoiseLevels
+
+MOST = 2e9
+"""Bytes that the equations of all motions may take."""
+
+
+@final
+@dataclass(frozen=True)
+class MaximumLikelihood(AbstractEstimator):
+    """Maximum likelihood (ML) of the motion and the parameters together, from the logged positions and torques themselves:
+
+        min over q(t), X of  sum |q_k - q(t_k)|^2 / sigma_q^2 + sum |tau - D(q, qd, qdd) X|^2 / sigma_tau^2
+
+    Least squares takes the filtered, differentiated positions for the motion; here it is unknown, a cubic polynomial between the
+    instants at which the torque changes. Where the sign of a velocity says nothing of friction, torques count for next to
+    nothing. It begins at the generalized least-squares solution and its noise levels, and finds those of the torques anew. No
+    filter takes part: of the chain it uses the mask for where it begins, and nothing else.
+    """
+
+    needs: ClassVar[frozenset[Need]] = frozenset({"logs"})
+
+    def solve(self, problem: Problem) -> Estimate:
+        """Return the estimate of every run.
+
+        Raises
+        ------
+        IdentificationError
+            If the model is not the explicit one, the logs are too long, or motion and parameters diverge.
+        """
+        if not isinstance(problem.model, ExplicitModel):
+            raise IdentificationError("ML has the torque equation of the explicit model: take --model explicit, or GLS")
+        _require_short(problem)
+        # Rows show little of the positions' noise where torques are noisy; their differences show all of it.
+        start, position = GeneralizedLeastSquares().solve(problem), np.maximum(position_noise(problem.signals), SMALLEST)
+        torque = problem.likely_noise.levels.torque
+        runs, p = start.X.shape[:-1], len(problem.names)
+        X, covariance = np.full((*runs, p), np.nan), np.full((*runs, p, p), np.nan)
+        for run in np.ndindex(runs):
+            if start.status[run] != Status.OK:
+                continue
+            logs = tuple(Cells.of(_alone(log, run)) for log in problem.logs)
+            rms = np.sqrt(np.mean([np.mean(cells.torque[0] ** 2, axis=-1) for cells in logs], axis=0))
+            own = NoiseLevels(torque[run], position[run])
+            found = JointFit.start(logs, problem.basis, start.X[run], own).solved(EXACT * rms)
+            X[run], covariance[run] = found.X, found.covariance
+        honest = frozen(covariance)
+        return Estimate(problem, frozen(X), honest, honest=honest)
+
+
+def _alone(log: MotionLog, run: tuple[int, ...]) -> MotionLog:
+    return MotionLog(log.fs, log.q[run], log.tau[run], log.torque)
+
+
+def _require_short(problem: Problem) -> None:
+    n, p = problem.basis.n, len(problem.names)
+    samples = sum(log.samples for log in problem.logs)
+    if (size := samples * 2 * n * (2 * p + 8 * n) * 8) > MOST:
+        raise IdentificationError(
+            f"motion and parameters of {samples} samples of {n} joints together take {size / 1e9:.3g} GB: take GLS, or at most "
+            f"{int(samples * MOST / size)} samples"
+        )
