@@ -31,10 +31,10 @@ class MaximumLikelihood(AbstractEstimator):
 
         min over q(t), X of  sum |q_k - q(t_k)|^2 / sigma_q^2 + sum |tau - D(q, qd, qdd) X|^2 / sigma_tau^2
 
-    Least squares takes the filtered, differentiated positions for the motion; here it is unknown, a cubic polynomial between the
-    instants at which the torque changes. Where the sign of a velocity says nothing of friction, torques count for next to
+    Least squares takes the filtered, differentiated positions for the motion; here it is unknown, a cubic polynomial between
+    the instants at which the torque changes. Where the sign of a velocity says nothing of friction, torques count for next to
     nothing. It begins at the generalized least-squares solution and its noise levels, and finds those of the torques anew. No
-    filter takes part: of the chain it uses the mask for where it begins, and nothing else.
+    filter takes part.
     """
 
     needs: ClassVar[frozenset[Need]] = frozenset({"logs"})
