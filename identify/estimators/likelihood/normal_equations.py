@@ -118,12 +118,8 @@ class NormalEquations:
         nodes = z[part.start : part.stop + 1]
         points = [cells.motion(nodes, s) for s in GAUSS]
         D = np.stack([_columns(basis, *point) for point in points])  # (point, cell, joint, p)
-        J = np.stack(
-            [
-                _by_nodes(slope, hermite(s, cells.period))
-                for s, slope in zip(GAUSS, _slopes_of(cells, basis, X, nodes), strict=True)
-            ]
-        )
+        slope, T = _slopes_of(cells, basis, X, nodes), cells.period
+        J = np.stack([_by_nodes(slope, hermite(s, T)) for s in GAUSS])
         wanted = [tau[:, part].T for tau in cells.torque]
         for sign, tau, sigma in ((1.0, wanted[0], noise.mean), (-1.0, wanted[1], noise.half)):
             # Mean of both points, and half of what the second has more than the first.
@@ -174,8 +170,8 @@ def _columns(basis: Basis, q: Array, qd: Array, qdd: Array) -> Array:
     return found
 
 
-def _slopes_of(cells: Cells, basis: Basis, X: Array, z: Array) -> list[list[Array]]:
-    """Return stiffness, damping and inertia in cells, shape (cell, joint, joint), at both points: those of the middle."""
+def _slopes_of(cells: Cells, basis: Basis, X: Array, z: Array) -> list[Array]:
+    """Return stiffness, damping and inertia in cells, shape (cell, joint, joint), those of its middle."""
     count, step = len(z) - 1, max(1, int(cells.log.fs / RATE))
     some = np.unique(np.append(np.arange(0, count, step), count - 1))
     q, qd, qdd = (x[..., some] for x in cells.motion(z, 0.5))
@@ -185,7 +181,7 @@ def _slopes_of(cells: Cells, basis: Basis, X: Array, z: Array) -> list[list[Arra
     share = between - low
     high = np.minimum(low + 1, len(some) - 1)
     full = [np.moveaxis(x[..., low] * (1 - share) + x[..., high] * share, -1, 0) for x in found]
-    return [[full[2], full[1], full[0]]] * 2
+    return [full[2], full[1], full[0]]
 
 
 def _by_nodes(slope: list[Array], weights: tuple[Array, Array, Array]) -> Array:
