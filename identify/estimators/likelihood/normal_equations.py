@@ -138,7 +138,7 @@ class NormalEquations:
             self._add_cells(part.start, np.swapaxes(H, -1, -2), W, rho)
 
     def _add_cells(self, first: int, H: Array, W: Array, rho: Array) -> None:
-        """Add residuals rho, (cell, joint, right), with slopes H, (cell, 4 n, joint), by nodes and W, (cell, joint, p), by X."""
+        """Add residuals rho, (cell, joint, right), of slopes H, (cell, 4 n, joint), by nodes and W, (cell, joint, p), by X."""
         count, width = H.shape[:2]
         own, step = np.matmul(H, np.swapaxes(H, -1, -2)), width // 2
         stop = step * (count - 1) + 1
