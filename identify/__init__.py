@@ -49,6 +49,7 @@ from identify.estimators.identification import identify as identify
 from identify.estimators.identification import identify_each as identify_each
 from identify.estimators.recursive_least_squares import Recursive as Recursive
 from identify.estimators.recursive_least_squares import recursive_least_squares as recursive_least_squares
+from identify.judge.bound import cramer_rao as cramer_rao
 from identify.judge.diagnosis import Instants as Instants
 from identify.judge.diagnosis import binned as binned
 from identify.judge.diagnosis import cutoffs as cutoffs

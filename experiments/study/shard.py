@@ -8,17 +8,18 @@ from typing import Any
 
 import numpy as np
 
+from experiments.study.bound import bound_of
 from experiments.study.method import Method
 from experiments.study.study import Study
-from identify import Estimate, ExplicitModel, IdentificationError, Problem, Status, attempt_each
+from identify import Array, Estimate, ExplicitModel, IdentificationError, Problem, Status, attempt_each
 from sim.engine.run import Run
 from sim.engine.simulation import Progress, simulate
 from sim.errors import BenchError
 from sim.scenario.scenario import Scenario
 from sim.trajectories import Reference
 
-PARTS = ("", ".sigma", ".paper_sigma", ".truth")
-"""Of every parameter: the estimate, its corrected sigma, that of the paper's formula, and the truth."""
+PARTS = ("", ".sigma", ".paper_sigma", ".truth", ".bound")
+"""Of every parameter: the estimate, its corrected sigma, that of the paper's formula, the truth, and the least error."""
 
 
 @dataclass
@@ -49,6 +50,7 @@ def run_shard(study: Study, runs: range, *, threads: int = 1, progress: Progress
         try:
             simulated = _simulate(scenarios, together, threads, _part(progress, done, len(together), len(runs)))
             truth = study.subject.truth(simulated.robots[0])
+            bound = bound_of(study, simulated, truth)
         except BenchError as error:
             _fail(shard, study, scenarios, list(together), str(error))
             continue
@@ -56,7 +58,7 @@ def run_shard(study: Study, runs: range, *, threads: int = 1, progress: Progress
         done += len(together)
         for method in study.methods:
             start = time.perf_counter()
-            shard.rows += _identify(study, method, simulated, list(together), truth)
+            shard.rows += _identify(study, method, simulated, list(together), truth, bound)
             shard.seconds[f"{method.chain_name} {method.estimator_name}"] += time.perf_counter() - start
     shard.rows.sort(key=lambda row: row["run"])
     return shard
@@ -92,7 +94,7 @@ def _part(progress: Progress | None, done: int, part: int, runs: int) -> Progres
 
 
 def _identify(
-    study: Study, method: Method, simulated: Run, runs: Sequence[int], truth: Mapping[str, float]
+    study: Study, method: Method, simulated: Run, runs: Sequence[int], truth: Mapping[str, float], bound: Array
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for every run and model."""
     found: dict[str, Estimate | IdentificationError]
@@ -103,7 +105,7 @@ def _identify(
         found = dict.fromkeys(study.models, error)
     for model in study.models:
         outcome = found[model]
-        columns = _columns(outcome, truth) if isinstance(outcome, Estimate) else {}
+        columns = _columns(outcome, truth, bound) if isinstance(outcome, Estimate) else {}
         for i, run in enumerate(runs):
             common = _common(study, method, run, model, simulated.seeds[i])
             if reason := simulated.failures.get(i) or _failure(outcome, i):
@@ -121,10 +123,10 @@ def _failure(outcome: Estimate | IdentificationError, i: int) -> str:
     return "" if np.isfinite(outcome.X[i]).all() else "the estimator finds no finite value"
 
 
-def _columns(estimate: Estimate, truth: Mapping[str, float]) -> dict[str, list[Any]]:
+def _columns(estimate: Estimate, truth: Mapping[str, float], bound: Array) -> dict[str, list[Any]]:
     """Return what an estimate of many runs found, a list with the value of each run."""
     runs = len(estimate.X)
-    parts = estimate.X, estimate.best_sigma, estimate.sigma, np.tile(list(truth.values()), (runs, 1))
+    parts = estimate.X, estimate.best_sigma, estimate.sigma, np.tile(list(truth.values()), (runs, 1)), bound
     columns = {
         "condition_number": estimate.condition_number.tolist(),
         "rows": estimate.row_count.tolist(),

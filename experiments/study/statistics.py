@@ -40,8 +40,8 @@ class Cell:
         Names of X.
     run : int array, shape (runs,)
         Numbers of the runs that gave an estimate.
-    X, sigma, paper_sigma, truth : Array, shape (runs, p)
-        Of those runs.
+    X, sigma, paper_sigma, truth, bound : Array, shape (runs, p)
+        Of those runs; `bound` is NaN where it was not asked for.
     failures : mapping of str to int array
         Reasons of the others, as the first of them has it, and the runs that failed so: reasons that differ in numbers alone
         are one.
@@ -55,6 +55,7 @@ class Cell:
     sigma: Array
     paper_sigma: Array
     truth: Array
+    bound: Array
     failures: Mapping[str, np.typing.NDArray[np.int64]]
 
     @property
@@ -97,6 +98,16 @@ class Cell:
     def typical(self) -> float:
         """Geometric mean over the parameters of their rmse: one figure that no parameter's unit or size decides."""
         return float(np.exp(np.mean(np.log(np.maximum(self.rmse[self.relative], LEAST)))))
+
+    @property
+    def least(self) -> Array:
+        """Root mean square of the least relative errors that noise allows (Cramer-Rao), shape (p,); NaN if not asked for."""
+        return np.sqrt(np.mean((self.bound / np.where(self.truth == 0, np.nan, self.truth)) ** 2, axis=0))
+
+    @property
+    def typical_least(self) -> float:
+        """Geometric mean over the parameters of `least`."""
+        return float(np.exp(np.mean(np.log(np.maximum(self.least[self.relative], LEAST)))))
 
     @property
     def relative(self) -> np.typing.NDArray[np.bool_]:
@@ -156,6 +167,7 @@ def _cell(
         sigma=of(".sigma"),
         paper_sigma=of(".paper_sigma"),
         truth=of(".truth"),
+        bound=of(".bound"),
         failures=_grouped(rows["failure"][index[failed]], rows["run"][index[failed]]),
     )
 

@@ -63,6 +63,8 @@ class Study:
     """Names of chains."""
     estimators: Names = ("WLS",)
     """Names of estimators."""
+    bound: bool = False
+    """Whether the least error that encoders and torque noise allow is computed beside (Cramer-Rao)."""
 
     def __post_init__(self) -> None:
         if not self.axes:

@@ -92,13 +92,14 @@ def _overview(cell: Cell) -> list[str]:
     settings = [value(x) for x in cell.settings.values()]
     head = [*settings, *cell.names, f"{cell.runs}", f"{cell.failed or ''}"]
     if not cell.runs:
-        return [*head, *[""] * 4]
+        return [*head, *[""] * 5]
     worst = int(np.nan_to_num(cell.rmse).argmax())
     shares = []
     for sigma in (cell.sigma, cell.paper_sigma):
         share = 100 * cell.coverage(sigma)
         shares.append(f"{share.mean():.0f} % ({share.min():.0f} to {share.max():.0f})" if np.isfinite(share).all() else "")
-    return [*head, percent(cell.typical), f"{percent(cell.rmse[worst])} {cell.parameters[worst]}", *shares]
+    least = percent(cell.typical_least) if np.isfinite(cell.typical_least) else ""
+    return [*head, percent(cell.typical), least, f"{percent(cell.rmse[worst])} {cell.parameters[worst]}", *shares]
 
 
 def _details(cell: Cell, title: str) -> Iterator[list[str]]:

@@ -42,11 +42,16 @@ def write_results(page: Console, store: Store, recording: "StudyRecording | None
 
 def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:
     axes = [short(field) for field in store.study.varied]
-    grid = new_table(store.study.question, [*axes[1:], "identified by", "runs", "failed", "typical error", "within 2 sigma"])
+    least = ["bound"] if store.study.bound else []
+    columns = [*axes[1:], "identified by", "runs", "failed", "typical error", *least, "within 2 sigma"]
+    grid = new_table(store.study.question, columns)
     for cell in found:
         settings = [value(x) for x in cell.settings.values()]
         numbers = f"{cell.runs}", f"{cell.failed or ''}"
-        judged = (percent(cell.typical), f"{100 * cell.coverage(cell.sigma).mean():.0f} %") if cell.runs else ("", "")
+        errors = (
+            [percent(cell.typical), *([percent(cell.typical_least)] if least else [])] if cell.runs else [""] * (1 + len(least))
+        )
+        judged = *errors, f"{100 * cell.coverage(cell.sigma).mean():.0f} %" if cell.runs else ""
         grid.add_row(*settings, method(cell, found), *numbers, *judged)
     grid.columns[0].header = axes[0]
     page.print(grid)
@@ -93,6 +98,7 @@ def _cell(cell: Cell) -> dict[str, Any]:
             "coverage_low": cell.coverage_interval(cell.sigma)[:, 0],
             "coverage_high": cell.coverage_interval(cell.sigma)[:, 1],
             "paper_coverage": cell.coverage(cell.paper_sigma),
+            "bound_percent": 100 * cell.least,
         }
         summary |= {name: [float(x) if isfinite(x) else None for x in values] for name, values in numbers.items()}
     return summary

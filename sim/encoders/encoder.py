@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from sim.errors import ScenarioError
 from sim.robot.motors import Array
 
 
@@ -32,3 +33,13 @@ class AbstractEncoder(ABC):
         rngs : sequence of numpy.random.Generator
             One for each simulation, so that none depends on the others.
         """
+
+    def spread(self, n: int) -> Array:
+        """Return the standard deviation of the noise in the positions of `n` moving joints, shape (n,) [rad]; asked for bounds.
+
+        Raises
+        ------
+        ScenarioError
+            If it does not say.
+        """
+        raise ScenarioError(f"encoder {type(self).__name__} has no spread({n}), which a study with bound = true needs")

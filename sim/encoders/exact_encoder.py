@@ -20,6 +20,10 @@ class ExactEncoder(AbstractEncoder):
         del n, samples, fs, rngs
         return _Reader()
 
+    def spread(self, n: int) -> Array:
+        """Return zeros."""
+        return np.zeros(n)
+
 
 class _Reader(AbstractReader):
     def read(self, k: int, q: Array) -> Array:

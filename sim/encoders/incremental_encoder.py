@@ -37,6 +37,11 @@ class IncrementalEncoder(AbstractEncoder):
         missed = np.stack([(rng.random((samples, n)) < self.missed_counts / fs).astype(np.float64) for rng in rngs], axis=1)
         return _Reader(self, per_joint(self.lines, n, "encoder.lines"), noise, missed)
 
+    def spread(self, n: int) -> Array:
+        """Return what counts, step / sqrt(12), noise and interpolation error make together."""
+        period = 2 * np.pi / per_joint(self.lines, n, "encoder.lines")
+        return np.sqrt((period / self.quadrature) ** 2 / 12 + self.noise**2 + (self.interpolation_error * period) ** 2 / 2)
+
 
 class _Reader(AbstractReader):
     def __init__(self, settings: IncrementalEncoder, lines: Array, noise: Array, missed: Array) -> None:

@@ -33,6 +33,11 @@ class TorqueMeasurement:
         if self.cutoff and self.source == "reference":
             raise ScenarioError(f"cutoff = {self.cutoff:g} Hz needs source = 'current': a reference is not filtered")
 
+    def spread(self, n: int) -> Array:
+        """Return the standard deviation of the noise in the torques of `n` joints, that of the converter included [N m]."""
+        noise, step = (per_joint(getattr(self, name), n, f"torque.{name}") for name in ("noise", "resolution"))
+        return np.hypot(noise, step / np.sqrt(12))
+
     def logged(self, tau: Array, n: int, rngs: Sequence[np.random.Generator]) -> Array:
         """Return what the log says of the torques `tau` [N m], shape (nsim, time, joint)."""
         gain, offset, noise, step = (

@@ -118,8 +118,8 @@ class NormalEquations:
         nodes = z[part.start : part.stop + 1]
         points = [cells.motion(nodes, s) for s in GAUSS]
         D = np.stack([_columns(basis, *point) for point in points])  # (point, cell, joint, p)
-        slope, T = _slopes_of(cells, basis, X, nodes), cells.period
-        J = np.stack([_by_nodes(slope, hermite(s, T)) for s in GAUSS])
+        both, T = _slopes_of(cells, basis, X, nodes), cells.period
+        J = np.stack([_by_nodes(slope, hermite(s, T)) for s, slope in zip(GAUSS, both, strict=True)])
         wanted = [tau[:, part].T for tau in cells.torque]
         for sign, tau, sigma in ((1.0, wanted[0], noise.mean), (-1.0, wanted[1], noise.half)):
             # Mean of both points, and half of what the second has more than the first.
@@ -170,18 +170,25 @@ def _columns(basis: Basis, q: Array, qd: Array, qdd: Array) -> Array:
     return found
 
 
-def _slopes_of(cells: Cells, basis: Basis, X: Array, z: Array) -> list[Array]:
-    """Return stiffness, damping and inertia in cells, shape (cell, joint, joint), those of its middle."""
+def _slopes_of(cells: Cells, basis: Basis, X: Array, z: Array) -> list[list[Array]]:
+    """Return stiffness, damping and inertia at both Gauss points of every cell, shape (cell, joint, joint) each.
+
+    Inertia at one point less that at the other counts: accelerations that a node makes there have opposite signs.
+    """
     count, step = len(z) - 1, max(1, int(cells.log.fs / RATE))
     some = np.unique(np.append(np.arange(0, count, step), count - 1))
     q, qd, qdd = (x[..., some] for x in cells.motion(z, 0.5))
     found = slopes(basis, X, q, qd, qdd, qd)
-    between = np.interp(np.arange(count), some, np.arange(len(some)))
-    low = np.minimum(between.astype(np.intp), max(0, len(some) - 2))
-    share = between - low
-    high = np.minimum(low + 1, len(some) - 1)
-    full = [np.moveaxis(x[..., low] * (1 - share) + x[..., high] * share, -1, 0) for x in found]
-    return [full[2], full[1], full[0]]
+    if len(some) < 2:
+        return [[np.moveaxis(x, -1, 0) for x in reversed(found)]] * 2
+    return [[_between(x, some, np.arange(count) + s - 0.5) for x in reversed(found)] for s in GAUSS]
+
+
+def _between(x: Array, some: npt.NDArray[np.intp], at: Array) -> Array:
+    """Return values x, shape (..., len(some)), of cells `some` at places `at`, time first, by straight lines."""
+    low = np.clip(np.searchsorted(some, at, side="right") - 1, 0, len(some) - 2)
+    share = (at - some[low]) / (some[low + 1] - some[low])
+    return np.moveaxis(x[..., low] * (1 - share) + x[..., low + 1] * share, -1, 0)
 
 
 def _by_nodes(slope: list[Array], weights: tuple[Array, Array, Array]) -> Array:

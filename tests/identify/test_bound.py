@@ -1,0 +1,68 @@
+"""The Cramer-Rao bound."""
+
+import numpy as np
+import pytest
+
+from identify import Basis, CoulombFriction, NoiseLevels, ViscousFriction, cramer_rao, scara
+from identify.basis.armature import Armature
+
+FS = 100.0
+
+
+def one_joint():
+    """J qdd + Fv qd + Fs sign(qd)."""
+    return Basis(1, (Armature(), ViscousFriction(), CoulombFriction()))
+
+
+def motion(seconds, runs=()):
+    """A joint that always moves forward, with accelerations that vary."""
+    t = np.arange(round(seconds * FS)) / FS
+    q, qd = 3 * t + np.sin(2 * t), 3 + 2 * np.cos(2 * t)
+    return (np.broadcast_to(x[:, None], (*runs, len(t), 1)) for x in (q, qd))
+
+
+def closed_form(q, qd, X, sq, st):
+    """The whole Gaussian: positions are start, velocity, and torques of each period through J q'' = u, Fv small."""
+    N, T = len(q), 1 / FS
+    J, Fv = X[0], X[1]
+    a, b = np.exp(-Fv / J * T), J / Fv
+    step, push = np.array([[1, b * (1 - a)], [0, a]]), np.array([(T - b * (1 - a)) / Fv, (1 - a) / Fv])
+    qdd = np.diff(qd[:, 0]) / T
+    middle = (qd[:-1, 0] + qd[1:, 0]) / 2
+    W = np.stack([qdd, middle, np.ones(N - 1)], axis=1)
+    response = np.zeros((N, N - 1))
+    state = np.zeros((2, N - 1))
+    start, power = np.zeros((N, 2)), np.eye(2)
+    for k in range(N):
+        response[k], start[k] = state[0], power[0]
+        if k < N - 1:
+            state = step @ state
+            state[:, k] += push
+            power = step @ power
+    C = sq**2 * np.eye(N) + st**2 * response @ response.T
+    A = np.concatenate([response @ W, start], axis=1)
+    return np.linalg.inv(A.T @ np.linalg.solve(C, A))[:3, :3]
+
+
+@pytest.mark.parametrize(("sq", "st"), [(2.8e-5, 1e-4), (2.8e-5, 0.1), (4e-4, 0.01)])
+def test_one_joint_against_the_whole_gaussian(sq, st):
+    X = np.array([3.5, 0.5, 0.4])
+    q, qd = motion(3.0)
+    order = [one_joint().names.index(name) for name in one_joint().names]
+    found = cramer_rao(one_joint(), X[order], q, qd, FS, NoiseLevels(np.array([st]), np.array([sq])))
+    wanted = closed_form(q, qd, X, sq, st)
+    np.testing.assert_allclose(np.sqrt(np.diag(found)), np.sqrt(np.diag(wanted)), rtol=0.01)
+
+
+def test_it_scales_with_the_noise_and_runs_are_independent(truth):
+    t = np.arange(600) / FS
+    phase = np.array([0.0, 0.4, 0.9])[:, None, None]
+    q = np.stack([np.sin(2 * t), np.cos(3 * t)], axis=-1) + 0 * phase + phase
+    qd = np.broadcast_to(np.stack([2 * np.cos(2 * t), -3 * np.sin(3 * t)], axis=-1), q.shape)
+    noise = NoiseLevels(np.full(2, 0.01), np.full(2, 1e-5))
+    found = cramer_rao(scara(), truth, q, qd, FS, noise)
+    alone = cramer_rao(scara(), truth, q[1], qd[1], FS, noise)
+    np.testing.assert_allclose(found[1], alone, rtol=1e-9)
+    # Friction's jump stands for an unknown torque where joints turn, which does not grow with the noise.
+    double = cramer_rao(scara(), truth, q[1], qd[1], FS, NoiseLevels(np.full(2, 0.02), np.full(2, 2e-5)))
+    np.testing.assert_allclose(np.sqrt(np.diag(double) / np.diag(alone)), 2.0, rtol=0.1)

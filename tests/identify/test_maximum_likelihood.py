@@ -1,0 +1,147 @@
+"""Motion and parameters together."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identify import (
+    MODELS,
+    GeneralizedLeastSquares,
+    IdentificationError,
+    MaximumLikelihood,
+    MotionLog,
+    TorqueChannel,
+    attempt_each,
+    identify,
+    scara,
+)
+from identify.estimators import maximum_likelihood
+from identify.estimators.likelihood.cells import GAUSS, Cells, hermite
+from identify.estimators.likelihood.normal_equations import Noise, NormalEquations
+from identify.estimators.problem import Problem
+from identify.rows.chains import idbench_chain
+from sim.engine.simulation import simulate
+from sim.scenario.scenario_file import load
+from sim.trajectories import RandomMoves
+
+EXPLICIT, ML, GLS = MODELS.create("explicit"), MaximumLikelihood(), GeneralizedLeastSquares()
+BITS16 = 2 * np.pi / 2**16 / np.sqrt(12)
+RUNS = 12
+
+
+def scenario(**changes):
+    moves = RandomMoves(moves=12, durations=(1.3, 1.3), rest=0.7, seed=3)
+    return replace(load("ideal"), trajectory=moves, **changes)
+
+
+@pytest.fixture(scope="module")
+def exact():
+    """A held command, exact positions, of 12 motions."""
+    base = scenario()
+    motions = [replace(base.trajectory, seed=100 + i).sample(base.real_robot, base.fs) for i in range(RUNS)]
+    return simulate(base, range(RUNS), motions=motions).log
+
+
+def noisy(log, position, torque):
+    rng = np.random.default_rng(5)
+    q, tau = (x + s * rng.standard_normal(x.shape) for x, s in ((log.q, position), (log.tau, torque)))
+    return MotionLog(log.fs, q, tau, log.torque)
+
+
+def test_cubic_polynomials_are_those_of_their_ends():
+    """q = t^3 - 2 t of a cell of 0.1 s, with its derivatives, anywhere."""
+    T, s = 0.1, np.linspace(0, 1, 7)
+    ends = np.array([0.0, -2.0, T**3 - 2 * T, 3 * T**2 - 2])
+    t = s * T
+    for weights, wanted in zip(hermite(s, T), (t**3 - 2 * t, 3 * t**2 - 2, 6 * t), strict=True):
+        np.testing.assert_allclose(ends @ weights, wanted, atol=1e-12)
+
+
+@pytest.mark.parametrize("meaning", ["held", "averaged", "instantaneous"])
+def test_torque_in_a_cell_is_what_its_samples_mean(meaning):
+    """Of tau = t^2 + 3 t, logged late by 4 ms: mean and half the difference at the Gauss points; held torques are steps."""
+    fs, delay, t = 100.0, 0.004, np.arange(200) / 100.0
+    channel = TorqueChannel(meaning, delay)
+    begin = t + delay
+    mean = ((begin + 0.01) ** 3 - begin**3) / 0.03 + 3 * (begin + 0.005)
+    tau = mean if meaning == "averaged" else begin**2 + 3 * begin
+    cells = Cells.of(MotionLog(fs, np.zeros((200, 1)), tau[:, None], channel))
+    points = [begin + s * 0.01 for s in GAUSS]
+    first, second = (x**2 + 3 * x for x in points)
+    found = [x[0] for x in cells.torque]
+    inner = slice(3, cells.count - 3)
+    wanted = (tau, 0 * tau) if meaning == "held" else ((first + second) / 2, (second - first) / 2)
+    for x, y in zip(found, wanted, strict=True):
+        np.testing.assert_allclose(x[inner], y[: cells.count][inner], atol=1e-7)
+
+
+def test_the_right_hand_side_is_the_slope_of_the_cost(exact, truth):
+    """By central differences of the cost, in X and in the motion, where friction does not jump."""
+    log = noisy(exact, BITS16, 0.01).part(0, 200)
+    cells = Cells.of(MotionLog(log.fs, log.q[0], log.tau[0], log.torque))
+    t = np.arange(201)[:, None] / log.fs
+    z = np.stack([np.sin(t + [0.3, 0.7]) + 2 * t, np.cos(t + [0.3, 0.7]) + 2], axis=1)
+    one = np.ones((2, cells.count))
+    noise = Noise(0.1 * one, 0.2 * one, np.full(2, 1e-3), one > 0)
+
+    def cost(X, z):
+        return NormalEquations.of(cells, scara(), X, z, noise).cost
+
+    found = NormalEquations.of(cells, scara(), truth, z, noise)
+    for k in range(8):
+        step = 1e-4 * np.eye(8)[k]
+        slope = (cost(truth + step, z) - cost(truth - step, z)) / 2e-4
+        assert -2 * found.b_parameters[k, 0] == pytest.approx(slope, rel=1e-5)
+    for index in ((0, 0, 0), (57, 1, 0), (57, 0, 1), (200, 1, 1)):
+        step = np.zeros_like(z)
+        step[index] = 1e-6
+        slope = (cost(truth, z + step) - cost(truth, z - step)) / 2e-6
+        # To what slopes at a cell's middle, from velocities of difference 0.05 rad/s, leave.
+        assert -2 * found.b_nodes.reshape(*z.shape, -1)[(*index, 0)] == pytest.approx(slope, rel=2e-2)
+
+
+@pytest.mark.parametrize(
+    ("position", "torque", "most"), [(BITS16, 0.0, 0.25), (16 * BITS16, 0.0, 0.2), (BITS16, 0.01, 0.9), (BITS16, 0.1, 1.1)]
+)
+def test_errors_against_weighted_least_squares(position, torque, most, exact, truth):
+    """Typical errors of 12 motions, each known to a fifth, and sigma: the table of docs/noise.md has 64."""
+    log = noisy(exact, position, torque)
+    weighted, likely = identify(log, scara(), EXPLICIT), identify(log, scara(), EXPLICIT, estimator=ML)
+    error, other = (np.sqrt(np.mean((found.X - truth) ** 2, axis=0)) for found in (likely, weighted))
+    assert np.exp(np.mean(np.log(error / other))) < most
+    z = (likely.X - truth) / likely.corrected_sigma
+    assert np.sqrt(np.mean(z**2)) == pytest.approx(1, abs=0.25)
+
+
+@pytest.mark.parametrize("delay", [0.003, 0.012, -0.004])
+def test_a_stated_delay_is_taken_into_account(delay, truth):
+    made = scenario(timing=replace(load("ideal").timing, delay=max(delay, 0.0)))
+    log = simulate(made).alone()
+    if delay < 0:
+        pytest.skip("no drive acts before it is told to")
+    found = identify(noisy(log, BITS16, 0.0), scara(), EXPLICIT, estimator=ML)
+    assert (np.abs(found.X - truth) < 5 * found.sigma).all()
+
+
+def test_two_logs_are_worth_two(exact):
+    one, two = (MotionLog(exact.fs, *(x[k] for x in (exact.q, exact.tau)), exact.torque) for k in (0, 1))
+    one, two = noisy(one, BITS16, 0.02), noisy(two, BITS16, 0.02)
+    both = identify([one, two], scara(), EXPLICIT, estimator=ML)
+    alone = [identify(log, scara(), EXPLICIT, estimator=ML) for log in (one, two)]
+    together = 1 / np.sqrt(sum(1 / found.sigma**2 for found in alone))
+    np.testing.assert_allclose(both.sigma, together, rtol=0.25)
+
+
+def test_other_models_are_refused_and_leave_the_explicit_one(exact):
+    log = MotionLog(exact.fs, exact.q[0], exact.tau[0], exact.torque)
+    problem = Problem((noisy(log, BITS16, 0.0),), scara(), EXPLICIT, idbench_chain())
+    found = attempt_each(problem, {name: MODELS.create(name) for name in MODELS.builtin}, ML)
+    assert found["explicit"].X.shape == (8,)
+    assert "--model explicit, or GLS" in str(found["power"])
+
+
+def test_logs_too_long_for_their_motion_are_refused(exact, monkeypatch):
+    monkeypatch.setattr(maximum_likelihood, "MOST", 1e6)
+    with pytest.raises(IdentificationError, match=r"together take .* GB: take GLS, or at most \d+ samples"):
+        identify(MotionLog(exact.fs, exact.q[0], exact.tau[0], exact.torque), scara(), EXPLICIT, estimator=ML)
