@@ -22,6 +22,7 @@ from identify.basis import TreeLinks as TreeLinks
 from identify.basis import ViscousFriction as ViscousFriction
 from identify.basis import scara as scara
 from identify.basis import tree_basis as tree_basis
+from identify.data.encoder_step import encoder_steps as encoder_steps
 from identify.data.kinematics import Joint as Joint
 from identify.data.kinematics import KinematicTree as KinematicTree
 from identify.data.motion_log import MotionLog as MotionLog

@@ -1,6 +1,6 @@
 """Identifications as text."""
 
-from math import isfinite
+from math import isfinite, log2, pi
 
 from rich.console import Console
 from rich.text import Text
@@ -38,7 +38,19 @@ def print_identified(console: Console, found: Identified, title: str) -> None:
     for model, why in found.failures.items():
         console.print(Text(f"{model}: no estimate: {why}"), soft_wrap=True)
     console.print(Text(f"torque: {read}" + (f", which chain {found.chain} ignores: it takes it as logged" if logged else "")))
+    console.print(Text(_noise(found)), soft_wrap=True)
     console.print()
+
+
+def _noise(found: Identified) -> str:
+    """Return the noise of a log in words, joint by joint."""
+    torque, position = (" ".join(f"{x or 0:.2g}" for x in found.noise[name]) for name in ("torque", "position"))
+    words = f"noise found in the log: torque {torque} N m, position {position} rad"
+    steps = found.noise["encoder_step"]
+    if not any(steps):
+        return words
+    bits = " ".join(f"{log2(2 * pi / step):.1f}" if step else "?" for step in steps)
+    return f"{words}; encoder steps {' '.join(f'{x:.3g}' if x else '?' for x in steps)} rad ({bits} bits)"
 
 
 def _explained(share: float) -> str:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from identify import (
     MotionLog,
     Problem,
     attempt_each,
+    encoder_steps,
 )
 
 
@@ -134,6 +136,14 @@ class Identified:
     def _torque_squares(self) -> Array:
         return np.sum(self.problem.factors.R[..., -1] ** 2, axis=-1)
 
+    @cached_property
+    def noise(self) -> dict[str, list[float | None]]:
+        """Noise of the logs as the first estimate has it [N m, rad], and the encoders' steps [rad], joint by joint."""
+        levels = next(iter(self.estimates.values())).noise_levels
+        steps = encoder_steps(self.logs[0].q)
+        parts = {"torque": levels.torque, "position": levels.position, "encoder_step": steps}
+        return {name: [float(x) if isfinite(x) else None for x in part] for name, part in parts.items()}
+
     def summary(self) -> dict[str, Any]:
         """Return what a summary.json says of it."""
         truth = None if self.truth is None else list(self.truth.values())
@@ -151,6 +161,7 @@ class Identified:
             "chain": self.chain,
             "estimator": self.estimator,
             "torque": {"meaning": channel.meaning, "delay": channel.delay, "gain": channel.gain},
+            "noise": self.noise,
             "models": models,
             "failures": self.failures,
         }

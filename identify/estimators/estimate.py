@@ -11,6 +11,7 @@ import numpy.typing as npt
 from identify.arrays import Array, frozen
 from identify.estimators.problem import Influence, Problem
 from identify.rows.factors import Factor, Fit, Status
+from identify.rows.noise_propagation import NoiseLevels
 from identify.rows.rows import Rows
 
 
@@ -32,6 +33,8 @@ class Estimate:
         Returns what rows were multiplied by, shape (..., rows), where X is a least-squares solution.
     honest : Array, shape (..., p, p), optional
         Covariance of the error of X that the noise of the logs makes, if the estimator knows it; by default from `influence`.
+    levels : NoiseLevels, optional
+        The noise of the logs as the estimator found it; by default that of the problem.
     """
 
     problem: Problem
@@ -40,6 +43,7 @@ class Estimate:
     influence: Influence | None = None
     weights: Callable[[Rows], Array] | None = None
     honest: Array | None = None
+    levels: NoiseLevels | None = None
 
     @classmethod
     def judge(
@@ -114,6 +118,11 @@ class Estimate:
             found = found * self.problem.excess(self.X, self.weights)[..., None, None]
         found = found + self.problem.bias_covariance(self.influence)
         return np.where((self.status == Status.OK)[..., None, None], found, np.nan)
+
+    @property
+    def noise_levels(self) -> NoiseLevels:
+        """Standard deviations of the noise in torques and positions, on which the corrected sigma rests."""
+        return self.levels or self.problem.noise.levels
 
     @property
     def corrected_sigma(self) -> Array:

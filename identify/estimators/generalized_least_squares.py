@@ -48,7 +48,8 @@ class GeneralizedLeastSquares(AbstractEstimator):
             return np.matmul(whitened.solved(rows), inverse)
 
         covariance = frozen(inverse + problem.bias_covariance(influence))
-        return Estimate(problem, frozen(factor.solution(solvable)), covariance, influence, honest=covariance)
+        X, levels = frozen(factor.solution(solvable)), problem.likely_noise.levels
+        return Estimate(problem, X, covariance, influence, honest=covariance, levels=levels)
 
 
 def _shares(problem: Problem) -> Array | None:

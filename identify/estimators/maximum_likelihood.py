@@ -52,7 +52,7 @@ class MaximumLikelihood(AbstractEstimator):
         _require_short(problem)
         # Rows show little of the positions' noise where torques are noisy; their differences show all of it.
         start, position = GeneralizedLeastSquares().solve(problem), np.maximum(position_noise(problem.signals), SMALLEST)
-        torque = problem.likely_noise.levels.torque
+        torque = problem.likely_noise.levels.torque.copy()
         runs, p = start.X.shape[:-1], len(problem.names)
         X, covariance = np.full((*runs, p), np.nan), np.full((*runs, p, p), np.nan)
         for run in np.ndindex(runs):
@@ -62,9 +62,9 @@ class MaximumLikelihood(AbstractEstimator):
             rms = np.sqrt(np.mean([np.mean(cells.torque[0] ** 2, axis=-1) for cells in logs], axis=0))
             own = NoiseLevels(torque[run], position[run])
             found = JointFit.start(logs, problem.basis, start.X[run], own).solved(EXACT * rms)
-            X[run], covariance[run] = found.X, found.covariance
+            X[run], covariance[run], torque[run] = found.X, found.covariance, found.levels.torque
         honest = frozen(covariance)
-        return Estimate(problem, frozen(X), honest, honest=honest)
+        return Estimate(problem, frozen(X), honest, honest=honest, levels=NoiseLevels(torque, position))
 
 
 def _alone(log: MotionLog, run: tuple[int, ...]) -> MotionLog:

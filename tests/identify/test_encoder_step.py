@@ -1,0 +1,31 @@
+"""The step of an encoder, found in its counts."""
+
+import numpy as np
+import pytest
+
+from identify import encoder_steps
+
+T = np.arange(2000) / 100.0
+MOTION = np.stack([np.sin(T) + 0.1 * T, 0.3 * np.cos(2 * T)], axis=-1)
+
+
+@pytest.mark.parametrize("steps", [(2 * np.pi / 2**16, 2 * np.pi / 2**12), (1e-5, 2 * np.pi / 10000)])
+@pytest.mark.parametrize("digits", [8, 17])
+def test_steps_are_found_in_rounded_files(steps, digits):
+    """To a thousandth: positions counted about any zero, written with so many significant digits."""
+    counted = np.round(MOTION / steps) * steps + [0.1, -0.7]
+    written = np.vectorize(lambda x: float(f"{x:.{digits}g}"))(counted)
+    np.testing.assert_allclose(encoder_steps(written), steps, rtol=1e-3)
+
+
+def test_a_fast_joint_that_never_moves_one_step_has_one_all_the_same():
+    """Differences of 3, 5, 7 ... steps: their greatest common part."""
+    counts = np.cumsum(np.random.default_rng(0).choice([3, 5, 7, 11], 500)) * 1e-3
+    assert encoder_steps(counts[:, None])[0] == pytest.approx(1e-3, rel=1e-6)
+
+
+def test_positions_without_steps_have_none(rng):
+    noisy = MOTION + 1e-5 * rng.standard_normal(MOTION.shape)
+    still = np.zeros((100, 1))
+    assert np.isnan(encoder_steps(noisy)).all()
+    assert np.isnan(encoder_steps(still)).all()
