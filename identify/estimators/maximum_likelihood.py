@@ -1,6 +1,7 @@
 """Maximum likelihood of motion and parameters together."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import ClassVar, final
 
 import numpy as np
@@ -24,6 +25,19 @@ MOST = 2e9
 """Bytes that the equations of all motions may take."""
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class JointEstimate(Estimate):
+    """An estimate of motion and parameters together.
+
+    Parameters
+    ----------
+    fits : mapping of tuple of int to JointFit
+        Of every run that could be solved, () of a single one: motions, levels; `smoothed(estimate.fits[()])` is the motion.
+    """
+
+    fits: Mapping[tuple[int, ...], JointFit] = field(default_factory=dict)
+
+
 @final
 @dataclass(frozen=True)
 class MaximumLikelihood(AbstractEstimator):
@@ -39,7 +53,7 @@ class MaximumLikelihood(AbstractEstimator):
 
     needs: ClassVar[frozenset[Need]] = frozenset({"logs"})
 
-    def solve(self, problem: Problem) -> Estimate:
+    def solve(self, problem: Problem) -> JointEstimate:
         """Return the estimate of every run.
 
         Raises
@@ -55,6 +69,7 @@ class MaximumLikelihood(AbstractEstimator):
         torque = problem.likely_noise.levels.torque.copy()
         runs, p = start.X.shape[:-1], len(problem.names)
         X, covariance = np.full((*runs, p), np.nan), np.full((*runs, p, p), np.nan)
+        fits: dict[tuple[int, ...], JointFit] = {}
         for run in np.ndindex(runs):
             if start.status[run] != Status.OK:
                 continue
@@ -62,9 +77,10 @@ class MaximumLikelihood(AbstractEstimator):
             rms = np.sqrt(np.mean([np.mean(cells.torque[0] ** 2, axis=-1) for cells in logs], axis=0))
             own = NoiseLevels(torque[run], position[run])
             found = JointFit.start(logs, problem.basis, start.X[run], own).solved(EXACT * rms)
+            fits[run] = found
             X[run], covariance[run], torque[run] = found.X, found.covariance, found.levels.torque
         honest = frozen(covariance)
-        return Estimate(problem, frozen(X), honest, honest=honest, levels=NoiseLevels(torque, position))
+        return JointEstimate(problem, frozen(X), honest, honest=honest, levels=NoiseLevels(torque, position), fits=fits)
 
 
 def _alone(log: MotionLog, run: tuple[int, ...]) -> MotionLog:

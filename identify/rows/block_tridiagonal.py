@@ -127,8 +127,8 @@ class Cholesky:
             x[..., k, :, :] = np.matmul(np.swapaxes(self.inverse[..., k, :, :], -1, -2), rest)
         return x
 
-    def traces(self, parts: list[Blocks]) -> Array:
-        """Return the trace of C^-1 times each matrix, shape (..., part), from the blocks of C^-1 that they have (Takahashi)."""
+    def inverse_blocks(self) -> Blocks:
+        """Return the blocks of the inverse that the matrix itself has (Takahashi)."""
         blocks = self.inverse.shape[-3]
         own, following = np.empty_like(self.inverse), np.empty_like(self.below)
         for k in reversed(range(blocks)):
@@ -140,7 +140,13 @@ class Cholesky:
             gain = np.matmul(back, self.below[..., k, :, :])
             following[..., k, :, :] = -np.matmul(gain, own[..., k + 1, :, :])
             own[..., k, :, :] = np.matmul(back, root) - np.matmul(following[..., k, :, :], np.swapaxes(gain, -1, -2))
+        return Blocks(own, following)
+
+    def traces(self, parts: list[Blocks]) -> Array:
+        """Return the trace of C^-1 times each matrix, shape (..., part)."""
+        inverse = self.inverse_blocks()
         found = [
-            np.sum(own * part.own, axis=(-3, -2, -1)) + 2 * np.sum(following * part.next, axis=(-3, -2, -1)) for part in parts
+            np.sum(inverse.own * part.own, axis=(-3, -2, -1)) + 2 * np.sum(inverse.next * part.next, axis=(-3, -2, -1))
+            for part in parts
         ]
         return np.stack(found, axis=-1)

@@ -15,6 +15,7 @@ from identify import (
     attempt_each,
     identify,
     scara,
+    smoothed,
 )
 from identify.estimators import maximum_likelihood
 from identify.estimators.likelihood.cells import GAUSS, Cells, hermite
@@ -143,3 +144,20 @@ def test_logs_too_long_for_their_motion_are_refused(exact, monkeypatch):
     monkeypatch.setattr(maximum_likelihood, "MOST", 1e6)
     with pytest.raises(IdentificationError, match=r"together take .* GB: take GLS, or at most \d+ samples"):
         identify(MotionLog(exact.fs, exact.q[0], exact.tau[0], exact.torque), scara(), EXPLICIT, estimator=ML)
+
+
+def test_the_smoothed_motion_is_true_within_its_sigma(truth):
+    """Positions and velocities of a simulated motion, at its samples and between, away from the ends."""
+    run = simulate(scenario())
+    estimate = identify(noisy(run.log, BITS16, 0.01), scara(), EXPLICIT, estimator=ML)
+    motion = smoothed(estimate.fits[(0,)])
+    inner, count = slice(20, -20), len(motion.t)
+    for found, sigma, true in ((motion.q, motion.sigma_q, run.q[0]), (motion.qd, motion.sigma_qd, run.qd[0])):
+        z = ((found - true[:count]) / sigma)[inner]
+        assert np.sqrt(np.mean(z**2)) == pytest.approx(1, abs=0.3)
+    raw = np.gradient(run.log.q[0] + BITS16, 1 / run.log.fs, axis=0)[:count]
+    assert (np.std((motion.qd - run.qd[0][:count])[inner], axis=0) < np.std((raw - run.qd[0][:count])[inner], axis=0)).all()
+    between = smoothed(estimate.fits[(0,)], t=np.array([3.003, 3.0071]))
+    assert between.q.shape == (2, 2)
+    with pytest.raises(IdentificationError, match="instants must lie in 0 to"):
+        smoothed(estimate.fits[(0,)], t=np.array([1e3]))

@@ -73,7 +73,7 @@ class JointFit:
         """
         now = self
         for _ in range(ROUNDS):
-            before, noises = now, [now._noise(k) for k in range(len(now.logs))]
+            before, noises = now, [now.noise(k) for k in range(len(now.logs))]
             for _ in range(STEPS):
                 now, moved = now._step(noises)
                 if moved < SETTLED:
@@ -103,7 +103,7 @@ class JointFit:
             )
         return replace(self, X=self.X + dX, motions=tuple(motions), covariance=covariance), moved
 
-    def _noise(self, k: int) -> Noise:
+    def noise(self, k: int) -> Noise:
         """Return the standard deviations of a log's cells: torques count for little where friction's sign is not known."""
         cells, z = self.logs[k], self.motions[k]
         q, qd, qdd = cells.motion(z, 0.5)
