@@ -15,12 +15,9 @@ LEAST = 1e-9
 def bound_of(study: Study, simulated: Run, truth: Mapping[str, float]) -> Array:
     """Return the least standard deviation of every parameter that the noise of encoders and torques allows, shape (run, p).
 
-    NaN if the study does not ask for it. What else is wrong in a scenario, such as cogging, is no part of it.
+    What else is wrong in a scenario, such as cogging, is no part of it.
     """
-    runs, n = simulated.q.shape[0], study.subject.basis.n
-    if not study.bound:
-        return np.full((runs, len(truth)), np.nan)
-    scenario = simulated.scenario
+    scenario, n = simulated.scenario, study.subject.basis.n
     noise = NoiseLevels(*(np.maximum(x, LEAST) for x in (scenario.torque.spread(n), scenario.encoder.spread(n))))
     found = cramer_rao(study.subject.basis, np.array(list(truth.values())), simulated.q, simulated.qd, scenario.fs, noise)
     return np.sqrt(np.diagonal(found, axis1=-2, axis2=-1))

@@ -18,8 +18,16 @@ from sim.errors import BenchError
 from sim.scenario.scenario import Scenario
 from sim.trajectories import Reference
 
-PARTS = ("", ".sigma", ".paper_sigma", ".truth", ".bound")
-"""Of every parameter: the estimate, its corrected sigma, that of the paper's formula, the truth, and the least error."""
+PARTS = ("", ".sigma", ".paper_sigma", ".truth")
+"""Of every parameter: the estimate, its corrected sigma, that of the paper's formula, and the truth."""
+
+BOUND = ".bound"
+"""Of every parameter, in studies that ask for it: the least error that noise allows."""
+
+
+def parts_of(study: Study) -> tuple[str, ...]:
+    """Return what the rows of a study hold of every parameter."""
+    return (*PARTS, BOUND) if study.bound else PARTS
 
 
 @dataclass
@@ -50,7 +58,7 @@ def run_shard(study: Study, runs: range, *, threads: int = 1, progress: Progress
         try:
             simulated = _simulate(scenarios, together, threads, _part(progress, done, len(together), len(runs)))
             truth = study.subject.truth(simulated.robots[0])
-            bound = bound_of(study, simulated, truth)
+            bound = bound_of(study, simulated, truth) if study.bound else None
         except BenchError as error:
             _fail(shard, study, scenarios, list(together), str(error))
             continue
@@ -94,7 +102,7 @@ def _part(progress: Progress | None, done: int, part: int, runs: int) -> Progres
 
 
 def _identify(
-    study: Study, method: Method, simulated: Run, runs: Sequence[int], truth: Mapping[str, float], bound: Array
+    study: Study, method: Method, simulated: Run, runs: Sequence[int], truth: Mapping[str, float], bound: Array | None
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for every run and model."""
     found: dict[str, Estimate | IdentificationError]
@@ -123,17 +131,19 @@ def _failure(outcome: Estimate | IdentificationError, i: int) -> str:
     return "" if np.isfinite(outcome.X[i]).all() else "the estimator finds no finite value"
 
 
-def _columns(estimate: Estimate, truth: Mapping[str, float], bound: Array) -> dict[str, list[Any]]:
+def _columns(estimate: Estimate, truth: Mapping[str, float], bound: Array | None) -> dict[str, list[Any]]:
     """Return what an estimate of many runs found, a list with the value of each run."""
     runs = len(estimate.X)
-    parts = estimate.X, estimate.best_sigma, estimate.sigma, np.tile(list(truth.values()), (runs, 1)), bound
+    parts = [estimate.X, estimate.best_sigma, estimate.sigma, np.tile(list(truth.values()), (runs, 1))]
+    names = PARTS if bound is None else (*PARTS, BOUND)
+    parts += [] if bound is None else [bound]
     columns = {
         "condition_number": estimate.condition_number.tolist(),
         "rows": estimate.row_count.tolist(),
         "residual_rms": estimate.residual_rms.tolist(),
     }
     for p, name in enumerate(estimate.names):
-        columns |= {name + part: x[:, p].tolist() for part, x in zip(PARTS, parts, strict=True)}
+        columns |= {name + part: x[:, p].tolist() for part, x in zip(names, parts, strict=True)}
     return columns
 
 

@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from experiments.errors import ResultsError, StudyError
-from experiments.study.shard import PARTS, Shard
+from experiments.study.shard import Shard, parts_of
 from experiments.study.study import Study
 from experiments.study.versions import require_versions, versions
 
@@ -98,4 +98,4 @@ def _schema(study: Study) -> pa.Schema:
     fields += [pa.field(name, pa.string()) for name in ("chain", "estimator", "model", "failure")]
     quality = {"condition_number": pa.float64(), "rows": pa.int64(), "residual_rms": pa.float64()}
     fields += [pa.field(name, kind) for name, kind in quality.items()]
-    return pa.schema(fields + [pa.field(name + part, pa.float64()) for name in study.parameters for part in PARTS])
+    return pa.schema(fields + [pa.field(name + part, pa.float64()) for name in study.parameters for part in parts_of(study)])

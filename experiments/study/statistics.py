@@ -40,11 +40,13 @@ class Cell:
         Names of X.
     run : int array, shape (runs,)
         Numbers of the runs that gave an estimate.
-    X, sigma, paper_sigma, truth, bound : Array, shape (runs, p)
-        Of those runs; `bound` is NaN where it was not asked for.
+    X, sigma, paper_sigma, truth : Array, shape (runs, p)
+        Of those runs.
     failures : mapping of str to int array
         Reasons of the others, as the first of them has it, and the runs that failed so: reasons that differ in numbers alone
         are one.
+    bound : Array, shape (runs, p), optional
+        The least standard deviations that noise allows, of a study that asks for them.
     """
 
     settings: Mapping[str, Any]
@@ -55,8 +57,8 @@ class Cell:
     sigma: Array
     paper_sigma: Array
     truth: Array
-    bound: Array
     failures: Mapping[str, np.typing.NDArray[np.int64]]
+    bound: Array | None = None
 
     @property
     def runs(self) -> int:
@@ -102,6 +104,8 @@ class Cell:
     @property
     def least(self) -> Array:
         """Root mean square of the least relative errors that noise allows (Cramer-Rao), shape (p,); NaN if not asked for."""
+        if self.bound is None:
+            return np.full(len(self.parameters), np.nan)
         return np.sqrt(np.mean((self.bound / np.where(self.truth == 0, np.nan, self.truth)) ** 2, axis=0))
 
     @property
@@ -167,7 +171,7 @@ def _cell(
         sigma=of(".sigma"),
         paper_sigma=of(".paper_sigma"),
         truth=of(".truth"),
-        bound=of(".bound"),
+        bound=of(".bound") if parameters[0] + ".bound" in rows else None,
         failures=_grouped(rows["failure"][index[failed]], rows["run"][index[failed]]),
     )
 

@@ -149,14 +149,15 @@ def test_logs_too_long_for_their_motion_are_refused(exact, monkeypatch):
 def test_the_smoothed_motion_is_true_within_its_sigma(truth):
     """Positions and velocities of a simulated motion, at its samples and between, away from the ends."""
     run = simulate(scenario())
-    estimate = identify(noisy(run.log, BITS16, 0.01), scara(), EXPLICIT, estimator=ML)
+    log = noisy(run.log, BITS16, 0.001)
+    estimate = identify(log, scara(), EXPLICIT, estimator=ML)
     motion = smoothed(estimate.fits[(0,)])
     inner, count = slice(20, -20), len(motion.t)
     for found, sigma, true in ((motion.q, motion.sigma_q, run.q[0]), (motion.qd, motion.sigma_qd, run.qd[0])):
         z = ((found - true[:count]) / sigma)[inner]
         assert np.sqrt(np.mean(z**2)) == pytest.approx(1, abs=0.3)
-    raw = np.gradient(run.log.q[0] + BITS16, 1 / run.log.fs, axis=0)[:count]
-    assert (np.std((motion.qd - run.qd[0][:count])[inner], axis=0) < np.std((raw - run.qd[0][:count])[inner], axis=0)).all()
+    raw, true = np.gradient(log.q[0], 1 / log.fs, axis=0)[:count], run.qd[0][:count]
+    assert np.std((motion.qd - true)[inner, 0]) < 0.8 * np.std((raw - true)[inner, 0])
     between = smoothed(estimate.fits[(0,)], t=np.array([3.003, 3.0071]))
     assert between.q.shape == (2, 2)
     with pytest.raises(IdentificationError, match="instants must lie in 0 to"):
