@@ -13,7 +13,6 @@ from identify.estimators.problem import Problem
 from identify.estimators.restricted_likelihood import likely
 from identify.rows.block_tridiagonal import Blocks
 from identify.rows.factors import Factor, Status, triangular
-from identify.rows.noise_propagation import NoisyRows
 from identify.rows.row_map import RowMap
 from identify.rows.rows import Rows
 from identify.rows.whitening import Whitening, parts_of
@@ -30,15 +29,16 @@ class GeneralizedLeastSquares(AbstractEstimator):
     Noise of an encoder, twice differentiated, grows with the square of the frequency, and rows share that of neighbouring
     instants and other joints. Weighted least squares takes them for independent, and leaves a factor of four. C follows from
     the noise of each joint's torque and position (`NoisyRows`), whose levels make the explicit model's rows most likely
-    (`likely_noise`). Rows of a model that multiplies torques by something that varies, such as the power model, have some white
-    error beside that, as much as their residuals ask for.
+    (`likely_noise`). What noise of the positions adds to W on average is taken from it (`unbiased`). Rows of a model that
+    multiplies torques by something that varies, such as the power model, have some white error beside that, as much as their
+    residuals ask for.
     """
 
     needs: ClassVar[frozenset[Need]] = frozenset({"factors"})
 
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate; of logs too long for their rows to be kept, pieces count as independent."""
-        whitened = _Whitened(problem.likely_noise, _shares(problem))
+        whitened = _Whitened(problem, _shares(problem))
         parts = [triangular(whitened(rows)) for rows in problem.every_part()]
         factor = Factor(triangular(np.concatenate(parts, axis=-2)), problem.factors.together.rows, problem.names)
         solvable = problem.factors.together.status == Status.OK
@@ -59,27 +59,35 @@ def _shares(problem: Problem) -> Array | None:
     found = [parts_of(rows.maps[0], problem.likely_noise) for rows in problem.parts]
     lags = max(C.bands.shape[-4] for C, _, _ in found)
     units = [[Blocks.of(C, lags), Blocks.of(white, lags)] for C, white, _ in found]
-    joined = [rows.joined * kept[..., None] for rows, (_, _, kept) in zip(problem.parts, found, strict=True)]
+    joined = [rows.joined * kept[..., None] for rows, (_, _, kept) in zip(problem.unbiased_parts, found, strict=True)]
     runs = joined[0].shape[:-2]
     return likely(units, joined, np.broadcast_to([1.0, 0.1], (*runs, 2)), np.full(2, LEAST))
 
 
 class _Whitened:
-    """Rows [W Y] made independent, and C^-1 W, log by log."""
+    """Rows [W Y] made independent, and C^-1 W, log by log, W without the bias of noise in it."""
 
-    def __init__(self, noise: NoisyRows, shares: Array | None) -> None:
-        self._noise, self._shares = noise, shares
-        self._known: WeakKeyDictionary[RowMap, Whitening] = WeakKeyDictionary()
+    def __init__(self, problem: Problem, shares: Array | None) -> None:
+        self._problem, self._shares = problem, shares
+        self._known = WeakKeyDictionary[RowMap, tuple[Whitening, Array]]()
 
     def __call__(self, rows: Rows) -> Array:
-        parts = [self._of(to_rows).whiten(rows.joined[..., rows.of_log(k), :]) for k, to_rows in enumerate(rows.maps)]
-        return np.concatenate(parts, axis=-2)
+        """Return L^-1 [W Y] of the rows of one log, or of a piece of it."""
+        whitening, W = self._of(rows)
+        return whitening.whiten(np.concatenate([W, rows.Y[..., None]], axis=-1))
 
     def solved(self, rows: Rows) -> Array:
-        parts = [self._of(to_rows).solve(rows.W[..., rows.of_log(k), :]) for k, to_rows in enumerate(rows.maps)]
-        return np.concatenate(parts, axis=-2)
+        """Return C^-1 W of the rows of all logs, or of a piece of one."""
+        parts = [rows] if len(rows.maps) == 1 else self._problem.parts
+        return np.concatenate([whitening.solve(W) for whitening, W in map(self._of, parts)], axis=-2)
 
-    def _of(self, rows: RowMap) -> Whitening:
-        if rows not in self._known:
-            self._known[rows] = Whitening.of(rows, self._noise, self._shares)
-        return self._known[rows]
+    def _of(self, rows: Rows) -> tuple[Whitening, Array]:
+        (to_rows,) = rows.maps
+        if to_rows not in self._known:
+            whitening = Whitening.of(to_rows, self._problem.likely_noise, self._shares)
+            self._known[to_rows] = whitening, self._unbiased(rows).W
+        return self._known[to_rows]
+
+    def _unbiased(self, rows: Rows) -> Rows:
+        known = zip(self._problem.parts, self._problem.unbiased_parts, strict=True)
+        return next((better for part, better in known if part is rows), None) or self._problem.unbiased(rows)

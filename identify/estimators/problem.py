@@ -14,6 +14,7 @@ from identify.errors import IdentificationError, LogError
 from identify.estimators.noise import noise_of, position_noise
 from identify.estimators.restricted_likelihood import likely_noise
 from identify.estimators.row_weights import RowWeights
+from identify.estimators.unbiased import unbiased
 from identify.models.explicit import ExplicitModel
 from identify.models.model import AbstractModel
 from identify.rows.chain import Chain
@@ -115,6 +116,24 @@ class Problem:
             yield self._rows_of(self.chain.signals(log.part(*piece)))
 
     @cached_property
+    def unbiased_parts(self) -> tuple[Rows, ...]:
+        """The parts, with W less what noise of the positions adds to it on average."""
+        return tuple(map(self.unbiased, self.parts))
+
+    def unbiased(self, rows: Rows) -> Rows:
+        """Return rows of one log, or of a piece of it, with W less what noise of the positions adds to it on average."""
+
+        def rebuilt(log: MotionLog, signals: Signals) -> Rows:
+            return self._rows_of(self.chain.signals(log, signals))
+
+        return unbiased(rows, self.position_noise, rebuilt)
+
+    @cached_property
+    def position_noise(self) -> Array:
+        """Standard deviation of the noise of the positions, from their differences [rad], shape (..., joint)."""
+        return self.explicit.position_noise if self.explicit is not self else position_noise(self.signals)
+
+    @cached_property
     def factors(self) -> Factors:
         """Triangular factors of the rows as they are, one for each kind."""
         return self._long_factors[0] if self.long else self.rows.factors
@@ -143,8 +162,8 @@ class Problem:
         """The noise whose levels make the explicit model's rows most likely, from their covariance."""
         if self.explicit is not self:
             return self.explicit.likely_noise
-        start = NoiseLevels(self.noise.levels.torque, position_noise(self.signals))
-        return likely_noise(self.parts, start, self.linear)
+        start = NoiseLevels(self.noise.levels.torque, self.position_noise)
+        return likely_noise(self.unbiased_parts, start, self.linear)
 
     def linear(self, signals: Signals) -> Linearization:
         """Return the linearization of the explicit model about these signals."""
