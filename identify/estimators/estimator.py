@@ -47,7 +47,9 @@ class AbstractEstimator(ABC):
         lost = ~np.isfinite(estimate.X) & (status == Status.OK)[..., None]
         if throw and lost.any():
             names = ", ".join(np.array(problem.names)[lost.reshape(-1, len(problem.names)).any(axis=0)])
-            raise IdentificationError(f"{type(self).__name__} finds no finite value for {names}")
+            raise IdentificationError(
+                f"{type(self).__name__} finds no finite value for {names}: use a longer log, or another estimator, such as WLS"
+            )
         return estimate
 
     def _require(self, problem: Problem) -> None:

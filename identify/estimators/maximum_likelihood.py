@@ -6,7 +6,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from identify.arrays import frozen
+from identify.arrays import Array, frozen
 from identify.data.motion_log import MotionLog
 from identify.errors import IdentificationError
 from identify.estimators.estimate import Estimate
@@ -20,6 +20,10 @@ from identify.estimators.restricted_likelihood import EXACT, SMALLEST
 from identify.models.explicit import ExplicitModel
 from identify.rows.factors import Status
 from identify.rows.noise_propagation import NoiseLevels
+
+FAR, SMALL = 20.0, 1e-2
+"""Sigmas from the generalized least-squares estimate, and share of its sigma, beyond which a fit is not believed: where torques
+do not belong to the motion, parameters of zero, with which nothing moves, are as good as any."""
 
 MOST = 2e9
 """Bytes that the equations of all motions may take."""
@@ -71,16 +75,30 @@ class MaximumLikelihood(AbstractEstimator):
         X, covariance = np.full((*runs, p), np.nan), np.full((*runs, p, p), np.nan)
         fits: dict[tuple[int, ...], JointFit] = {}
         for run in np.ndindex(runs):
-            if start.status[run] != Status.OK:
+            if start.status[run] != Status.OK or not np.isfinite(start.X[run]).all():
                 continue
             logs = tuple(Cells.of(_alone(log, run)) for log in problem.logs)
             rms = np.sqrt(np.mean([np.mean(cells.torque[0] ** 2, axis=-1) for cells in logs], axis=0))
             own = NoiseLevels(torque[run], position[run])
             found = JointFit.start(logs, problem.basis, start.X[run], own).solved(EXACT * rms)
+            _require_near(found, start.X[run], start.sigma[run], problem.names)
             fits[run] = found
             X[run], covariance[run], torque[run] = found.X, found.covariance, found.levels.torque
         honest = frozen(covariance)
         return JointEstimate(problem, frozen(X), honest, honest=honest, levels=NoiseLevels(torque, position), fits=fits)
+
+
+def _require_near(found: JointFit, X: Array, sigma: Array, names: tuple[str, ...]) -> None:
+    """Raise IdentificationError if a fit went so far from where it began that another minimum caught it."""
+    far, small = np.abs(found.X - X) / sigma, np.sqrt(np.diag(found.covariance)) / sigma
+    if far.max() < FAR and small.min() > SMALL:
+        return
+    k = int(far.argmax() if far.max() >= FAR else small.argmin())
+    raise IdentificationError(
+        f"motion and parameters together do not go with generalized least squares: {names[k]} is {found.X[k]:.4g} instead of "
+        f"{X[k]:.4g}, sigma {np.sqrt(found.covariance[k, k]):.2g} instead of {sigma[k]:.2g}: check order, units, sign and "
+        "delay of the torques, or take GLS"
+    )
 
 
 def _alone(log: MotionLog, run: tuple[int, ...]) -> MotionLog:

@@ -32,7 +32,8 @@ def likely_noise(parts: Sequence[Rows], start: NoiseLevels, linear: Callable[[Si
     The covariance of rows is C = sum of sigma_i^2 C_i over the torques and positions of all joints. The likelihood of what the
     parameters leave over is stationary where r' C^-1 C_i C^-1 r = trace of P C_i, with P = C^-1 - C^-1 W (W' C^-1 W)^-1 W' C^-1
     and r the residual (H. D. Patterson and R. Thompson, "Recovery of inter-block information when block sizes are unequal",
-    Biometrika 58 (1971) 545-554). In each round every sigma_i^2 is multiplied by a power of the ratio of the two, which keeps it positive.
+    Biometrika 58 (1971) 545-554). In each round every sigma_i^2 is multiplied by a power of the ratio of the two, which keeps
+    it positive.
 
     Parameters
     ----------

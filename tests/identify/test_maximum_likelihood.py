@@ -162,3 +162,16 @@ def test_the_smoothed_motion_is_true_within_its_sigma(truth):
     assert between.q.shape == (2, 2)
     with pytest.raises(IdentificationError, match="instants must lie in 0 to"):
         smoothed(estimate.fits[(0,)], t=np.array([1e3]))
+
+
+def test_torques_that_do_not_belong_to_the_motion_are_refused(exact):
+    """Parameters of zero, with which nothing moves, would explain them as well as any."""
+    log = noisy(MotionLog(exact.fs, exact.q[0], np.ones_like(exact.tau[0]), exact.torque), BITS16, 0.0)
+    with pytest.raises(IdentificationError, match=r"do not go with generalized least squares: .* check order, units, sign"):
+        identify(log, scara(), EXPLICIT, estimator=ML)
+
+
+def test_a_motion_that_nothing_moves_is_refused(exact):
+    log = noisy(MotionLog(exact.fs, exact.q[0], np.zeros_like(exact.tau[0]), exact.torque), BITS16, 0.0)
+    with pytest.raises(IdentificationError, match=r"the motion is not determined by this log: .*take WLS"):
+        identify(log, scara(), EXPLICIT, estimator=ML)
