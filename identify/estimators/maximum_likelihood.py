@@ -53,9 +53,17 @@ class MaximumLikelihood(AbstractEstimator):
     the instants at which the torque changes. Where the sign of a velocity says nothing of friction, torques count for next to
     nothing. It begins at the generalized least-squares solution and its noise levels, and finds those of the torques anew. No
     filter takes part.
+
+    Parameters
+    ----------
+    find_delay : bool
+        Whether the delay of the torques is one more unknown, one for all logs, from what they state; it is
+        `estimate.fits[()].delay` [s], more than what was stated.
     """
 
     needs: ClassVar[frozenset[Need]] = frozenset({"logs"})
+
+    find_delay: bool = False
 
     def solve(self, problem: Problem) -> JointEstimate:
         """Return the estimate of every run.
@@ -80,17 +88,19 @@ class MaximumLikelihood(AbstractEstimator):
             logs = tuple(Cells.of(_alone(log, run)) for log in problem.logs)
             rms = np.sqrt(np.mean([np.mean(cells.torque[0] ** 2, axis=-1) for cells in logs], axis=0))
             own = NoiseLevels(torque[run], position[run])
-            found = JointFit.start(logs, problem.basis, start.X[run], own).solved(EXACT * rms)
-            _require_near(found, start.X[run], start.sigma[run], problem.names)
+            begin = JointFit.start(logs, problem.basis, start.X[run], own, find_delay=self.find_delay)
+            found = begin.solved(EXACT * rms)
+            if not self.find_delay:  # a wrong delay may be why it goes far
+                _require_near(found, start.X[run], start.sigma[run], problem.names)
             fits[run] = found
-            X[run], covariance[run], torque[run] = found.X, found.covariance, found.levels.torque
+            X[run], covariance[run], torque[run] = found.X, found.covariance[:p, :p], found.levels.torque
         honest = frozen(covariance)
         return JointEstimate(problem, frozen(X), honest, honest=honest, levels=NoiseLevels(torque, position), fits=fits)
 
 
 def _require_near(found: JointFit, X: Array, sigma: Array, names: tuple[str, ...]) -> None:
     """Raise IdentificationError if a fit went so far from where it began that another minimum caught it."""
-    far, small = np.abs(found.X - X) / sigma, np.sqrt(np.diag(found.covariance)) / sigma
+    far, small = np.abs(found.X - X) / sigma, np.sqrt(np.diag(found.covariance)[: len(X)]) / sigma
     if far.max() < FAR and small.min() > SMALL:
         return
     k = int(far.argmax() if far.max() >= FAR else small.argmin())

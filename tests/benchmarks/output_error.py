@@ -15,8 +15,16 @@ import numpy as np
 from mujoco import sysid
 
 import models
-from identify import Array, MotionLog, identify_each, scara
-from identify.models import ExplicitModel, ImplicitModel, PowerModel
+from identify import (
+    Array,
+    ExplicitModel,
+    GeneralizedLeastSquares,
+    MaximumLikelihood,
+    MotionLog,
+    WeightedLeastSquares,
+    identify,
+    scara,
+)
 from sim.encoders import IncrementalEncoder
 from sim.engine.simulation import simulate
 from sim.robot.scara import scara_truth
@@ -97,18 +105,19 @@ def main() -> None:
     run = simulate(replace(load("ideal"), encoder=IncrementalEncoder(lines=2**14)))
     log, truth = run.alone(), scara_truth(run.robots[0])
     true = np.array(list(truth.values()))
-    forms = {"explicit": ExplicitModel(), "implicit": ImplicitModel(), "power": PowerModel()}
-    identify_each(log, scara(), forms)
-    begin = time.perf_counter()
-    estimates = identify_each(log, scara(), forms)
-    ours = time.perf_counter() - begin
-    begin = time.perf_counter()
-    theirs = output_error(log, truth)
-    slow = time.perf_counter() - begin
+    estimators = {"WLS": WeightedLeastSquares(), "GLS": GeneralizedLeastSquares(), "ML": MaximumLikelihood()}
+    ways = {f"explicit, {name}": timed(lambda e=each: identify(log, scara(), ExplicitModel(), estimator=e).X)
+            for name, each in estimators.items()}  # fmt: skip
+    ways["mujoco.sysid"] = timed(lambda: output_error(log, truth))
     print(f"{'error [%]':14} {'  '.join(f'{name:>8}' for name in truth)}")
-    for name, X in (*((form, e.X) for form, e in estimates.items()), ("mujoco.sysid", theirs)):
-        print(f"{name:14} {'  '.join(f'{error:+8.3f}' for error in 100 * (X - true) / true)}")
-    print(f"three models {1e3 * ours:.1f} ms, mujoco.sysid {slow:.1f} s: {slow / ours:.0f} times longer")
+    for name, (X, seconds) in ways.items():
+        print(f"{name:14} {'  '.join(f'{error:+8.4f}' for error in 100 * (X - true) / true)}  {seconds:8.3f} s")
+
+
+def timed(solve: Callable[[], Array]) -> tuple[Array, float]:
+    """Return a solution, and how long it took [s]."""
+    begin = time.perf_counter()
+    return solve(), time.perf_counter() - begin
 
 
 if __name__ == "__main__":

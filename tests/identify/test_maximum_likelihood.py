@@ -175,3 +175,16 @@ def test_a_motion_that_nothing_moves_is_refused(exact):
     log = noisy(MotionLog(exact.fs, exact.q[0], np.zeros_like(exact.tau[0]), exact.torque), BITS16, 0.0)
     with pytest.raises(IdentificationError, match=r"the motion is not determined by this log: .*take WLS"):
         identify(log, scara(), EXPLICIT, estimator=ML)
+
+
+@pytest.mark.parametrize("stated", [0.004, 0.002, 0.007])
+def test_the_delay_is_found_with_the_parameters(stated, truth):
+    """A true one of 4 ms, from what the log states: to five of its sigmas, which are below 50 us."""
+    log = simulate(scenario(timing=replace(load("ideal").timing, delay=0.004))).alone()
+    told = noisy(MotionLog(log.fs, log.q, log.tau, TorqueChannel("held", stated)), BITS16, 0.01)
+    found = identify(told, scara(), EXPLICIT, estimator=MaximumLikelihood(find_delay=True))
+    fit = found.fits[()]
+    sigma = np.sqrt(fit.covariance[-1, -1])
+    assert sigma < 5e-5
+    assert abs(stated + fit.delay - 0.004) < 5 * sigma
+    assert (np.abs(found.X - truth) < 5 * found.sigma).all()

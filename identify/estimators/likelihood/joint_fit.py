@@ -47,8 +47,10 @@ class JointFit:
         q [rad] and qd [rad/s] at the nodes of each log.
     levels : NoiseLevels
         Noise of torques and positions.
-    covariance : Array, shape (p, p)
-        Of the error of X.
+    delay : float, optional
+        Change of the delays that the logs state [s], if it is unknown.
+    covariance : Array, shape (p, p), or (p + 1, p + 1)
+        Of the error of X, and of the delay if it is unknown.
     """
 
     logs: tuple[Cells, ...]
@@ -56,12 +58,20 @@ class JointFit:
     X: Array
     motions: tuple[Array, ...]
     levels: NoiseLevels
+    delay: float | None = None
     covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     @classmethod
-    def start(cls, logs: tuple[Cells, ...], basis: Basis, X: Array, levels: NoiseLevels) -> "JointFit":
+    def start(
+        cls, logs: tuple[Cells, ...], basis: Basis, X: Array, levels: NoiseLevels, *, find_delay: bool = False
+    ) -> "JointFit":
         """Return where to begin: logged positions and their differences at the nodes."""
-        return cls(logs, basis, X, tuple(_begin(cells) for cells in logs), levels)
+        return cls(logs, basis, X, tuple(_begin(cells) for cells in logs), levels, 0.0 if find_delay else None)
+
+    @property
+    def unknowns(self) -> Array:
+        """Parameters, and the delay if it is unknown."""
+        return self.X if self.delay is None else np.append(self.X, self.delay)
 
     def solved(self, floor: Array) -> "JointFit":
         """Return the fit whose likelihood is greatest; levels of the torques, not below `floor`, are found as well.
@@ -79,7 +89,7 @@ class JointFit:
                 if moved < SETTLED:
                     break
             now = replace(now, levels=now._levels(noises, floor))
-            if np.abs(now.X - before.X).max() == 0 or _sigmas(now.X - before.X, now.covariance) < SETTLED:
+            if _sigmas(now.unknowns - before.unknowns, now.covariance) < SETTLED:
                 break
         return now
 
@@ -90,18 +100,24 @@ class JointFit:
             for cells, z, noise in zip(self.logs, self.motions, noises, strict=True)
         ]
         parts = [system.solved() for system in systems]
-        covariance, b = _reduced(systems, parts)
+        covariance, b = _reduced(systems, parts, len(self.unknowns))
         dX = covariance @ b[:, 0]
         motions = []
         for z, (V, y, L) in zip(self.motions, parts, strict=True):
-            dz, _ = scipy.linalg.lapack.dtbtrs(L, y[:, 0] - V @ dX, uplo="L", trans="T")
+            dz, _ = scipy.linalg.lapack.dtbtrs(L, y[:, 0] - V[:, : len(dX)] @ dX, uplo="L", trans="T")
             motions.append(z + dz.reshape(z.shape))
         moved = _sigmas(dX, covariance)
         if not np.isfinite(moved) or not all(np.isfinite(z).all() for z in motions):
             raise IdentificationError(
                 "motion and parameters together diverge: take GLS, or check torque, units and delay of the log"
             )
-        return replace(self, X=self.X + dX, motions=tuple(motions), covariance=covariance), moved
+        moved_on = replace(self, X=self.X + dX[: len(self.X)], motions=tuple(motions), covariance=covariance)
+        return (moved_on if self.delay is None else moved_on._delayed(float(dX[-1]))), moved
+
+    def _delayed(self, change: float) -> "JointFit":
+        """Return the fit with torques that act so much later [s]; the motion stays where the torques are."""
+        logs = tuple(replace(cells, delay=cells.delay + change) for cells in self.logs)
+        return replace(self, logs=logs, delay=(self.delay or 0.0) + change)
 
     def noise(self, k: int) -> Noise:
         """Return the standard deviations of a log's cells: torques count for little where friction's sign is not known."""
@@ -135,7 +151,7 @@ class JointFit:
             for cells, z, noise, each in zip(self.logs, self.motions, noises, signs, strict=True)
         ]
         parts = [system.solved() for system in systems]
-        covariance, b = _reduced(systems, parts)
+        covariance, b = _reduced(systems, parts, len(self.unknowns))
         taken = sum(np.sum(y[:, 1:] ** 2, axis=0) for _, y, _ in parts) + np.sum(b[:, 1:] * (covariance @ b[:, 1:]), axis=0)
         known = sum(np.count_nonzero(noise.known, axis=-1) for noise in noises)
         free = np.maximum(known - np.asarray(taken).reshape(n, -1).mean(axis=1), 1e-3 * known)
@@ -143,11 +159,12 @@ class JointFit:
         return replace(self.levels, torque=np.maximum(self.levels.torque * np.sqrt(squares), floor))
 
 
-def _reduced(systems: list[NormalEquations], parts: list[tuple[Array, Array, Array]]) -> tuple[Array, Array]:
-    """Return the covariance of the parameters, and their right-hand sides, with the motions eliminated."""
-    S = sum(system.corner - V.T @ V for system, (V, _, _) in zip(systems, parts, strict=True))
-    b = sum(system.b_parameters - V.T @ y for system, (V, y, _) in zip(systems, parts, strict=True))
-    return np.linalg.pinv(np.asarray(S), hermitian=True), np.asarray(b)
+def _reduced(systems: list[NormalEquations], parts: list[tuple[Array, Array, Array]], count: int) -> tuple[Array, Array]:
+    """Return the covariance of the first `count` parameters, and their right-hand sides, with the motions eliminated."""
+    S = np.asarray(sum(system.corner - V.T @ V for system, (V, _, _) in zip(systems, parts, strict=True)))[:count, :count]
+    b = np.asarray(sum(system.b_parameters - V.T @ y for system, (V, y, _) in zip(systems, parts, strict=True)))[:count]
+    size = np.sqrt(np.maximum(np.diag(S), 1e-300))
+    return np.linalg.pinv(S / np.outer(size, size), hermitian=True) / np.outer(size, size), b
 
 
 def _sigmas(dX: Array, covariance: Array) -> float:

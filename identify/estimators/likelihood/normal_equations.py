@@ -1,4 +1,4 @@
-"""The normal equations of a motion and the robot's parameters together."""
+"""The normal equations of a motion, the robot's parameters and the delay of its torques together."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -49,11 +49,11 @@ class NormalEquations:
     ----------
     band : Array, shape (4 n, 2 n nodes)
         A_zz, its lower half as `scipy.linalg.cholesky_banded` has it.
-    border : Array, shape (2 n nodes, p)
-        A_zX.
-    corner : Array, shape (p, p)
+    border : Array, shape (2 n nodes, p + 1)
+        A_zX; the last column is that of the delay, as which positions lie elsewhere in their cells.
+    corner : Array, shape (p + 1, p + 1)
         A_XX.
-    b_nodes, b_parameters : Array, shape (2 n nodes, 1 + m), (p, 1 + m)
+    b_nodes, b_parameters : Array, shape (2 n nodes, 1 + m), (p + 1, 1 + m)
         The right-hand side, and m of `signs`.
     squares : Array, shape (joint,)
         Sums of the squared residuals of the mean torques over their variances, where friction's sign is known.
@@ -77,7 +77,7 @@ class NormalEquations:
         their products with the solutions show how much of the mean torques' residuals the unknowns take (M. F. Hutchinson,
         "A stochastic estimator of the trace of the influence matrix", Communications in Statistics 19 (1990) 433-450).
         """
-        n, p, size = basis.n, len(X), z.size
+        n, p, size = basis.n, len(X) + 1, z.size
         right = 1 + (0 if signs is None else len(signs) * n)
         zeros = np.zeros((4 * n, size)), np.zeros((size, p)), np.zeros((p, p)), np.zeros((size, right)), np.zeros((p, right))
         found = cls(*zeros, np.zeros(n))
@@ -87,7 +87,13 @@ class NormalEquations:
         return found
 
     def solved(self) -> tuple[Array, Array, Array]:
-        """Return L^-1 A_zX, L^-1 b_nodes, and the factor L of A_zz in bands."""
+        """Return L^-1 A_zX, L^-1 b_nodes, and the factor L of A_zz in bands.
+
+        Raises
+        ------
+        IdentificationError
+            If positions and torques do not determine the motion.
+        """
         try:
             L = scipy.linalg.cholesky_banded(self.band, lower=True, overwrite_ab=True, check_finite=False)
         except np.linalg.LinAlgError:
@@ -106,9 +112,13 @@ class NormalEquations:
         ends = np.stack([z[cell, 0], z[cell, 1], z[cell + 1, 0], z[cell + 1, 1]])
         left = (cells.log.q[cells.seen] - np.einsum("ks,ksj->sj", w, ends)) / sigma**2
         self.cost += float(np.sum((left * sigma) ** 2))
+        speed = np.einsum("ks,ksj->sj", hermite(place, cells.period)[1], ends)
+        self.corner[-1, -1] += float(np.sum((speed / sigma) ** 2))
+        self.b_parameters[-1, 0] -= float(np.sum(speed * left))
         where = [2 * n * cell[:, None] + n * k + np.arange(n) for k in range(4)]
         for k in range(4):
             np.add.at(self.b_nodes[:, 0], where[k], w[k][:, None] * left)
+            np.add.at(self.border[:, -1], where[k], -w[k][:, None] * speed / sigma**2)
             for m in range(k + 1):
                 np.add.at(self.band, (np.full_like(where[m], n * (k - m)), where[m]), (w[k] * w[m])[:, None] / sigma**2)
 
@@ -150,11 +160,11 @@ class NormalEquations:
         for half in (0, 1):
             begin = step * (first + half)
             rows = slice(begin, begin + step * count)
-            self.border[rows] += crossed[:, half * step : (half + 1) * step].reshape(step * count, -1)
+            self.border[rows, :-1] += crossed[:, half * step : (half + 1) * step].reshape(step * count, -1)
             self.b_nodes[rows] += right[:, half * step : (half + 1) * step].reshape(step * count, -1)
         flat = W.reshape(-1, W.shape[-1])
-        self.corner += flat.T @ flat
-        self.b_parameters += flat.T @ rho.reshape(len(flat), -1)
+        self.corner[:-1, :-1] += flat.T @ flat
+        self.b_parameters[:-1] += flat.T @ rho.reshape(len(flat), -1)
 
 
 def _chunks(count: int) -> Iterator[slice]:

@@ -70,7 +70,7 @@ def _covariance(fit: JointFit, log: int) -> Array:
     inverse = _windows(Cholesky.of(_blocks(system.band, cells.log.n)).inverse_blocks(), cells.log.n)[: cells.count]
     V, _, L = system.solved()
     U, _ = scipy.linalg.lapack.dtbtrs(L, V, uplo="L", trans="T")
-    of_X = U.reshape(len(z), 2, cells.log.n, -1)
+    of_X = U[:, : len(fit.unknowns)].reshape(len(z), 2, cells.log.n, -1)
     pairs = np.concatenate([of_X[:-1], of_X[1:]], axis=1).transpose(0, 2, 1, 3)
     return inverse + np.matmul(np.matmul(pairs, fit.covariance), np.swapaxes(pairs, -1, -2))
 
