@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from identify.arrays import Array, frozen
-from identify.estimators.problem import Influence, Problem
+from identify.estimators.problem import Problem
+from identify.estimators.propagated import Influence, bias_covariance, excess, noise_covariance
 from identify.rows.factors import Factor, Fit, Status
 from identify.rows.noise_propagation import NoiseLevels
 from identify.rows.rows import Rows
@@ -113,10 +114,10 @@ class Estimate:
             return self.honest
         if self.influence is None:
             return np.full(self.covariance.shape, np.nan)
-        found = self.problem.noise_covariance(self.influence)
+        found = noise_covariance(self.problem, self.influence)
         if self.weights is not None:
-            found = found * self.problem.excess(self.X, self.weights)[..., None, None]
-        found = found + self.problem.bias_covariance(self.influence)
+            found = found * excess(self.problem, self.X, self.weights)[..., None, None]
+        found = found + bias_covariance(self.problem, self.influence)
         return np.where((self.status == Status.OK)[..., None, None], found, np.nan)
 
     @property

@@ -10,6 +10,7 @@ from identify.arrays import Array, frozen
 from identify.estimators.estimate import Estimate
 from identify.estimators.estimator import AbstractEstimator, Need
 from identify.estimators.problem import Problem
+from identify.estimators.propagated import bias_covariance
 from identify.estimators.restricted_likelihood import likely
 from identify.rows.block_tridiagonal import Blocks
 from identify.rows.factors import Factor, Status, triangular
@@ -47,7 +48,7 @@ class GeneralizedLeastSquares(AbstractEstimator):
         def influence(rows: Rows) -> Array:
             return np.matmul(whitened.solved(rows), inverse)
 
-        covariance = frozen(inverse + problem.bias_covariance(influence))
+        covariance = frozen(inverse + bias_covariance(problem, influence))
         X, levels = frozen(factor.solution(solvable)), problem.likely_noise.levels
         return Estimate(problem, X, covariance, influence, honest=covariance, levels=levels)
 

@@ -5,8 +5,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, Self
 
-import numpy as np
-
 from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.data.motion_log import MotionLog
@@ -22,14 +20,10 @@ from identify.rows.factors import Factors, Fit
 from identify.rows.linearization import Linearization
 from identify.rows.long_logs import is_long, piece_of
 from identify.rows.noise_propagation import NoiseLevels, NoisyRows
-from identify.rows.row_map import RowMap
 from identify.rows.rows import Rows
 from identify.signals.signals import Signals
 
 Weights = Literal["measured", "own"]
-
-Influence = Callable[[Rows], Array]
-"""Rows of a problem -> G, shape (..., rows, p), with which X = G' Y to first order."""
 
 SAMPLED = 8
 """Pieces of long logs from which noise is estimated and propagated."""
@@ -116,6 +110,12 @@ class Problem:
             yield self._rows_of(self.chain.signals(log.part(*piece)))
 
     @cached_property
+    def share(self) -> float:
+        """The share of all rows that the parts make: 1 but for logs too long for their rows to be kept."""
+        every = sum(self.chain.grid(log).count for log in self.logs)
+        return len(self._together.time) / self._together.kinds / every
+
+    @cached_property
     def unbiased_parts(self) -> tuple[Rows, ...]:
         """The parts, with W less what noise of the positions adds to it on average."""
         return tuple(map(self.unbiased, self.parts))
@@ -179,46 +179,6 @@ class Problem:
             return None
         return RowWeights(self.parts, self.model, self.noise)
 
-    def noise_covariance(self, influence: Influence) -> Array:
-        """Return the covariance that the noise of the logs gives an estimate X = G' Y, shape (..., p, p).
-
-        Parameters
-        ----------
-        influence : callable
-            Returns G, shape (..., rows, p), of rows of this problem.
-        """
-        total = np.zeros(())
-        for rows, G in self._influences(influence):
-            total = total + self.noise.covariance(rows).of_sums(G)
-        return total / self._share
-
-    def bias_covariance(self, influence: Influence) -> Array:
-        """Return the square of the bias that noise of velocities near zero gives an estimate X = G' Y, shape (..., p, p)."""
-        if self.row_weights is None:
-            return np.zeros(())
-        bias = np.zeros(())
-        for rows, G in self._influences(influence):
-            bias = bias + np.matmul(np.swapaxes(G, -1, -2), self.row_weights.bias(rows)[..., None]) / self._share
-        return np.matmul(bias, np.swapaxes(bias, -1, -2))
-
-    def _influences(self, influence: Influence) -> Iterator[tuple[RowMap, Array]]:
-        """Yield the rows of each log with their G."""
-        for part in self.parts if self.long else [self.rows]:
-            G = influence(part)
-            for k, rows in enumerate(part.maps):
-                yield rows, G[..., part.of_log(k), :]
-
-    def excess(self, X: Array, weights: Callable[[Rows], Array]) -> Array:
-        """Return how many times the squares of weighted residuals are what noise makes of them, at least 1, shape (...).
-
-        1 where rows of a kind are alike, since noise levels are theirs; elsewhere what the model does not explain counts, too.
-        """
-        if self.row_weights is None:
-            return np.ones(X.shape[:-1])
-        p = len(self.names)
-        free = 1 - p / np.maximum(self.factors.together.rows * self._share, p + 1)
-        return self.row_weights.excess(X, weights, free)
-
     def at(self, log: MotionLog | Sequence[MotionLog], weights: Weights = "measured") -> Rows:
         """Return the rows of other logs, by the same chain, basis and model (instrumental variables, DIDIM).
 
@@ -281,12 +241,6 @@ class Problem:
     def _pieces(self) -> list[tuple[MotionLog, tuple[int, int]]]:
         """The log, first sample and end of every piece of long logs."""
         return [(log, piece) for log in self.logs for piece in self.chain.pieces(log, piece_of(log))]
-
-    @cached_property
-    def _share(self) -> float:
-        """The share of all rows that the parts make."""
-        every = sum(self.chain.grid(log).count for log in self.logs)
-        return len(self._together.time) / self._together.kinds / every
 
     @cached_property
     def _long_factors(self) -> tuple[Factors, Factors]:

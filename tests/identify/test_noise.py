@@ -23,6 +23,7 @@ from identify import (
     paper_chain,
     scara,
 )
+from identify.estimators.propagated import noise_covariance
 from identify.rows.linearization import Linearization
 from identify.rows.noise_propagation import position_paths, torque_paths
 
@@ -234,7 +235,7 @@ def test_two_logs_are_worth_two(log):
     influence = double.influence(double.rows)  # of weights that the noise of both logs made
     parts = [influence[..., double.rows.of_log(k), :] for k in (0, 1)]
     np.testing.assert_array_equal(*parts)
-    whole = double.problem.noise_covariance(double.influence)
+    whole = noise_covariance(double.problem, double.influence)
     half = double.problem.noise.covariance(double.rows.maps[0]).of_sums(parts[0])
     np.testing.assert_allclose(whole, 2 * half, rtol=1e-9)
     np.testing.assert_allclose(2 * double.corrected_covariance, single.corrected_covariance, rtol=0.1)
