@@ -62,6 +62,7 @@ from identify.judge.diagnosis import measured_state as measured_state
 from identify.judge.diagnosis import spectrum as spectrum
 from identify.judge.excitation import brisk_shares as brisk_shares
 from identify.judge.excitation import showing_moves as showing_moves
+from identify.judge.noise_spectra import noise_spectra as noise_spectra
 from identify.judge.validation import Validation as Validation
 from identify.judge.validation import split as split
 from identify.judge.validation import validate as validate

@@ -33,7 +33,7 @@ class View:
     folder: tyro.conf.Positional[Path]
     """Results folder, or a recording (.rrd)."""
     tab: str = ""
-    """What is in front: overview, friction, drive, filters, excitation, parameters, study or table2, as far as it has it."""
+    """What is in front: overview, friction, drive, filters, noise, excitation, parameters, study or table2, if it has it."""
     save: File = None
     """Write the recording and its layers to one file (.rrd) instead, to be taken elsewhere."""
 

@@ -12,7 +12,7 @@ from experiments.recording.lanes import Lanes, mask_states
 from experiments.recording.layouts import tabs
 from experiments.recording.stream import Stream
 from experiments.recording.style import FORM_WIDTHS, FORMS, GREY, JOINTS, Color, kind_colors, lighter
-from experiments.recording.texts import estimates_table, judged, short_table
+from experiments.recording.texts import estimates_table, judged, noise_table, short_table
 from identify import (
     MODELS,
     Array,
@@ -23,6 +23,7 @@ from identify import (
     filtered,
     instants,
     measured_state,
+    noise_spectra,
     recursive_least_squares,
     spectrum,
 )
@@ -85,7 +86,11 @@ class Layer:
         for name, cutoff in cutoffs(self._chain, self._log.fs).items():
             mark = rr.BarChart([1.1 * self._highest], abscissa=[cutoff], widths=[RESOLUTION / 3], color=GREY)
             self.stream.keep(f"{self._at}/cutoff/{name}", mark)
-        for name, text in (("report", estimates_table(self._found)), ("estimates", short_table(self._found))):
+        for name, text in (
+            ("report", estimates_table(self._found)),
+            ("estimates", short_table(self._found)),
+            ("noise", noise_table(self._found, self._joints)),
+        ):
             self.stream.keep(f"{self._at}/{name}", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
         self.stream.arrange(tabs(self._known | self.stream.paths))
         self.stream.breathe(0.0)
@@ -167,14 +172,23 @@ class Layer:
         names = self._names(form, len(left.residual))
         if names is self._joints:
             self._over(at, form, left)
-        for row, residual, weight in zip(names, left.residual, left.weight, strict=True):
-            used = weight > 0
-            f, density = spectrum(np.where(used, residual, 0.0), log.fs, RESOLUTION)
-            density = density / np.sqrt(max(used.mean(), 1e-12))  # as if what is masked were like the rest
-            height = np.maximum(20 * np.log10(np.maximum(density, 1e-300) / FLOOR), 0.0)
+        for joint, (row, residual, weight) in enumerate(zip(names, left.residual, left.weight, strict=True)):
+            f, density = spectrum(residual * weight, log.fs, RESOLUTION)
+            density = density / np.sqrt(max(np.mean(weight**2), 1e-12))  # as if what is masked were like the rest
+            height = _decibels(density)
             path = f"{self._at}/{form}/spectrum/{row}"
             self.stream.keep(path, rr.BarChart(height, abscissa=f, widths=np.full(len(f), f[1]), color=color))
             self._highest = max(self._highest, height.max())
+            if form == "explicit":
+                self._noise(estimate, row, joint, f)
+
+    def _noise(self, estimate: Estimate, row: str, joint: int, f: Array) -> None:
+        """Send the spectra that the noise found in the log should have in the explicit model's residual, beside each other."""
+        each = zip(("torque", "position"), noise_spectra(estimate.problem, estimate.noise_levels, f), (-0.2, 0.2), strict=True)
+        for (kind, density, aside), color in zip(each, (JOINTS[1], JOINTS[0]), strict=True):
+            width, at = np.full(len(f), 0.3 * f[1]), f + aside * f[1]
+            chart = rr.BarChart(_decibels(density[joint]), abscissa=at, widths=width, color=color)
+            self.stream.keep(f"{self._at}/explicit/noise_{kind}/{row}", chart)
 
     def _over(self, at: str, form: str, left: Instants) -> None:
         state, last = measured_state(self._log, self._chain), left.first + left.residual.shape[-1]
@@ -202,3 +216,8 @@ class Layer:
         for name, value in ends.items():
             times = time_columns(self._log.t[[0, -1]], self._log.fs)
             self._curve(f"truth/{name}", times, np.array([value, value]), "true", GREY, 3.0)
+
+
+def _decibels(density: Array) -> Array:
+    """Return amplitude densities in dB over FLOOR, 0 below it."""
+    return np.maximum(20 * np.log10(np.maximum(density, 1e-300) / FLOOR), 0.0)

@@ -33,6 +33,9 @@ def _known_units() -> dict[str, str]:
 ESTIMATES = 12
 """Plots of estimates that have room beside each other."""
 
+TWO = 4
+"""Spectra from which on two stand beside each other."""
+
 CHARTS = 7
 """Charts of imperfections in a column."""
 
@@ -123,6 +126,23 @@ def filters(shelf: Shelf) -> Part:
     return side_by_side("filters", column(*motion), column(*spectra), shares=[1, 1]) if rows else None
 
 
+def noise(shelf: Shelf) -> Part:
+    """Return the spectra of what the explicit model leaves over, beside what the noise found in the log predicts."""
+    rows = shelf.last("identify/*/explicit/noise_torque/*")
+    spectra = [
+        bars(
+            shelf,
+            f"residual {r} [dB over 10 µNm/√Hz] over f [Hz]; predicted: torque noise orange, position noise blue",
+            *shelf.by_method(f"identify/*/explicit/spectrum/{r}"),
+            *shelf.by_method(f"identify/*/explicit/noise_torque/{r}"),
+            *shelf.by_method(f"identify/*/explicit/noise_position/{r}"),
+        )
+        for r in rows
+    ]
+    found = text(shelf, "identify/*/noise")
+    return side_by_side("noise", found, grid("spectra", spectra, 1 if len(rows) < TWO else 2), shares=[1, 3]) if rows else None
+
+
 def excitation(shelf: Shelf) -> Part:
     """Return the columns of W, and how well they tell the parameters apart."""
     rows = shelf.last("identify/*/*/columns/*")
@@ -145,7 +165,7 @@ def parameters(shelf: Shelf) -> Part:
         for what, kind in (("error", "error"), ("sigma", "relative_sigma"))
     ]
     left = column(text(shelf, "identify/*/report"), *judged, shares=[3.0, *[2.0] * len(judged)])
-    return side_by_side("parameters", left, _estimates(shelf, names), shares=[2, 3]) if names else None
+    return side_by_side("parameters", left, _estimates(shelf, names) if names else None, shares=[2, 3]) if any(judged) else None
 
 
 def _estimates(shelf: Shelf, names: Sequence[str]) -> Part:
@@ -209,6 +229,7 @@ LAYOUTS: dict[str, Callable[[Shelf], Part]] = {
     "friction": friction,
     "drive": drive,
     "filters": filters,
+    "noise": noise,
     "excitation": excitation,
     "parameters": parameters,
 }

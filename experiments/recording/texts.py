@@ -38,6 +38,18 @@ def short_table(found: Identified) -> str:
     return "\n".join(lines)
 
 
+def noise_table(found: Identified, joints: Sequence[str]) -> str:
+    """Return the noise found in the log, joint by joint, as a markdown table."""
+    lines = [
+        "Noise found in the log, rms\n",
+        "| | torque [N m] | position [rad] | encoder step [rad] |",
+        "|---|---:|---:|---:|",
+    ]
+    for joint, *values in zip(joints, *(found.noise[name] for name in ("torque", "position", "encoder_step")), strict=True):
+        lines.append(f"| {joint} | {' | '.join('' if x is None else f'{x:.2g}' for x in values)} |")
+    return "\n".join(lines)
+
+
 def _cells(found: Identified, i: int) -> Iterator[str]:
     for estimate in found.estimates.values():
         aside = f"{estimate.best_sigma[i]:.2g}" if found.truth is None else f"{judged(found, estimate)[i]:+.2g} %"
