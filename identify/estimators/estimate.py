@@ -1,7 +1,7 @@
 """What comes out of an identification, and how good it is."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Self
 
@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from identify.arrays import Array, frozen
+from identify.estimators.likelihood.joint_fit import JointFit
 from identify.estimators.problem import Problem
 from identify.estimators.propagated import Influence, bias_covariance, excess, noise_covariance
 from identify.rows.factors import Factor, Fit, Status
@@ -36,6 +37,8 @@ class Estimate:
         Covariance of the error of X that the noise of the logs makes, if the estimator knows it; by default from `influence`.
     levels : NoiseLevels, optional
         The noise of the logs as the estimator found it; by default that of the problem.
+    fits : mapping of tuple of int to JointFit
+        Of maximum likelihood, motion and parameters of every run that could be solved, () of a single one.
     """
 
     problem: Problem
@@ -45,6 +48,7 @@ class Estimate:
     weights: Callable[[Rows], Array] | None = None
     honest: Array | None = None
     levels: NoiseLevels | None = None
+    fits: Mapping[tuple[int, ...], JointFit] = field(default_factory=dict)
 
     @classmethod
     def judge(

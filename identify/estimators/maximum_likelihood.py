@@ -1,7 +1,6 @@
 """Maximum likelihood of motion and parameters together."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import ClassVar, final
 
 import numpy as np
@@ -29,19 +28,6 @@ MOST = 2e9
 """Bytes that the equations of all motions may take."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class JointEstimate(Estimate):
-    """An estimate of motion and parameters together.
-
-    Parameters
-    ----------
-    fits : mapping of tuple of int to JointFit
-        Of every run that could be solved, () of a single one: motions, levels; `smoothed(estimate.fits[()])` is the motion.
-    """
-
-    fits: Mapping[tuple[int, ...], JointFit] = field(default_factory=dict)
-
-
 @final
 @dataclass(frozen=True)
 class MaximumLikelihood(AbstractEstimator):
@@ -65,7 +51,7 @@ class MaximumLikelihood(AbstractEstimator):
 
     find_delay: bool = False
 
-    def solve(self, problem: Problem) -> JointEstimate:
+    def solve(self, problem: Problem) -> Estimate:
         """Return the estimate of every run.
 
         Raises
@@ -95,7 +81,7 @@ class MaximumLikelihood(AbstractEstimator):
             fits[run] = found
             X[run], covariance[run], torque[run] = found.X, found.covariance[:p, :p], found.levels.torque
         honest = frozen(covariance)
-        return JointEstimate(problem, frozen(X), honest, honest=honest, levels=NoiseLevels(torque, position), fits=fits)
+        return Estimate(problem, frozen(X), honest, honest=honest, levels=NoiseLevels(torque, position), fits=fits)
 
 
 def _require_near(found: JointFit, X: Array, sigma: Array, names: tuple[str, ...]) -> None:
