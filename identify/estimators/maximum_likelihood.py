@@ -31,7 +31,7 @@ MOST = 2e9
 @final
 @dataclass(frozen=True)
 class MaximumLikelihood(AbstractEstimator):
-    """Maximum likelihood (ML) of the motion and the parameters together, from the logged positions and torques themselves:
+    """Maximum likelihood (ML) of motion and parameters together, from positions and torques as they were logged.
 
         min over q(t), X of  sum |q_k - q(t_k)|^2 / sigma_q^2 + sum |tau - D(q, qd, qdd) X|^2 / sigma_tau^2
 
