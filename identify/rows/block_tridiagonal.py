@@ -99,8 +99,8 @@ class Cholesky:
                 inverse[..., k, :, :] = np.linalg.inv(np.linalg.cholesky(left))
             except np.linalg.LinAlgError:
                 raise IdentificationError(
-                    "the covariance of the rows is singular: their noise is too little to be told; take WLS, or a log of an "
-                    "encoder or torque sensor with noise"
+                    "the covariance of the rows is singular: there is too little noise to weigh them by; take WLS, or a log of "
+                    "an encoder or torque sensor with noise"
                 ) from None
             if k + 1 < own.shape[-3]:
                 below[..., k, :, :] = np.matmul(inverse[..., k, :, :], C.next[..., k, :, :])

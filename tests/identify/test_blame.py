@@ -73,7 +73,11 @@ def test_a_friction_law_that_goes_wrong(log, do, error, message):
             PluginError,
             r"shape \(3,\), expected .* shape \(8,\)",
         ),
-        (lambda problem: Estimate(problem, np.r_[np.nan, np.ones(7)], np.eye(8), None), IdentificationError, "value for ZZR1: use a longer log"),
+        (
+            lambda problem: Estimate(problem, np.r_[np.nan, np.ones(7)], np.eye(8), None),
+            IdentificationError,
+            "value for ZZR1: use a longer log",
+        ),
     ],
     ids=["None", "raises", "shape", "nan"],
 )

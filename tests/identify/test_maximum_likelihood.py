@@ -181,8 +181,8 @@ def test_a_motion_that_nothing_moves_is_refused(exact):
 def test_the_delay_is_found_with_the_parameters(stated, truth):
     """A true one of 4 ms, from what the log states: to five of its sigmas, which are below 50 us."""
     log = simulate(scenario(timing=replace(load("ideal").timing, delay=0.004))).alone()
-    told = noisy(MotionLog(log.fs, log.q, log.tau, TorqueChannel("held", stated)), BITS16, 0.01)
-    found = identify(told, scara(), EXPLICIT, estimator=MaximumLikelihood(find_delay=True))
+    wrong = noisy(MotionLog(log.fs, log.q, log.tau, TorqueChannel("held", stated)), BITS16, 0.01)
+    found = identify(wrong, scara(), EXPLICIT, estimator=MaximumLikelihood(find_delay=True))
     fit = found.fits[()]
     sigma = np.sqrt(fit.covariance[-1, -1])
     assert sigma < 5e-5
