@@ -6,9 +6,8 @@ from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.estimators.likelihood.cells import GAUSS, hermite
 from identify.estimators.likelihood.joint_fit import MASK, UNKNOWN
-from identify.rows.linearization import SLIDING, slopes
+from identify.rows.linearization import friction_jumps, observation, slopes
 from identify.rows.noise_propagation import NoiseLevels
-from identify.signals.state import State
 
 TERMS = 8
 """Terms of the exponential series: slopes times a period are well below 1."""
@@ -37,7 +36,7 @@ def cramer_rao(basis: Basis, X: Array, q: Array, qd: Array, fs: float, noise: No
         Standard deviations, shape (joint,) each.
     """
     A, B, W = _steps(basis, X, q, qd, 1 / fs)
-    unknown = UNKNOWN * _jumps(basis, X, q)
+    unknown = UNKNOWN * friction_jumps(basis, X, np.reshape(q, (-1, basis.n))[0])
     weight = MASK.weight(np.moveaxis((qd[..., 1:, :] + qd[..., :-1, :]) / 2, -1, -2), fs)
     variance = np.moveaxis((noise.torque[:, None] + (1 - weight) * unknown[:, None]) ** 2, -1, -2)
     n, p, runs = basis.n, len(X), q.shape[:-2]
@@ -66,7 +65,7 @@ def _steps(basis: Basis, X: Array, q: Array, qd: Array, T: float) -> tuple[Array
     ends = np.stack([q[..., :-1, :], qd[..., :-1, :], q[..., 1:, :], qd[..., 1:, :]])
     middle, first, second = ([np.moveaxis(np.tensordot(w, ends, axes=1), -1, -2) for w in hermite(s, T)] for s in (0.5, *GAUSS))
     M, D, K = (np.moveaxis(x, -1, -3) for x in slopes(basis, X, middle[0], middle[1], middle[2], middle[1]))
-    W = (_dense(basis, *first) + _dense(basis, *second)) / 2
+    W = (observation(basis, *first) + observation(basis, *second)) / 2
     n, inverse = basis.n, np.linalg.inv(M)
     F = np.zeros((*M.shape[:-2], 2 * n, 2 * n))
     F[..., :n, n:] = np.eye(n)
@@ -77,19 +76,3 @@ def _steps(basis: Basis, X: Array, q: Array, qd: Array, T: float) -> tuple[Array
         A, integral = A + term, integral + term * (T / i)
         term = np.matmul(F, term) * (T / i)
     return A, np.matmul(integral, push), W
-
-
-def _dense(basis: Basis, q: Array, qd: Array, qdd: Array) -> Array:
-    """Return D(q, qd, qdd), shape (..., time, joint, p)."""
-    found = np.zeros((*q.shape[:-2], q.shape[-1], basis.n, len(basis.names)))
-    for (row, name), column in basis.explicit(State(q, qd, lambda _: qdd)).items():
-        found[..., row, basis.names.index(name)] = column
-    return found
-
-
-def _jumps(basis: Basis, X: Array, q: Array) -> Array:
-    """Return the torque by which friction jumps where joints turn, shape (joint,) [N m]."""
-    still = np.zeros((basis.n, 1))
-    at = np.reshape(q, (-1, basis.n))[:1].T
-    ahead, back = (_dense(basis, at, still + v, still)[0] @ X for v in (SLIDING, -SLIDING))
-    return np.asarray(np.abs(ahead - back))

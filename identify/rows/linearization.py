@@ -99,6 +99,22 @@ def slopes(basis: Basis, X: Array, q: Array, qd: Array, qdd: Array, slow: Array)
     return Slopes(*(np.moveaxis(x, 0, -2) for x in found))
 
 
+def observation(basis: Basis, q: Array, qd: Array, qdd: Array) -> Array:
+    """Return D(q, qd, qdd) of a motion, shape (..., joint, time), at every instant, shape (..., time, joint, p)."""
+    found = np.zeros((*q.shape[:-2], q.shape[-1], basis.n, len(basis.names)))
+    for (row, name), column in basis.explicit(State(q, qd, lambda _: qdd)).items():
+        found[..., row, basis.names.index(name)] = column
+    return found
+
+
+def friction_jumps(basis: Basis, X: Array, q: Array) -> Array:
+    """Return the torque by which friction jumps where joints at positions q, shape (joint,), turn, shape (joint,) [N m]."""
+    still = np.zeros((basis.n, 1))
+    there = [State(q[:, None], still + v, lambda _: still) for v in (SLIDING, -SLIDING)]
+    ahead, back = (combined(basis.explicit(state), basis.names, X, np.zeros_like(still)) for state in there)
+    return np.abs(ahead - back)[:, 0]
+
+
 def smoothed(x: Array, fs: float) -> Array:
     """Return `x`, shape (..., time), with noise above some 5 Hz taken out, and slow motion left as it is."""
     window = 2 * round(SMOOTHING * fs / 2) + 1

@@ -10,10 +10,9 @@ from identify.basis.basis import Basis
 from identify.errors import IdentificationError
 from identify.estimators.likelihood.cells import HELD, Cells
 from identify.estimators.likelihood.normal_equations import Noise, NormalEquations
-from identify.rows.linearization import SLIDING, smoothed
+from identify.rows.linearization import friction_jumps, smoothed
 from identify.rows.noise_propagation import NoiseLevels
 from identify.signals.masks.reversal import ReversalMask
-from identify.signals.state import State
 
 ROUNDS, STEPS = 4, 6
 """Rounds, in each of which mask and levels are frozen, and Gauss-Newton steps of each."""
@@ -122,25 +121,12 @@ class JointFit:
     def noise(self, k: int) -> Noise:
         """Return the standard deviations of a log's cells: torques count for little where friction's sign is not known."""
         cells, z = self.logs[k], self.motions[k]
-        q, qd, qdd = cells.motion(z, 0.5)
+        q, qd, _ = cells.motion(z, 0.5)
         weight = MASK.weight(smoothed(qd, cells.log.fs), cells.log.fs)
-        lost = (1 - weight) * self._friction(q, qdd)
+        lost = (1 - weight) * UNKNOWN * friction_jumps(self.basis, self.X, q[:, 0])[:, None]
         mean = self.levels.torque[:, None] * np.ones_like(weight)
         half = np.hypot(HELD * self.levels.torque[:, None], cells.rough)
         return Noise(mean + lost, half + lost, self.levels.position, weight == 1)
-
-    def _friction(self, q: Array, qdd: Array) -> Array:
-        """Return the torque by which friction jumps where a joint turns, shape (joint, 1) [N m]."""
-        still = np.zeros_like(q[:, :1])
-        there = [State(q[:, :1], still + v, lambda _: qdd[:, :1]) for v in (SLIDING, -SLIDING)]
-        ahead, back = (self._torques(state) for state in there)
-        return UNKNOWN * np.abs(ahead - back)
-
-    def _torques(self, state: State) -> Array:
-        total = np.zeros_like(state.q)
-        for (row, name), column in self.basis.explicit(state).items():
-            total[row] += column * self.X[self.basis.names.index(name)]
-        return total
 
     def _levels(self, noises: list[Noise], floor: Array) -> NoiseLevels:
         """Return the levels with those of the torques from what is left over, and the share of it that the unknowns take."""

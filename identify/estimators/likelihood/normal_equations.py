@@ -11,8 +11,7 @@ from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.errors import IdentificationError
 from identify.estimators.likelihood.cells import GAUSS, Cells, hermite
-from identify.rows.linearization import slopes
-from identify.signals.state import State
+from identify.rows.linearization import observation, slopes
 
 CHUNK = 2000
 """Cells whose columns are made at once: those of all would take too much memory."""
@@ -127,7 +126,7 @@ class NormalEquations:
     ) -> None:
         nodes = z[part.start : part.stop + 1]
         points = [cells.motion(nodes, s) for s in GAUSS]
-        D = np.stack([_columns(basis, *point) for point in points])  # (point, cell, joint, p)
+        D = np.stack([observation(basis, *point) for point in points])  # (point, cell, joint, p)
         both, T = _slopes_of(cells, basis, X, nodes), cells.period
         J = np.stack([_by_nodes(slope, hermite(s, T)) for s, slope in zip(GAUSS, both, strict=True)])
         wanted = [tau[:, part].T for tau in cells.torque]
@@ -170,14 +169,6 @@ class NormalEquations:
 def _chunks(count: int) -> Iterator[slice]:
     for start in range(0, count, CHUNK):
         yield slice(start, min(start + CHUNK, count))
-
-
-def _columns(basis: Basis, q: Array, qd: Array, qdd: Array) -> Array:
-    """Return D(q, qd, qdd), shape (cell, joint, p)."""
-    found = np.zeros((q.shape[-1], basis.n, len(basis.names)))
-    for (row, name), column in basis.explicit(State(q, qd, lambda _: qdd)).items():
-        found[:, row, basis.names.index(name)] = column
-    return found
 
 
 def _slopes_of(cells: Cells, basis: Basis, X: Array, z: Array) -> list[list[Array]]:
