@@ -13,7 +13,6 @@ from identify.estimators.estimator import AbstractEstimator, Need
 from identify.estimators.generalized_least_squares import GeneralizedLeastSquares
 from identify.estimators.likelihood.cells import Cells
 from identify.estimators.likelihood.joint_fit import JointFit
-from identify.estimators.noise import position_noise
 from identify.estimators.problem import Problem
 from identify.estimators.restricted_likelihood import EXACT, SMALLEST
 from identify.models.explicit import ExplicitModel
@@ -63,7 +62,7 @@ class MaximumLikelihood(AbstractEstimator):
             raise IdentificationError("ML has the torque equation of the explicit model: take --model explicit, or GLS")
         _require_short(problem)
         # Rows show little of the positions' noise where torques are noisy; their differences show all of it.
-        start, position = GeneralizedLeastSquares().solve(problem), np.maximum(position_noise(problem.signals), SMALLEST)
+        start, position = GeneralizedLeastSquares().solve(problem), np.maximum(problem.position_noise, SMALLEST)
         torque = problem.likely_noise.levels.torque.copy()
         runs, p = start.X.shape[:-1], len(problem.names)
         X, covariance = np.full((*runs, p), np.nan), np.full((*runs, p, p), np.nan)

@@ -10,7 +10,7 @@ from identify.rows.factors import Factor, triangular
 from identify.rows.linearization import Linearization
 from identify.rows.noise_propagation import NoiseLevels, NoisyRows, position_paths, torque_paths
 from identify.rows.rows import Rows
-from identify.rows.whitening import seen
+from identify.rows.whitening import kept_rows
 from identify.signals.signals import Signals
 
 ROUNDS = 5
@@ -45,7 +45,7 @@ def likely_noise(parts: Sequence[Rows], start: NoiseLevels, linear: Callable[[Si
         Returns the linearization of the explicit model about signals.
     """
     units = [_units(rows, linear(rows.maps[0].signals)) for rows in parts]
-    joined = [rows.joined * seen(rows.maps[0])[..., None] for rows in parts]
+    joined = [rows.joined * kept_rows(rows.maps[0])[..., None] for rows in parts]
     tau = [rows.maps[0].signals.torque.mean for rows in parts]
     rms = np.sqrt(sum(np.mean(one**2, axis=-1) for one in tau) / len(parts))
     least = np.concatenate([np.maximum(EXACT * rms, 1e-12), np.full(rms.shape, SMALLEST)], axis=-1) ** 2
@@ -77,7 +77,7 @@ def _units(rows: Rows, linear: Linearization) -> list[Blocks]:
     """Return the covariances of rows by unit noise of the torques, and of the positions, joint by joint."""
     (to_rows,) = rows.maps
     each = [*torque_paths(to_rows).each(), *position_paths(to_rows, linear).each()]
-    lags, kept = max(C.bands.shape[-4] for C in each), seen(to_rows)
+    lags, kept = max(C.bands.shape[-4] for C in each), kept_rows(to_rows)
     return [Blocks.of(C.kept(kept), lags) for C in each]
 
 

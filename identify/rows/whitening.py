@@ -63,7 +63,7 @@ class Whitening:
 
 def parts_of(rows: RowMap, noise: NoisyRows) -> tuple[BandedCovariance, BandedCovariance, npt.NDArray[np.bool_]]:
     """Return what noise makes of rows, white noise of the same mean variance, and which rows are kept."""
-    kept = seen(rows)
+    kept = kept_rows(rows)
     C = noise.covariance(rows).kept(kept)
     mean = np.sum(C.variance, axis=-1) / np.maximum(np.sum(kept, axis=-1), 1)
     count, kinds = C.bands.shape[-3:-1]
@@ -71,7 +71,7 @@ def parts_of(rows: RowMap, noise: NoisyRows) -> tuple[BandedCovariance, BandedCo
     return C, BandedCovariance(np.array(one)).times(mean).kept(kept), kept
 
 
-def seen(rows: RowMap) -> npt.NDArray[np.bool_]:
+def kept_rows(rows: RowMap) -> npt.NDArray[np.bool_]:
     """Return which rows the mask leaves enough of, shape (..., r)."""
     one = np.ones(rows.signals.log.n)
     whole = torque_paths(rows.unmasked()).covariance(one).variance

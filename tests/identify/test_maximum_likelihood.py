@@ -15,7 +15,7 @@ from identify import (
     attempt_each,
     identify,
     scara,
-    smoothed,
+    smoothed_motion,
 )
 from identify.estimators import maximum_likelihood
 from identify.estimators.likelihood.cells import GAUSS, Cells, hermite
@@ -151,17 +151,17 @@ def test_the_smoothed_motion_is_true_within_its_sigma(truth):
     run = simulate(scenario())
     log = noisy(run.log, BITS16, 0.001)
     estimate = identify(log, scara(), EXPLICIT, estimator=ML)
-    motion = smoothed(estimate.fits[(0,)])
+    motion = smoothed_motion(estimate.fits[(0,)])
     inner, count = slice(20, -20), len(motion.t)
     for found, sigma, true in ((motion.q, motion.sigma_q, run.q[0]), (motion.qd, motion.sigma_qd, run.qd[0])):
         z = ((found - true[:count]) / sigma)[inner]
         assert np.sqrt(np.mean(z**2)) == pytest.approx(1, abs=0.3)
     raw, true = np.gradient(log.q[0], 1 / log.fs, axis=0)[:count], run.qd[0][:count]
     assert np.std((motion.qd - true)[inner, 0]) < 0.8 * np.std((raw - true)[inner, 0])
-    between = smoothed(estimate.fits[(0,)], t=np.array([3.003, 3.0071]))
+    between = smoothed_motion(estimate.fits[(0,)], t=np.array([3.003, 3.0071]))
     assert between.q.shape == (2, 2)
     with pytest.raises(IdentificationError, match="instants must lie in 0 to"):
-        smoothed(estimate.fits[(0,)], t=np.array([1e3]))
+        smoothed_motion(estimate.fits[(0,)], t=np.array([1e3]))
 
 
 def test_torques_that_do_not_belong_to_the_motion_are_refused(exact):

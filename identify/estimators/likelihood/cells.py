@@ -19,7 +19,7 @@ HELD = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """The cells of one log, between instants half a period, or none, after those at which its torque was logged.
+    """The cells of one log: each from the instant that a torque sample speaks for, or from which on, to that of the next.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Cells:
         return np.sqrt(np.mean(np.diff(tau, 2, axis=-1) ** 2, axis=-1, keepdims=True)) / 4
 
     @cached_property
-    def seen(self) -> npt.NDArray[np.bool_]:
+    def inside(self) -> npt.NDArray[np.bool_]:
         """Samples of the positions that lie in a cell, shape (sample,)."""
         at = self._at
         return (at >= 0) & (at < self.count)
@@ -83,7 +83,7 @@ class Cells:
     @cached_property
     def places(self) -> tuple[npt.NDArray[np.intp], Array]:
         """Cell of every sample that is seen, and where it lies there, from 0 to 1."""
-        at = self._at[self.seen]
+        at = self._at[self.inside]
         cell = np.minimum(np.floor(at).astype(np.intp), self.count - 1)
         return cell, at - cell
 

@@ -93,23 +93,20 @@ class NormalEquations:
         IdentificationError
             If positions and torques do not determine the motion.
         """
-        try:
-            L = scipy.linalg.cholesky_banded(self.band, lower=True, overwrite_ab=True, check_finite=False)
-        except np.linalg.LinAlgError:
+        both, p = np.concatenate([self.border, self.b_nodes], axis=1), self.border.shape[1]
+        L, singular = scipy.linalg.lapack.dpbtrf(self.band, lower=True, overwrite_ab=True)
+        z, none = scipy.linalg.lapack.dtbtrs(L, both, uplo="L", overwrite_b=True)
+        if singular or none:
             raise IdentificationError(
                 "the motion is not determined by this log: positions and torques that change are needed; take WLS"
-            ) from None
-        both, p = np.concatenate([self.border, self.b_nodes], axis=1), self.border.shape[1]
-        z, info = scipy.linalg.lapack.dtbtrs(L, both, uplo="L", overwrite_b=True)
-        if info:
-            raise IdentificationError(f"the motion is not determined by this log (dtbtrs: {info}): take WLS")
+            )
         return z[:, :p], z[:, p:], L
 
     def _add_positions(self, cells: Cells, z: Array, sigma: Array) -> None:
         cell, place = cells.places
         n, w = len(sigma), hermite(place, cells.period)[0]
         ends = np.stack([z[cell, 0], z[cell, 1], z[cell + 1, 0], z[cell + 1, 1]])
-        left = (cells.log.q[cells.seen] - np.einsum("ks,ksj->sj", w, ends)) / sigma**2
+        left = (cells.log.q[cells.inside] - np.einsum("ks,ksj->sj", w, ends)) / sigma**2
         self.cost += float(np.sum((left * sigma) ** 2))
         speed = np.einsum("ks,ksj->sj", hermite(place, cells.period)[1], ends)
         self.corner[-1, -1] += float(np.sum((speed / sigma) ** 2))

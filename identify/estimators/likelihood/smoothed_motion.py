@@ -30,7 +30,7 @@ class SmoothedMotion(NamedTuple):
     sigma_qdd: Array
 
 
-def smoothed(fit: JointFit, log: int = 0, t: Array | None = None) -> SmoothedMotion:
+def smoothed_motion(fit: JointFit, log: int = 0, t: Array | None = None) -> SmoothedMotion:
     """Return the motion of a log as positions, torques and the robot's equation together say.
 
     Parameters
@@ -49,7 +49,7 @@ def smoothed(fit: JointFit, log: int = 0, t: Array | None = None) -> SmoothedMot
     """
     cells, z = fit.logs[log], fit.motions[log]
     fs = cells.log.fs
-    given = np.flatnonzero(cells.seen) / fs if t is None else np.asarray(t, dtype=np.float64)
+    given = np.flatnonzero(cells.inside) / fs if t is None else np.asarray(t, dtype=np.float64)
     at = (given - cells.delay) * fs
     if len(at) and (at.min() < -1e-6 or at.max() > cells.count + 1e-6):
         last = cells.delay + cells.count / fs
