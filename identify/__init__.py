@@ -48,6 +48,7 @@ from identify.estimators.identification import attempt_each as attempt_each
 from identify.estimators.identification import estimate as estimate
 from identify.estimators.identification import identify as identify
 from identify.estimators.identification import identify_each as identify_each
+from identify.estimators.likelihood.joint_fit import JointFit as JointFit
 from identify.estimators.likelihood.smoothed_motion import SmoothedMotion as SmoothedMotion
 from identify.estimators.likelihood.smoothed_motion import smoothed_motion as smoothed_motion
 from identify.estimators.recursive_least_squares import Recursive as Recursive

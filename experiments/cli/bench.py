@@ -9,6 +9,7 @@ import tyro
 from experiments.cli.app import APP
 from experiments.cli.interruption import importing
 from experiments.cli.options import Asked, Count, File, Folder, Number, Robot, Scenario, Watched, Window
+from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.parameters import Parameters
 from experiments.recording.audience import Watching
 
@@ -25,9 +26,9 @@ class Run:
     """Folder for summary.json, recording.rrd, log.parquet and scenario.toml; runs/<name of the scenario> by default."""
     force: bool = False
     """Replace results of another experiment in the folder."""
-    chain: str = "idbench"
+    chain: str = CHAIN
     """Signal processing."""
-    estimator: str = "WLS"
+    estimator: str = ESTIMATOR
     """OLS, WLS, ..."""
     study: Annotated[Path | None, tyro.conf.arg(name="from", metavar="DIR")] = None
     """Instead of a scenario: the folder of a study, one run of which is made again."""

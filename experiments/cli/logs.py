@@ -9,6 +9,7 @@ import tyro
 from experiments.cli.app import APP
 from experiments.cli.interruption import importing
 from experiments.cli.options import Asked, Delay, File, Folder, Robot, Torque, Watched
+from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.parameters import Parameters
 from experiments.recording.audience import Watching
 
@@ -30,11 +31,11 @@ class Identify:
     """From a sample to the instant it speaks for, in seconds, or `estimate` to find it from the log."""
     unwrap: bool = False
     """Take jumps of a hinge by about a turn for a change of the turn that is counted, and undo them."""
-    chain: str = "idbench"
+    chain: str = CHAIN
     """Signal processing."""
     model: str = "all"
     """all, explicit, implicit or power."""
-    estimator: str = "WLS"
+    estimator: str = ESTIMATOR
     """OLS, WLS, ..."""
     validate: File = None
     """A second log, on which the result is judged; without it the last quarter of the first, by a fit of the rest."""

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.results import summarize
 from experiments.identification.subject import Subject
 from identify import (
@@ -56,8 +57,8 @@ class Identified:
     subject: Subject = field(default_factory=Subject)
     truth: Mapping[str, float] | None = None
     models: tuple[str, ...] = ("explicit", "implicit", "power")
-    chain: str = "idbench"
-    estimator: str = "WLS"
+    chain: str = CHAIN
+    estimator: str = ESTIMATOR
     method: tuple[Chain, AbstractEstimator] | None = None
     trim: float | None = None
     name: str = ""

@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from experiments.errors import ExperimentError
+from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.identified import Identified
 from experiments.identification.parameters import Parameters
 from experiments.identification.subject import Subject
@@ -41,8 +42,8 @@ class ScenarioRun:
     """
 
     scenario: Scenario
-    chain: str = "idbench"
-    estimator: str = "WLS"
+    chain: str = CHAIN
+    estimator: str = ESTIMATOR
     method: tuple[Chain, AbstractEstimator] | None = None
     progress: Progress | None = None
     watch: Watch | None = None

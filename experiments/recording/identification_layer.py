@@ -10,6 +10,7 @@ from experiments.recording.audience import Audience
 from experiments.recording.columns import Times, part, seconds, time_columns
 from experiments.recording.lanes import Lanes, mask_states
 from experiments.recording.layouts import tabs
+from experiments.recording.smoothed_layer import send_smoothed
 from experiments.recording.stream import Stream
 from experiments.recording.style import FORM_WIDTHS, FORMS, GREY, JOINTS, Color, kind_colors, lighter
 from experiments.recording.texts import estimates_table, judged, noise_table, short_table
@@ -82,6 +83,8 @@ class Layer:
             self._running(at, form, estimate, color)
             self._left_over(at, form, estimate, color)
             self._judge(form, estimate)
+            for fit in estimate.fits.values():
+                send_smoothed(self.stream, self._at, fit, self._joints)
         self._truth()
         for name, cutoff in cutoffs(self._chain, self._log.fs).items():
             mark = rr.BarChart([1.1 * self._highest], abscissa=[cutoff], widths=[RESOLUTION / 3], color=GREY)
@@ -151,7 +154,7 @@ class Layer:
 
     def _running(self, at: str, form: str, estimate: Estimate, color: Color) -> None:
         """Send the estimate as it comes about, with its variance, once that is small enough to be worth a look."""
-        if estimate.weights is None:
+        if estimate.whiten is None:
             return
         log = self._log
         t = np.append(np.arange(EVERY, log.t[-1], EVERY), log.t[-1] + self._chain.halo(log.fs, log.torque))

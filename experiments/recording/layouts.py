@@ -114,7 +114,8 @@ def filters(shelf: Shelf) -> Part:
         plot(shelf, "q [rad], measured and filtered", "q/measured", "identify/*/q/filtered", legend=False),
         *(
             plot(shelf, f"{x} [{unit}], measured, filtered{' and true' if shelf.of(f'{x}/true') else ''}",
-                 f"identify/*/{x}/measured", f"identify/*/{x}/filtered", f"{x}/true", legend=False)
+                 f"identify/*/{x}/measured", f"identify/*/{x}/filtered", f"identify/*/smoothed/{x}/*", f"{x}/true",
+                 legend=False)
             for x, unit in (("qd", "rad/s"), ("qdd", "rad/s²"))
         ),
     ]  # fmt: skip
@@ -139,8 +140,14 @@ def noise(shelf: Shelf) -> Part:
         )
         for r in rows
     ]
-    found = text(shelf, "identify/*/noise")
-    return side_by_side("noise", found, grid("spectra", spectra, 1 if len(rows) < TWO else 2), shares=[1, 3]) if rows else None
+    smoothed = [
+        plot(shelf, f"{x} {r} [{unit}], measured - smoothed, and sigma of the smoothed one",
+             f"identify/*/smoothed_band/{x}/{r}", f"identify/*/measured_less_smoothed/{x}/{r}", legend=False)
+        for r in shelf.last("identify/*/smoothed_band/q/*") for x, unit in (("q", "rad"), ("qd", "rad/s"))
+    ]  # fmt: skip
+    columns = 1 if len(rows) < TWO else 2
+    parts = text(shelf, "identify/*/noise"), grid("spectra", spectra, columns), grid("smoothed motion", smoothed, columns)
+    return side_by_side("noise", *parts, shares=[1, 3, 3]) if rows else None
 
 
 def excitation(shelf: Shelf) -> Part:

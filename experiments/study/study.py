@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from experiments.errors import StudyError
+from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.subject import Subject
 from experiments.study.axis import Axis, Setting
 from experiments.study.method import Method, combinations, methods_of, whole_first
@@ -59,9 +60,9 @@ class Study:
     """drawn: every run draws a motion of its own (trajectory of kind random); shared: all follow the scenario's."""
     models: Names = ("explicit", "implicit", "power")
     """Names of models."""
-    chains: Names = ("idbench",)
+    chains: Names = (CHAIN,)
     """Names of chains."""
-    estimators: Names = ("WLS",)
+    estimators: Names = (ESTIMATOR,)
     """Names of estimators."""
     bound: bool = False
     """Whether the least error that encoders and torque noise allow is computed beside (Cramer-Rao)."""

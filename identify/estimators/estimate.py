@@ -32,7 +32,10 @@ class Estimate:
     influence : callable, optional
         Returns G of rows, shape (..., rows, p), with which X = G' Y to first order; without it there is no corrected sigma.
     weights : callable, optional
-        Returns what rows were multiplied by, shape (..., rows), where X is a least-squares solution.
+        Returns what rows were multiplied by, shape (..., rows), where X is a least-squares solution of each row by itself.
+    whiten : callable, optional
+        Returns [W Y] of rows made independent, shape (..., rows, p + 1), of which X is the least-squares solution, each from
+        those that come before it.
     honest : Array, shape (..., p, p), optional
         Covariance of the error of X that the noise of the logs makes, if the estimator knows it; by default from `influence`.
     levels : NoiseLevels, optional
@@ -46,6 +49,7 @@ class Estimate:
     covariance: Array
     influence: Influence | None = None
     weights: Callable[[Rows], Array] | None = None
+    whiten: Callable[[Rows], Array] | None = None
     honest: Array | None = None
     levels: NoiseLevels | None = None
     fits: Mapping[tuple[int, ...], JointFit] = field(default_factory=dict)
@@ -87,10 +91,13 @@ class Estimate:
             weight = np.tile(fit.weight, len(rows.time) // rows.kinds)
             return weight * problem.row_weights.of(rows) if scaled and problem.row_weights else weight
 
+        def whiten(rows: Rows) -> Array:
+            return rows.joined * weights(rows)[..., None]
+
         def influence(rows: Rows) -> Array:
             return np.matmul(rows.W * (weights(rows) ** 2)[..., None], inverse)
 
-        return cls(problem, frozen(fit.X), frozen(_paper_covariance(fit.factor, fit.X, inverse)), influence, weights)
+        return cls(problem, frozen(fit.X), frozen(_paper_covariance(fit.factor, fit.X, inverse)), influence, weights, whiten)
 
     @property
     def names(self) -> tuple[str, ...]:

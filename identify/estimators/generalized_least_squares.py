@@ -12,14 +12,15 @@ from identify.estimators.estimator import AbstractEstimator, Need
 from identify.estimators.problem import Problem
 from identify.estimators.propagated import bias_covariance
 from identify.estimators.restricted_likelihood import likely
+from identify.rows.banded import BandedCovariance
 from identify.rows.block_tridiagonal import Blocks
 from identify.rows.factors import Factor, Status, triangular
 from identify.rows.row_map import RowMap
 from identify.rows.rows import Rows
-from identify.rows.whitening import Whitening, parts_of
+from identify.rows.whitening import Whitening, kept_rows
 
 LEAST = 1e-4
-"""Share of the mean variance of rows that is white at least."""
+"""Share of the mean variance of rows that each part of it is at least."""
 
 
 @final
@@ -31,15 +32,15 @@ class GeneralizedLeastSquares(AbstractEstimator):
     instants and other joints. Weighted least squares takes them for independent, and leaves a factor of four. C follows from
     the noise of each joint's torque and position (`NoisyRows`), whose levels make the explicit model's rows most likely
     (`likely_noise`). What noise of the positions adds to W on average is taken from it (`unbiased`). Rows of a model that
-    multiplies torques by something that varies, such as the power model, have some white error beside that, as much as their
-    residuals ask for.
+    multiplies torques by something that varies, such as the power model, have two independent errors beside that, as large as
+    makes them most likely: one that is white, and what noise makes of friction where joints hardly move.
     """
 
     needs: ClassVar[frozenset[Need]] = frozenset({"factors"})
 
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate; of logs too long for their rows to be kept, pieces count as independent."""
-        whitened = _Whitened(problem, _shares(problem))
+        whitened = _Whitened(problem)
         parts = [triangular(whitened(rows)) for rows in problem.every_part()]
         factor = Factor(triangular(np.concatenate(parts, axis=-2)), problem.factors.together.rows, problem.names)
         solvable = problem.factors.together.status == Status.OK
@@ -50,26 +51,40 @@ class GeneralizedLeastSquares(AbstractEstimator):
 
         covariance = frozen(inverse + bias_covariance(problem, influence))
         X, levels = frozen(factor.solution(solvable)), problem.likely_noise.levels
-        return Estimate(problem, X, covariance, influence, honest=covariance, levels=levels)
+        return Estimate(problem, X, covariance, influence, whiten=whitened, honest=covariance, levels=levels)
 
 
-def _shares(problem: Problem) -> Array | None:
-    """Return how much of what noise makes of the rows, and of white noise beside it, makes them most likely, shape (..., 2)."""
+def _covariances(problem: Problem, rows: RowMap) -> list[BandedCovariance]:
+    """Return what noise makes of rows, and, beside it, errors of the same mean variance that are independent."""
+    C = problem.likely_noise.covariance(rows)
     if problem.row_weights is None:
-        return None
-    found = [parts_of(rows.maps[0], problem.likely_noise) for rows in problem.parts]
-    lags = max(C.bands.shape[-4] for C, _, _ in found)
-    units = [[Blocks.of(C, lags), Blocks.of(white, lags)] for C, white, _ in found]
-    joined = [rows.joined * kept[..., None] for rows, (_, _, kept) in zip(problem.unbiased_parts, found, strict=True)]
-    runs = joined[0].shape[:-2]
-    return likely(units, joined, np.broadcast_to([1.0, 0.1], (*runs, 2)), np.full(2, LEAST))
+        return [C]
+    mean, (count, kinds) = np.mean(C.variance, axis=-1, keepdims=True), C.bands.shape[-3:-1]
+    rest = problem.row_weights.bias(rows) ** 2
+    of_rest = np.mean(rest, axis=-1, keepdims=True)
+    share = np.divide(rest, of_rest, out=np.ones_like(rest), where=of_rest > 0)
+    return [C, *(BandedCovariance.of_variance(mean * x, kinds) for x in (np.ones(count * kinds), share))]
+
+
+def _shares(problem: Problem) -> Array:
+    """Return how much of each covariance makes the rows most likely, shape (..., 1 or 3)."""
+    if problem.row_weights is None:
+        return np.ones((1,))
+    units, joined = [], []
+    for rows, better in zip(problem.parts, problem.unbiased_parts, strict=True):
+        kept, each = kept_rows(rows.maps[0]), _covariances(problem, rows.maps[0])
+        lags = max(C.bands.shape[-4] for C in each)
+        units.append([Blocks.of(C.kept(kept), lags) for C in each])
+        joined.append(better.joined * kept[..., None])
+    start = np.array([1.0, 0.1, 0.1])
+    return likely(units, joined, np.broadcast_to(start, (*joined[0].shape[:-2], 3)), np.full(3, LEAST))
 
 
 class _Whitened:
     """Rows [W Y] made independent, and C^-1 W, log by log, W without the bias of noise in it."""
 
-    def __init__(self, problem: Problem, shares: Array | None) -> None:
-        self._problem, self._shares = problem, shares
+    def __init__(self, problem: Problem) -> None:
+        self._problem, self._shares = problem, _shares(problem)
         self._known = WeakKeyDictionary[RowMap, tuple[Whitening, Array]]()
 
     def __call__(self, rows: Rows) -> Array:
@@ -85,8 +100,10 @@ class _Whitened:
     def _of(self, rows: Rows) -> tuple[Whitening, Array]:
         (to_rows,) = rows.maps
         if to_rows not in self._known:
-            whitening = Whitening.of(to_rows, self._problem.likely_noise, self._shares)
-            self._known[to_rows] = whitening, self._unbiased(rows).W
+            kept, each = kept_rows(to_rows), _covariances(self._problem, to_rows)
+            scaled = [C.times(self._shares[..., i]) for i, C in enumerate(each)]
+            C = sum(scaled[1:], start=scaled[0])
+            self._known[to_rows] = Whitening(C.kept(kept), kept), self._unbiased(rows).W
         return self._known[to_rows]
 
     def _unbiased(self, rows: Rows) -> Rows:

@@ -9,8 +9,8 @@ from identify.data.motion_log import MotionLog
 from identify.errors import IdentificationError
 from identify.estimators.estimate import Estimate
 from identify.estimators.estimator import AbstractEstimator
+from identify.estimators.generalized_least_squares import GeneralizedLeastSquares
 from identify.estimators.problem import Problem
-from identify.estimators.weighted_least_squares import WeightedLeastSquares
 from identify.models.explicit import ExplicitModel
 from identify.models.model import AbstractModel
 from identify.rows.chain import Chain
@@ -40,7 +40,7 @@ def identify(
     chain : Chain, optional
         Signal processing; chain `idbench` by default.
     estimator : AbstractEstimator, optional
-        Weighted least squares by default.
+        Generalized least squares by default.
     simulate : callable, optional
         Simulates the robot with given parameters, for estimators that need it.
     throw : bool
@@ -58,7 +58,7 @@ def identify(
     """
     _require(model, AbstractModel, 'a model, such as MODELS.create("power")')
     problem = _problem(log, basis, model, chain, simulate)
-    return estimate(problem, estimator or WeightedLeastSquares(), throw=throw)
+    return estimate(problem, estimator or GeneralizedLeastSquares(), throw=throw)
 
 
 def identify_each(
@@ -91,7 +91,7 @@ def attempt_each(
     models : mapping of str to AbstractModel
         The models, by name.
     estimator : AbstractEstimator, optional
-        Weighted least squares by default.
+        Generalized least squares by default.
     throw : bool
         Raise if a run cannot be solved; otherwise the estimates' `status` says it.
 
@@ -101,7 +101,7 @@ def attempt_each(
         If the log or a setting allows no model an estimate.
     """
     _require(problem, Problem, "a Problem, such as Problem((log,), basis, model, chain)")
-    estimator = estimator or WeightedLeastSquares()
+    estimator = estimator or GeneralizedLeastSquares()
     _require(estimator, AbstractEstimator, 'an estimator, such as ESTIMATORS.create("OLS")')
     for model in models.values():
         _require(model, AbstractModel, 'a model, such as MODELS.create("power")')

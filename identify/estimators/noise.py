@@ -59,7 +59,7 @@ def noise_of(parts: Sequence[Rows], factors: Factors, fit: Fit, linear: Callable
     levels = NoiseLevels(torque, np.where(shown.any(axis=-1, keepdims=True), position * np.sqrt(most), 0.0))
     found = NoisyRows(levels, linear)
     if np.array_equal(levels.position, position):
-        found.known.update((each, w.scaled(torque) + m) for each, w, m in zip(maps, white, made, strict=True))
+        found.known.update((each, w.scaled(levels.in_rows) + m) for each, w, m in zip(maps, white, made, strict=True))
     return found
 
 

@@ -30,8 +30,8 @@ class Recursive:
 def recursive_least_squares(estimate: Estimate, t: Array, halo: float = 0.0) -> Recursive:
     """Return the estimate from the rows that were final at each instant, by one triangular factor that takes in row by row.
 
-    The rows are weighted as for the estimate itself, so that the last of it is that estimate. Sigma is that of section 7.3 for
-    the rows so far, corrected in the ratio in which that of all rows is corrected.
+    The rows are made independent as for the estimate itself, each by those before it, so that the last of it is that estimate.
+    Sigma is that of section 7.3 for the rows so far, in the ratio to that of all rows in which the estimate's sigma is.
 
     Parameters
     ----------
@@ -48,23 +48,21 @@ def recursive_least_squares(estimate: Estimate, t: Array, halo: float = 0.0) -> 
         If the estimate is not that of a single run of one log, no least-squares solution, or its log too long for its rows to
         be kept; if the instants decrease.
     """
-    if estimate.weights is None or estimate.X.ndim > 1 or len(estimate.problem.logs) > 1:
+    if estimate.whiten is None or estimate.X.ndim > 1 or len(estimate.problem.logs) > 1:
         raise IdentificationError("recursive least squares needs the rows of a least-squares estimate of one run of one log")
     if len(t) and np.diff(t, prepend=t[0]).min() < 0:
         raise IdentificationError("the instants of recursive least squares must not decrease: sort them")
-    given, weights = estimate.rows, estimate.weights(estimate.rows)
-    order = np.argsort(given.time, kind="stable")
-    rows = (np.concatenate([given.W, given.Y[:, None]], axis=1) * weights[:, None])[order]
-    valid = np.cumsum(given.valid[order])
-    until = np.searchsorted(given.time[order] + halo, t, side="right")
+    given, rows = estimate.rows, estimate.whiten(estimate.rows)
+    valid = np.cumsum(np.append(0, given.valid))
+    until = np.append(np.searchsorted(given.time + halo, t, side="right"), len(given.time))
     p, before = len(estimate.names), 0
-    R = np.zeros((len(t) + 1, p + 1, p + 1))
+    R = np.zeros((len(until) + 1, p + 1, p + 1))
     for k, now in enumerate(until):
         R[k + 1] = np.linalg.qr(np.concatenate([R[k], rows[before:now]]), mode="r")
         before = int(now)
-    factor = Factor(R[1:], np.concatenate([[0], valid])[until], estimate.names)
+    factor = Factor(R[1:], valid[until], estimate.names)
     solvable = factor.status == Status.OK
     X = factor.solution(solvable)
     variance = factor.squares(X) / np.maximum(factor.rows - p, 1)
     sigma = np.sqrt(variance[:, None] * np.diagonal(factor.inverse(solvable), axis1=-2, axis2=-1))
-    return Recursive(t, X, sigma * estimate.best_sigma / estimate.sigma)
+    return Recursive(t, X[:-1], sigma[:-1] * estimate.best_sigma / sigma[-1])

@@ -54,6 +54,12 @@ class BandedCovariance:
         bands = np.moveaxis(np.stack(found, axis=-4), (-4, -3), (-2, -1))
         return cls(bands * _pairs(outside, lags))
 
+    @classmethod
+    def of_variance(cls, variance: Array, kinds: int) -> Self:
+        """Return the covariance of independent rows of that variance, shape (..., r)."""
+        by_kind = variance.reshape(*variance.shape[:-1], 1, -1, kinds)
+        return cls(by_kind[..., None] * np.eye(kinds))
+
     def __add__(self, other: Self) -> Self:
         few, many = sorted((self.bands, other.bands), key=lambda bands: bands.shape[-4])
         total = many.copy()

@@ -33,13 +33,19 @@ class NoiseLevels:
     Parameters
     ----------
     torque : Array, shape (..., joint)
-        Of the torques [N m].
+        Of the torques [N m]; NaN of all joints in runs that cannot be solved, and of joints whose rows are all masked.
     position : Array, shape (..., joint)
         Of the positions [rad].
     """
 
     torque: Array
     position: Array
+
+    @property
+    def in_rows(self) -> Array:
+        """The noise of the torques as far as rows have it, shape (..., joint): none of joints whose rows are all masked."""
+        masked = np.isnan(self.torque) & np.isfinite(self.torque).any(axis=-1, keepdims=True)
+        return np.where(masked, 0.0, self.torque)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +71,7 @@ class NoisyRows:
         for other, found in self.known.items():
             if rows.noisy_as(other):
                 return found
-        found = torque_paths(rows).covariance(self.levels.torque)
+        found = torque_paths(rows).covariance(self.levels.in_rows)
         if self.levels.position.any():
             found = found + position_paths(rows, self.linear(rows.signals)).covariance(self.levels.position)
         self.known[rows] = found

@@ -33,12 +33,10 @@ class Whitening:
     kept: npt.NDArray[np.bool_]
 
     @classmethod
-    def of(cls, rows: RowMap, noise: NoisyRows, shares: Array | None = None) -> Self:
-        """Return that of rows with known noise, or with `shares`, shape (..., 2), of what noise makes, and of as much white."""
-        C, white, kept = parts_of(rows, noise)
-        if shares is not None:
-            C = C.times(shares[..., 0]) + white.times(shares[..., 1])
-        return cls(C, kept)
+    def of(cls, rows: RowMap, noise: NoisyRows) -> Self:
+        """Return that of rows with known noise."""
+        kept = kept_rows(rows)
+        return cls(noise.covariance(rows).kept(kept), kept)
 
     @cached_property
     def blocks(self) -> Blocks:
@@ -53,22 +51,12 @@ class Whitening:
     def whiten(self, x: Array) -> Array:
         """Return L^-1 x of rows x, shape (..., r, m), L L' being their covariance."""
         z = self.root.whiten(self.blocks.cut(x * self.kept[..., None]))
-        return z.reshape(*z.shape[:-3], -1, z.shape[-1])
+        return z.reshape(*z.shape[:-3], -1, z.shape[-1])[..., : x.shape[-2], :]
 
     def solve(self, x: Array) -> Array:
         """Return C^-1 x, zero for rows that are left out, shape (..., r, m)."""
         z = self.root.unwhiten(self.root.whiten(self.blocks.cut(x * self.kept[..., None])))
         return z.reshape(*z.shape[:-3], -1, z.shape[-1])[..., : x.shape[-2], :] * self.kept[..., None]
-
-
-def parts_of(rows: RowMap, noise: NoisyRows) -> tuple[BandedCovariance, BandedCovariance, npt.NDArray[np.bool_]]:
-    """Return what noise makes of rows, white noise of the same mean variance, and which rows are kept."""
-    kept = kept_rows(rows)
-    C = noise.covariance(rows).kept(kept)
-    mean = np.sum(C.variance, axis=-1) / np.maximum(np.sum(kept, axis=-1), 1)
-    count, kinds = C.bands.shape[-3:-1]
-    one = np.broadcast_to(np.eye(kinds), (*mean.shape, 1, count, kinds, kinds))
-    return C, BandedCovariance(np.array(one)).times(mean).kept(kept), kept
 
 
 def kept_rows(rows: RowMap) -> npt.NDArray[np.bool_]:

@@ -35,7 +35,7 @@ def test_every_scenario_that_ships_runs(name, tmp_path, capsys):
     assert all(word in printed for word in ("ZZR1", "Cond(W)", "tau2 explained", "torque: held"))
     assert sorted(x.name for x in out.iterdir()) == [
         "log.parquet",
-        "recording.idbench-WLS.rrd",
+        "recording.idbench-GLS.rrd",
         "recording.rrd",
         "scenario.toml",
         "summary.json",
@@ -77,7 +77,7 @@ def test_a_csv_is_identified_with_what_its_torque_means(csv, capsys, truth, tmp_
     assert min(summary["models"]["power"]["explained_share"]) > 0.999
     assert sorted(x.name for x in out.iterdir()) == [
         "log.parquet",
-        "recording.idbench-WLS.rrd",
+        "recording.idbench-GLS.rrd",
         "recording.rrd",
         "summary.json",
     ]

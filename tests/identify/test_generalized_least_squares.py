@@ -12,6 +12,7 @@ from identify import (
     IdentificationError,
     MotionLog,
     Problem,
+    WeightedLeastSquares,
     idbench_chain,
     identify,
     identify_each,
@@ -107,7 +108,9 @@ def test_errors_against_weighted_least_squares(position, torque, most, log, trut
     """Typical error over 100 draws, and sigma within a quarter, for the models whose rows are torques."""
     draws = noisy(log, position, torque)
     models = {name: EVERY[name] for name in ("explicit", "implicit")}
-    weighted, general = (identify_each(draws, scara(), models, **how) for how in ({}, {"estimator": GLS}))
+    weighted, general = (
+        identify_each(draws, scara(), models, **how) for how in ({"estimator": WeightedLeastSquares()}, {"estimator": GLS})
+    )
     for name, found in general.items():
         error, other = (np.sqrt(np.mean((each.X - truth) ** 2, axis=0)) for each in (found, weighted[name]))
         assert np.exp(np.mean(np.log(error / other))) < most

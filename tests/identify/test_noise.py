@@ -17,6 +17,7 @@ from identify import (
     NoPrefilter,
     Problem,
     TorqueChannel,
+    WeightedLeastSquares,
     idbench_chain,
     identify,
     identify_each,
@@ -175,7 +176,9 @@ def test_the_power_models_weights_know_that_joints_differ(sigma, share, log):
 def test_weighting_does_not_undo_the_mask(log, rng):
     """Rows of modulating functions that the mask takes a part of stay as small as it makes them."""
     chain = replace(idbench_chain(), operator=OPERATORS.create("modulating"))
-    found = identify(noisy(log, (0.5, 0.025), 1).part(0, log.samples), scara(), EVERY["explicit"], chain)
+    found = identify(
+        noisy(log, (0.5, 0.025), 1).part(0, log.samples), scara(), EVERY["explicit"], chain, WeightedLeastSquares()
+    )
     weights = found.weights(found.rows)
     for kind in (0, 1):
         assert np.ptp(weights[..., found.rows.group == kind]) == 0

@@ -12,21 +12,24 @@ def noisy(log):
     return MotionLog(log.fs, log.q, log.tau + 0.1 * rng.standard_normal(log.tau.shape), log.torque)
 
 
-@pytest.mark.parametrize("estimator", ["OLS", "WLS"])
+@pytest.mark.parametrize("estimator", ["OLS", "WLS", "GLS"])
 @pytest.mark.parametrize("model", ["explicit", "power"])
 def test_it_is_least_squares_of_the_rows_so_far(noisy, model, estimator):
     """By another route: SciPy-free normal least squares, anew for every instant."""
     estimate = identify(noisy, scara(), MODELS.create(model), estimator=ESTIMATORS.create(estimator))
-    t, halo, given, weights = np.arange(8.0, 47.0, 3.0), 0.7, estimate.rows, estimate.weights(estimate.rows)
-    W, Y = given.W * weights[:, None], given.Y * weights
+    t, halo, given, whitened = np.arange(8.0, 47.0, 3.0), 0.7, estimate.rows, estimate.whiten(estimate.rows)
+    W, Y = whitened[:, :-1], whitened[:, -1]
     running = recursive_least_squares(estimate, t, halo)
-    ratio = estimate.corrected_sigma / estimate.sigma
+    _, whole = least_squares(W, Y, given.valid)
     for k, now in enumerate(t):
-        rows = (given.time + halo <= now) & given.valid
-        X, squares, *_ = np.linalg.lstsq(W[rows], Y[rows], rcond=None)
+        X, sigma = least_squares(W, Y, (given.time + halo <= now) & given.valid)
         np.testing.assert_allclose(running.X[k], X, rtol=1e-9)
-        variance = squares[0] / (rows.sum() - 8) * np.diag(np.linalg.inv(W[rows].T @ W[rows]))
-        np.testing.assert_allclose(running.sigma[k], np.sqrt(variance) * ratio, rtol=1e-8)
+        np.testing.assert_allclose(running.sigma[k], sigma / whole * estimate.corrected_sigma, rtol=1e-8)
+
+
+def least_squares(W, Y, rows):
+    X, squares, *_ = np.linalg.lstsq(W[rows], Y[rows], rcond=None)
+    return X, np.sqrt(squares[0] / (rows.sum() - 8) * np.diag(np.linalg.inv(W[rows].T @ W[rows])))
 
 
 def test_it_ends_at_the_estimate(noisy):

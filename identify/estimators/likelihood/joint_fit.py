@@ -10,7 +10,7 @@ from identify.basis.basis import Basis
 from identify.errors import IdentificationError
 from identify.estimators.likelihood.cells import HELD, Cells
 from identify.estimators.likelihood.normal_equations import Noise, NormalEquations
-from identify.rows.linearization import friction_jumps, smoothed
+from identify.rows.linearization import friction_jumps, slopes, smoothed
 from identify.rows.noise_propagation import NoiseLevels
 from identify.signals.masks.reversal import ReversalMask
 
@@ -25,6 +25,9 @@ PROBES = 4
 
 UNKNOWN = 5.0
 """Noise of the torque where friction's sign is not known, over the jump of friction there."""
+
+INERTIAS = 100
+"""Instants at which the inertia is computed of which the median is taken."""
 
 MASK = ReversalMask(threshold=0.1, width=0.02, taper=0.02)
 """Where the sign of a velocity is no model of friction."""
@@ -126,7 +129,21 @@ class JointFit:
         lost = (1 - weight) * UNKNOWN * friction_jumps(self.basis, self.X, q[:, 0])[:, None]
         mean = self.levels.torque[:, None] * np.ones_like(weight)
         half = np.hypot(HELD * self.levels.torque[:, None], cells.rough)
-        return Noise(mean + lost, half + lost, self.levels.position, weight == 1)
+        return Noise(mean + lost, half + lost, self.levels.position, weight == 1, *self._velocities(cells, q, lost))
+
+    def _velocities(self, cells: Cells, q: Array, lost: Array) -> tuple[Array, Array]:
+        """Return how far velocities of nodes may be from differences of the positions, and these, shape (node, joint) each.
+
+        Where the sign of friction is not known, torques leave the velocities to the positions, a sample a cell, between which
+        they would swing. Differences are off by noise, and by what the torque that is not known does to a joint in a period.
+        """
+        some = q[:, :: max(1, q.shape[1] // INERTIAS)]
+        still = np.zeros_like(some)
+        inertia = np.diagonal(slopes(self.basis, self.X, some, still, still, still).inertia, axis1=0, axis2=1)
+        strength = lost / np.maximum(np.median(inertia, axis=0), 1e-12)[:, None]
+        off = np.hypot(UNKNOWN * self.levels.position[:, None] * cells.log.fs, strength * cells.period)
+        of_nodes = np.maximum(np.pad(off * (lost > 0), ((0, 0), (0, 1))), np.pad(off * (lost > 0), ((0, 0), (1, 0))))
+        return np.where(of_nodes > 0, of_nodes, np.inf).T, _at_nodes(cells, _differences(cells))
 
     def _levels(self, noises: list[Noise], floor: Array) -> NoiseLevels:
         """Return the levels with those of the torques from what is left over, and the share of it that the unknowns take."""
@@ -141,7 +158,7 @@ class JointFit:
         taken = sum(np.sum(y[:, 1:] ** 2, axis=0) for _, y, _ in parts) + np.sum(b[:, 1:] * (covariance @ b[:, 1:]), axis=0)
         known = sum(np.count_nonzero(noise.known, axis=-1) for noise in noises)
         free = np.maximum(known - np.asarray(taken).reshape(n, -1).mean(axis=1), 1e-3 * known)
-        squares = sum(system.squares for system in systems) / free
+        squares = np.divide(sum(system.squares for system in systems), free, out=np.ones(n), where=known > 0)
         return replace(self.levels, torque=np.maximum(self.levels.torque * np.sqrt(squares), floor))
 
 
@@ -160,11 +177,25 @@ def _sigmas(dX: Array, covariance: Array) -> float:
 
 def _begin(cells: Cells) -> Array:
     """Return positions and velocities at the nodes of a log, by parabolas through its positions."""
-    fs, q = cells.log.fs, cells.log.q.T
-    slow = smoothed(np.gradient(q, 1 / fs, axis=-1), fs)
-    t = np.arange(cells.log.samples) / fs
-    nodes = np.arange(cells.count + 1) / fs + cells.delay
-    inside = np.clip(nodes, t[0], t[-1])
-    beyond = nodes - inside
-    qd = np.stack([np.interp(inside, t, x) for x in slow], axis=-1)
-    return np.stack([np.stack([np.interp(inside, t, x) for x in q], axis=-1) + qd * beyond[:, None], qd], axis=1)
+    q, rate = cells.log.q.T, _differences(cells)
+    qd = _at_nodes(cells, smoothed(rate, cells.log.fs))
+    _, beyond = _nodes(cells)
+    return np.stack([_at_nodes(cells, q) + qd * beyond[:, None], qd], axis=1)
+
+
+def _differences(cells: Cells) -> Array:
+    """Return central differences of the positions, shape (joint, sample)."""
+    return np.gradient(cells.log.q.T, cells.period, axis=-1)
+
+
+def _nodes(cells: Cells) -> tuple[Array, Array]:
+    """Return where nodes lie among the samples [s], and by how much beyond their ends."""
+    nodes = np.arange(cells.count + 1) * cells.period + cells.delay
+    inside = np.clip(nodes, 0, (cells.log.samples - 1) * cells.period)
+    return inside, nodes - inside
+
+
+def _at_nodes(cells: Cells, x: Array) -> Array:
+    """Return values x of the samples, shape (joint, sample), at the nodes, shape (node, joint), by straight lines."""
+    inside, _ = _nodes(cells)
+    return np.stack([np.interp(inside, np.arange(cells.log.samples) * cells.period, one) for one in x], axis=-1)

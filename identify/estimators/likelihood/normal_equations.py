@@ -32,12 +32,17 @@ class Noise:
         Of the positions [rad].
     known : bool array, shape (joint, cell)
         Where the sign of friction is known.
+    velocity, wanted : Array, shape (node, joint)
+        Of the velocities that differences of the positions give, infinite where torques say more, and these velocities
+        [rad/s].
     """
 
     mean: Array
     half: Array
     position: Array
     known: npt.NDArray[np.bool_]
+    velocity: Array
+    wanted: Array
 
 
 @dataclass(eq=False)
@@ -81,6 +86,7 @@ class NormalEquations:
         zeros = np.zeros((4 * n, size)), np.zeros((size, p)), np.zeros((p, p)), np.zeros((size, right)), np.zeros((p, right))
         found = cls(*zeros, np.zeros(n))
         found._add_positions(cells, z, noise.position)
+        found._add_velocities(z, noise)
         for part in _chunks(cells.count):
             found._add_torques(cells, basis, X, z, noise, part, signs)
         return found
@@ -98,7 +104,7 @@ class NormalEquations:
         z, none = scipy.linalg.lapack.dtbtrs(L, both, uplo="L", overwrite_b=True)
         if singular or none:
             raise IdentificationError(
-                "the motion is not determined by this log: positions and torques that change are needed; take WLS"
+                "the motion is not determined by this log: every joint must move, with torques that change; take GLS"
             )
         return z[:, :p], z[:, p:], L
 
@@ -117,6 +123,14 @@ class NormalEquations:
             np.add.at(self.border[:, -1], where[k], -w[k][:, None] * speed / sigma**2)
             for m in range(k + 1):
                 np.add.at(self.band, (np.full_like(where[m], n * (k - m)), where[m]), (w[k] * w[m])[:, None] / sigma**2)
+
+    def _add_velocities(self, z: Array, noise: Noise) -> None:
+        weight, left = noise.velocity**-2, noise.wanted - z[:, 1]
+        self.cost += float(np.sum(weight * left**2))
+        n = z.shape[-1]
+        rows = (2 * n * np.arange(len(z))[:, None] + n + np.arange(n)).ravel()
+        self.band[0, rows] += weight.ravel()
+        self.b_nodes[rows, 0] += (weight * left).ravel()
 
     def _add_torques(
         self, cells: Cells, basis: Basis, X: Array, z: Array, noise: Noise, part: slice, signs: Array | None

@@ -26,16 +26,16 @@ def copied(recorded, tmp_path):
 
 def test_identify_adds_a_layer_to_a_run_and_replaces_one_of_the_same_name(copied, reading, capsys, recorded):
     before = (copied / "recording.rrd").read_bytes()
-    for estimator in ("OLS", "WLS"):
+    for estimator in ("OLS", "GLS"):
         assert main(["identify", str(copied), "--estimator", estimator, "--label", "second"]) == 0
     assert "added to the recording" in capsys.readouterr().out
     assert (copied / "recording.rrd").read_bytes() == before
     assert len(files(copied)) == 4
     name, there = known(files(copied))
     assert name == recorded.streams[0][1].name
-    assert {"identify/second/power/residual/power", "identify/idbench-WLS/power/residual/power"} <= there
+    assert {"identify/second/power/residual/power", "identify/idbench-GLS/power/residual/power"} <= there
     _, mine = reading.column(copied / "recording.second.rrd", "identify/second/power/residual/power")
-    theirs = recorded.column("identify/idbench-WLS/power/residual/power", file="recording.idbench-WLS.rrd")[1]
+    theirs = recorded.column("identify/idbench-GLS/power/residual/power", file="recording.idbench-GLS.rrd")[1]
     np.testing.assert_array_equal(mine, theirs)
 
 
@@ -49,7 +49,7 @@ def test_a_layer_knows_the_truth_of_its_run(copied, reading):
 def test_every_layer_lays_out_the_others_too(copied):
     assert main(["identify", str(copied), "--label", "second"]) == 0
     shown = {path.name: str(RrdReader(path).store(store=RrdReader(path).blueprints()[0]).summary()) for path in layers(copied)}
-    assert set(shown) == {"recording.idbench-WLS.rrd", "recording.second.rrd"}
+    assert set(shown) == {"recording.idbench-GLS.rrd", "recording.second.rrd"}
     sizes = {name: len(text.splitlines()) for name, text in shown.items()}
     assert len(set(sizes.values())) == 1  # the same views in both
 

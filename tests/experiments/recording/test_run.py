@@ -110,7 +110,7 @@ def test_measured_predicted_and_residual_are_those_of_the_estimate(recorded):
 
 
 def layer(recorded, path, component="Scalars:scalars"):
-    return recorded.column(f"identify/idbench-WLS/{path}", component, "recording.idbench-WLS.rrd")
+    return recorded.column(f"identify/idbench-GLS/{path}", component, "recording.idbench-GLS.rrd")
 
 
 def test_running_estimates_end_at_the_estimate_with_its_sigma(recorded):
@@ -136,8 +136,8 @@ def test_velocities_are_shown_as_measured_and_as_the_rows_see_them(recorded):
 
 def test_the_parameter_table_and_the_bars_tell_the_errors(recorded):
     found = recorded.ran.identified
-    store = RrdReader(recorded.folder / "recording.idbench-WLS.rrd").store()
-    (text,) = [c for c in store.stream().filter(content="identify/idbench-WLS/report").to_chunks() if c.is_static]
+    store = RrdReader(recorded.folder / "recording.idbench-GLS.rrd").store()
+    (text,) = [c for c in store.stream().filter(content="identify/idbench-GLS/report").to_chunks() if c.is_static]
     table = text.to_record_batch().column("TextDocument:text").to_pylist()[0][0]
     for name, truth in found.truth.items():
         assert f"{name} | {truth:g} |" in table
@@ -145,7 +145,7 @@ def test_the_parameter_table_and_the_bars_tell_the_errors(recorded):
 
 def test_a_recording_is_a_base_and_layers_of_one_id_each_with_one_layout(recorded, reading):
     ids = set()
-    for name, layouts in (("recording.rrd", 1), ("recording.inner.rrd", 0), ("recording.idbench-WLS.rrd", 1)):
+    for name, layouts in (("recording.rrd", 1), ("recording.inner.rrd", 0), ("recording.idbench-GLS.rrd", 1)):
         reader = RrdReader(recorded.folder / name)
         ids |= {(e.application_id, e.recording_id) for e in reader.recordings()}
         assert len(reader.blueprints()) == layouts

@@ -213,12 +213,12 @@ rest = 0.6
         ('field = "origin"\nvalues = ["[/b]", "one"]', 0),
         ('field = "timing.jitter"\nvalues = [0.02, 0.03]', 4),
         ('field = "fs"\nvalues = [9.0, 100.0]', 2),
-        ('field = "chain.mask.threshold"\nvalues = [0.1, 50.0]', 0),
+        ('field = "chain.mask.threshold"\nvalues = [0.1, 50.0]', 2),
         ('field = "friction.coulomb"\nvalues = [0.0, 1.0]', 0),
     ],
 )
 def test_odd_studies_end_in_a_report(tmp_path, axis, failed, capfd):
-    """Values of several kinds, words that look like markup, runs that all fail, no sigma, a truth of 0."""
+    """Values of several kinds, words that look like markup, runs that all fail, noise that nothing shows, a truth of 0."""
     (tmp_path / "odd.toml").write_text(f"{ODD}\n[[axes]]\n{axis}\n")
     code = main(["study", str(tmp_path / "odd.toml"), "--out", str(tmp_path / "out")])
     printed = capfd.readouterr()
