@@ -38,13 +38,21 @@ def print_identified(console: Console, found: Identified, title: str) -> None:
     for model, why in found.failures.items():
         console.print(Text(f"{model}: no estimate: {why}"), soft_wrap=True)
     console.print(Text(f"torque: {read}" + (f", which chain {found.chain} ignores: it takes it as logged" if logged else "")))
+    if found.delay is not None:
+        delay, sigma = (1e3 * x for x in found.delay)
+        words = (
+            f"delay found with the parameters: {delay:.4g} ms, sigma {sigma:.2g} ms; what follows is at the delay of the log"
+        )
+        console.print(Text(words), soft_wrap=True)
     console.print(Text(_noise(found)), soft_wrap=True)
     console.print()
 
 
 def _noise(found: Identified) -> str:
     """Return the noise of a log in words, joint by joint."""
-    torque, position = (" ".join(f"{x or 0:.2g}" for x in found.noise[name]) for name in ("torque", "position"))
+    torque, position = (
+        " ".join("?" if x is None else f"{x:.2g}" for x in found.noise[name]) for name in ("torque", "position")
+    )
     words = f"noise found in the log: torque {torque} N m, position {position} rad"
     steps = found.noise["encoder_step"]
     if not any(steps):

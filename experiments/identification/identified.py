@@ -145,13 +145,21 @@ class Identified:
         parts = {"torque": levels.torque, "position": levels.position, "encoder_step": steps}
         return {name: [float(x) if isfinite(x) else None for x in part] for name, part in parts.items()}
 
+    @property
+    def delay(self) -> tuple[float, float] | None:
+        """Delay of the torques, and its sigma [s], that an estimate found beside the parameters, if one did."""
+        fits = [fit for estimate in self.estimates.values() for fit in estimate.fits.values() if fit.delay is not None]
+        if not fits:
+            return None
+        return self.logs[0].torque.delay + (fits[0].delay or 0.0), float(fits[0].covariance[-1, -1]) ** 0.5
+
     def summary(self) -> dict[str, Any]:
         """Return what a summary.json says of it."""
         truth = None if self.truth is None else list(self.truth.values())
         models = {name: summarize(e, truth) for name, e in self.estimates.items()}
         for name, share in self.explained.items():
             models[name]["explained_share"] = share.tolist()
-        channel = self.logs[0].torque
+        channel, delay = self.logs[0].torque, self.delay
         base = self.subject.base
         return {
             "parameters": list(self.basis.names),
@@ -162,6 +170,7 @@ class Identified:
             "chain": self.chain,
             "estimator": self.estimator,
             "torque": {"meaning": channel.meaning, "delay": channel.delay, "gain": channel.gain},
+            "found_delay": None if delay is None else {"delay": delay[0], "sigma": delay[1]},
             "noise": self.noise,
             "models": models,
             "failures": self.failures,

@@ -147,7 +147,7 @@ def noise(shelf: Shelf) -> Part:
     ]  # fmt: skip
     columns = 1 if len(rows) < TWO else 2
     parts = text(shelf, "identify/*/noise"), grid("spectra", spectra, columns), grid("smoothed motion", smoothed, columns)
-    return side_by_side("noise", *parts, shares=[1, 3, 3]) if rows else None
+    return side_by_side("noise", *parts, shares=[3, 6, 6]) if rows else None
 
 
 def excitation(shelf: Shelf) -> Part:

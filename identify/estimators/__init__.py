@@ -8,6 +8,7 @@ from identify.estimators.generalized_least_squares import (
 from identify.estimators.maximum_likelihood import (
     MaximumLikelihood as MaximumLikelihood,
 )
+from identify.estimators.maximum_likelihood import with_delay
 from identify.estimators.ordinary_least_squares import (
     OrdinaryLeastSquares as OrdinaryLeastSquares,
 )
@@ -25,5 +26,6 @@ ESTIMATORS: PluginTable[AbstractEstimator] = PluginTable(
         "WLS": WeightedLeastSquares,
         "GLS": GeneralizedLeastSquares,
         "ML": MaximumLikelihood,
+        "ML-delay": with_delay,
     },
 )

@@ -86,6 +86,11 @@ class MaximumLikelihood(AbstractEstimator):
         return Estimate(problem, frozen(X), honest, honest=honest, levels=NoiseLevels(torque, position), fits=fits)
 
 
+def with_delay() -> MaximumLikelihood:
+    """Maximum likelihood (ML) of motion, parameters and the delay of the torques together."""
+    return MaximumLikelihood(find_delay=True)
+
+
 def _require_near(found: JointFit, X: Array, sigma: Array, names: tuple[str, ...]) -> None:
     """Raise IdentificationError if a fit went so far from where it began that another minimum caught it."""
     far, small = np.abs(found.X - X) / sigma, np.sqrt(np.diag(found.covariance)[: len(X)]) / sigma

@@ -19,6 +19,7 @@ from identify import (
     scara,
 )
 from identify.estimators.restricted_likelihood import likely_noise
+from identify.estimators.unbiased import unbiased
 from identify.rows import long_logs
 from identify.rows.block_tridiagonal import Blocks, Cholesky
 from identify.rows.noise_propagation import NoiseLevels, NoisyRows
@@ -116,6 +117,27 @@ def test_errors_against_weighted_least_squares(position, torque, most, log, trut
         assert np.exp(np.mean(np.log(error / other))) < most
         assert np.sqrt(np.mean(((found.X - truth) / found.corrected_sigma) ** 2)) == pytest.approx(1, abs=0.25)
         np.testing.assert_array_equal(found.sigma, found.corrected_sigma)
+
+
+def test_no_noise_is_put_in_where_a_joint_stands(log):
+    """Of |qd|, which power has, noise would make friction where none is."""
+    problem = Problem((log,), scara(), EVERY["power"], idbench_chain())
+    rows = problem.rows
+    moves = np.abs(np.gradient(log.q, axis=-2)).max(axis=(-3, -1) if log.q.ndim > 2 else -1) > 0
+    near = np.array([moves[(log.t > t - 1) & (log.t < t + 1)].any() for t in rows.time])
+    better = unbiased(rows, np.full(2, 1e-4), problem_rows(problem))
+    assert np.count_nonzero(~near) > 5
+    np.testing.assert_allclose(better.W[..., ~near, :], rows.W[..., ~near, :], atol=1e-12)
+    assert np.abs(better.W - rows.W).max() > 1e-6
+
+
+def problem_rows(problem):
+    """Return what makes the rows of another log with given weights."""
+
+    def made(log, signals):
+        return problem.chain.rows(problem.chain.signals(log, signals), problem.basis, problem.model)
+
+    return made
 
 
 @pytest.mark.parametrize("operator", OPERATORS.builtin)
