@@ -10,7 +10,18 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import TypeAlias
 
-from identify import Array, AsLogged, Chain, MotionLog, NoMask, TorqueChannel, idbench_chain, identify_each, scara
+from identify import (
+    Array,
+    AsLogged,
+    Chain,
+    MotionLog,
+    NoMask,
+    TorqueChannel,
+    WeightedLeastSquares,
+    idbench_chain,
+    identify_each,
+    scara,
+)
 from identify.models import ExplicitModel, PowerModel
 from sim.drives import AveragedDrive, SwitchedDrive
 from sim.encoders import IncrementalEncoder
@@ -80,7 +91,7 @@ def errors_of(imperfection: Imperfection) -> Errors:
     """Return the signed error [%] of every parameter in each model."""
     log, truth = _ideal_but_for(json.dumps(to_dict(imperfection.scenario)))
     believed = MotionLog(log.fs, log.q, log.tau, imperfection.believed or log.torque)
-    estimates = identify_each(believed, scara(), COMPARED, imperfection.chain)
+    estimates = identify_each(believed, scara(), COMPARED, imperfection.chain, WeightedLeastSquares())
     return {form: estimate.error_percent(truth) for form, estimate in estimates.items()}
 
 
