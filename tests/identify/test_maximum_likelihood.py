@@ -117,6 +117,20 @@ def test_errors_against_weighted_least_squares(position, torque, most, exact, tr
     assert np.sqrt(np.mean(z**2)) == pytest.approx(1, abs=0.25)
 
 
+@pytest.mark.parametrize("coulomb", [(20.0, 10.0), (60.0, 15.0)])
+def test_friction_a_hundred_times_larger_than_what_moves_a_joint(coulomb, truth):
+    """As of geared arms: where its sign is not known, velocities would swing between the counts, and no fit converge."""
+    made = scenario(friction=replace(load("ideal").friction, coulomb=coulomb))
+    log = simulate(made).alone()
+    rng = np.random.default_rng(0)
+    tau = log.tau + np.array([3.0, 0.5]) * rng.standard_normal(log.tau.shape)
+    log = MotionLog(log.fs, log.q + BITS16 * rng.standard_normal(log.q.shape), tau, log.torque)
+    found, true = identify(log, scara(), EXPLICIT, estimator=ML), truth.copy()
+    true[[2, 7]] = coulomb
+    assert (np.abs(found.X - true) < 4 * found.sigma).all()
+    np.testing.assert_allclose(found.noise_levels.torque, [3.0, 0.5], rtol=0.1)
+
+
 @pytest.mark.parametrize("delay", [0.003, 0.012])
 def test_a_stated_delay_is_taken_into_account(delay, truth):
     made = scenario(timing=replace(load("ideal").timing, delay=delay))

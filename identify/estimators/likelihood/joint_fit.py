@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import numpy.typing as npt
 import scipy
 
 from identify.arrays import Array
@@ -10,7 +11,7 @@ from identify.basis.basis import Basis
 from identify.errors import IdentificationError
 from identify.estimators.likelihood.cells import HELD, Cells
 from identify.estimators.likelihood.normal_equations import Noise, NormalEquations
-from identify.rows.linearization import friction_jumps, slopes, smoothed
+from identify.rows.linearization import friction_jumps, smoothed
 from identify.rows.noise_propagation import NoiseLevels
 from identify.signals.masks.reversal import ReversalMask
 
@@ -24,10 +25,7 @@ PROBES = 4
 """Random signs by which the leverage of the torques is estimated."""
 
 UNKNOWN = 5.0
-"""Noise of the torque where friction's sign is not known, over the jump of friction there."""
-
-INERTIAS = 100
-"""Instants at which the inertia is computed of which the median is taken."""
+"""Where friction's sign is not known: noise of the torque over friction's jump, and that of velocities over what moves them."""
 
 MASK = ReversalMask(threshold=0.1, width=0.02, taper=0.02)
 """Where the sign of a velocity is no model of friction."""
@@ -129,21 +127,19 @@ class JointFit:
         lost = (1 - weight) * UNKNOWN * friction_jumps(self.basis, self.X, q[:, 0])[:, None]
         mean = self.levels.torque[:, None] * np.ones_like(weight)
         half = np.hypot(HELD * self.levels.torque[:, None], cells.rough)
-        return Noise(mean + lost, half + lost, self.levels.position, weight == 1, *self._velocities(cells, q, lost))
+        return Noise(mean + lost, half + lost, self.levels.position, weight == 1, *self._velocities(cells, weight == 1))
 
-    def _velocities(self, cells: Cells, q: Array, lost: Array) -> tuple[Array, Array]:
+    def _velocities(self, cells: Cells, known: npt.NDArray[np.bool_]) -> tuple[Array, Array]:
         """Return how far velocities of nodes may be from differences of the positions, and these, shape (node, joint) each.
 
         Where the sign of friction is not known, torques leave the velocities to the positions, a sample a cell, between which
-        they would swing. Differences are off by noise, and by what the torque that is not known does to a joint in a period.
+        they would swing. Differences are off by noise, and by what a joint that starts or stops accelerates in a period.
         """
-        some = q[:, :: max(1, q.shape[1] // INERTIAS)]
-        still = np.zeros_like(some)
-        inertia = np.diagonal(slopes(self.basis, self.X, some, still, still, still).inertia, axis1=0, axis2=1)
-        strength = lost / np.maximum(np.median(inertia, axis=0), 1e-12)[:, None]
-        off = np.hypot(UNKNOWN * self.levels.position[:, None] * cells.log.fs, strength * cells.period)
-        of_nodes = np.maximum(np.pad(off * (lost > 0), ((0, 0), (0, 1))), np.pad(off * (lost > 0), ((0, 0), (1, 0))))
-        return np.where(of_nodes > 0, of_nodes, np.inf).T, _at_nodes(cells, _differences(cells))
+        rate = _differences(cells)
+        acceleration = np.sqrt(np.mean(np.gradient(smoothed(rate, cells.log.fs), cells.period, axis=-1) ** 2, axis=-1))
+        off = UNKNOWN * np.hypot(self.levels.position * cells.log.fs, acceleration * cells.period)
+        beside = np.pad(~known, ((0, 0), (0, 1))) | np.pad(~known, ((0, 0), (1, 0)))
+        return np.where(beside, off[:, None], np.inf).T, _at_nodes(cells, rate)
 
     def _levels(self, noises: list[Noise], floor: Array) -> NoiseLevels:
         """Return the levels with those of the torques from what is left over, and the share of it that the unknowns take."""
