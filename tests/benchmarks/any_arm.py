@@ -11,7 +11,18 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from identify import MODELS, BaseParameters, Joint, KinematicTree, MotionLog, State, TreeLinks, identify_each, tree_basis
+from identify import (
+    ESTIMATORS,
+    MODELS,
+    BaseParameters,
+    Joint,
+    KinematicTree,
+    MotionLog,
+    State,
+    TreeLinks,
+    identify_each,
+    tree_basis,
+)
 from sim.engine.ideal_log import ideal_log
 from sim.robot.robot import Robot
 from sim.robot.tree import kinematic_tree
@@ -61,7 +72,7 @@ def resident():
     return int(Path("/proc/self/statm").read_text().split()[1]) * 4096 / 1e9
 
 
-def hour():
+def hour(estimator):
     """Print time and memory of all three models on an hour at 1 kHz of seven joints, against a log of 100 s."""
     robot = Robot.load("panda")
     tree = kinematic_tree(robot)
@@ -79,17 +90,18 @@ def hour():
     watcher = threading.Thread(target=watch)
     watcher.start()
     start = time.perf_counter()
-    identify_each(long, basis, models)
+    identify_each(long, basis, models, estimator=ESTIMATORS.create(estimator))
     took = time.perf_counter() - start
     done.set()
     watcher.join()
     short = log.part(0, 100_000)
-    each = best(lambda: identify_each(short, basis, models)) / short.samples
-    print(f"{long.samples} samples x 7 joints, {len(basis.names)} parameters, three models: {took:.0f} s,")
+    each = best(lambda: identify_each(short, basis, models, estimator=ESTIMATORS.create(estimator))) / short.samples
+    print(f"{long.samples} samples x 7 joints, {len(basis.names)} parameters, three models, {estimator}: {took:.0f} s,")
     print(f"{most[0] - before:.2f} GB above the log, itself {2 * long.q.nbytes / 1e9:.2f} GB;")
     print(f"cost of a sample against a log of 100 000: {took / long.samples / each:.2f}")
 
 
 if __name__ == "__main__":
     regressor()
-    hour()
+    for name in ("WLS", "GLS"):
+        hour(name)

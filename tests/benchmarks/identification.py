@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from experiments.paper.table1 import SCENARIO, Table1
-from identify import CHAINS, MODELS, Chain, MotionLog, identify_each, scara
+from identify import CHAINS, ESTIMATORS, MODELS, Chain, MotionLog, identify_each, scara
 from sim.scenario.scenario_file import load
 
 SAMPLES, RUNS = 4000, 60
@@ -48,18 +48,20 @@ def main() -> None:
         for k in range(SAMPLES):
             W[k] = pin.computeJointTorqueRegressor(model, data, q[k], qd[k], qdd[k])
 
-    def ours(chain: Chain, sigma: str) -> None:
-        for estimate in identify_each(log, basis, models, chain).values():
+    def ours(chain: Chain, estimator: str, sigma: str) -> None:
+        for estimate in identify_each(log, basis, models, chain, ESTIMATORS.create(estimator)).values():
             assert np.isfinite(getattr(estimate, sigma)).all()
             assert np.isfinite(estimate.condition_number)
 
     for name in CHAINS:
         chain = CHAINS.create(name)
-        for sigma in ("sigma", "corrected_sigma"):
-            ours(chain, sigma)
-            pairs = np.array([(seconds(lambda c=chain, s=sigma: ours(c, s)), seconds(peer)) for _ in range(RUNS)])
+        for estimator, sigma in (("WLS", "sigma"), ("WLS", "corrected_sigma"), ("GLS", "sigma")):
+            ours(chain, estimator, sigma)
+            pairs = np.array(
+                [(seconds(lambda c=chain, e=estimator, s=sigma: ours(c, e, s)), seconds(peer)) for _ in range(RUNS)]
+            )
             mine, theirs, ratio = *np.median(pairs, axis=0), np.median(pairs[:, 0] / pairs[:, 1])
-            what = f"chain {name:12} 3 models with {sigma:15} {1e3 * mine:6.2f} ms"
+            what = f"chain {name:12} 3 models {estimator} with {sigma:15} {1e3 * mine:6.2f} ms"
             print(f"{what}, pinocchio's regressor {1e3 * theirs:6.2f} ms, ratio {ratio:.2f}")
 
 
