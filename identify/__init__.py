@@ -50,6 +50,7 @@ from identify.estimators.identification import identify as identify
 from identify.estimators.identification import identify_each as identify_each
 from identify.estimators.likelihood.joint_fit import JointFit as JointFit
 from identify.estimators.likelihood.smoothed_motion import SmoothedMotion as SmoothedMotion
+from identify.estimators.likelihood.smoothed_motion import smoothed_log as smoothed_log
 from identify.estimators.likelihood.smoothed_motion import smoothed_motion as smoothed_motion
 from identify.estimators.recursive_least_squares import Recursive as Recursive
 from identify.estimators.recursive_least_squares import recursive_least_squares as recursive_least_squares

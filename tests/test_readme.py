@@ -59,7 +59,7 @@ def test_every_plugin_is_in_its_table(readme):
 
     for table in TABLES:
         (row,) = re.findall(rf"^\| `{table.point}` \| (.*?) \|", readme, re.MULTILINE)
-        assert set(re.findall(r"`(\w+)`", row)) == set(table.builtin), table.point
+        assert set(re.findall(r"`([\w-]+)`", row)) == set(table.builtin), table.point
 
 
 def test_the_causes_in_the_docs_are_those_computed(root, table1):

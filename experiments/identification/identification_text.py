@@ -53,12 +53,15 @@ def _noise(found: Identified) -> str:
     torque, position = (
         " ".join("?" if x is None else f"{x:.2g}" for x in found.noise[name]) for name in ("torque", "position")
     )
-    words = f"noise found in the log: torque {torque} N m, position {position} rad"
+    slides = [joint.kind == "slide" for joint in found.subject.tree.joints]
+    force, length = ("N m, N", "rad, m") if any(slides) else ("N m", "rad")
+    words = f"noise found in the log: torque {torque} {force}, position {position} {length}"
     steps = found.noise["encoder_step"]
     if not any(steps):
         return words
-    bits = " ".join(f"{log2(2 * pi / step):.1f}" if step else "?" for step in steps)
-    return f"{words}; encoder steps {' '.join(f'{x:.3g}' if x else '?' for x in steps)} rad ({bits} bits)"
+    each = zip(steps, slides, strict=True)
+    bits = " ".join("-" if slide else f"{log2(2 * pi / step):.1f}" if step else "?" for step, slide in each)
+    return f"{words}; encoder steps {' '.join(f'{x:.3g}' if x else '?' for x in steps)} {length} ({bits} bits)"
 
 
 def _explained(share: float) -> str:

@@ -41,9 +41,11 @@ def _step(moved: Array) -> float:
 
 
 def _refined(found: Array, step: float) -> float:
-    """Return the step that fits differences, the smallest first, from a first guess; NaN if they are no multiples of it."""
+    """Return the step that fits differences, the smallest first, from a first guess; NaN if few are its multiples."""
     for most in (5, 50, MOST):
         some = found[found < (most + 0.5) * step]
+        if most == MOST and len(some) < LEAST:
+            return np.nan
         count = np.round(some / step)
         if (np.abs(some / step - count) > OFF).any():
             return np.nan

@@ -43,7 +43,7 @@ class GeneralizedLeastSquares(AbstractEstimator):
         whitened = _Whitened(problem)
         parts = [triangular(whitened(rows)) for rows in problem.every_part()]
         factor = Factor(triangular(np.concatenate(parts, axis=-2)), problem.factors.together.rows, problem.names)
-        solvable = problem.factors.together.status == Status.OK
+        solvable = (problem.factors.together.status == Status.OK) & factor.determined
         inverse = factor.inverse(solvable)
 
         def influence(rows: Rows) -> Array:
@@ -101,7 +101,7 @@ class _Whitened:
         (to_rows,) = rows.maps
         if to_rows not in self._known:
             kept, each = kept_rows(to_rows), _covariances(self._problem, to_rows)
-            scaled = [C.times(self._shares[..., i]) for i, C in enumerate(each)]
+            scaled = [C.scaled(self._shares[..., i]) for i, C in enumerate(each)]
             C = sum(scaled[1:], start=scaled[0])
             self._known[to_rows] = Whitening(C.kept(kept), kept), self._unbiased(rows).W
         return self._known[to_rows]

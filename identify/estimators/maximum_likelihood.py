@@ -1,6 +1,6 @@
 """Maximum likelihood of motion and parameters together."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, final
 
 import numpy as np
@@ -12,7 +12,7 @@ from identify.estimators.estimate import Estimate
 from identify.estimators.estimator import AbstractEstimator, Need
 from identify.estimators.generalized_least_squares import GeneralizedLeastSquares
 from identify.estimators.likelihood.cells import Cells
-from identify.estimators.likelihood.joint_fit import JointFit
+from identify.estimators.likelihood.joint_fit import CHECK, JointFit
 from identify.estimators.problem import Problem
 from identify.estimators.restricted_likelihood import EXACT, SMALLEST
 from identify.models.explicit import ExplicitModel
@@ -65,25 +65,39 @@ class MaximumLikelihood(AbstractEstimator):
         # Rows show little of the positions' noise where torques are noisy; their differences show all of it.
         start, position = GeneralizedLeastSquares().solve(problem), np.maximum(problem.position_noise, SMALLEST)
         torque = problem.likely_noise.levels.torque.copy()
-        runs, p = start.X.shape[:-1], len(problem.names)
+        runs, p, failures = start.X.shape[:-1], len(problem.names), list[IdentificationError]()
         X, covariance = np.full((*runs, p), np.nan), np.full((*runs, p, p), np.nan)
         fits: dict[tuple[int, ...], JointFit] = {}
         for run in np.ndindex(runs):
             if start.status[run] != Status.OK or not np.isfinite(start.X[run]).all():
                 continue
-            logs = tuple(Cells.of(_alone(log, run)) for log in problem.logs)
-            rms = np.sqrt(np.mean([np.mean(cells.torque[0] ** 2, axis=-1) for cells in logs], axis=0))
-            shown = np.isfinite(torque[run])  # a joint that stands says nothing of its torque
-            own = NoiseLevels(np.where(shown, torque[run], rms), position[run])
-            begin = JointFit.start(logs, problem.basis, start.X[run], own, find_delay=self.find_delay)
-            found = begin.solved(EXACT * rms)
-            if not self.find_delay:  # a wrong delay may be why it goes far
-                _require_near(found, start.X[run], start.sigma[run], problem.names)
-            fits[run] = found
-            X[run], covariance[run] = found.X, found.covariance[:p, :p]
-            torque[run] = np.where(shown, found.levels.torque, np.nan)
+            try:
+                found = self._found(problem, run, start, NoiseLevels(torque[run], position[run]))
+            except IdentificationError as error:  # one run does not take the others away
+                failures.append(error)
+                continue
+            fits[run], X[run], covariance[run] = found, found.X, found.covariance[:p, :p]
+            torque[run] = np.where(np.isfinite(torque[run]), found.levels.torque, np.nan)
+        if failures and not fits:
+            raise failures[0]
         honest = frozen(covariance)
         return Estimate(problem, frozen(X), honest, honest=honest, levels=NoiseLevels(torque, position), fits=fits)
+
+    def _found(self, problem: Problem, run: tuple[int, ...], start: Estimate, levels: NoiseLevels) -> JointFit:
+        """Return the fit of one run."""
+        alone = tuple(MotionLog(log.fs, log.q[run], log.tau[run], log.torque) for log in problem.logs)
+        logs = tuple(map(Cells.of, alone))
+        rms = np.sqrt(np.mean([np.mean(cells.torque[0] ** 2, axis=-1) for cells in logs], axis=0))
+        # A joint that stands says nothing of its torque.
+        own = NoiseLevels(np.where(np.isfinite(levels.torque), levels.torque, rms), levels.position)
+        found = JointFit.start(logs, problem.basis, start.X[run], own, find_delay=self.find_delay).solved(EXACT * rms)
+        X, sigma = start.X[run], start.sigma[run]
+        if found.delay is not None:
+            later = [replace(log, torque=replace(log.torque, delay=log.torque.delay + found.delay)) for log in alone]
+            again = GeneralizedLeastSquares().solve(Problem(tuple(later), problem.basis, problem.model, problem.chain))
+            X, sigma = again.X, again.sigma
+        _require_near(found, X, sigma, problem.names)
+        return found
 
 
 def with_delay() -> MaximumLikelihood:
@@ -99,19 +113,14 @@ def _require_near(found: JointFit, X: Array, sigma: Array, names: tuple[str, ...
     k = int(far.argmax() if far.max() >= FAR else small.argmin())
     raise IdentificationError(
         f"motion and parameters together do not go with generalized least squares: {names[k]} is {found.X[k]:.4g} instead of "
-        f"{X[k]:.4g}, sigma {np.sqrt(found.covariance[k, k]):.2g} instead of {sigma[k]:.2g}: check order, units, sign and "
-        "delay of the torques, or take GLS"
+        f"{X[k]:.4g}, sigma {np.sqrt(found.covariance[k, k]):.2g} instead of {sigma[k]:.2g}: {CHECK}"
     )
-
-
-def _alone(log: MotionLog, run: tuple[int, ...]) -> MotionLog:
-    return MotionLog(log.fs, log.q[run], log.tau[run], log.torque)
 
 
 def _require_short(problem: Problem) -> None:
     n, p = problem.basis.n, len(problem.names)
     samples = sum(log.samples for log in problem.logs)
-    if (size := samples * 2 * n * (2 * p + 8 * n) * 8) > MOST:
+    if (size := samples * 2 * n * (3 * p + 20 * n) * 8) > MOST:
         raise IdentificationError(
             f"motion and parameters of {samples} samples of {n} joints together take {size / 1e9:.3g} GB: take GLS, or at most "
             f"{int(samples * MOST / size)} samples"

@@ -24,6 +24,12 @@ NEGLIGIBLE = 1e-4
 LEAST = 32
 """Samples that it takes to estimate the noise of positions."""
 
+FREE = 0.01
+"""Share of the rows of a kind that the fit leaves free at least."""
+
+TOLD = 2.0
+"""Rows whose residuals count as noise of the torque, whatever their spectrum says: that of a few rows says little."""
+
 
 def noise_of(parts: Sequence[Rows], factors: Factors, fit: Fit, linear: Callable[[Signals], Linearization]) -> NoisyRows:
     """Return the noise of logs as the rows of their explicit model show it, NaN in runs that cannot be solved.
@@ -53,13 +59,14 @@ def noise_of(parts: Sequence[Rows], factors: Factors, fit: Fit, linear: Callable
     shown = np.nan_to_num(of_position / np.where(squares > 0, squares, np.nan)) > NEGLIGIBLE
     rest = np.where(shown, _torque_share(parts, fit.X, white, made), 1.0) * squares
     of_torque = _by_kind(parts, white)
-    free = np.sum(of_torque, axis=-1) - _leverage(factors, fit) * of_torque.max(axis=-1)
+    whole = np.sum(of_torque, axis=-1)
+    free = np.maximum(np.sum(of_torque * (1 - _leverage(parts, factors, fit)), axis=-1), FREE * whole)
     torque = np.sqrt(np.divide(rest, free, out=np.full(free.shape, np.nan), where=free > 0))
     most = np.minimum(1.0, np.divide(squares, of_position, out=np.ones_like(squares), where=of_position > squares))
     levels = NoiseLevels(torque, np.where(shown.any(axis=-1, keepdims=True), position * np.sqrt(most), 0.0))
     found = NoisyRows(levels, linear)
     if np.array_equal(levels.position, position):
-        found.known.update((each, w.scaled(levels.in_rows) + m) for each, w, m in zip(maps, white, made, strict=True))
+        found.known.update((each, w.leveled(levels.in_rows) + m) for each, w, m in zip(maps, white, made, strict=True))
     return found
 
 
@@ -78,14 +85,16 @@ def _torque_share(
     a, b = two_levels(T, P, seen)
     of_torque, of_position = a * np.sum(_by_kind(parts, white), axis=-1), b * np.sum(_by_kind(parts, made), axis=-1)
     both = of_torque + of_position
-    return np.divide(of_torque, both, out=np.ones_like(both), where=both > 0)
+    share = np.divide(of_torque, both, out=np.ones_like(both), where=both > 0)
+    few = np.maximum(np.count_nonzero(_by_kind(parts, white), axis=-1), 1)
+    return np.maximum(share, np.minimum(TOLD / few, 1.0))
 
 
-def _leverage(factors: Factors, fit: Fit) -> Array:
-    """Return the sum over the rows of every kind of their leverage: the parameters that they determine, shape (..., kind)."""
-    R = factors.R[..., :-1] * fit.weight[..., None, None]
+def _leverage(parts: Sequence[Rows], factors: Factors, fit: Fit) -> Array:
+    """Return the share of every row that the fit takes, shape (..., kind, instant)."""
     inverse = fit.factor.inverse(factors.together.status == Status.OK)
-    return np.sum(np.matmul(R, inverse[..., None, :, :]) * R, axis=(-2, -1))
+    each = [rows.by_kind(np.sum(np.matmul(rows.W, inverse) * rows.W, axis=-1)) for rows in parts]
+    return np.concatenate(each, axis=-1) * fit.weight[..., None] ** 2
 
 
 def position_noise(logs: Sequence[Signals]) -> Array:
@@ -94,15 +103,18 @@ def position_noise(logs: Sequence[Signals]) -> Array:
     From differences of order 6, whose variance is that of the noise times the sum of their squared weights (P. Hall, J. W. Kay
     and D. M. Titterington, "Asymptotically optimal difference-based estimation of variance in nonparametric regression",
     Biometrika 77 (1990) 521-528). Counts of an encoder at rest are constant, and say nothing: without a mask they make it too
-    small. 0 where little is left.
+    small. Where it leaves too few samples, all that change count; 0 where there are few of those, too.
     """
     weights = np.array([(-1.0) ** k * comb(ORDER, k) for k in range(ORDER + 1)])
     weights /= np.linalg.norm(weights)
-    squares, count = 0.0, 0
+    squares: Array | float = 0.0
+    count: Array | float = 0.0
     for signals in logs:
         inner = slice(ORDER // 2, -(ORDER // 2))  # beyond the ends of a log there is nothing
         moving = (signals.weight == 1)[..., inner]
         differences = slide(np.swapaxes(signals.log.q, -1, -2), weights)[..., inner]
-        squares = squares + np.sum(differences**2 * moving, axis=-1)
-        count = count + np.sum(moving, axis=-1)
-    return np.where(count >= LEAST, np.sqrt(squares / np.maximum(count, 1)), 0.0)
+        counts = np.stack([moving, differences != 0])
+        squares = squares + np.sum(differences**2 * counts, axis=-1)
+        count = count + np.sum(counts, axis=-1)
+    used, changing = np.where(np.asarray(count) >= LEAST, np.sqrt(squares / np.maximum(count, 1)), 0.0)
+    return np.where(np.asarray(count)[0] >= LEAST, used, changing)

@@ -13,11 +13,14 @@ from identify.rows.rows import Rows
 from identify.rows.whitening import kept_rows
 from identify.signals.signals import Signals
 
-ROUNDS = 5
-"""Levels that are not zero settle in three or four; one that is falls by a third a round."""
+ROUNDS, SETTLED = 20, 0.01
+"""Rounds at most, and change, in all that the levels make of the rows, at which they count as found."""
 
 HASTE = 1.5
 """Power of the ratio by which a level is multiplied: more than 1 is faster, 2 might swing for ever."""
+
+LOWEST = 1e-3
+"""Share of the torque's rms at which its noise begins at least: what begins at nothing hardly grows."""
 
 EXACT = 1e-5
 """Share of the torque's rms that counts as noise at least: no model of a robot is better."""
@@ -49,7 +52,8 @@ def likely_noise(parts: Sequence[Rows], start: NoiseLevels, linear: Callable[[Si
     tau = [rows.maps[0].signals.torque.mean for rows in parts]
     rms = np.sqrt(sum(np.mean(one**2, axis=-1) for one in tau) / len(parts))
     least = np.concatenate([np.maximum(EXACT * rms, 1e-12), np.full(rms.shape, SMALLEST)], axis=-1) ** 2
-    levels = np.concatenate([start.torque, np.broadcast_to(start.position, start.torque.shape)], axis=-1)
+    begin = np.where(np.isfinite(start.torque), np.maximum(start.torque, LOWEST * rms), start.torque)
+    levels = np.concatenate([begin, np.broadcast_to(start.position, start.torque.shape)], axis=-1)
     squares = likely(units, joined, np.nan_to_num(levels**2), least)
     torque, position = np.split(np.where(np.isfinite(levels), np.sqrt(squares), np.nan), 2, axis=-1)
     return NoisyRows(NoiseLevels(torque, position), linear)
@@ -68,8 +72,14 @@ def likely(units: Sequence[list[Blocks]], joined: Sequence[Array], start: Array,
         Where to begin, and where to end.
     """
     squares = np.maximum(start, least)
+    settled = np.zeros(squares.shape[:-1], dtype=bool)
     for _ in range(ROUNDS):
-        squares = np.maximum(squares * _ratio(units, joined, squares) ** HASTE, least)
+        ratio, share = _ratio(units, joined, squares)
+        moved = np.where(settled[..., None], squares, np.maximum(squares * ratio**HASTE, least))
+        settled |= np.max(np.abs(moved / squares - 1) * share, axis=-1) < SETTLED  # each run by itself, as if it were alone
+        squares = moved
+        if settled.all():
+            break
     return squares
 
 
@@ -81,13 +91,16 @@ def _units(rows: Rows, linear: Linearization) -> list[Blocks]:
     return [Blocks.of(C.kept(kept), lags) for C in each]
 
 
-def _ratio(units: Sequence[list[Blocks]], joined: Sequence[Array], squares: Array) -> Array:
-    """Return r' C^-1 C_i C^-1 r over the trace of P C_i, shape (..., source)."""
+def _ratio(units: Sequence[list[Blocks]], joined: Sequence[Array], squares: Array) -> tuple[Array, Array]:
+    """Return r' C^-1 C_i C^-1 r over the trace of P C_i, and that trace's share of all, shape (..., source).
+
+    1 in runs whose rows do not determine the parameters.
+    """
     roots = [Cholesky.of(_sum(parts, squares)) for parts in units]
     white = [root.whiten(parts[0].cut(x)) for root, parts, x in zip(roots, units, joined, strict=True)]
     names = ("",) * (joined[0].shape[-1] - 1)
     factor = Factor(triangular(np.concatenate([_rows(z) for z in white], axis=-2)), np.array(0), names)
-    solvable = np.ones(factor.R.shape[:-2], dtype=bool)
+    solvable = factor.determined
     X, inverse = factor.solution(solvable), factor.inverse(solvable)
     found, expected = np.zeros(squares.shape), np.zeros(squares.shape)
     for root, parts, z in zip(roots, units, white, strict=True):
@@ -96,10 +109,13 @@ def _ratio(units: Sequence[list[Blocks]], joined: Sequence[Array], squares: Arra
         left = of_Y - np.matmul(of_W, X[..., None, :, None])
         expected += root.traces(parts)
         for i, part in enumerate(parts):
-            found[..., i] += np.sum(left * part.times(left), axis=(-3, -2, -1))
-            taken = np.sum(np.matmul(np.swapaxes(of_W, -1, -2), part.times(of_W)), axis=-3)
+            found[..., i] += np.sum(left * (part @ left), axis=(-3, -2, -1))
+            taken = np.sum(np.matmul(np.swapaxes(of_W, -1, -2), part @ of_W), axis=-3)
             expected[..., i] -= np.sum(taken * inverse, axis=(-2, -1))
-    return np.divide(found, expected, out=np.ones_like(found), where=expected > 0)
+    ratio = np.divide(found, expected, out=np.ones_like(found), where=expected > 0)
+    weight = np.maximum(np.nan_to_num(expected * squares), 0.0)
+    total = np.sum(weight, axis=-1, keepdims=True)
+    return ratio, np.divide(weight, total, out=np.zeros_like(weight), where=total > 0)
 
 
 def _sum(parts: list[Blocks], squares: Array) -> Blocks:

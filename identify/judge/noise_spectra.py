@@ -41,8 +41,17 @@ def noise_spectra(problem: Problem, levels: NoiseLevels, f: Array) -> tuple[Arra
         )
     )
     moving = (signals.weight[:, None, some] > 0).astype(np.float64)
-    inertia, damping, stiffness = (x[..., None] for x in problem.linear(signals).at(some))
-    squares = (stiffness * plain - inertia * twice) ** 2 + (damping * rate) ** 2
-    mean = np.sum(squares * moving[..., None], axis=2) / np.maximum(np.sum(moving, axis=2), 1)[..., None]
-    of_position = np.sqrt(np.einsum("jkf,k->jf", mean, levels.position**2))
+    inertia, damping, stiffness = problem.linear(signals).at(some)
+
+    def mean(x: Array) -> Array:
+        """Return the mean of x, shape (joint, joint, time), where joints move, times the squared noise of each position."""
+        return np.sum(x * moving, axis=-1) / np.maximum(np.sum(moving, axis=-1), 1) @ levels.position**2
+
+    parts = (
+        (mean(stiffness**2), plain**2),
+        (-2 * mean(stiffness * inertia), plain * twice),
+        (mean(inertia**2), twice**2),
+        (mean(damping**2), rate**2),
+    )
+    of_position = np.sqrt(np.maximum(sum(np.outer(of_joint, of_f) for of_joint, of_f in parts), 0.0))
     return np.sqrt(2 / fs) * levels.torque[:, None] * aligned, np.sqrt(2 / fs) * of_position

@@ -66,11 +66,11 @@ class BandedCovariance:
         total[..., : few.shape[-4], :, :, :] += few
         return type(self)(total)
 
-    def scaled(self, level: Array) -> Self:
+    def leveled(self, level: Array) -> Self:
         """Return the covariance of rows multiplied by a level for each kind, shape (..., kind)."""
         return type(self)(self.bands * (level[..., :, None] * level[..., None, :])[..., None, None, :, :])
 
-    def times(self, factor: Array) -> Self:
+    def scaled(self, factor: Array) -> Self:
         """Return the covariance times a number for each run, shape (...)."""
         return type(self)(self.bands * factor[..., None, None, None, None])
 

@@ -51,7 +51,7 @@ class Blocks:
         padded[..., : x.shape[-2], :] = x
         return padded.reshape(*x.shape[:-2], blocks, size, x.shape[-1])
 
-    def times(self, x: Array) -> Array:
+    def __matmul__(self, x: Array) -> Array:
         """Return the product with x, shape (..., block, b, m)."""
         total = np.matmul(self.own, x)
         total[..., :-1, :, :] += np.matmul(self.next, x[..., 1:, :, :])
@@ -83,25 +83,19 @@ class Cholesky:
 
     @classmethod
     def of(cls, C: Blocks) -> Self:
-        """Return the factor; rows without any noise, which are void, are left as they are.
+        """Return the factor, NaN in runs where C is lost or not positive definite; void rows, without noise, are left.
 
         Raises
         ------
         IdentificationError
-            If C is not positive definite.
+            If C is not positive definite, in all runs that there are.
         """
         void = np.diagonal(C.own, axis1=-2, axis2=-1) == 0
         own = C.own + np.eye(C.own.shape[-1]) * void[..., None, :]
         inverse, below = np.empty_like(own), np.empty_like(C.next)
         left = own[..., 0, :, :]
         for k in range(own.shape[-3]):
-            try:
-                inverse[..., k, :, :] = np.linalg.inv(np.linalg.cholesky(left))
-            except np.linalg.LinAlgError:
-                raise IdentificationError(
-                    "the covariance of the rows is singular: there is too little noise to weigh them by; take WLS, or a log of "
-                    "an encoder or torque sensor with noise"
-                ) from None
+            inverse[..., k, :, :] = np.linalg.inv(_root(left))
             if k + 1 < own.shape[-3]:
                 below[..., k, :, :] = np.matmul(inverse[..., k, :, :], C.next[..., k, :, :])
                 left = own[..., k + 1, :, :] - np.matmul(np.swapaxes(below[..., k, :, :], -1, -2), below[..., k, :, :])
@@ -150,3 +144,27 @@ class Cholesky:
             for part in parts
         ]
         return np.stack(found, axis=-1)
+
+
+def _root(A: Array) -> Array:
+    """Return the Cholesky factors of matrices, shape (..., b, b), NaN where there is none; raise if no finite one has any."""
+    lost = np.asarray(~np.isfinite(A).all(axis=(-2, -1)))
+    usable = np.where(lost[..., None, None], np.eye(A.shape[-1]), A)
+    try:
+        found = np.linalg.cholesky(usable)
+    except np.linalg.LinAlgError:
+        found = np.stack([_root_or_lost(one) for one in usable.reshape(-1, *A.shape[-2:])]).reshape(A.shape)
+        lost = np.asarray(lost | ~np.isfinite(found).all(axis=(-2, -1)))
+        if lost.all():
+            raise IdentificationError(
+                "the covariance of the rows is singular: there is too little noise to weigh them by; take WLS, or a log of "
+                "an encoder or torque sensor with noise"
+            ) from None
+    return np.where(lost[..., None, None], np.nan, found)
+
+
+def _root_or_lost(A: Array) -> Array:
+    try:
+        return np.asarray(np.linalg.cholesky(A), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        return np.full(A.shape, np.nan)

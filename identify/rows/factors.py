@@ -65,6 +65,12 @@ class Factor:
         values = self._singular_values[..., 1, :]
         return np.count_nonzero(values > NOT_SHOWN * values[..., :1], axis=-1)
 
+    @property
+    def determined(self) -> npt.NDArray[np.bool_]:
+        """Whether W has full rank, and nothing in it is lost, shape (...)."""
+        finite = np.asarray(np.isfinite(self.R).all(axis=(-2, -1)))
+        return finite & (Factor(np.where(finite[..., None, None], self.R, 0.0), self.rows, self.names).rank == self.p)
+
     @cached_property
     def status(self) -> npt.NDArray[np.intp]:
         """Status of every run, shape (...)."""

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -10,7 +10,7 @@ import numpy.typing as npt
 from identify.arrays import Array
 from identify.rows.banded import BandedCovariance
 from identify.rows.block_tridiagonal import Blocks, Cholesky
-from identify.rows.noise_propagation import NoisyRows, torque_paths
+from identify.rows.noise_propagation import torque_paths
 from identify.rows.row_map import RowMap
 
 SEEN = 0.05
@@ -31,12 +31,6 @@ class Whitening:
 
     C: BandedCovariance
     kept: npt.NDArray[np.bool_]
-
-    @classmethod
-    def of(cls, rows: RowMap, noise: NoisyRows) -> Self:
-        """Return that of rows with known noise."""
-        kept = kept_rows(rows)
-        return cls(noise.covariance(rows).kept(kept), kept)
 
     @cached_property
     def blocks(self) -> Blocks:
@@ -59,8 +53,13 @@ class Whitening:
         return z.reshape(*z.shape[:-3], -1, z.shape[-1])[..., : x.shape[-2], :] * self.kept[..., None]
 
 
+_KEPT: WeakKeyDictionary[RowMap, npt.NDArray[np.bool_]] = WeakKeyDictionary()
+
+
 def kept_rows(rows: RowMap) -> npt.NDArray[np.bool_]:
-    """Return which rows the mask leaves enough of, shape (..., r)."""
-    one = np.ones(rows.signals.log.n)
-    whole = torque_paths(rows.unmasked()).covariance(one).variance
-    return np.asarray(torque_paths(rows).covariance(one).variance > SEEN * whole)
+    """Return which rows the mask leaves enough of, shape (..., r); computed once."""
+    if rows not in _KEPT:
+        one = np.ones(rows.signals.log.n)
+        whole = torque_paths(rows.unmasked()).covariance(one).variance
+        _KEPT[rows] = np.asarray(torque_paths(rows).covariance(one).variance > SEEN * whole)
+    return _KEPT[rows]

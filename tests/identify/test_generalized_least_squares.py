@@ -23,7 +23,7 @@ from identify.estimators.unbiased import unbiased
 from identify.rows import long_logs
 from identify.rows.block_tridiagonal import Blocks, Cholesky
 from identify.rows.noise_propagation import NoiseLevels, NoisyRows
-from identify.rows.whitening import Whitening
+from identify.rows.whitening import Whitening, kept_rows
 
 EVERY = {name: MODELS.create(name) for name in MODELS.builtin}
 GLS = GeneralizedLeastSquares()
@@ -52,7 +52,7 @@ def whitened(log):
     """Return the rows of an implicit problem with their whitening, and their covariance as a matrix."""
     problem = Problem((log,), scara(), EVERY["implicit"], idbench_chain())
     noise = NoisyRows(NoiseLevels(np.array([0.1, 0.01]), np.full(2, 1e-4)), problem.linear)
-    whitening = Whitening.of(problem.rows.maps[0], noise)
+    whitening = whitening_of(problem.rows.maps[0], noise)
     return problem.rows, whitening, dense(whitening.C)
 
 
@@ -65,7 +65,7 @@ def test_block_tridiagonal_algebra_is_that_of_the_whole_matrix(whitened, rng):
     z = whitening.whiten(x)
     np.testing.assert_allclose(z.T @ z, x[kept].T @ np.linalg.solve(C, x[kept]), rtol=1e-9)
     blocks = whitening.blocks
-    product = blocks.times(blocks.cut(x * whitening.kept[:, None])).reshape(-1, 3)[: len(x)]
+    product = (blocks @ blocks.cut(x * whitening.kept[:, None])).reshape(-1, 3)[: len(x)]
     np.testing.assert_allclose(product[kept], C @ x[kept], rtol=1e-9, atol=1e-15)
     assert Cholesky.of(blocks).traces([blocks])[..., 0] == pytest.approx(len(kept))
 
@@ -131,6 +131,11 @@ def test_no_noise_is_put_in_where_a_joint_stands(log):
     assert np.abs(better.W - rows.W).max() > 1e-6
 
 
+def whitening_of(rows, noise):
+    kept = kept_rows(rows)
+    return Whitening(noise.covariance(rows).kept(kept), kept)
+
+
 def problem_rows(problem):
     """Return what makes the rows of another log with given weights."""
 
@@ -192,7 +197,7 @@ def test_what_noise_adds_to_W_is_taken_from_it(log, truth):
     found = identify(noisy(log, 16 * BITS16, (0.0, 0.0)), scara(), EVERY["explicit"], estimator=GLS)
     assert np.abs(np.mean((found.X - truth) / found.sigma, axis=0)).max() < 0.5
     problem, whole = found.problem, found.rows
-    whitening = Whitening.of(whole.maps[0], problem.likely_noise)
+    whitening = whitening_of(whole.maps[0], problem.likely_noise)
     solved = np.swapaxes(whitening.solve(whole.W), -1, -2)
     plain = np.linalg.solve(solved @ whole.W, solved @ whole.Y[..., None])[..., 0]
     assert np.abs(np.mean((plain - truth) / found.sigma, axis=0)).max() > 1

@@ -225,7 +225,8 @@ def test_what_comes_before_the_operator_is_not_counted_twice(log, operator, pref
     To 4 %: rows whose weights change over what they look at are taken for such whose do not.
     """
     chain = replace(idbench_chain(), prefilter=prefilter, operator=OPERATORS.create(operator))
-    found = identify(noisy(replace(log, torque=channel), (300.0, 300.0), 100), scara(), EVERY["explicit"], chain)
+    draws, weighted = noisy(replace(log, torque=channel), (300.0, 300.0), 100), WeightedLeastSquares()
+    found = identify(draws, scara(), EVERY["explicit"], chain, weighted)
     np.testing.assert_allclose(np.sqrt(np.mean(found.problem.noise.levels.torque**2, axis=0)), 300.0, rtol=0.04)
     rms = np.sqrt(np.mean(found.corrected_sigma**2, axis=0))
     np.testing.assert_allclose(rms, found.X.std(axis=0), rtol=0.28)  # four times what 100 draws leave

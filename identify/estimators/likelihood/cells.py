@@ -72,7 +72,7 @@ class Cells:
     def inside(self) -> npt.NDArray[np.bool_]:
         """Samples of the positions that lie in a cell, shape (sample,)."""
         at = self._at
-        return (at >= 0) & (at < self.count)
+        return (at >= 0) & (at <= self.count)
 
     @cached_property
     def _at(self) -> Array:

@@ -1,5 +1,6 @@
 """Motion and parameters that together make a log most likely."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,19 +11,23 @@ from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.errors import IdentificationError
 from identify.estimators.likelihood.cells import HELD, Cells
-from identify.estimators.likelihood.normal_equations import Noise, NormalEquations
+from identify.estimators.likelihood.normal_equations import Noise, NormalEquations, Solved
 from identify.rows.linearization import friction_jumps, smoothed
 from identify.rows.noise_propagation import NoiseLevels
 from identify.signals.masks.reversal import ReversalMask
 
-ROUNDS, STEPS = 4, 6
-"""Rounds, in each of which mask and levels are frozen, and Gauss-Newton steps of each."""
+ROUNDS, STEPS = 6, 6
+"""Rounds at most, in each of which mask and levels are frozen, and Gauss-Newton steps of each."""
 
-SETTLED = 0.02
-"""Change of the parameters, in sigma, at which they count as settled."""
+SETTLED, RESTLESS = 0.02, 3.0
+"""Change of the parameters in a round, in sigma, at which they count as settled, and above which at the end they are refused:
+with coarse encoders masks may go to and fro, for a sigma or so."""
 
 PROBES = 4
 """Random signs by which the leverage of the torques is estimated."""
+
+CHECK = "check order and delay of the torques, and whether they were filtered, or take GLS"
+"""What helps where torques and motion do not go together."""
 
 UNKNOWN = 5.0
 """Where friction's sign is not known: noise of the torque over friction's jump, and that of velocities over what moves them."""
@@ -79,9 +84,9 @@ class JointFit:
         Raises
         ------
         IdentificationError
-            If it diverges, or the log does not determine the motion.
+            If it diverges or does not settle, or the log does not determine the motion.
         """
-        now = self
+        now, change = self, np.inf
         for _ in range(ROUNDS):
             before, noises = now, [now.noise(k) for k in range(len(now.logs))]
             for _ in range(STEPS):
@@ -89,18 +94,16 @@ class JointFit:
                 if moved < SETTLED:
                     break
             now = replace(now, levels=now._levels(noises, floor))
-            if _sigmas(now.unknowns - before.unknowns, now.covariance) < SETTLED:
+            change = _sigmas(now.unknowns - before.unknowns, now.covariance)
+            if change < SETTLED:
                 break
-        return now
+        if change > RESTLESS:
+            raise IdentificationError(f"motion and parameters together do not settle, they move by {change:.2g} sigma: {CHECK}")
+        return replace(now, covariance=now._covariance())
 
     def _step(self, noises: list[Noise]) -> tuple["JointFit", float]:
         """Return the fit after a Gauss-Newton step, and how far the parameters moved [sigma]."""
-        systems = [
-            NormalEquations.of(cells, self.basis, self.X, z, noise)
-            for cells, z, noise in zip(self.logs, self.motions, noises, strict=True)
-        ]
-        parts = [system.solved() for system in systems]
-        covariance, b = _reduced(systems, parts, len(self.unknowns))
+        _, parts, covariance, b = self._reduced(noises)
         dX = covariance @ b[:, 0]
         motions = []
         for z, (V, y, L) in zip(self.motions, parts, strict=True):
@@ -108,9 +111,7 @@ class JointFit:
             motions.append(z + dz.reshape(z.shape))
         moved = _sigmas(dX, covariance)
         if not np.isfinite(moved) or not all(np.isfinite(z).all() for z in motions):
-            raise IdentificationError(
-                "motion and parameters together diverge: take GLS, or check torque, units and delay of the log"
-            )
+            raise IdentificationError(f"motion and parameters together diverge: {CHECK}")
         moved_on = replace(self, X=self.X + dX[: len(self.X)], motions=tuple(motions), covariance=covariance)
         return (moved_on if self.delay is None else moved_on._delayed(float(dX[-1]))), moved
 
@@ -127,7 +128,7 @@ class JointFit:
         lost = (1 - weight) * UNKNOWN * friction_jumps(self.basis, self.X, q[:, 0])[:, None]
         mean = self.levels.torque[:, None] * np.ones_like(weight)
         half = np.hypot(HELD * self.levels.torque[:, None], cells.rough)
-        return Noise(mean + lost, half + lost, self.levels.position, weight == 1, *self._velocities(cells, weight == 1))
+        return Noise(mean + lost, half + lost, self.levels.position, weight == 1, *self._velocities(cells, lost == 0))
 
     def _velocities(self, cells: Cells, known: npt.NDArray[np.bool_]) -> tuple[Array, Array]:
         """Return how far velocities of nodes may be from differences of the positions, and these, shape (node, joint) each.
@@ -145,20 +146,31 @@ class JointFit:
         """Return the levels with those of the torques from what is left over, and the share of it that the unknowns take."""
         rng, n = np.random.default_rng(0), self.basis.n
         signs = [rng.choice([-1.0, 1.0], (PROBES, n, cells.count)) for cells in self.logs]
-        systems = [
-            NormalEquations.of(cells, self.basis, self.X, z, noise, each)
-            for cells, z, noise, each in zip(self.logs, self.motions, noises, signs, strict=True)
-        ]
-        parts = [system.solved() for system in systems]
-        covariance, b = _reduced(systems, parts, len(self.unknowns))
+        systems, parts, covariance, b = self._reduced(noises, signs)
         taken = sum(np.sum(y[:, 1:] ** 2, axis=0) for _, y, _ in parts) + np.sum(b[:, 1:] * (covariance @ b[:, 1:]), axis=0)
         known = sum(np.count_nonzero(noise.known, axis=-1) for noise in noises)
         free = np.maximum(known - np.asarray(taken).reshape(n, -1).mean(axis=1), 1e-3 * known)
         squares = np.divide(sum(system.squares for system in systems), free, out=np.ones(n), where=known > 0)
         return replace(self.levels, torque=np.maximum(self.levels.torque * np.sqrt(squares), floor))
 
+    def _covariance(self) -> Array:
+        """Return the covariance of the unknowns with the levels as they are."""
+        return self._reduced([self.noise(k) for k in range(len(self.logs))])[2]
 
-def _reduced(systems: list[NormalEquations], parts: list[tuple[Array, Array, Array]], count: int) -> tuple[Array, Array]:
+    def _reduced(
+        self, noises: list[Noise], signs: Sequence[Array | None] | None = None
+    ) -> tuple[list[NormalEquations], list[Solved], Array, Array]:
+        """Return equations, their solutions, and the covariance of the unknowns and their right-hand sides without motions."""
+        each = signs or [None] * len(self.logs)
+        systems = [
+            NormalEquations.of(cells, self.basis, self.X, z, noise, some)
+            for cells, z, noise, some in zip(self.logs, self.motions, noises, each, strict=True)
+        ]
+        parts = [system.solved() for system in systems]
+        return systems, parts, *_without_motions(systems, parts, len(self.unknowns))
+
+
+def _without_motions(systems: list[NormalEquations], parts: list[Solved], count: int) -> tuple[Array, Array]:
     """Return the covariance of the first `count` parameters, and their right-hand sides, with the motions eliminated."""
     S = np.asarray(sum(system.corner - V.T @ V for system, (V, _, _) in zip(systems, parts, strict=True)))[:count, :count]
     b = np.asarray(sum(system.b_parameters - V.T @ y for system, (V, y, _) in zip(systems, parts, strict=True)))[:count]

@@ -13,6 +13,9 @@ from identify.errors import IdentificationError
 from identify.estimators.likelihood.cells import GAUSS, Cells, hermite
 from identify.rows.linearization import observation, slopes
 
+Solved = tuple[Array, Array, Array]
+"""L^-1 A_zX, L^-1 b_nodes, and the factor L of A_zz in bands."""
+
 CHUNK = 2000
 """Cells whose columns are made at once: those of all would take too much memory."""
 
@@ -91,8 +94,8 @@ class NormalEquations:
             found._add_torques(cells, basis, X, z, noise, part, signs)
         return found
 
-    def solved(self) -> tuple[Array, Array, Array]:
-        """Return L^-1 A_zX, L^-1 b_nodes, and the factor L of A_zz in bands.
+    def solved(self) -> Solved:
+        """Return the motion eliminated.
 
         Raises
         ------

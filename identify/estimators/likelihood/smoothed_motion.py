@@ -6,6 +6,7 @@ import numpy as np
 import scipy
 
 from identify.arrays import Array
+from identify.data.motion_log import MotionLog
 from identify.errors import IdentificationError
 from identify.estimators.likelihood.cells import hermite
 from identify.estimators.likelihood.joint_fit import JointFit
@@ -61,6 +62,13 @@ def smoothed_motion(fit: JointFit, log: int = 0, t: Array | None = None) -> Smoo
     values = [np.einsum("kt,ktj->tj", w, ends) for w in weights]
     sigmas = [np.sqrt(np.einsum("kt,tjkm,mt->tj", w, covariance, w)) for w in weights]
     return SmoothedMotion(given, *values, *sigmas)
+
+
+def smoothed_log(fit: JointFit, log: int = 0) -> MotionLog:
+    """Return a log of the smoothed positions and their torques, to feed other models or estimators with."""
+    cells, motion = fit.logs[log], smoothed_motion(fit, log)
+    first = round(motion.t[0] * cells.log.fs)
+    return MotionLog(cells.log.fs, motion.q, cells.log.tau[first : first + len(motion.q)], cells.log.torque)
 
 
 def _covariance(fit: JointFit, log: int) -> Array:
