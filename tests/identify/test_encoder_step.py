@@ -29,3 +29,8 @@ def test_positions_without_steps_have_none(rng):
     still = np.zeros((100, 1))
     assert np.isnan(encoder_steps(noisy)).all()
     assert np.isnan(encoder_steps(still)).all()
+
+
+def test_one_small_difference_is_no_encoder():
+    moved = np.append(np.random.default_rng(0).uniform(0.8e-3, 1.2e-3, 400), 1e-7)
+    assert np.isnan(encoder_steps(np.cumsum(moved)[:, None])).all()

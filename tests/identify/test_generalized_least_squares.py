@@ -13,6 +13,7 @@ from identify import (
     MotionLog,
     Problem,
     WeightedLeastSquares,
+    attempt_each,
     idbench_chain,
     identify,
     identify_each,
@@ -201,3 +202,27 @@ def test_what_noise_adds_to_W_is_taken_from_it(log, truth):
     solved = np.swapaxes(whitening.solve(whole.W), -1, -2)
     plain = np.linalg.solve(solved @ whole.W, solved @ whole.Y[..., None])[..., 0]
     assert np.abs(np.mean((plain - truth) / found.sigma, axis=0)).max() > 1
+
+
+def test_rows_of_one_model_that_are_too_few_leave_the_others(log):
+    """Of a short log: the power model's rows do not determine its parameters, the explicit model's do."""
+    part = noisy(log, BITS16, (0.01, 0.001), 1)
+    short = MotionLog(log.fs, part.q[0, 900:1080], part.tau[0, 900:1080], log.torque)
+    found = attempt_each(Problem((short,), scara(), EVERY["explicit"], idbench_chain()), EVERY, GLS, throw=False)
+    assert np.isfinite(found["explicit"].X).all()
+    assert np.isnan(found["power"].X).all()
+
+
+def test_one_run_without_a_covariance_leaves_the_others():
+    own = np.stack([np.eye(4)[None], -np.eye(4)[None]])
+    root = Cholesky.of(Blocks(own, np.zeros((2, 0, 4, 4))))
+    np.testing.assert_array_equal(root.inverse[0, 0], np.eye(4))
+    assert np.isnan(root.inverse[1]).all()
+
+
+def test_levels_that_begin_at_nothing_are_found(log):
+    draws = noisy(log, BITS16, (0.1, 0.005), 4)
+    problem = Problem((draws,), scara(), EVERY["explicit"], idbench_chain())
+    nothing = NoiseLevels(np.zeros((4, 2)), np.full((4, 2), BITS16))
+    levels = likely_noise(problem.unbiased_parts, nothing, problem.linear).levels
+    np.testing.assert_allclose(levels.torque, problem.likely_noise.levels.torque, rtol=0.03)

@@ -16,6 +16,7 @@ from identify import (
     attempt_each,
     identify,
     scara,
+    smoothed_log,
     smoothed_motion,
 )
 from identify.estimators import maximum_likelihood
@@ -204,3 +205,23 @@ def test_the_delay_is_found_with_the_parameters(stated, truth):
     assert sigma < 5e-5
     assert abs(stated + fit.delay - 0.004) < 5 * sigma
     assert (np.abs(found.X - truth) < 5 * found.sigma).all()
+
+
+def test_one_run_does_not_take_the_others_away(exact):
+    """Of two runs one has its torques exchanged: the other is as it is alone."""
+    log = noisy(MotionLog(exact.fs, exact.q[:2], exact.tau[:2], exact.torque), BITS16, 0.01)
+    tau = np.stack([log.tau[0], log.tau[1][:, ::-1]])
+    both = MotionLog(log.fs, log.q, tau, log.torque)
+    found = identify(both, scara(), EXPLICIT, estimator=ML, throw=False)
+    alone = identify(MotionLog(log.fs, log.q[0], log.tau[0], log.torque), scara(), EXPLICIT, estimator=ML)
+    np.testing.assert_array_equal(found.X[0], alone.X)
+    assert np.isnan(found.X[1]).all()
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.004])
+def test_the_smoothed_log_has_the_torques_of_its_positions(delay, truth):
+    log = simulate(scenario(timing=replace(load("ideal").timing, delay=delay))).alone()
+    log = noisy(log, BITS16, 0.0)
+    better = smoothed_log(identify(log, scara(), EXPLICIT, estimator=ML).fits[()])
+    before, after = (identify(one, scara(), EXPLICIT, estimator=WeightedLeastSquares()).X - truth for one in (log, better))
+    assert np.exp(np.mean(np.log(np.abs(after) / np.abs(before)))) < 0.5

@@ -14,7 +14,8 @@ from sim.errors import ScenarioError
 def test_the_bound_stands_beside_the_errors(tmp_path, capsys):
     """Of a study of nine runs: below the error of WLS, in the table, the summary and the report."""
     path = tmp_path / "small.toml"
-    head = 'name = "small"\nquestion = "?"\nscenario = "ideal"\nseeds = 9\nmodels = ["explicit"]\nestimators = ["WLS"]\nbound = true\n'
+    head = 'name = "small"\nquestion = "?"\nscenario = "ideal"\nseeds = 9\nmodels = ["explicit"]\n'
+    head += 'estimators = ["WLS"]\nbound = true\n'
     body = '[settings]\nencoder = { kind = "incremental" }\ntorque = { noise = [0.1, 0.01] }\n[settings.trajectory]\n'
     moves = (
         'kind = "random"\nmoves = 6\ndurations = [0.9, 1.3]\nrest = 0.6\n[[axes]]\nfield = "encoder.lines"\nvalues = [2048]\n'
