@@ -28,14 +28,14 @@ class Estimate:
     X : Array, shape (..., p)
         Estimated parameters; NaN where the rows cannot be solved.
     covariance : Array, shape (..., p, p)
-        Covariance of the error of X, as the estimator has it: as if rows were independent.
+        Covariance of the error of X, as the estimator has it: of OLS and WLS as if rows were independent.
     influence : callable, optional
         Returns G of rows, shape (..., rows, p), with which X = G' Y to first order; without it there is no corrected sigma.
     weights : callable, optional
         Returns what rows were multiplied by, shape (..., rows), where X is a least-squares solution of each row by itself.
     whiten : callable, optional
-        Returns [W Y] of rows made independent, shape (..., rows, p + 1), of which X is the least-squares solution, each from
-        those that come before it.
+        Returns [W Y] of rows of one log made independent, shape (..., rows, p + 1), of which X is the least-squares solution,
+        each from those that come before it.
     honest : Array, shape (..., p, p), optional
         Covariance of the error of X that the noise of the logs makes, if the estimator knows it; by default from `influence`.
     levels : NoiseLevels, optional
