@@ -128,7 +128,7 @@ def filters(shelf: Shelf) -> Part:
 
 
 def noise(shelf: Shelf) -> Part:
-    """Return the noise found, spectra of what the explicit model leaves over beside those predicted, and the smoothed motion."""
+    """Return the noise found, spectra of what the explicit model leaves over beside those predicted, and smoothed motions."""
     rows = shelf.last("identify/*/explicit/noise_torque/*")
     spectra = [
         bars(
