@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from collections.abc import Set as AbstractSet
+from functools import cache
 
 import rerun.blueprint as rrb
 
@@ -23,6 +24,7 @@ def _number(name: str) -> int:
     return int(name[len(name.rstrip(DIGITS)) :] or 0)
 
 
+@cache
 def _known_units() -> dict[str, str]:
     """Return the units of the parameters of links and of the blocks that are built in, by their letters."""
     blocks = [BLOCKS.create(name) for name in BLOCKS.builtin]

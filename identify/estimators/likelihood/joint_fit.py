@@ -30,7 +30,10 @@ CHECK = "check order and delay of the torques, and whether they were filtered, o
 """What helps where torques and motion do not go together."""
 
 UNKNOWN = 5.0
-"""Where friction's sign is not known: noise of the torque over friction's jump, and that of velocities over what moves them."""
+"""Noise of the torque where friction's sign is not known, over the jump of friction there."""
+
+NEAR = 5.0
+"""How far velocities may then be from differences of the positions, over what noise and accelerations make of these."""
 
 MASK = ReversalMask(threshold=0.1, width=0.02, taper=0.02)
 """Where the sign of a velocity is no model of friction."""
@@ -138,7 +141,7 @@ class JointFit:
         """
         rate = _differences(cells)
         acceleration = np.sqrt(np.mean(np.gradient(smoothed(rate, cells.log.fs), cells.period, axis=-1) ** 2, axis=-1))
-        off = UNKNOWN * np.hypot(self.levels.position * cells.log.fs, acceleration * cells.period)
+        off = NEAR * np.hypot(self.levels.position * cells.log.fs, acceleration * cells.period)
         beside = np.pad(~known, ((0, 0), (0, 1))) | np.pad(~known, ((0, 0), (1, 0)))
         return np.where(beside, off[:, None], np.inf).T, _at_nodes(cells, rate)
 
