@@ -29,7 +29,7 @@ class Run:
     chain: str = CHAIN
     """Signal processing."""
     estimator: str = ESTIMATOR
-    """OLS, WLS, GLS, ML, ..."""
+    """OLS, WLS, GLS, ML, ML-delay (the last two: explicit model alone), or of a plug-in: idbench list."""
     study: Annotated[Path | None, tyro.conf.arg(name="from", metavar="DIR")] = None
     """Instead of a scenario: the folder of a study, one run of which is made again."""
     index: Number = None

@@ -88,16 +88,16 @@ def _shown(found: Identified) -> tuple[Identified, list[str]]:
 
 
 def _advice(validated: Validated, asked: Identify) -> list[str]:
-    """Return what is most likely to mend a result that is not good; of a delay that nobody stated, what the log says."""
+    """Return what the log says of the delay, and what is most likely to mend a result that is not good."""
     try:
         good = "good" in {Verdict(validated, model).word for model in validated.torques}
     except IdentificationError:
         return []
     if is_long(validated.found.logs):
         return []
-    remedies, log = Remedies(validated), validated.found.logs[0]
-    assumed = asked.torque_delay is None and not log.torque.delay
-    delay = list(remedies.delay()) if assumed or (not good and asked.torque_delay != "estimate") else []
+    remedies = Remedies(validated)
+    # Friction takes a wrong delay in, and the verdict may be good: the log itself is asked.
+    delay = list(remedies.delay()) if asked.torque_delay != "estimate" else []
     return delay + ([] if good else list(remedies.options()))
 
 

@@ -36,7 +36,7 @@ class Identify:
     model: str = "all"
     """all, explicit, implicit or power."""
     estimator: str = ESTIMATOR
-    """OLS, WLS, GLS, ML, ..."""
+    """OLS, WLS, GLS, ML, ML-delay (the last two: explicit model alone), or of a plug-in: idbench list."""
     validate: File = None
     """A second log, on which the result is judged; without it the last quarter of the first, by a fit of the rest."""
     write_mjcf: File = None

@@ -7,7 +7,7 @@ from rich.text import Text
 
 from experiments.identification.identified import Identified
 from experiments.identification.validated import Validated
-from experiments.identification.verdict import Verdict
+from experiments.identification.verdict import SURE, Verdict
 from experiments.text import WORTHLESS, new_table, number, percent, percentage, print_titled
 from identify import AsLogged, Estimate, IdentificationError
 
@@ -40,9 +40,9 @@ def print_identified(console: Console, found: Identified, title: str) -> None:
     console.print(Text(f"torque: {read}" + (f", which chain {found.chain} ignores: it takes it as logged" if logged else "")))
     if found.delay is not None:
         delay, sigma = (1e3 * x for x in found.delay)
-        words = (
-            f"delay found with the parameters: {delay:.4g} ms, sigma {sigma:.2g} ms; what follows is at the delay of the log"
-        )
+        words = f"delay found with the parameters: {delay:.4g} ms, sigma {sigma:.2g} ms"
+        if abs(delay - 1e3 * channel.delay) > SURE * sigma:
+            words += f"; what follows judges them at {1e3 * channel.delay:.4g} ms: give --torque-delay {1e-3 * delay:.4g}"
         console.print(Text(words), soft_wrap=True)
     console.print(Text(_noise(found)), soft_wrap=True)
     console.print()

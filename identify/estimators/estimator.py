@@ -48,7 +48,7 @@ class AbstractEstimator(ABC):
         if throw and lost.any():
             names = ", ".join(np.array(problem.names)[lost.reshape(-1, len(problem.names)).any(axis=0)])
             raise IdentificationError(
-                f"{type(self).__name__} finds no finite value for {names}: use a longer log, or another estimator, such as WLS"
+                f"{type(self).__name__} finds no finite value for {names}: use a longer log, in which all joints move"
             )
         return estimate
 

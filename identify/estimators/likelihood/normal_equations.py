@@ -107,7 +107,7 @@ class NormalEquations:
         z, none = scipy.linalg.lapack.dtbtrs(L, both, uplo="L", overwrite_b=True)
         if singular or none:
             raise IdentificationError(
-                "the motion is not determined by this log: every joint must move, with torques that change; take GLS"
+                "the motion is not determined by this log: a joint stands, or its torque is constant or another's: take GLS"
             )
         return z[:, :p], z[:, p:], L
 
