@@ -23,6 +23,9 @@ SETTLED, RESTLESS = 0.02, 3.0
 """Change of the parameters in a round, in sigma, at which they count as settled, and above which at the end they are refused:
 with coarse encoders masks may go to and fro, for a sigma or so."""
 
+NEXT = 0.5
+"""Move of a step, in sigma, after which levels come next: steps converge quadratically, one more would move a thousandth."""
+
 PROBES = 4
 """Random signs by which the leverage of the torques is estimated."""
 
@@ -89,12 +92,12 @@ class JointFit:
         IdentificationError
             If it diverges or does not settle, or the log does not determine the motion.
         """
-        now, change = self, np.inf
+        now, before, change = self, self, np.inf
         for _ in range(ROUNDS):
             before, noises = now, [now.noise(k) for k in range(len(now.logs))]
             for _ in range(STEPS):
                 now, moved = now._step(noises)
-                if moved < SETTLED:
+                if moved < NEXT:
                     break
             now = replace(now, levels=now._levels(noises, floor))
             change = _sigmas(now.unknowns - before.unknowns, now.covariance)
@@ -102,7 +105,8 @@ class JointFit:
                 break
         if change > RESTLESS:
             raise IdentificationError(f"motion and parameters together do not settle, they move by {change:.2g} sigma: {CHECK}")
-        return replace(now, covariance=now._covariance())
+        same = np.allclose(now.levels.torque, before.levels.torque, rtol=SETTLED)
+        return now if same else replace(now, covariance=now._covariance())
 
     def _step(self, noises: list[Noise]) -> tuple["JointFit", float]:
         """Return the fit after a Gauss-Newton step, and how far the parameters moved [sigma]."""
