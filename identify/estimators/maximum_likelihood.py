@@ -20,9 +20,9 @@ from identify.rows.factors import Status
 from identify.rows.noise_propagation import NoiseLevels
 
 FAR, APART, SMALL = 15.0, 3.0, 1e-2
-"""Sigmas from the generalized least-squares estimate beyond which a fit is not believed; those where its own sigma is below this
-share of that. Where torques do not belong to the motion, parameters of zero, with which nothing moves, are as good as any. Noise
-alone, of a 10-bit encoder, takes a fit 7 sigma far."""
+"""Sigmas from the generalized least-squares estimate beyond which a fit is not believed; those where its own sigma is below
+this share of that. Where torques do not belong to the motion, parameters of zero, with which nothing moves, are as good as any.
+Noise alone, of a 10-bit encoder, takes a fit 7 sigma far."""
 
 MOST = 2e9
 """Bytes that the equations of all motions may take."""
