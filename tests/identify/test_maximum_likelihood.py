@@ -204,6 +204,7 @@ def test_the_delay_is_found_with_the_parameters(stated, truth):
     sigma = np.sqrt(fit.covariance[-1, -1])
     assert sigma < 5e-5
     assert abs(stated + fit.delay - 0.004) < 5 * sigma
+    assert smoothed_log(fit).torque.delay == pytest.approx(stated + fit.delay)
     assert (np.abs(found.X - truth) < 5 * found.sigma).all()
 
 
@@ -223,5 +224,6 @@ def test_the_smoothed_log_has_the_torques_of_its_positions(delay, truth):
     log = simulate(scenario(timing=replace(load("ideal").timing, delay=delay))).alone()
     log = noisy(log, BITS16, 0.0)
     better = smoothed_log(identify(log, scara(), EXPLICIT, estimator=ML).fits[()])
+    assert better.torque == log.torque
     before, after = (identify(one, scara(), EXPLICIT, estimator=WeightedLeastSquares()).X - truth for one in (log, better))
     assert np.exp(np.mean(np.log(np.abs(after) / np.abs(before)))) < 0.5

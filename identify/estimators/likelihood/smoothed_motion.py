@@ -1,5 +1,6 @@
 """The motion that a maximum-likelihood fit finds, with its uncertainty."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -65,10 +66,11 @@ def smoothed_motion(fit: JointFit, log: int = 0, t: Array | None = None) -> Smoo
 
 
 def smoothed_log(fit: JointFit, log: int = 0) -> MotionLog:
-    """Return a log of the smoothed positions and their torques, to feed other models or estimators with."""
+    """Return a log of the smoothed positions and their torques, with the delay of the fit, for other models or estimators."""
     cells, motion = fit.logs[log], smoothed_motion(fit, log)
     first = round(motion.t[0] * cells.log.fs)
-    return MotionLog(cells.log.fs, motion.q, cells.log.tau[first : first + len(motion.q)], cells.log.torque)
+    tau, torque = cells.log.tau[first : first + len(motion.q)], replace(cells.log.torque, delay=cells.delay)
+    return MotionLog(cells.log.fs, motion.q, tau, torque)
 
 
 def _covariance(fit: JointFit, log: int) -> Array:
