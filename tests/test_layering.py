@@ -22,6 +22,7 @@ ALLOWED_IN = {
     "identify/parameters/consistent.py": {"clarabel"},
     "sim/scenario/scenario_file.py": {"tomli_w"},
     "experiments/recording/columns.py": {"pyarrow"},
+    "experiments/recording/scales.py": {"matplotlib"},
     "experiments/study/study.py": {"pydantic"},
     "experiments/study/shard_file.py": {"pyarrow"},
     "experiments/study/store.py": {"pyarrow", "tomli_w"},

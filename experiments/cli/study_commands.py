@@ -55,8 +55,6 @@ def study(asked: Study) -> None:
         if pool is not None:
             with counting(store.study, sum(len(r) for r in store.missing(runs))) as watch:
                 run_missing(store, pool, runs, watch, receive)
-        if recording and not audience:
-            _show(store, recording)
         write_results(page, store, recording)
 
 
@@ -70,10 +68,10 @@ def _recording(store: Store, audience: Audience | None) -> "StudyRecording":
     return recording
 
 
-def _show(store: Store, recording: "StudyRecording", runs: range | None = None) -> None:
-    """Send runs to a recording, those of a shard or all that are finished."""
-    table = store.table() if runs is None else store.part(runs)
-    recording.add(cells(arrays(table), store.study.varied, store.study.parameters))
+def _show(store: Store, recording: "StudyRecording", _: range = range(0)) -> None:
+    """Show the runs that are finished to who watches, if it is time."""
+    if recording.due:
+        recording.show(cells(arrays(store.table()), store.study.varied, store.study.parameters))
 
 
 def _begun(name: str, out: Path | None, seeds: int | None, yes: bool) -> Store:

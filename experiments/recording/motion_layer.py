@@ -7,11 +7,12 @@ import rerun as rr
 
 from experiments.recording.arm import Arm
 from experiments.recording.audience import Audience
+from experiments.recording.chart import send_keys
 from experiments.recording.columns import Times, part, seconds, time_columns
 from experiments.recording.lanes import Lanes, joint_states
 from experiments.recording.layouts import tabs
 from experiments.recording.stream import Stream
-from experiments.recording.style import WIDTHS, kind_colors
+from experiments.recording.style import GREY, WIDTHS, joint_colors, kind_colors
 from identify import Array, MotionLog
 from sim.engine.watch import Inner, Stretch
 from sim.robot.robot import Robot
@@ -47,6 +48,8 @@ class Base:
         self._joints, self._fs, self._roles = [part(joint) for joint in robot.joints], fs, roles
         self._arm, self._lanes = Arm(self.stream, robot, roles), Lanes(self.stream, fs)
         self._before, self._turning = (np.empty(0), np.empty((0, robot.n))), np.zeros(robot.n)
+        keys = {"measured": GREY, **dict(zip(self._joints, joint_colors(robot.n), strict=True))}
+        send_keys(self.stream, "legend/joints", keys)
         if audience:
             audience.begin()
 

@@ -1,9 +1,9 @@
 """Writing arrays to a rerun recording: columns, not rows; to a file, a viewer, or both at once."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import Chunk, RrdReader
@@ -35,6 +35,7 @@ class Stream:
 
     def __init__(self, name: str, audience: Audience | None = None, *, layer: bool = False) -> None:
         self.name, self.paths, self._audience = name, set[str](), audience
+        self._draft = False
         self._file = rr.RecordingStream(APPLICATION, recording_id=name, send_properties=not layer)
         self._file.set_log_time_enabled(False)
         self._bytes = rr.binary_stream(self._file)
@@ -46,21 +47,32 @@ class Stream:
         live.set_sinks(rr.GrpcSink(audience.url))
         return live
 
+    @property
+    def _targets(self) -> list[rr.RecordingStream]:
+        return [recording for recording in (None if self._draft else self._file, self._live) if recording]
+
+    @contextmanager
+    def draft(self) -> Iterator[None]:
+        """Show what is sent in the block to who watches, and keep nothing of it: it will be sent again."""
+        self._draft = True
+        try:
+            yield
+        finally:
+            self._draft = False
+
     def send(self, path: str, times: Times, columns: Iterable[rr.ComponentColumn]) -> None:
         """Send columns of an entity."""
         self.paths.add(path)
         chunk = Chunk.from_columns(path, times, columns)
-        rr.send_chunks(chunk, recording=self._file)
-        if self._live:
-            rr.send_chunks(chunk, recording=self._live)
+        for recording in self._targets:
+            rr.send_chunks(chunk, recording=recording)
 
     def keep(self, path: str, *things: rr.AsComponents) -> None:
         """Send what holds at all times."""
         self.paths.add(path)
         for thing in things:
-            self._file.log(path, thing, static=True)
-            if self._live:
-                self._live.log(path, thing, static=True)
+            for recording in self._targets:
+                recording.log(path, thing, static=True)
 
     def style(self, path: str, names: Sequence[str], colors: Sequence[Color], width: float = 1.5) -> None:
         """Announce an entity of curves."""
@@ -79,27 +91,15 @@ class Stream:
         nothing = [" "] * len(STATES)  # words would be cut off where a state is short: the view's title tells the colours
         self.keep(path, rr.StateConfiguration(values=list(STATES), labels=nothing, colors=list(STATES.values())))
 
-    def bars(self, path: str, values: Array, x: Array, width: float, color: Color) -> None:
-        """Send bars where there is something to show: a value that is not finite has none."""
-        known = np.isfinite(values)
-        if known.any():
-            widths = np.full(np.count_nonzero(known), width)
-            self.keep(path, rr.BarChart(values[known], abscissa=x[known], widths=widths, color=color))
-
-    def grouped_bars(self, path: str, values: Array, place: int, kinds: int, color: Color) -> None:
-        """Send bars at 1, 2, ...; those of several `kinds` stand side by side, each in its `place`, from 0."""
-        slots = kinds + 1
-        self.bars(path, values, 1.0 + np.arange(float(len(values))) + (place - (kinds - 1) / 2) / slots, 1 / slots, color)
-
     def copy(self, reader: RrdReader) -> None:
         """Send what another file of the recording holds."""
         for entry in reader.recordings():
-            for recording in filter(None, (self._file, self._live)):
+            for recording in self._targets:
                 rr.send_chunks(reader.stream(store=entry), recording=recording)
 
     def describe(self, **properties: str) -> None:
         """Send properties of the whole recording."""
-        for recording in filter(None, (self._file, self._live)):
+        for recording in self._targets:
             recording.send_property("run", rr.AnyValues(drop_untyped_nones=True, **properties))
 
     def arrange(self, blueprint: rrb.Blueprint) -> None:

@@ -1,5 +1,6 @@
-"""The recording of a study: every run's errors, their distribution, and the worst runs."""
+"""The recording of a study: errors over the values of its axes, their distribution, and the worst runs."""
 
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -7,10 +8,12 @@ import numpy as np
 import rerun as rr
 
 from experiments.recording.audience import Audience
-from experiments.recording.columns import numbers
+from experiments.recording.chart import Chart
 from experiments.recording.folder import BASE
 from experiments.recording.layouts import tabs
+from experiments.recording.scales import linear
 from experiments.recording.stream import Stream
+from experiments.recording.study_charts import AxisCharts
 from experiments.recording.style import FORMS, GREY
 from experiments.study.answer import answer, where
 from experiments.study.statistics import Cell
@@ -20,9 +23,12 @@ from experiments.study.study_report import command, worst_runs
 EDGES = np.arange(-6.25, 6.3, 0.5)
 """Bins of errors in sigma; what lies beyond counts in the outermost."""
 
+EVERY = 2.0
+"""Time between two drawings for who watches [s]."""
+
 
 class StudyRecording:
-    """The recording of a study: points while it runs, the rest when it has ended.
+    """The recording of a study: drawn again and again while it runs, and kept when it has ended.
 
     Parameters
     ----------
@@ -35,41 +41,57 @@ class StudyRecording:
     """
 
     def __init__(self, study: Study, folder: Path, audience: Audience | None = None) -> None:
-        self._study, self._folder = study, folder
+        self._study, self._folder, self._drawn = study, folder, 0.0
         self.stream = Stream(f"study-{study.name}-{study.fingerprint[:10]}", audience)
-        for model in study.models:
-            size = 2.0 * (len(study.models) - study.models.index(model))
-            for name in study.parameters:
-                points = rr.SeriesPoints(names=model, colors=FORMS.get(model, GREY), marker_sizes=size)
-                self.stream.keep(f"runs/{name}/{model}", points)
-        self.stream.show(tabs(self.stream.paths))
 
-    def add(self, cells: Sequence[Cell]) -> None:
-        """Send the errors of runs, each a point."""
-        for cell in cells:
-            order, errors = np.argsort(cell.run, kind="stable"), 100 * cell.error
-            for p, name in enumerate(cell.parameters if cell.runs else ()):
-                self.stream.curves(f"runs/{name}/{cell.names[2]}", [numbers("run", cell.run[order])], errors[order, p])
+    @property
+    def due(self) -> bool:
+        """Whether it is time to draw again."""
+        return time.monotonic() > self._drawn + EVERY
+
+    def show(self, cells: Sequence[Cell]) -> None:
+        """Draw what is there so far for who watches."""
+        with self.stream.draft():
+            self._draw(cells)
+        self.stream.show(tabs(self.stream.paths))
         self.stream.breathe(0.0)
+        self._drawn = time.monotonic()
 
     def finish(self, cells: Sequence[Cell]) -> list[tuple[str, Stream]]:
-        """Send the answer, and the distributions of the errors; return the stream by the name of its file."""
-        text = rr.TextDocument(_text(self._study, cells, self._folder), media_type=rr.MediaType.MARKDOWN)
-        self.stream.keep("answer", text)
-        for model in self._study.models:
-            if mine := [cell for cell in cells if cell.runs and cell.names[2] == model]:
-                _sigmas(self.stream, model, mine)
+        """Draw everything, to be kept; return the stream by the name of its file."""
+        self._draw(cells)
         self.stream.arrange(tabs(self.stream.paths))
         return [(BASE, self.stream)]
 
+    def _draw(self, cells: Sequence[Cell]) -> None:
+        solved = [cell for cell in cells if cell.runs]
+        worst = worst_runs(solved)
+        written = rr.TextDocument(_text(self._study, cells, self._folder), media_type=rr.MediaType.MARKDOWN)
+        self.stream.keep("answer", written)
+        if not solved:
+            return
+        for axis in self._study.axes:
+            if len(axis.points) > 1:
+                AxisCharts(self.stream, axis, solved).send([(c, name, e, r, command(self._study, self._folder, c, r))
+                                                            for c, name, e, r in worst])  # fmt: skip
+        _send_sigmas(self.stream, solved)
 
-def _sigmas(stream: Stream, model: str, cells: Sequence[Cell]) -> None:
-    """Send the histogram of all errors over their corrected sigma."""
-    z = np.concatenate([((c.X - c.truth)[c.sigma > 0] / c.sigma[c.sigma > 0]) for c in cells])
-    color = FORMS.get(model, GREY)
-    counts, _ = np.histogram(np.clip(z, EDGES[0], EDGES[-1]), EDGES)
-    bars = rr.BarChart(counts / max(counts.sum(), 1), abscissa=(EDGES[:-1] + EDGES[1:]) / 2, widths=np.diff(EDGES), color=color)
-    stream.keep(f"sigmas/{model}", bars)
+
+def _send_sigmas(stream: Stream, cells: Sequence[Cell]) -> None:
+    """Send the distribution of all errors over their corrected sigma, a line a model, beside the normal one."""
+    middle = (EDGES[:-1] + EDGES[1:]) / 2
+    normal = np.exp(-(middle**2) / 2) / np.sqrt(2 * np.pi) * np.diff(EDGES)
+    shares = {}
+    for model in dict.fromkeys(cell.names[2] for cell in cells):
+        mine = [c for c in cells if c.names[2] == model]
+        z = np.concatenate([(c.X - c.truth)[c.sigma > 0] / c.sigma[c.sigma > 0] for c in mine])
+        counts, _ = np.histogram(np.clip(z, EDGES[0], EDGES[-1]), EDGES)
+        shares[model] = counts / max(counts.sum(), 1)
+    x, y = linear("error over its sigma", EDGES), linear("share of all errors", np.zeros(1), normal, *shares.values())
+    chart = Chart(stream, "study/sigmas", x, y)
+    chart.line("as it should be", middle, normal, GREY, 3.0)
+    for model, share in shares.items():
+        chart.line(model, middle, share, FORMS.get(model, GREY))
 
 
 def _text(study: Study, cells: Sequence[Cell], folder: Path) -> str:

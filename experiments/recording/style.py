@@ -26,6 +26,14 @@ FORMS: dict[str, Color] = {
 }
 """Colours of the models."""
 
+AGAIN: dict[str, tuple[Color, ...]] = {
+    "explicit": ((190, 230, 120), (0, 150, 150)),
+    "implicit": ((215, 190, 240), (90, 100, 230)),
+    "power": ((255, 175, 120), (255, 110, 200)),
+    "energy": ((210, 170, 140), (240, 200, 60)),
+}
+"""Colours of the models in a second and a third identification of a log."""
+
 PLANNED: Color = (240, 200, 60)
 MEASURED: Color = (90, 210, 220)
 """Colours of the planned arm and of that which the encoders see; the true arm has its own."""
@@ -50,8 +58,15 @@ def joint_colors(n: int) -> list[Color]:
     return [JOINTS[j % len(JOINTS)] for j in range(n)]
 
 
+def model_color(form: str, identification: int = 0) -> Color:
+    """Return the colour of a model in the first, second or third identification of a log; a fourth has that of the second."""
+    if not identification or form not in AGAIN:
+        return lighter(FORMS.get(form, GREY), identification)
+    return AGAIN[form][(identification - 1) % len(AGAIN[form])]
+
+
 def lighter(color: Color, times: int) -> list[int]:
-    """Return `color` moved halfway to white, that many times: a second identification in shades of the first."""
+    """Return `color` moved halfway to white, that many times."""
     return [round(255 - (255 - c) / 2**times) for c in color]
 
 

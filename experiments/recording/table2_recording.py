@@ -4,52 +4,74 @@ import numpy as np
 import rerun as rr
 
 from experiments.paper.table2 import PAPER, Table2
-from experiments.recording.columns import part
+from experiments.recording.chart import NARROW, SYMBOLS, Chart
 from experiments.recording.identification_recording import ROLES, RunRecording
 from experiments.recording.layouts import tabs
+from experiments.recording.scales import listed, named, signed
 from experiments.recording.stream import Stream
-from experiments.recording.style import FORMS
+from experiments.recording.style import FORMS, Color
 from experiments.recording.texts import about
-from identify import Array
 
-FLOOR = 0.01
-"""Error [%] at which the bars begin; every unit of their height is a decade more."""
+BEND = 0.01
+"""Error [%] up to which axes are linear, and that has the darkest cell."""
+
+WORST = 100.0
+"""Error [%] from which on a cell is as bright as it can be."""
+
+DARKEST, BRIGHTEST = np.array([32.0, 32.0, 36.0]), np.array([205.0, 60.0, 40.0])
+"""Colours of cells: on a logarithmic scale that all causes share."""
 
 
 def finish_table2(recording: RunRecording, table: Table2) -> list[tuple[str, Stream]]:
     """Add what only the end of a run gives to the first realization's recording; return its streams by file name."""
     run, stream = table.run, recording.base.stream
     streams = recording.end(run)
-    truth = list(table.truth.values())
-    for name, found in table.found.items():
-        for form, one in found.items():
-            _send(stream, f"processing/{name}/{form}", one.estimates[form].error_percent(truth), form)
-    for k, (name, alone) in enumerate(table.attribution.items()):
-        # Entities are shown in the order of their names.
-        at = f"attribution/{k:02}_{part(name.replace('%', 'percent'))}"
-        for form, error in alone.items():
-            _send(stream, f"{at}/{form}", error, form)
-    stream.keep("table2", rr.TextDocument(_markdown(table), media_type=rr.MediaType.MARKDOWN))
-    stream.keep(
-        "about", rr.TextDocument(about(table.scenario.name, table.scenario.origin, ROLES), media_type=rr.MediaType.MARKDOWN)
-    )
+    _send_processings(stream, table)
+    for form in next(iter(table.attribution.values())):
+        _send_causes(stream, table, form)
+    described = about(table.scenario.name, table.scenario.origin, ROLES)
+    for name, text in (("table2", _markdown(table)), ("about", described)):
+        stream.keep(name, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
     known = set().union(*(s.paths for _, s in streams))
     stream.arrange(tabs(known))
     return streams
 
 
-def _send(stream: Stream, path: str, error_percent: Array, form: str) -> None:
-    """Send bars of how many decades errors are above FLOOR, with their sign; those of the models stand side by side."""
-    heights = np.sign(error_percent) * np.log10(1 + np.abs(error_percent) / FLOOR)
-    stream.grouped_bars(path, heights, list(FORMS).index(form), len(FORMS), FORMS[form])
+def _send_processings(stream: Stream, table: Table2) -> None:
+    """Send the error of every parameter by both processings, on one scale."""
+    truth, names = list(table.truth.values()), list(table.truth)
+    errors = {
+        name: {form: one.estimates[form].error_percent(truth) for form, one in found.items()}
+        for name, found in table.found.items()
+    }
+    x = signed("error [%]", *(error for found in errors.values() for error in found.values()), bend=BEND)
+    for name, found in errors.items():
+        chart = Chart(stream, f"processing/{name}", x, listed("", names), NARROW)
+        for symbol, (form, error) in zip(SYMBOLS, found.items(), strict=False):
+            chart.marks(form, error, np.arange(float(len(names))), FORMS[form], symbol)
+            chart.list_entry(form, FORMS[form])
+
+
+def _send_causes(stream: Stream, table: Table2, form: str) -> None:
+    """Send the error of every parameter by each cause alone, as a table whose cells are coloured on one scale."""
+    causes, names = list(table.attribution), list(table.truth)
+    chart = Chart(stream, f"attribution/{form}", named("", names), listed("", causes))
+    errors = np.array([table.attribution[cause][form] for cause in causes])
+    y, x = np.indices(errors.shape).astype(np.float64)
+    chart.cells(x.ravel(), y.ravel(), [_shade(e) for e in errors.ravel()], [f"{e:+.2g}" for e in errors.ravel()])
+
+
+def _shade(error_percent: float) -> Color:
+    share = np.log10(max(abs(error_percent), BEND) / BEND) / np.log10(WORST / BEND)
+    return [round(c) for c in DARKEST + min(share, 1.0) * (BRIGHTEST - DARKEST)]
 
 
 def _markdown(table: Table2) -> str:
-    """Return the explicit and the power model's estimates beside the paper's, and how to read the bars."""
+    """Return the explicit and the power model's estimates beside the paper's."""
     lines = ["| | true | | paper | paper's steps | idbench |", "|---|---:|---|---:|---:|---:|"]
     for i, (name, true) in enumerate(table.truth.items()):
         for form in ("explicit", "power"):
             X = [found[form].estimates[form].X[i] for found in table.found.values()]
-            head = f"{i + 1} {name} | {true:g}" if form == "explicit" else " | "
+            head = f"{name} | {true:g}" if form == "explicit" else " | "
             lines.append(f"| {head} | {form} | {PAPER[form].estimate[i]:g} | {' | '.join(f'{x:.4g}' for x in X)} |")
-    return "\n".join([*lines, f"\nBars: error of parameters 1 to 8 in decades above {FLOOR} %; 4 is 100 %."])
+    return "\n".join(lines)

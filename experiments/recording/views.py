@@ -5,8 +5,13 @@ from collections.abc import Set as AbstractSet
 
 import rerun.blueprint as rrb
 
-MOST = 3
-"""Entities in a view up to which a legend has room; the colours are the same everywhere."""
+from experiments.recording.chart import HEIGHT, WIDE
+
+LEGEND, EDGE = 0.66, 0.1
+"""Room to the right of a chart, with a legend and without one, in heights of its frame."""
+
+KEYS = rrb.VisualBounds2D(x_range=[0, 32], y_range=[-0.5, 0.5])
+"""What a row of keys shows: some eight of them."""
 
 Part = rrb.Container | rrb.View | None
 
@@ -49,17 +54,17 @@ def _matches(path: Sequence[str], pattern: Sequence[str]) -> bool:
     return len(path) == len(pattern) and all(p in ("*", part) for part, p in zip(path, pattern, strict=True))
 
 
-def plot(shelf: Shelf, name: str, *patterns: str, legend: bool = True) -> Part:
-    """Return a view of curves over time, its time axis that of all others; none if there is nothing to show."""
+def plot(shelf: Shelf, name: str, *patterns: str) -> Part:
+    """Return a view of curves over time, its time axis that of all others; none if there is nothing to show.
+
+    It has no legend, which would cover curves: `keys` is one for all.
+    """
     found = shelf.of(*patterns)
     if not found:
         return None
-    return rrb.TimeSeriesView(
-        name=name,
-        contents=_contents(found),
-        axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop, visible=legend and len(found) <= MOST),
-    )
+    linked = rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal)
+    hidden = rrb.PlotLegend(visible=False)
+    return rrb.TimeSeriesView(name=name, contents=_contents(found), axis_x=linked, plot_legend=hidden)
 
 
 def lanes(shelf: Shelf, name: str, *patterns: str) -> Part:
@@ -68,17 +73,42 @@ def lanes(shelf: Shelf, name: str, *patterns: str) -> Part:
     return rrb.StateTimelineView(name=name, contents=_contents(found)) if found else None
 
 
-def bars(shelf: Shelf, name: str, *patterns: str) -> Part:
-    """Return a view of bars, if there are any."""
-    found = shelf.of(*patterns)
-    hidden = rrb.PlotLegend(visible=False)  # it would be paths; the colours are those of the models
-    return rrb.BarChartView(name=name, contents=_contents(found), plot_legend=hidden) if found else None
+def charts(shelf: Shelf, name: str, pattern: str, width: float = WIDE, words: float = 0.0) -> list[Part]:
+    """Return a view of each chart, titled with its parts of the path in braces.
+
+    Parameters
+    ----------
+    shelf : Shelf
+        Where they are.
+    name : str
+        Title, with {1} for the second part of the path and so on.
+    pattern : str
+        Paths of the charts.
+    width : float
+        That of their frames.
+    words : float
+        Room that names beside the upright axis need more than numbers do, in heights of the frame.
+    """
+    found = [frame.removesuffix("/frame") for frame in shelf.of(f"{pattern}/frame")]
+    return [_chart(shelf, name.format(*path.split("/")), path, width, words) for path in found]
+
+
+def _chart(shelf: Shelf, name: str, path: str, width: float, words: float) -> Part:
+    right = LEGEND if shelf.of(f"{path}/legend/*") else EDGE
+    bounds = rrb.VisualBounds2D(x_range=[-0.32 - words, width + right], y_range=[-0.17, HEIGHT + 0.3])
+    return rrb.Spatial2DView(origin=f"/{path}", name=name, visual_bounds=bounds)
+
+
+def keys(shelf: Shelf, *patterns: str) -> Part:
+    """Return legends, side by side in a row that is as low as it can be."""
+    rows = [rrb.Spatial2DView(origin=f"/{path}", name=path, titlebar=False, visual_bounds=KEYS) for path in shelf.of(*patterns)]
+    return rrb.Horizontal(*rows) if len(rows) > 1 else next(iter(rows), None)
 
 
 def text(shelf: Shelf, *patterns: str) -> Part:
     """Return the texts, one behind the other, if there are any."""
     found = [rrb.TextDocumentView(origin=f"/{path}", name=_title(path)) for path in shelf.of(*patterns)]
-    return rrb.Tabs(*found, active_tab=len(found) - 1) if len(found) > 1 else next(iter(found), None)
+    return rrb.Tabs(*found, active_tab=len(found) - 1, name="texts") if len(found) > 1 else next(iter(found), None)
 
 
 def _title(path: str) -> str:
@@ -94,10 +124,10 @@ def _contents(paths: Iterable[str]) -> list[str]:
     return [f"+ /{path}" for path in paths]
 
 
-def column(*parts: Part, shares: Sequence[float] | None = None) -> Part:
+def column(*parts: Part, shares: Sequence[float] | None = None, name: str | None = None) -> Part:
     """Return the parts that there are, one above the other; none if there are none."""
     there = [(part, share) for part, share in zip(parts, shares or [1.0] * len(parts), strict=True) if part is not None]
-    return rrb.Vertical(*(p for p, _ in there), row_shares=[s for _, s in there]) if there else None
+    return rrb.Vertical(*(p for p, _ in there), row_shares=[s for _, s in there], name=name) if there else None
 
 
 def side_by_side(name: str, *parts: Part, shares: Sequence[float]) -> Part:
@@ -108,10 +138,10 @@ def side_by_side(name: str, *parts: Part, shares: Sequence[float]) -> Part:
     return rrb.Horizontal(*(p for p, _ in there), column_shares=[s for _, s in there], name=name)
 
 
-def tabbed(parts: Sequence[Part]) -> Part:
+def tabbed(parts: Sequence[Part], name: str | None = None) -> Part:
     """Return parts behind each other, the first in front."""
     there = [part for part in parts if part is not None]
-    return rrb.Tabs(*there, active_tab=0) if there else None
+    return rrb.Tabs(*there, active_tab=0, name=name) if there else None
 
 
 def grid(name: str, parts: Sequence[Part], columns: int) -> Part:

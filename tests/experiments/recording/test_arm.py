@@ -73,17 +73,3 @@ def test_it_moves_and_is_recorded_under_names_without_signs(robot, reading, tmp_
     np.testing.assert_allclose(position, moving.positions["fore arm"], atol=1e-6)
     assert {"world/true/body1/geom1", "world/true/fore_arm/mesh"} <= reading.entities(tmp_path / "made.rrd")
     reading.verify(tmp_path / "made.rrd")
-
-
-def test_what_has_no_number_has_no_bar(reading, tmp_path):
-    """An error of a parameter whose truth is zero is none, not a perfect one."""
-    stream = Stream("bars")
-    stream.grouped_bars("some", np.array([1.0, np.nan, -2.0, np.inf]), 0, 1, (0, 0, 0))
-    stream.grouped_bars("none", np.array([np.nan]), 0, 1, (0, 0, 0))
-    stream.write(tmp_path / "bars.rrd")
-    assert "none" not in reading.entities(tmp_path / "bars.rrd")
-    (chunk,) = RrdReader(tmp_path / "bars.rrd").stream().filter(content="some").to_chunks()
-    batch = chunk.to_record_batch()
-    shown = {name: batch.column(f"BarChart:{name}").to_pylist()[0][0]["buffer"] for name in ("values", "abscissa")}
-    np.testing.assert_array_equal(np.array(shown["values"]), [1.0, -2.0])
-    np.testing.assert_array_equal(np.array(shown["abscissa"]), [1.0, 3.0])

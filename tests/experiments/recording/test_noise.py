@@ -37,15 +37,17 @@ def test_measured_positions_are_off_by_counts_and_the_band_is_narrower(folder, j
 
 
 def test_it_stands_in_the_tab_beside_the_spectra(folder):
-    shown = [path for view in views(noise(Shelf(known(files(folder))[1]))) for path in view.contents]
-    for part in ("explicit/spectrum/joint2", "measured_less_smoothed/qd/joint2", "smoothed_band/q/joint1"):
+    there = views(noise(Shelf(known(files(folder))[1])))
+    shown = [path for view in there if isinstance(view.contents, list) for path in view.contents]
+    for part in ("measured_less_smoothed/qd/joint2", "smoothed_band/q/joint1"):
         assert f"+ /identify/idbench-ML-delay/{part}" in shown
+    assert "/identify/idbench-ML-delay/spectrum/joint2" in [view.origin for view in there]
 
 
 def views(part):
-    """Return the views of a container that have contents, those of the containers in it included."""
+    """Return the views of a container, those of the containers in it included."""
     if not isinstance(part, rrb.Container):
-        return [part] if isinstance(part.contents, list) else []
+        return [part]
     return [view for inner in part.contents for view in views(inner)]
 
 

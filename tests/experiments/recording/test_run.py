@@ -7,6 +7,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from experiments.recording.audience import Audience
+from experiments.recording.chart import SQUARE
 from experiments.recording.identification_recording import RunRecording
 from identify import measured_state
 from sim.robot.scene import motion, shapes
@@ -134,13 +135,38 @@ def test_velocities_are_shown_as_measured_and_as_the_rows_see_them(recorded):
     assert np.abs(seen - true).max() < 0.2 * np.abs(true).max()  # moves of 1.3 s pass a filter of 5 Hz, but for their edges
 
 
-def test_the_parameter_table_and_the_bars_tell_the_errors(recorded):
-    found = recorded.ran.identified
+def static(recorded, path, component):
     store = RrdReader(recorded.folder / "recording.idbench-GLS.rrd").store()
-    (text,) = [c for c in store.stream().filter(content="identify/idbench-GLS/report").to_chunks() if c.is_static]
-    table = text.to_record_batch().column("TextDocument:text").to_pylist()[0][0]
-    for name, truth in found.truth.items():
-        assert f"{name} | {truth:g} |" in table
+    (chunk,) = [c for c in store.stream().filter(content=f"identify/idbench-GLS/{path}").to_chunks() if c.is_static]
+    return chunk.to_record_batch().column(component).to_pylist()[0]
+
+
+def test_the_table_and_the_chart_of_parameters_tell_the_errors(recorded):
+    """In the chart a mark is as far to the right as its error is large, and on the side of its sign."""
+    found, names = recorded.ran.identified, recorded.ran.identified.basis.names
+    table = static(recorded, "report", "TextDocument:text")[0]
+    truth = np.array(list(found.truth.values()))
+    for name, true in found.truth.items():
+        assert f"{name} | {true:g} |" in table
+    assert static(recorded, "parameters/0/ticks_y", "LineStrips2D:labels") == list(names)
+    for form, estimate in found.estimates.items():
+        strips = static(recorded, f"parameters/0/marks/{form}", "LineStrips2D:strips")
+        x = np.array([(min(p[0] for p in strip) + max(p[0] for p in strip)) / 2 for strip in strips])
+        error = (estimate.X - truth) / truth
+        np.testing.assert_array_equal(np.argsort(x), np.argsort(error))
+        assert ((x > SQUARE / 2) == (error > 0)).all()
+
+
+def test_friction_and_residuals_are_charted_for_each_joint(recorded, reading):
+    """The law that was found goes through the dots; the residual's mean is that of the dots' bins."""
+    there = reading.entities(recorded.folder / "recording.idbench-GLS.rrd")
+    for joint in ("joint1", "joint2"):
+        for kind, lines in (("friction", ("explicit", "implicit", "true")), ("over_velocity", ("mean_explicit",))):
+            assert {f"identify/idbench-GLS/{kind}/{joint}/lines/{line}" for line in lines} <= there
+        law = np.array(static(recorded, f"friction/{joint}/lines/true", "LineStrips2D:strips")[0])
+        assert (np.diff(law[:, 0]) >= 0).all()
+        assert (np.diff(law[:, 1]) <= 1e-6).all()  # friction grows with velocity, and y points down
+    assert not any("/friction/power" in path for path in there)
 
 
 def test_a_recording_is_a_base_and_layers_of_one_id_each_with_one_layout(recorded, reading):

@@ -62,16 +62,24 @@ def test_the_report_is_one_file_with_everything_in_it(done):
 
 
 def test_the_recording_holds_every_error(done, undisturbed):
+    """Dots of a parameter, back through the logarithmic axis: as many as runs, each at its size."""
     path = done / "recording.rrd"
     verified = subprocess.run(
         [rerun_cli.__path__[0] + "/rerun", "rrd", "verify", str(path)], capture_output=True, text=True, check=False
     )
     assert verified.returncode == 0, verified.stderr
-    chunks = RrdReader(path).stream().filter(content="/runs/Fv2/power", has_timeline="run").to_chunks()
-    batches = [chunk.to_record_batch() for chunk in chunks]
-    values = np.concatenate([np.ravel(batch.column("Scalars:scalars").to_pylist()) for batch in batches])
-    expected = [100 * (r["Fv2"] - 0.01) / 0.01 for r in undisturbed.to_pylist() if r["model"] == "power"]
-    np.testing.assert_allclose(np.sort(values), np.sort(expected), rtol=1e-9)
+    errors = [100 * abs(r["Fv2"] - 0.01) / 0.01 for r in undisturbed.to_pylist() if r["model"] == "power"]
+    cutoffs = sorted({r["chain.operator.cutoff"] for r in undisturbed.to_pylist()})
+    assert len(cutoffs) == 2
+    chunks = RrdReader(path).stream().filter(content="/study/chain.operator.cutoff/parameters/06/Fv2/dots/**").to_chunks()
+    of_power = [chunk for chunk in chunks if "_power_" in chunk.entity_path]
+    batches = [chunk.to_record_batch() for chunk in of_power]
+    places = np.concatenate([np.array(batch.column("Points2D:positions").to_pylist()[0]) for batch in batches])
+    assert 0.9 * len(errors) <= len(places) <= len(errors)  # errors that are zero by chance lie below the axis
+    up = np.sort(-places[:, 1])
+    expected = np.sort(np.log10(errors))[-len(up) :]
+    slope, offset = np.polyfit(expected, up, 1)
+    np.testing.assert_allclose(up, slope * expected + offset, atol=1e-5)
 
 
 def test_a_run_is_made_again_bit_for_bit(done, tmp_path, capfd):

@@ -1,0 +1,160 @@
+"""Charts of one quantity over another, drawn into a 2D view: what rerun plots by itself is over time."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+import rerun as rr
+
+from experiments.recording.columns import part
+from experiments.recording.scales import AbstractScale
+from experiments.recording.stream import Stream
+from experiments.recording.style import Color
+from identify import Array
+
+HEIGHT = 1.0
+"""Height of a frame: the unit of everything in a chart. 2D views keep the ratio of their axes."""
+
+WIDE, NARROW, SQUARE = 2.2, 1.4, 1.2
+"""Widths of frames: of charts one above the other, of those that stand in a row, and of those that hold a long list."""
+
+FRAME: Color = (120, 120, 120)
+GRID: Color = (70, 70, 70)
+TEXT: Color = (170, 170, 170)
+
+LINE = 0.11
+"""Height of a line of the legend."""
+
+GRID_ORDER, DOT_ORDER, LINE_ORDER, MARK_ORDER = -3.0, -2.0, 1.0, 2.0
+"""What is drawn over what."""
+
+Symbol = Literal["circle", "square", "triangle", "diamond", "cross"]
+
+_TURNS: dict[Symbol, Sequence[tuple[float, float]]] = {
+    "square": [(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)],
+    "triangle": [(-1, 1), (0, -1), (1, 1), (-1, 1)],
+    "diamond": [(-1.3, 0), (0, -1.3), (1.3, 0), (0, 1.3), (-1.3, 0)],
+    "cross": [(-1, -1), (1, 1), (0, 0), (-1, 1), (1, -1)],
+    "circle": [(np.cos(a), np.sin(a)) for a in np.linspace(0, 2 * np.pi, 13)],
+}
+SYMBOLS: tuple[Symbol, ...] = tuple(_TURNS)
+
+LETTER, GAP = 0.5, 1.4
+"""Width of a letter of a legend in a row, and of the room between its entries, in heights of its view."""
+
+LETTER_BESIDE = 0.016
+"""Half the width of a letter beside the upright axis, of a chart that is some 220 points high."""
+
+FILLS = 8
+"""Lines that fill a cell."""
+
+RAISE = 0.05
+"""How far texts are raised: the viewer writes them below where they belong."""
+
+SIZE = 0.016
+"""Half the width of a symbol."""
+
+
+class Chart:
+    """A chart: a frame with its axes, and what is drawn into it.
+
+    Widths and sizes are in points of the screen, which rerun takes from negative radii.
+
+    Parameters
+    ----------
+    stream : Stream
+        Where it goes.
+    path : str
+        Entity of which its parts are the children.
+    x, y : AbstractScale
+        Its axes.
+    width : float
+        That of its frame.
+    """
+
+    def __init__(self, stream: Stream, path: str, x: AbstractScale, y: AbstractScale, width: float = WIDE) -> None:
+        self._stream, self._path, self._x, self._y, self._listed = stream, path, x, y, list[str]()
+        self._width = width
+        corners = [[0, 0], [self._width, 0], [self._width, HEIGHT], [0, HEIGHT], [0, 0]]
+        self._strips("frame", [np.array(corners)], FRAME, 0.6, GRID_ORDER)
+        along, up = self._width * x.at(list(x.ticks)), HEIGHT * (1 - y.at(list(y.ticks)))
+        lines = [*([[at, 0], [at, HEIGHT]] for at in along), *([[0, at], [self._width, at]] for at in up)]
+        self._strips("grid", [np.array(line) for line in lines], GRID, 0.3, GRID_ORDER)
+        self._texts("ticks_x", [(at, HEIGHT + 0.1) for at in along], list(x.ticks.values()))
+        beside = [-LETTER_BESIDE * (2 + len(tick)) for tick in y.ticks.values()]
+        self._texts("ticks_y", list(zip(beside, up, strict=True)), list(y.ticks.values()))
+        self._texts("names", [(self._width / 2, HEIGHT + 0.24), (0.2, -0.09)], [x.name, y.name])
+
+    def dots(self, name: str, x: Array, y: Array, color: Color, size: float = 1.2) -> None:
+        """Draw values as dots, each `size` points in radius; those beyond the axes are left out."""
+        where = self._where(x, y)[self._x.holds(x) & self._y.holds(y)]
+        dots = rr.Points2D(where, colors=[color], radii=[-size], show_labels=False, draw_order=DOT_ORDER)
+        self._stream.keep(f"{self._path}/dots/{part(name)}", dots)
+
+    def line(self, name: str, x: Array, y: Array, color: Color, width: float = 1.2, *, listed: bool = True) -> None:
+        """Draw a line through values, with a gap where one is not finite, and list it in the legend."""
+        where = self._where(x, y)
+        gaps = np.flatnonzero(~np.isfinite(where).all(axis=1))
+        runs = [run[np.isfinite(run).all(axis=1)] for run in np.split(where, gaps)]
+        self._strips(f"lines/{part(name)}", [run for run in runs if len(run) > 1], color, width, LINE_ORDER)
+        if listed:
+            self.list_entry(name, color)
+
+    def segments(self, name: str, x: Array, y: Array, color: Color, width: float = 1.0) -> None:
+        """Draw a line from each first to each second value, arrays of shape (segment, 2): intervals, error bars."""
+        ends = np.stack([self._where(x[:, k], y[:, k]) for k in (0, 1)], axis=1)
+        self._strips(f"segments/{part(name)}", list(ends[np.isfinite(ends).all(axis=(1, 2))]), color, width, LINE_ORDER)
+
+    def marks(self, name: str, x: Array, y: Array, color: Color, symbol: Symbol = "circle") -> None:
+        """Draw values as symbols."""
+        where, shape = self._where(x, y), SIZE * np.array(_TURNS[symbol])
+        self._strips(
+            f"marks/{part(name)}", [at + shape for at in where[np.isfinite(where).all(axis=1)]], color, 1.0, MARK_ORDER
+        )
+
+    def cells(self, x: Array, y: Array, colors: Sequence[Color], texts: Sequence[str]) -> None:
+        """Fill a cell around each pair of names, and write into it."""
+        half = 0.47 * np.array([self._width, HEIGHT]) / np.abs([self._x.high - self._x.low, self._y.high - self._y.low])
+        where, turns = self._where(x, y), np.linspace(-1, 1, FILLS)
+        zigzag = np.stack([np.tile([-1, 1, 1, -1], FILLS // 2), np.repeat(turns, 2)], axis=1)  # boxes have no inside in 2D
+        thick = [half[1] / FILLS]
+        fills = rr.LineStrips2D([at + half * zigzag for at in where], colors=colors, radii=thick, draw_order=GRID_ORDER)
+        self._stream.keep(f"{self._path}/cells", fills)
+        self._texts("values", where, texts, (230, 230, 230))
+
+    def write(self, name: str, x: Array, y: Array, texts: Sequence[str], color: Color = TEXT) -> None:
+        """Write at values."""
+        self._texts(name, self._where(x, y), texts, color)
+
+    def list_entry(self, name: str, color: Color) -> None:
+        """Add a line to the legend, which stands beside the frame."""
+        at = (self._width + 0.26, LINE * (0.5 + len(self._listed)))
+        self._listed.append(name)
+        self._texts(f"legend/{part(name)}", [at], [name], color)
+
+    def _where(self, x: npt.ArrayLike, y: npt.ArrayLike) -> Array:
+        return np.stack([self._width * self._x.at(x), HEIGHT * (1 - self._y.at(y))], axis=-1)  # the view's y points down
+
+    def _strips(self, name: str, strips: Sequence[Array], color: Color, width: float, order: float) -> None:
+        if strips:
+            lines = rr.LineStrips2D(strips, colors=[color], radii=[-width], draw_order=order, show_labels=False)
+            self._stream.keep(f"{self._path}/{name}", lines)
+
+    def _texts(
+        self, name: str, where: "Iterable[tuple[float, float]] | Array", texts: Sequence[str], color: Color = TEXT
+    ) -> None:
+        """Write texts, each in the middle of a line too short to be seen: beside points, they stand below."""
+        shown = [(text, np.array([at, at]) - (0, RAISE)) for text, at in zip(texts, where, strict=True) if text]
+        if shown:
+            words, strips = zip(*shown, strict=True)
+            lines = rr.LineStrips2D(list(strips), colors=[color], radii=[0.0], labels=list(words), show_labels=True)
+            self._stream.keep(f"{self._path}/{name}", lines)
+
+
+def send_keys(stream: Stream, path: str, entries: Mapping[str, Color]) -> None:
+    """Send a legend for many plots: names in their colours, in a row."""
+    widths = np.array([LETTER * len(name) + GAP for name in entries])
+    strips = [np.array([[at, -0.5]] * 2) for at in np.cumsum(widths) - widths / 2]
+    lines = rr.LineStrips2D(strips, colors=list(entries.values()), radii=[0.0], labels=list(entries), show_labels=True)
+    stream.keep(path, lines)

@@ -1,0 +1,88 @@
+"""Charts of estimates: every parameter with its interval beside the truth, and how well W tells them apart."""
+
+from math import ceil
+
+import numpy as np
+import numpy.typing as npt
+
+from experiments.identification.identified import Identified
+from experiments.recording.chart import NARROW, SQUARE, SYMBOLS, Chart
+from experiments.recording.scales import Signed, decades, linear, listed
+from experiments.recording.stream import Stream
+from experiments.recording.style import FORMS, GREY
+from identify import Array
+
+MOST = 13
+"""Parameters of a chart."""
+
+SIGMAS = 2.0
+"""Half the length of an interval."""
+
+ASIDE = 0.22
+"""How far the models of a parameter stand apart, of its room."""
+
+PERCENT = 100.0
+
+
+def send_parameters(stream: Stream, at: str, found: Identified) -> None:
+    """Send every parameter's error, or its deviation from the first model's, with its interval; and the singular values."""
+    names, scale = found.basis.names, _scale(found)
+    for k, part in enumerate(_parts(found)):
+        chart = Chart(stream, f"{at}/parameters/{k}", scale, listed("", [names[p] for p in part]), SQUARE)
+        ends = np.array([-0.5, len(part) - 0.5])
+        chart.line("true" if found.truth else next(iter(found.estimates)), np.zeros(2), ends, GREY, listed=False)
+        for i, (form, estimate) in enumerate(found.estimates.items()):
+            off, sigma = _deviation(found, estimate.X)[part], _in_percent(found, estimate.best_sigma)[part]
+            y = np.arange(float(len(part))) + ASIDE * (i - (len(found.estimates) - 1) / 2)
+            color = FORMS.get(form, GREY)
+            reach = np.stack([off - SIGMAS * sigma, off + SIGMAS * sigma], axis=1)
+            chart.segments(form, reach, np.stack([y, y], axis=1), color, 1.5)
+            chart.marks(form, off, y, color, SYMBOLS[i % len(SYMBOLS)])
+    _singular_values(stream, at, found)
+
+
+def _parts(found: Identified) -> list[npt.NDArray[np.intp]]:
+    """Return the parameters of each chart, by joints."""
+    order = sorted(range(len(found.basis.names)), key=lambda p: found.basis.parameters[p].joint or 0)
+    return np.array_split(np.array(order, dtype=np.intp), ceil(len(order) / MOST))
+
+
+def _reference(found: Identified) -> Array:
+    """Return what estimates are compared with: the truth, or the first of them."""
+    return np.array(list(found.truth.values())) if found.truth else next(iter(found.estimates.values())).X
+
+
+def _in_percent(found: Identified, values: Array) -> Array:
+    reference = np.abs(_reference(found))
+    return PERCENT * values / np.where(reference == 0, np.nan, reference)
+
+
+def _deviation(found: Identified, X: Array) -> Array:
+    return _in_percent(found, X - _reference(found))
+
+
+def _scale(found: Identified) -> Signed:
+    """Return an axis for all parameters, linear up to what the best of them is sure of."""
+    sigmas = [SIGMAS * _in_percent(found, estimate.best_sigma) for estimate in found.estimates.values()]
+    off = [_deviation(found, estimate.X) for estimate in found.estimates.values()]
+    every = np.concatenate([np.abs(x) + s for x, s in zip(off, sigmas, strict=True)])
+    every = every[np.isfinite(every) & (every > 0)]
+    low, high = (float(every.min()), float(every.max())) if len(every) else (1.0, 1.0)
+    bend = 10.0 ** np.floor(np.log10(max(low, high * 1e-6)))
+    what = "error" if found.truth else f"difference from {next(iter(found.estimates))}"
+    return Signed(f"{what} [%], with its interval of two sigma", -1.3 * high, 1.3 * high, bend)
+
+
+def _singular_values(stream: Stream, at: str, found: Identified) -> None:
+    """Send the singular values of W, over the largest; beyond the conditions that they allow, parameters are not told apart."""
+    values = {
+        form: np.linalg.svd(estimate.problem.factors.together.R_W, compute_uv=False)
+        for form, estimate in found.estimates.items()
+    }
+    shares = {form: s / s[0] for form, s in values.items()}
+    numbers = np.arange(1.0, 1 + len(found.basis.names))
+    x, y = linear("number", numbers), decades("over the largest", *shares.values())
+    chart = Chart(stream, f"{at}/singular_values", x, y, NARROW)
+    for i, (form, share) in enumerate(shares.items()):
+        chart.marks(form, numbers, share, FORMS.get(form, GREY), SYMBOLS[i % len(SYMBOLS)])
+        chart.line(f"{form}: {1 / share[-1]:.3g}", numbers, share, FORMS.get(form, GREY))

@@ -1,0 +1,211 @@
+"""Layouts of runs and logs: what is looked at together, one a purpose."""
+
+from collections.abc import Iterator, Sequence
+from functools import cache
+
+from experiments.recording.chart import NARROW, SQUARE
+from experiments.recording.views import Part, Shelf, arm, charts, column, grid, keys, lanes, plot, side_by_side, tabbed, text
+from identify import BLOCKS
+from identify.basis.body_regressor import KINDS
+
+DIGITS = "0123456789"
+
+ESTIMATES = 12
+"""Plots of estimates that have room beside each other."""
+
+FEW = 3
+"""Kinds of row that have room one above the other."""
+
+JOINT_STATES = "green slides, amber turns, red stands, pink saturated"
+MASK_STATES = "green used, amber in part, red masked"
+
+
+def overview(shelf: Shelf) -> Part:
+    """Return where to begin: the arm, the motion, torques measured and predicted, what is left over, parameters."""
+    rows = _rows(shelf)
+    motion = column(
+        plot(shelf, "q [rad]", "q/planned", "q/true") or plot(shelf, "q [rad]", "q/measured"),
+        plot(shelf, "qd [rad/s]", "qd/planned", "qd/true"),
+        plot(shelf, "torque in the log [N m]", "torque/log") or plot(shelf, "torque commanded [N m]", "torque/command"),
+        None if rows else plot(shelf, "tracking error [rad]", "error/tracking"),
+        None if rows else plot(shelf, "torque, true - commanded [N m]", "torque/disturbance"),
+        lanes(shelf, JOINT_STATES, "state/*"),
+    )
+    left = column(arm(shelf), text(shelf, "identify/*/estimates") or text(shelf, "about"), shares=[5, 4])
+    fits, left_over = column(*_fits(shelf, rows)), column(*_residuals(shelf, rows))
+    return side_by_side("overview", left, motion, fits, left_over, shares=[7, 7, 5, 5])
+
+
+def torques(shelf: Shelf) -> Part:
+    """Return torques measured and predicted, and residuals, two joints in a row; of arms with many joints."""
+    rows = _rows(shelf)
+    if len(rows) <= FEW + 1:  # which the overview shows well
+        return None
+    pairs = zip(_fits(shelf, rows), _residuals(shelf, rows), strict=True)
+    return grid("torques", [column(fit, left, shares=[3, 2]) for fit, left in pairs], 2)
+
+
+def friction(shelf: Shelf) -> Part:
+    """Return friction over velocity, residuals over velocity and position, where cogging shows, and the friction parameters."""
+    joints = shelf.parents("identify/*/over_velocity/*/frame")
+    names = [name for name in sorted(shelf.last("identify/*/*/estimate/*"), key=_order) if name.startswith("F")]
+    if not joints:
+        return None
+    if len(joints) * len(shelf.methods) <= FEW:
+        return _friction(shelf, "friction", joints, names)
+    pages = [
+        _friction(shelf, joint, [joint], [x for x in names if _number(x) == number]) for number, joint in enumerate(joints, 1)
+    ]
+    return tabbed(pages, "friction")
+
+
+def _friction(shelf: Shelf, name: str, joints: Sequence[str], names: Sequence[str]) -> Part:
+    rows = [_frictions(shelf, joint, method) for joint in joints for method in shelf.methods]
+    shown = grid("charts", [view for row in rows for view in row], max(map(len, rows)))
+    return side_by_side(name, shown, column(*(_estimate(shelf, x) for x in names)), shares=[5, 1])
+
+
+def _frictions(shelf: Shelf, joint: str, method: str) -> list[Part]:
+    of = f" ({method})" if len(shelf.methods) > 1 else ""
+    kinds = {
+        "friction": "friction over velocity",
+        "over_velocity": "residual over velocity",
+        "over_position": "residual over position",
+    }
+    found = [charts(shelf, f"{joint}: {what}{of}", f"identify/{method}/{kind}/{joint}", NARROW) for kind, what in kinds.items()]
+    return [view for views in found for view in views]
+
+
+def drive(shelf: Shelf) -> Part:
+    """Return what the drives were asked for and did, at every sample and inside the loop."""
+    if not shelf.of("drive/*"):
+        return None
+    samples = column(
+        plot(shelf, "current [A], asked for and true", "drive/reference", "drive/current"),
+        plot(shelf, "voltage [V]", "drive/voltage"),
+        plot(shelf, "duty, share of the bus voltage", "drive/duty"),
+        plot(shelf, "torque, true - commanded [N m]", "torque/disturbance"),
+        lanes(shelf, JOINT_STATES, "state/*"),
+    )
+    inside = column(
+        plot(shelf, "inside the loop: current [A], asked for and true", "inner/reference", "inner/current"),
+        plot(shelf, "inside the loop: voltage [V]", "inner/voltage"),
+        plot(shelf, "inside the loop: duty, share of the bus voltage", "inner/duty"),
+        plot(shelf, "inside the loop: torque [N m]", "inner/torque"),
+    )
+    return side_by_side("drive", samples, inside, shares=[1, 1])
+
+
+def filters(shelf: Shelf) -> Part:
+    """Return the motion before and after the filters, what the mask leaves out, and spectra of what is left over."""
+    if not (spectra := charts(shelf, "{1}: spectrum of the residual of {3}", "identify/*/spectrum/*")):
+        return None
+    motion = [
+        plot(shelf, "encoder error [rad]", "error/encoder"),
+        plot(shelf, "q [rad], measured and filtered", "q/measured", "identify/*/q/filtered"),
+        *(
+            plot(shelf, f"{x} [{unit}], measured, filtered{' and true' if shelf.of(f'{x}/true') else ''}",
+                 f"identify/*/{x}/measured", f"identify/*/{x}/filtered", f"identify/*/smoothed/{x}/*", f"{x}/true")
+            for x, unit in (("qd", "rad/s"), ("qdd", "rad/s²"))
+        ),
+        lanes(shelf, MASK_STATES, "identify/*/mask/*"),
+    ]  # fmt: skip
+    return side_by_side("filters", column(*motion), _in_grid("spectra", spectra), shares=[1, 1])
+
+
+def noise(shelf: Shelf) -> Part:
+    """Return the noise found, spectra of what is left over beside those predicted, and smoothed motions."""
+    if not (spectra := charts(shelf, "{1}: spectrum of the residual of {3}", "identify/*/spectrum/*")):
+        return None
+    smoothed = [
+        plot(shelf, f"{x} {r} [{unit}], measured - smoothed, and sigma of the smoothed one",
+             f"identify/*/smoothed_band/{x}/{r}", f"identify/*/measured_less_smoothed/{x}/{r}")
+        for r in shelf.last("identify/*/smoothed_band/q/*") for x, unit in (("q", "rad"), ("qd", "rad/s"))
+    ]  # fmt: skip
+    parts = text(shelf, "identify/*/noise"), _in_grid("spectra", spectra), _in_grid("smoothed motion", smoothed)
+    return side_by_side("noise", *parts, shares=[3, 6, 6])
+
+
+def excitation(shelf: Shelf) -> Part:
+    """Return the columns of W, and how well they tell the parameters apart."""
+    rows = shelf.last("identify/*/*/columns/*")
+    found = [shelf.of(f"identify/*/*/columns/{row}")[0] for row in rows]
+    W = [
+        column(plot(shelf, f"columns of W, {row}, to unit length", path), keys(shelf, f"{path}/keys"), shares=[8, 1])
+        for row, path in zip(rows, found, strict=True)
+    ]
+    values = column(*charts(shelf, "{1}: singular values of W", "identify/*/singular_values", NARROW))
+    return side_by_side("excitation", _in_grid("columns", W), values, shares=[2, 1]) if rows else None
+
+
+def parameters(shelf: Shelf) -> Part:
+    """Return every parameter with its interval beside the truth, and how every estimate comes about."""
+    found = charts(shelf, "{1}: parameters, two sigma", "identify/*/parameters/*", SQUARE)
+    names = sorted(shelf.last("identify/*/*/estimate/*"), key=_order)
+    table, running = text(shelf, "identify/*/report"), _estimates(shelf, names) if names else None
+    if len(found) == len(shelf.methods):  # few parameters: everything beside each other
+        shown = tabbed([grid("all", found, 1), table], "estimates")
+        return side_by_side("parameters", shown, running, shares=[1, 1]) if found else None
+    return tabbed([grid("all", found, 3), running, table], "parameters")
+
+
+def _in_grid(name: str, parts: Sequence[Part]) -> Part:
+    return grid(name, parts, 1 if len(parts) <= FEW else 2)
+
+
+def _estimates(shelf: Shelf, names: Sequence[str]) -> Part:
+    """Return how estimates come about, those of many parameters in a tab for each joint."""
+    if len(names) <= ESTIMATES:
+        return grid("estimates", [_estimate(shelf, name) for name in names], 2)
+    by_joint: dict[int, list[str]] = {}
+    for name in names:
+        by_joint.setdefault(_number(name), []).append(name)
+    pages = [grid(f"joint {j}", [_estimate(shelf, name) for name in of_joint], 3) for j, of_joint in by_joint.items()]
+    return tabbed(pages, "over time")
+
+
+def _estimate(shelf: Shelf, name: str) -> Part:
+    unit = _known_units().get(_letters(name), "").replace("^2", "²")
+    return plot(shelf, f"{name} [{unit}]" if unit else name, f"identify/*/*/estimate/{name}", f"truth/{name}")
+
+
+def _fits(shelf: Shelf, rows: Sequence[str]) -> Iterator[Part]:
+    for row in rows:  # models that share rows share their torque: the first is enough
+        measured = shelf.of(f"identify/*/*/measured/{row}")[0]
+        yield plot(shelf, f"{row} [{_unit(row)}]", measured, f"identify/*/*/predicted/{row}")
+
+
+def _residuals(shelf: Shelf, rows: Sequence[str]) -> list[Part]:
+    return [plot(shelf, f"residual {row} [{_unit(row)}]", f"identify/*/*/residual/{row}") for row in rows]
+
+
+def _rows(shelf: Shelf) -> list[str]:
+    return sorted(shelf.last("identify/*/*/residual/*"), key=lambda row: row == "power")
+
+
+def _unit(row: str) -> str:
+    return "W" if row == "power" else "N m"
+
+
+def _letters(name: str) -> str:
+    """Return the letters of a parameter, without the R of those that are grouped."""
+    return name.rstrip(DIGITS).removesuffix("R")
+
+
+def _number(name: str) -> int:
+    """Return the number of the joint that ends a parameter's name, 0 without one: a recording holds names alone."""
+    return int(name[len(name.rstrip(DIGITS)) :] or 0)
+
+
+def _order(name: str) -> tuple[int, int]:
+    """Return what parameters are sorted by: their joint, and then inertias, first moments, rotor and friction."""
+    letters = list(_known_units())
+    return _number(name), letters.index(_letters(name)) if _letters(name) in letters else len(letters)
+
+
+@cache
+def _known_units() -> dict[str, str]:
+    """Return the units of the parameters of links and of the blocks that are built in, by their letters."""
+    blocks = [BLOCKS.create(name) for name in BLOCKS.builtin]
+    each = [parameter for block in blocks for parameter in block.parameters(2)]
+    return {x: unit for x, (_, unit) in KINDS.items()} | {_letters(p.name): p.unit for p in each}

@@ -1,0 +1,167 @@
+"""Scales of charts: where a value lies between the ends of an axis, and which values are written beside it."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil
+from typing import final
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.ticker import LogLocator, MaxNLocator
+
+from identify import Array
+
+TICKS = 6
+"""Values that have room beside an axis."""
+
+ROOM = 0.04
+"""Share of an axis that stays free at either end."""
+
+SMALL = 1e-300
+"""What a logarithm takes for 0."""
+
+
+@dataclass(frozen=True)
+class AbstractScale(ABC):
+    """An axis of a chart.
+
+    Parameters
+    ----------
+    name : str
+        What it shows, with its unit.
+    low, high : float
+        Its ends.
+    """
+
+    name: str
+    low: float
+    high: float
+
+    def at(self, x: npt.ArrayLike) -> Array:
+        """Return where values lie, 0 at the low end and 1 at the high one; what is beyond an end lies there."""
+        low, high = self._bent(np.array([self.low, self.high]))
+        return np.clip((self._bent(np.asarray(x, dtype=np.float64)) - low) / ((high - low) or 1.0), 0.0, 1.0)
+
+    def holds(self, x: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+        """Return which values lie between the ends."""
+        low, high = sorted((self.low, self.high))
+        return (np.asarray(x) >= low) & (np.asarray(x) <= high)
+
+    @property
+    def ticks(self) -> dict[float, str]:
+        """Values that are written beside the axis, as text."""
+        return {float(v): _short(v) for v in self._values() if self.low <= v <= self.high}
+
+    @abstractmethod
+    def _bent(self, x: Array) -> Array:
+        """Return values as they are spaced."""
+
+    @abstractmethod
+    def _values(self) -> Array:
+        """Return round values that cover the axis."""
+
+
+@final
+@dataclass(frozen=True)
+class Linear(AbstractScale):
+    """An axis of equal steps."""
+
+    def _bent(self, x: Array) -> Array:
+        return x
+
+    def _values(self) -> Array:
+        return np.asarray(MaxNLocator(TICKS - 1).tick_values(self.low, self.high))
+
+
+@final
+@dataclass(frozen=True)
+class Decades(AbstractScale):
+    """A logarithmic axis."""
+
+    def _bent(self, x: Array) -> Array:
+        return np.log10(np.maximum(x, SMALL))
+
+    def _values(self) -> Array:
+        found = np.asarray(LogLocator(numticks=TICKS).tick_values(self.low, self.high))
+        inside = np.count_nonzero((found >= self.low) & (found <= self.high))
+        return found if inside > 1 else np.asarray(MaxNLocator(TICKS - 1).tick_values(self.low, self.high))
+
+
+@final
+@dataclass(frozen=True)
+class Signed(AbstractScale):
+    """An axis of decades to both sides of 0, linear up to `bend` (inverse hyperbolic sine)."""
+
+    bend: float = 1.0
+
+    def _bent(self, x: Array) -> Array:
+        return np.arcsinh(x / self.bend)
+
+    def _values(self) -> Array:
+        most = int(np.log10(self.high / self.bend))
+        powers = self.bend * 10.0 ** np.arange(most, 0, -max(1, ceil(most / 2)))  # at bend itself they would touch 0
+        return np.concatenate([-powers, [0.0], powers])
+
+
+@final
+@dataclass(frozen=True)
+class Words(AbstractScale):
+    """An axis of names, at 0, 1, 2 and so on."""
+
+    words: tuple[str, ...] = ()
+
+    def _bent(self, x: Array) -> Array:
+        return x
+
+    def _values(self) -> Array:
+        return np.arange(float(len(self.words)))
+
+    @property
+    def ticks(self) -> dict[float, str]:
+        """The names."""
+        return {float(k): word for k, word in enumerate(self.words)}
+
+
+def linear(name: str, *values: npt.ArrayLike) -> Linear:
+    """Return an axis of equal steps that holds all finite values."""
+    return Linear(name, *_widened(*_ends(values)))
+
+
+def decades(name: str, *values: npt.ArrayLike) -> Decades:
+    """Return a logarithmic axis that holds all values above 0."""
+    low, high = _ends([np.where(np.asarray(x, dtype=np.float64) > 0, x, np.nan) for x in values], 1.0)
+    low, high = _widened(*np.log10([low, high])) if low < high else (np.log10(low) - 1, np.log10(low) + 1)
+    return Decades(name, 10**low, 10**high)
+
+
+def signed(name: str, *values: npt.ArrayLike, bend: float) -> Signed:
+    """Return an axis of decades to both sides of 0, as far to one as to the other, that holds all finite values."""
+    widest = max(map(abs, _ends(values, bend)))
+    return Signed(name, -1.2 * max(widest, bend), 1.2 * max(widest, bend), bend)
+
+
+def named(name: str, words: Sequence[str]) -> Words:
+    """Return an axis of names."""
+    return Words(name, -0.5, len(words) - 0.5, tuple(words))
+
+
+def listed(name: str, words: Sequence[str]) -> Words:
+    """Return an upright axis of names, the first at the top."""
+    return Words(name, len(words) - 0.5, -0.5, tuple(words))
+
+
+def _ends(values: Sequence[npt.ArrayLike], nothing: float = 0.0) -> tuple[float, float]:
+    every = np.concatenate([np.ravel(np.asarray(x, dtype=np.float64)) for x in values])
+    every = every[np.isfinite(every)]
+    return (float(every.min()), float(every.max())) if len(every) else (nothing, nothing)
+
+
+def _widened(low: float, high: float) -> tuple[float, float]:
+    room = ROOM * (high - low) or max(abs(low), 1.0)
+    return low - room, high + room
+
+
+def _short(value: float) -> str:
+    """Return a value as text: 1e-5, not 1e-05."""
+    return f"{value:.4g}".replace("e-0", "e-").replace("e+0", "e")
