@@ -23,6 +23,8 @@ ALLOWED_IN = {
     "sim/scenario/scenario_file.py": {"tomli_w"},
     "experiments/recording/columns.py": {"pyarrow"},
     "experiments/recording/scales.py": {"matplotlib"},
+    "experiments/recording/comparison_recording.py": {"pyarrow"},
+    "experiments/recording/compared.py": {"scipy"},
     "experiments/study/study.py": {"pydantic"},
     "experiments/study/shard_file.py": {"pyarrow"},
     "experiments/study/store.py": {"pyarrow", "tomli_w"},

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import final
+from typing import Annotated, final
 
 import tyro
 
@@ -28,12 +28,13 @@ class List:
 @final
 @dataclass(frozen=True)
 class View:
-    """Open the recording of a results folder, with all its layers, in the rerun viewer."""
+    """Open the recording of a results folder in the rerun viewer; those of several laid over each other, to be compared."""
 
-    folder: tyro.conf.Positional[Path]
-    """Results folder, or a recording (.rrd)."""
+    folders: tyro.conf.Positional[Annotated[tuple[Path, ...], tyro.conf.arg(metavar="DIR|FILE")]] = ()
+    """Results folders, or a recording (.rrd); the latest of runs/ if none is named."""
     tab: str = ""
-    """What is in front: overview, friction, drive, filters, noise, excitation, parameters, study or table2, if it has it."""
+    """What is in front: overview, friction, drive, filters, noise, excitation, parameters,
+    torques, compare, study or table2, if it has it."""
     save: File = None
     """Write the recording and its layers to one file (.rrd) instead, to be taken elsewhere."""
 

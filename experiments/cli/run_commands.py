@@ -17,7 +17,7 @@ from experiments.errors import ExperimentError
 from experiments.identification.identification_text import print_identified
 from experiments.identification.results import Place, results_folder, tell_of, write_recording, write_summary
 from experiments.identification.scenario_run import ScenarioRun
-from experiments.identification.subject import absolute
+from experiments.identification.subject import Subject, absolute
 from experiments.identification.warnings import warnings_of_robot
 from experiments.paper.table2 import Table2
 from experiments.paper.table2_text import print_table2
@@ -53,7 +53,7 @@ def run(asked: Run) -> None:
     made.require_bearable(asked.yes)
     with watching.audience() as audience, shown(page):
         with results_folder(place) as folder, progress_of(f"simulating {described.name}") as progress:
-            recording = _recording(described, audience, inner) if watching.rerun else None
+            recording = _recording(described, audience, inner, made.subject) if watching.rerun else None
             ran = replace(made, progress=progress, watch=recording.watch if recording else None)
             print_identified(page, ran.identified, f"Scenario {described.name}")
             for warning in [*warnings_of_robot(ran.run.robots[0]), *plugin_conflicts()]:
@@ -105,10 +105,15 @@ def _doubt_window(page: Console, inner: tuple[float, float] | None, recording: "
         )
 
 
-def _recording(scenario: Scenario, audience: Audience | None, window: tuple[float, float] | None = None) -> "RunRecording":
+def _recording(
+    scenario: Scenario,
+    audience: Audience | None,
+    window: tuple[float, float] | None = None,
+    subject: Subject | None = None,
+) -> "RunRecording":
     from experiments.recording.identification_recording import RunRecording
 
-    return RunRecording(scenario, audience, window)
+    return RunRecording(scenario, audience, window, subject)
 
 
 def _alone(scenario: str, study: Path | None, index: int | None) -> str:

@@ -2,36 +2,44 @@
 
 import subprocess
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from experiments.cli.looking import View
 from experiments.cli.page import new_page, show
 from experiments.errors import ExperimentError, ResultsError
 from experiments.identification.results import beside
+from experiments.recording.comparison_recording import compare
 from experiments.recording.folder import BASE, files, merge
 from experiments.recording.viewers import LOOPBACK, require_display, viewer_binary
+
+LATEST = Path("runs")
+"""Where the latest results are looked for."""
 
 
 def view(asked: View) -> None:
     """Open a recording, or write it to one file."""
+    page, folders = new_page(), asked.folders or (_latest(),)
+    if not asked.folders:
+        page.print(f"the latest of {LATEST}: {folders[0]}", soft_wrap=True)
     if asked.save is None:
-        open_viewer(asked.folder, asked.tab)
+        show(page)
+        open_viewer(folders, asked.tab)
         return
-    page = new_page()
-    save(asked.folder, asked.tab, asked.save)
+    save(folders, asked.tab, asked.save)
     page.print(f"written to {asked.save}", soft_wrap=True)
     show(page)
 
 
-def open_viewer(folder: Path, tab: str = "") -> None:
-    """Open the recording of a results folder, or a recording itself; return when the viewer is closed.
+def open_viewer(folders: Sequence[Path], tab: str = "") -> None:
+    """Open recordings of results folders, or a recording itself; return when the viewer is closed.
 
     Raises
     ------
     ResultsError
         If there is no recording, no display, or the viewer fails.
     """
-    paths = _paths(folder)
+    paths = [path for folder in folders for path in _paths(folder)]
     try:
         require_display()
     except ExperimentError:
@@ -41,21 +49,37 @@ def open_viewer(folder: Path, tab: str = "") -> None:
         ) from None
     with tempfile.TemporaryDirectory(prefix="idbench-") as hidden:
         one = paths
-        if folder.is_dir() or tab:
+        if len(folders) > 1 or folders[0].is_dir() or tab:
             one = [Path(hidden) / BASE]
-            merge(paths, tab, one[0])
+            _merge(folders, tab, one[0])
         _open(one)
 
 
-def save(folder: Path, tab: str, out: Path) -> None:
-    """Write the recording of a results folder and its layers as one file; raise ResultsError if that fails."""
+def save(folders: Sequence[Path], tab: str, out: Path) -> None:
+    """Write the recordings of results folders, layers included, as one file; raise ResultsError if that fails."""
     if out.suffix != ".rrd":
         raise ResultsError(f"--save {out} must end with .rrd")
-    if out.name.startswith("recording.") and out.absolute().parent == folder.absolute():
+    if out.name.startswith("recording.") and out.absolute().parent in [folder.absolute() for folder in folders]:
         raise ResultsError(f"--save {out} would be a part of the recording itself: choose another name")
-    paths = _paths(folder)
     with beside(out.parent) as hidden:
-        merge(paths, tab, hidden / out.name)
+        _merge(folders, tab, hidden / out.name)
+
+
+def _merge(folders: Sequence[Path], tab: str, out: Path) -> None:
+    if len(folders) > 1:
+        compare(folders, tab, out)
+    else:
+        merge(_paths(folders[0]), tab, out)
+
+
+def _latest() -> Path:
+    """Return the folder of the recording that was written last."""
+    found = sorted(LATEST.glob(f"*/{BASE}"), key=lambda path: path.stat().st_mtime)
+    if not found:
+        raise ResultsError(
+            f"there is no recording in {LATEST}: name a results folder, or make one, such as `idbench run ripple`"
+        )
+    return found[-1].parent
 
 
 def _paths(folder: Path) -> list[Path]:

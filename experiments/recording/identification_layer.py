@@ -8,7 +8,7 @@ import rerun as rr
 from experiments.identification.identified import Identified
 from experiments.recording.audience import Audience
 from experiments.recording.chart import send_keys
-from experiments.recording.columns import Times, part, seconds, time_columns
+from experiments.recording.columns import part, seconds, time_columns
 from experiments.recording.lanes import Lanes, mask_states
 from experiments.recording.layouts import tabs
 from experiments.recording.parameter_charts import send_parameters
@@ -18,7 +18,6 @@ from experiments.recording.stream import Stream
 from experiments.recording.style import FORM_WIDTHS, GREY, JOINTS, Color, kind_colors, model_color
 from experiments.recording.texts import estimates_table, noise_table, short_table
 from identify import (
-    Array,
     Estimate,
     filtered,
     measured_state,
@@ -65,8 +64,10 @@ class Layer:
         self._motion()
         for form, estimate in self._found.estimates.items():
             at, color = f"{self._at}/{form}", self._color(form)
-            self._rows(at, form, estimate, color)
-            self._columns(at, form, estimate)
+            width = FORM_WIDTHS.get(form, 1.5) / (1 + self._shade)  # so that what lies below shows
+            names = row_names(form, estimate.rows.kinds, self._joints)
+            send_rows(self.stream, at, f"{form} {self._called}".strip(), estimate, names, color, width)
+            self._columns(at, form, estimate, names)
             self._running(at, form, estimate, color)
             for fit in estimate.fits.values():
                 send_smoothed(self.stream, self._at, fit, self._joints)
@@ -87,14 +88,6 @@ class Layer:
     def _color(self, form: str) -> Color:
         return model_color(form, self._shade)
 
-    def _names(self, form: str, system_rows: int) -> Sequence[str]:
-        """Return what the kinds of row of a model are called: after their joint, or after the model."""
-        return self._joints if system_rows == len(self._joints) and form != "power" else [form] * system_rows
-
-    def _curve(self, path: str, times: Times, values: Array, name: str, color: Color, width: float) -> None:
-        self.stream.style(path, [name], [color], width)
-        self.stream.curves(path, times, values)
-
     def _motion(self) -> None:
         """Send the motion as it was measured, and as the rows see it, and which instants are masked."""
         log, grid = self._log, self._chain.grid(self._log)
@@ -112,24 +105,13 @@ class Layer:
         for joint, of_joint in zip(self._joints, weight, strict=True):
             lanes.send(f"{self._at}/mask/{joint}", log.t, mask_states(of_joint))
 
-    def _rows(self, at: str, form: str, estimate: Estimate, color: Color) -> None:
-        """Send what was measured, what is predicted, and the residual, an entity for each kind of row."""
-        found = estimate.rows
-        for kind, row in enumerate(self._names(form, found.kinds)):
-            rows = (found.group == kind) & found.valid
-            times, named = [seconds(found.time[rows])], f"{form} {self._called}".strip()
-            self._curve(f"{at}/measured/{row}", times, found.Y[rows], "measured", GREY, 6.0)
-            width = FORM_WIDTHS.get(form, 1.5) / (1 + self._shade)  # so that what lies below shows
-            self._curve(f"{at}/predicted/{row}", times, estimate.predicted[rows], named, color, width)
-            self._curve(f"{at}/residual/{row}", times, estimate.residual[rows], named, color, width)
-
-    def _columns(self, at: str, form: str, estimate: Estimate) -> None:
+    def _columns(self, at: str, form: str, estimate: Estimate, names: Sequence[str]) -> None:
         """Send the columns of W, scaled to unit length."""
         found = estimate.rows
         length = np.linalg.norm(found.W, axis=0)
         W = found.W / np.where(length > 0, length, 1.0)
         if form != "implicit":  # whose W is the explicit one's, but for the differences
-            for kind, row in enumerate(self._names(form, found.kinds)):
+            for kind, row in enumerate(names):
                 rows = (found.group == kind) & found.valid
                 used = np.flatnonzero(np.abs(W[rows]).max(axis=0) > 0)
                 path, colors = f"{at}/columns/{row}", [JOINTS[p % len(JOINTS)] for p in used]
@@ -159,4 +141,23 @@ class Layer:
         ends: Mapping[str, float] = self._found.truth or {}
         for name, value in ends.items():
             times = time_columns(self._log.t[[0, -1]], self._log.fs)
-            self._curve(f"truth/{name}", times, np.array([value, value]), "true", GREY, 3.0)
+            self.stream.curve(f"truth/{name}", times, np.array([value, value]), "true", GREY, 3.0)
+
+
+def row_names(form: str, kinds: int, joints: Sequence[str]) -> Sequence[str]:
+    """Return what the kinds of row of a model are called: after their joint, or after the model."""
+    return joints if kinds == len(joints) and form != "power" else [form] * kinds
+
+
+def send_rows(  # noqa: PLR0913  # what to send, and how it looks
+    stream: Stream, at: str, named: str, estimate: Estimate, names: Sequence[str], color: Color, width: float, *,
+    after: float = -np.inf,
+) -> None:  # fmt: skip
+    """Send what was measured, what is predicted, and the residual, an entity for each kind of row; of rows `after` a time."""
+    found = estimate.rows
+    for kind, row in enumerate(names):
+        rows = (found.group == kind) & found.valid & (found.time > after)
+        times = [seconds(found.time[rows])]
+        stream.curve(f"{at}/measured/{row}", times, found.Y[rows], "measured", GREY, 6.0)
+        stream.curve(f"{at}/predicted/{row}", times, estimate.predicted[rows], named, color, width)
+        stream.curve(f"{at}/residual/{row}", times, estimate.residual[rows], named, color, width)

@@ -7,11 +7,15 @@ from pathlib import Path
 from rerun.chunk import RrdReader
 
 from experiments.errors import ResultsError
+from experiments.identification.defaults import CHAIN
 from experiments.identification.identified import Identified
 from experiments.identification.scenario_run import ScenarioRun
+from experiments.identification.subject import Subject
 from experiments.recording.audience import Audience
+from experiments.recording.columns import part
 from experiments.recording.folder import BASE, INNER, files, known, layer_file, rearranged
 from experiments.recording.identification_layer import Layer
+from experiments.recording.live_layer import LiveIdentification
 from experiments.recording.motion_layer import Base
 from experiments.recording.stream import Stream
 from experiments.recording.texts import about
@@ -39,19 +43,30 @@ class RunRecording:
         Who watches.
     window : tuple of float, optional
         From when to when signals inside the loop are shown at their full rate [s].
+    subject : Subject, optional
+        What is identified of the robot while it moves, for who watches; all of it by default.
     """
 
-    def __init__(self, scenario: Scenario, audience: Audience | None = None, window: tuple[float, float] | None = None) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        audience: Audience | None = None,
+        window: tuple[float, float] | None = None,
+        subject: Subject | None = None,
+    ) -> None:
         self._audience, written = audience, to_toml(scenario)
         self.base = Base(recording_id(scenario.name, written.encode()), scenario.real_robot, scenario.fs, ROLES, audience)
         self.base.stream.describe(scenario=written, seed=str(scenario.seed), fs_hz=f"{scenario.fs:g}")
         if audience:  # so that the view holds the whole motion from the beginning
             self.base.make_room(scenario.trajectory.sample(scenario.real_robot, scenario.fs).q)
+            joints = [part(joint) for joint in scenario.real_robot.joints]
+            subject = Subject(scenario.robot) if subject is None else subject
+            self.base.live = LiveIdentification(self.base.stream, subject, CHAIN, scenario.channel, scenario.fs, joints)
         self.watch = Watch(self.base.stretch, audience.every if audience else UNWATCHED, window)
 
     def end(self, run: Run) -> list[tuple[str, Stream]]:
         """Add what only the end of a simulation tells; return the streams by the name of their file."""
-        self.base.end(run.alone(), run.q[0])
+        self.base.end(run.q[0])
         return [(BASE, self.base.stream), *([(INNER, self.base.inner)] if self.base.inner else [])]
 
     def finish(self, ran: ScenarioRun) -> list[tuple[str, Stream]]:
@@ -71,7 +86,7 @@ def record_log(found: Identified, audience: Audience | None = None) -> list[tupl
     channel = log.torque
     base.stream.describe(fs_hz=f"{log.fs:g}", torque=channel.meaning, torque_delay_s=f"{channel.delay:g}")
     base.replay(log, {}, measured_state(log, found.processing).qd.T)
-    base.end(log, log.q)
+    base.end(log.q)
     base.finish(about("log", "", ("measured",)))
     return [(BASE, base.stream), layer(base.stream.name, found, robot.joints, base.stream.paths, audience)]
 

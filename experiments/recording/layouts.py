@@ -7,7 +7,17 @@ import rerun.blueprint as rrb
 
 from experiments.errors import ResultsError
 from experiments.recording.chart import NARROW
-from experiments.recording.run_layouts import drive, excitation, filters, friction, noise, overview, parameters, torques
+from experiments.recording.run_layouts import (
+    drive,
+    excitation,
+    filters,
+    friction,
+    noise,
+    overview,
+    parameters,
+    residuals,
+    torques,
+)
 from experiments.recording.views import Part, Shelf, arm, charts, column, grid, keys, plot, side_by_side, tabbed, text
 
 HIGHER = 26
@@ -31,6 +41,23 @@ def table2(shelf: Shelf) -> Part:
     return side_by_side("table2", left, steps, column(*causes), shares=[5, 4, 10])
 
 
+def compare(shelf: Shelf) -> Part:
+    """Return several runs over each other: what differs in them, how they move, and the differences."""
+    if not shelf.of("comparison"):
+        return None
+    together = column(
+        plot(shelf, "q [rad]", "q/measured", "other/*/q/measured"),
+        plot(shelf, "torque in the log [N m]", "torque/log", "other/*/torque/log"),
+        plot(shelf, "true velocity [rad/s]", "qd/true", "other/*/qd/true"),
+    )
+    apart = column(
+        plot(shelf, "difference of q [rad]", "difference/q/*"),
+        plot(shelf, "difference of the torques in the log [N m]", "difference/tau/*"),
+        *residuals(shelf),
+    )
+    return side_by_side("compare", text(shelf, "comparison"), together, apart, shares=[4, 5, 5])
+
+
 def study(shelf: Shelf) -> Part:
     """Return a study: errors over the values of each axis, all parameters together and one by one, and the answer."""
     axes = list(dict.fromkeys(path.split("/")[1] for path in shelf.of("study/*/typical/frame")))
@@ -51,6 +78,7 @@ def _over_axis(shelf: Shelf, axis: str) -> Part:
 LAYOUTS: dict[str, Callable[[Shelf], Part]] = {
     "study": study,
     "table2": table2,
+    "compare": compare,
     "overview": overview,
     "torques": torques,
     "friction": friction,

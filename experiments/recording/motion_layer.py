@@ -1,6 +1,7 @@
 """The base of a recording: a motion, what was planned, measured and true, and what the drives did."""
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 import rerun as rr
@@ -16,6 +17,9 @@ from experiments.recording.style import GREY, WIDTHS, joint_colors, kind_colors
 from identify import Array, MotionLog
 from sim.engine.watch import Inner, Stretch
 from sim.robot.robot import Robot
+
+if TYPE_CHECKING:
+    from experiments.recording.live_layer import LiveIdentification
 
 LOGGED = {"q/measured", "torque/log"}
 """What a robot would log: numbered by samples, too, which takes room."""
@@ -44,6 +48,7 @@ class Base:
     def __init__(self, name: str, robot: Robot, fs: float, roles: tuple[str, ...], audience: Audience | None = None) -> None:
         self.stream, self._audience = Stream(name, audience), audience
         self.inner: Stream | None = None
+        self.live: LiveIdentification | None = None
         self._shown = 0
         self._joints, self._fs, self._roles = [part(joint) for joint in robot.joints], fs, roles
         self._arm, self._lanes = Arm(self.stream, robot, roles), Lanes(self.stream, fs)
@@ -61,6 +66,8 @@ class Base:
         self._accelerate(t, stretch.qd)
         if stretch.inner is not None:
             self.inside(stretch.inner)
+        if self.live:
+            self.live.grow(stretch.measured, stretch.logged)
         poses = {"true": stretch.q, "planned": stretch.reference.q, "measured": stretch.measured}
         limited = stretch.electric.limited if stretch.electric else None
         self.add(stretch.first, signals, {role: poses[role] for role in self._roles}, stretch.qd, limited)
@@ -90,9 +97,10 @@ class Base:
             states = joint_states(qd[:, j], None if limited is None else limited[:, j], self._turning[j])
             self._lanes.send(f"state/{joint}", t, states)
         self._turning = qd[-1]
-        if self._audience and self._shown != len(self._paths):
-            self._shown = len(self._paths)
-            self.stream.show(tabs(self._paths))
+        there = self.stream.shown | (self.inner.paths if self.inner else set())
+        if self._audience and self._shown != len(there):
+            self._shown = len(there)
+            self.stream.show(tabs(there))
         self.stream.breathe(float(t[-1]))
 
     def replay(self, log: MotionLog, signals: Mapping[str, Array], qd: Array) -> None:
@@ -107,10 +115,8 @@ class Base:
         """Draw the way of the tool along planned positions [rad], shape (time, joint), before anything moves."""
         self._arm.trace(q)
 
-    def end(self, log: MotionLog, q: Array) -> None:
-        """Send what only the end of a run gives: the torque that was logged, and the way of the tool along `q` [rad]."""
-        if "torque/log" not in self.stream.paths:
-            self._curves(self.stream, "torque/log", time_columns(log.t, log.fs), log.tau)
+    def end(self, q: Array) -> None:
+        """Draw the way of the tool along `q` [rad], shape (time, joint), once it is known."""
         self._arm.trace(q)
 
     def finish(self, text: str) -> None:
@@ -162,4 +168,5 @@ def _signals(stretch: Stretch) -> dict[str, Array]:
         "torque/command": stretch.command,
         "torque/true": stretch.tau,
         "torque/disturbance": stretch.tau - stretch.command,
+        "torque/log": stretch.logged,
     }

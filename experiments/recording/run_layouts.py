@@ -32,7 +32,7 @@ def overview(shelf: Shelf) -> Part:
         lanes(shelf, JOINT_STATES, "state/*"),
     )
     left = column(arm(shelf), text(shelf, "identify/*/estimates") or text(shelf, "about"), shares=[5, 4])
-    fits, left_over = column(*_fits(shelf, rows)), column(*_residuals(shelf, rows))
+    fits, left_over = column(*_fits(shelf, rows)), column(*residuals(shelf))
     return side_by_side("overview", left, motion, fits, left_over, shares=[7, 7, 5, 5])
 
 
@@ -41,7 +41,7 @@ def torques(shelf: Shelf) -> Part:
     rows = _rows(shelf)
     if len(rows) <= FEW + 1:  # which the overview shows well
         return None
-    pairs = zip(_fits(shelf, rows), _residuals(shelf, rows), strict=True)
+    pairs = zip(_fits(shelf, rows), residuals(shelf), strict=True)
     return grid("torques", [column(fit, left, shares=[3, 2]) for fit, left in pairs], 2)
 
 
@@ -143,9 +143,11 @@ def parameters(shelf: Shelf) -> Part:
     found = charts(shelf, "{1}: parameters, two sigma", "identify/*/parameters/*", SQUARE)
     names = sorted(shelf.last("identify/*/*/estimate/*"), key=_order)
     table, running = text(shelf, "identify/*/report"), _estimates(shelf, names) if names else None
+    if not found:  # of a log that still grows
+        return running
     if len(found) == len(shelf.methods):  # few parameters: everything beside each other
         shown = tabbed([grid("all", found, 1), table], "estimates")
-        return side_by_side("parameters", shown, running, shares=[1, 1]) if found else None
+        return side_by_side("parameters", shown, running, shares=[1, 1])
     return tabbed([grid("all", found, 3), running, table], "parameters")
 
 
@@ -175,8 +177,9 @@ def _fits(shelf: Shelf, rows: Sequence[str]) -> Iterator[Part]:
         yield plot(shelf, f"{row} [{_unit(row)}]", measured, f"identify/*/*/predicted/{row}")
 
 
-def _residuals(shelf: Shelf, rows: Sequence[str]) -> list[Part]:
-    return [plot(shelf, f"residual {row} [{_unit(row)}]", f"identify/*/*/residual/{row}") for row in rows]
+def residuals(shelf: Shelf) -> list[Part]:
+    """Return what models leave over, a plot for each kind of row."""
+    return [plot(shelf, f"residual {row} [{_unit(row)}]", f"identify/*/*/residual/{row}") for row in _rows(shelf)]
 
 
 def _rows(shelf: Shelf) -> list[str]:

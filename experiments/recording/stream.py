@@ -35,7 +35,7 @@ class Stream:
 
     def __init__(self, name: str, audience: Audience | None = None, *, layer: bool = False) -> None:
         self.name, self.paths, self._audience = name, set[str](), audience
-        self._draft = False
+        self._draft, self._drafted = False, set[str]()
         self._file = rr.RecordingStream(APPLICATION, recording_id=name, send_properties=not layer)
         self._file.set_log_time_enabled(False)
         self._bytes = rr.binary_stream(self._file)
@@ -46,6 +46,14 @@ class Stream:
         live.set_log_time_enabled(False)
         live.set_sinks(rr.GrpcSink(audience.url))
         return live
+
+    @property
+    def shown(self) -> set[str]:
+        """Entities that who watches has, those of drafts included."""
+        return self.paths | self._drafted
+
+    def _note(self, path: str) -> None:
+        (self._drafted if self._draft else self.paths).add(path)
 
     @property
     def _targets(self) -> list[rr.RecordingStream]:
@@ -62,14 +70,17 @@ class Stream:
 
     def send(self, path: str, times: Times, columns: Iterable[rr.ComponentColumn]) -> None:
         """Send columns of an entity."""
-        self.paths.add(path)
-        chunk = Chunk.from_columns(path, times, columns)
+        self.add(Chunk.from_columns(path, times, columns), path)
+
+    def add(self, chunk: Chunk, path: str) -> None:
+        """Send a chunk of the entity `path`."""
+        self._note(path)
         for recording in self._targets:
             rr.send_chunks(chunk, recording=recording)
 
     def keep(self, path: str, *things: rr.AsComponents) -> None:
         """Send what holds at all times."""
-        self.paths.add(path)
+        self._note(path)
         for thing in things:
             for recording in self._targets:
                 recording.log(path, thing, static=True)
@@ -81,6 +92,12 @@ class Stream:
     def curves(self, path: str, times: Times, values: Array) -> None:
         """Send values of shape (time, curve) or (time,)."""
         self.send(path, times, scalars(values))
+
+    def curve(self, path: str, times: Times, values: Array, name: str, color: Color, width: float) -> None:
+        """Announce one curve, once, and send values of shape (time,)."""
+        if path not in self.shown:
+            self.style(path, [name], [color], width)
+        self.curves(path, times, values)
 
     def states(self, path: str, times: Times, states: Sequence[str]) -> None:
         """Send states, each from its time until the next."""

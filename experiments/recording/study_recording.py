@@ -53,7 +53,7 @@ class StudyRecording:
         """Draw what is there so far for who watches."""
         with self.stream.draft():
             self._draw(cells)
-        self.stream.show(tabs(self.stream.paths))
+        self.stream.show(tabs(self.stream.shown))
         self.stream.breathe(0.0)
         self._drawn = time.monotonic()
 

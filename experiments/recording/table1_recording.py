@@ -18,7 +18,7 @@ def record_table1(table: Table1, audience: Audience | None = None) -> list[tuple
     base.stream.describe(scenario=to_toml(scenario), seed=str(scenario.seed), fs_hz=f"{log.fs:g}")
     planned = {"q/planned": reference.q, "qd/planned": reference.qd, "qdd/planned": reference.qdd}
     base.replay(log, planned, reference.qd)
-    base.end(log, log.q)
+    base.end(log.q)
     base.finish(markdown(table))
     streams = [(BASE, base.stream)]
     for chain in table.chains:

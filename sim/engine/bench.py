@@ -30,6 +30,9 @@ from sim.trajectories import Reference
 
 T = TypeVar("T")
 
+NOISE = 2
+"""Stream of random numbers of the torque's noise."""
+
 BLOCK = 1e-3
 """Time [s] over which the motion of the rotors may be predicted, for back-EMF and ripple: with a jerk of 1000 rad/s^3 they are
 then off by 2e-7 rad and 5e-4 rad/s."""
@@ -60,7 +63,7 @@ class Bench:
         self._ripple = scenario.ripple.start(robot)
         friction, encoder = scenario.friction, scenario.encoder
         self._friction = _started(friction, friction.start(self._plant.batch, self._plant.Fs, self._h), AbstractContact)
-        self._encoder = _started(encoder, encoder.start(n, samples, fs, _generators(seeds, 0)), AbstractReader)
+        self._encoder = _started(encoder, encoder.start(n, samples, fs, generators(seeds, 0)), AbstractReader)
         self._each = nsim, n
         self._sensor = CurrentSensor(scenario.torque, nsim, n)
         self._jitter = self._drawn_jitter(samples)
@@ -90,7 +93,7 @@ class Bench:
                 f"timing.jitter = {self._scenario.timing.jitter:g} s needs a timing.delay of at least its half in whole "
                 f"physics steps of {self._h:g} s: a command cannot act before its sample is taken"
             )
-        return np.stack([width * (rng.random(samples) - 0.5) for rng in _generators(self._seeds, 1)], axis=1)
+        return np.stack([width * (rng.random(samples) - 0.5) for rng in generators(self._seeds, 1)], axis=1)
 
     def advance(self, step: int) -> int:
         """Advance from physics step `step` to where something may change; return how many steps that were."""
@@ -142,6 +145,7 @@ class Bench:
                 "qd": self._speeds,
                 "tau": self._tau,
                 "command": self._commands,
+                "logged": self._currents if self._scenario.torque.source == "current" else self._commands,
             }
             self._watcher.tell(self._final(step), self._planned, channels, self._drive)
 
@@ -182,11 +186,10 @@ class Bench:
             measured[failed] = command[failed] = current[failed] = 0.0
         scenario, n = self._scenario, q.shape[-1]
         logged = scenario.torque.logged(
-            current if scenario.torque.source == "current" else command, n, _generators(self._seeds, 2)
+            current if scenario.torque.source == "current" else command, n, generators(self._seeds, NOISE)
         )
         planned = replace(self._planned, **{x: getattr(self._planned, x)[skipped:] for x in ("q", "qd", "qdd")})
-        lag = float(scenario.drive.lag(self._plant.robot).mean()) - scenario.physics.early * self._h
-        log = MotionLog(scenario.fs, measured, logged, scenario.torque.channel(scenario.timing.delay, lag, scenario.fs))
+        log = MotionLog(scenario.fs, measured, logged, scenario.channel)
         return Run(scenario, self._seeds, self._plant.robots, planned, log, q, qd, tau, command, self._failures.reasons)
 
     def _stop_failed(self, step: int) -> None:
@@ -208,6 +211,6 @@ def _started(settings: object, made: T, kind: type) -> T:
     return made
 
 
-def _generators(seeds: Sequence[int], stream: int) -> list[np.random.Generator]:
+def generators(seeds: Sequence[int], stream: int) -> list[np.random.Generator]:
     """Return a generator for each simulation, that depends on its seed and the purpose alone."""
     return [np.random.default_rng([seed, stream]) for seed in seeds]

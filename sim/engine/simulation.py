@@ -1,12 +1,13 @@
 """Running a scenario, many simulations at once."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from identify.blame import blamed
-from sim.engine.bench import Bench
+from sim.engine.bench import NOISE, Bench, generators
 from sim.engine.run import Run
 from sim.engine.watch import Watch, Watcher
 from sim.errors import ScenarioError
@@ -62,7 +63,8 @@ def simulate(  # noqa: PLR0913  # all but two by their names
     robot = scenario.real_robot
     planned, skipped = _joined([_planned(scenario, robot, motion) for motion in motions or (None,)])
     h = scenario.drive.step_length(scenario.fs, scenario.physics.step)
-    watcher = Watcher(watch, scenario.fs, h, skipped) if watch else None
+    logged = partial(scenario.torque.logged, n=robot.n, rngs=generators(seeds[:1], NOISE))
+    watcher = Watcher(watch, scenario.fs, h, skipped, logged) if watch else None
     with blamed():
         bench = Bench(scenario, robot, planned, seeds, vary or {}, threads, watcher)
     step, reported, bearable = 0, -1, 0 if throw else len(seeds) - 1

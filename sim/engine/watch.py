@@ -49,6 +49,8 @@ class Stretch:
         True positions [rad] and velocities [rad/s].
     tau, command : Array
         True mean torque of the motors until the next sample, and the torque asked for [N m].
+    logged : Array
+        The torque that comes into the log [N m].
     electric : Electric, optional
         Means until the next sample; none for a drive without currents.
     inner : Inner, optional
@@ -62,6 +64,7 @@ class Stretch:
     qd: Array
     tau: Array
     command: Array
+    logged: Array
     electric: Electric | None
     inner: Inner | None
 
@@ -112,10 +115,12 @@ class Watcher:
         Sampling frequency [Hz] and physics step [s].
     skipped : int
         Samples before the log begins.
+    logged : callable
+        Gives what the log says of the torques of one stretch after the other, shape (1, time, joint).
     """
 
-    def __init__(self, watch: Watch, fs: float, h: float, skipped: int) -> None:
-        self._watch, self._fs, self._h, self._skipped = watch, fs, h, skipped
+    def __init__(self, watch: Watch, fs: float, h: float, skipped: int, logged: Callable[[Array], Array]) -> None:
+        self._watch, self._fs, self._h, self._skipped, self._logged = watch, fs, h, skipped, logged
         self._samples = max(1, round(watch.every * fs)) if np.isfinite(watch.every) else np.inf
         self._told, self._taken = skipped, list[Step]()
 
@@ -134,6 +139,7 @@ class Watcher:
         now, per_sample = slice(self._told, final), round(1 / (self._fs * self._h))
         parts = {name: x[now, 0].copy() for name, x in channels.items()}
         parts["tau"] /= per_sample
+        parts["logged"] = self._logged(parts["logged"][None])[0]
         reference = Reference(self._fs, *(_alone(getattr(planned, x)[now]) for x in ("q", "qd", "qdd")))
         ready = bisect_left(self._taken, final * per_sample, key=lambda taken: taken.step)
         taken, self._taken = self._taken[:ready], self._taken[ready:]

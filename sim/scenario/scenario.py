@@ -4,6 +4,7 @@ from typing import Annotated, Literal, final
 
 from pydantic import Field
 
+from identify.data.motion_log import TorqueChannel
 from sim.controllers import AbstractController, PDFeedforward
 from sim.drives import AbstractDrive, IdealDrive
 from sim.encoders import AbstractEncoder, ExactEncoder
@@ -95,6 +96,13 @@ class Scenario:
     def nominal_robot(self) -> Robot:
         """The robot as its maker describes it."""
         return Robot.load(self.robot)
+
+    @property
+    def channel(self) -> TorqueChannel:
+        """What the torque in the log means."""
+        lag = float(self.drive.lag(self.real_robot).mean())
+        early = self.physics.early * self.drive.step_length(self.fs, self.physics.step)
+        return self.torque.channel(self.timing.delay, lag - early, self.fs)
 
     def quintic(self) -> Quintic:
         """Return the trajectory if it is given by waypoints and times; raise ScenarioError if not."""

@@ -4,7 +4,6 @@ import mujoco
 import numpy as np
 import pytest
 import rerun as rr
-from rerun.chunk import RrdReader
 
 from experiments.recording.arm import Arm
 from experiments.recording.columns import time_columns

@@ -1,0 +1,82 @@
+"""Identification while the rows come in: estimates and residuals that grow, for who watches; nothing of it is kept."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+
+from experiments.identification.identified import Identified
+from experiments.identification.subject import Subject
+from experiments.recording.columns import seconds
+from experiments.recording.identification_layer import row_names, send_rows
+from experiments.recording.stream import Stream
+from experiments.recording.style import FORM_WIDTHS, FORMS, GREY
+from identify import Array, Estimate, IdentificationError, MotionLog, TorqueChannel
+
+GROWTH = 1.05
+"""How much longer the log must be before it is identified again: so often that the work stays in proportion to the log."""
+
+ESTIMATOR = "WLS"
+"""Quick, as it is asked again and again."""
+
+LABEL = "so-far"
+
+
+class LiveIdentification:
+    """What can be said of a log that grows.
+
+    Parameters
+    ----------
+    stream : Stream
+        Where it is shown.
+    subject : Subject
+        The robot.
+    chain : str
+        Name of the signal processing.
+    channel : TorqueChannel
+        What the torque means.
+    fs : float
+        Sampling frequency [Hz].
+    joints : sequence of str
+        Names of the joints, as parts of paths.
+    """
+
+    def __init__(
+        self, stream: Stream, subject: Subject, chain: str, channel: TorqueChannel, fs: float, joints: Sequence[str]
+    ) -> None:
+        self._stream, self._subject, self._chain, self._channel, self._fs = stream, subject, chain, channel, fs
+        self._joints, self._q, self._tau = joints, list[Array](), list[Array]()
+        self._identified, self._shown = 0, dict[str, float]()
+        self.found: Identified | None = None
+
+    def grow(self, q: Array, tau: Array) -> bool:
+        """Take in positions [rad] and torques [N m], shape (time, joint); return whether the estimates were made anew."""
+        self._q.append(q)
+        self._tau.append(tau)
+        samples = sum(map(len, self._q))
+        if samples < GROWTH * self._identified:
+            return False
+        self._identified = samples
+        try:
+            log = MotionLog(self._fs, np.concatenate(self._q), np.concatenate(self._tau), self._channel)
+            found = Identified((log,), self._subject, chain=self._chain, estimator=ESTIMATOR, name=LABEL)
+            estimates = found.estimates
+        except IdentificationError:  # too short yet, or not yet excited
+            return False
+        self.found = found
+        with self._stream.draft():
+            for form, estimate in estimates.items():
+                self._show(form, estimate, float(log.t[-1]))
+        return True
+
+    def _show(self, form: str, estimate: Estimate, now: float) -> None:
+        at, color = f"identify/{LABEL}/{form}", FORMS.get(form, GREY)
+        for name, x, sigma in zip(estimate.names, estimate.X, estimate.best_sigma, strict=True):
+            if form not in self._shown:
+                self._stream.keep(f"{at}/estimate/{name}", rr.Measurements.from_fields(names=[form], colors=[color]))
+            columns = rr.Measurements.columns(values=[x], variances=[sigma**2])
+            self._stream.send(f"{at}/estimate/{name}", [seconds(np.array([now]))], columns)
+        names = row_names(form, estimate.rows.kinds, self._joints)
+        last = self._shown.get(form, -np.inf)
+        send_rows(self._stream, at, form, estimate, names, color, FORM_WIDTHS.get(form, 1.5), after=last)
+        self._shown[form] = float(estimate.rows.time[estimate.rows.valid].max(initial=last))

@@ -1,0 +1,48 @@
+"""Estimates that grow with the log: each is that of the rows so far, and nothing of them is kept."""
+
+import numpy as np
+import pytest
+import rerun as rr
+
+from experiments.identification.identified import Identified
+from experiments.identification.subject import Subject
+from experiments.recording.live_layer import LiveIdentification
+from experiments.recording.stream import Stream
+from identify import MotionLog
+
+JOINTS = ("joint1", "joint2")
+
+
+@pytest.fixture
+def grown(table1):
+    """An identification that took in a log second by second, when it was made anew, and its stream."""
+    stream, log = Stream("grown"), table1.log
+    live = LiveIdentification(stream, Subject(), "idbench", log.torque, log.fs, JOINTS)
+    anew = [live.grow(log.q[k : k + 100], log.tau[k : k + 100]) for k in range(0, 2000, 100)]
+    return live, anew, stream
+
+
+def test_the_last_estimate_is_that_of_the_log_so_far(grown, table1):
+    live, anew, _ = grown
+    assert not anew[0]  # a second at rest tells nothing
+    samples = live.found.logs[0].samples
+    log = table1.log
+    part = MotionLog(log.fs, log.q[:samples], log.tau[:samples], log.torque)
+    expected = Identified((part,), estimator="WLS").estimates
+    for form, estimate in live.found.estimates.items():
+        np.testing.assert_array_equal(estimate.X, expected[form].X)
+
+
+def test_it_is_made_anew_as_the_log_grows_by_a_twentieth(grown):
+    live, anew, _ = grown
+    assert anew[-1] or anew[-2]
+    assert live.found.logs[0].samples > 2000 / 1.05 - 100
+
+
+def test_nothing_of_it_is_kept(grown, tmp_path, reading):
+    stream = grown[2]
+    stream.keep("about", rr.TextDocument("kept"))
+    stream.write(tmp_path / "kept.rrd")
+    assert reading.entities(tmp_path / "kept.rrd") == {"about"}
+    assert "identify/so-far/explicit/estimate/ZZR1" in stream.shown
+    assert "identify/so-far/explicit/estimate/ZZR1" not in stream.paths
