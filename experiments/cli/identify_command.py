@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
+from experiments.cli.follow import Follower
 from experiments.cli.logs import Identify
 from experiments.cli.page import new_page, shown
 from experiments.cli.plugins import plugin_conflicts
@@ -49,11 +50,15 @@ def identify(asked: Identify) -> None:
     named = Identified(  # complains of names first
         (), subject, models=models, chain=asked.chain, estimator=asked.estimator, name=asked.label
     )
-    known, about_delay = read(path, Question(asked.torque, asked.torque_delay, asked.unwrap), named)
-    found, hidden = _shown(replace(named, logs=(known,), truth=_truth(stated, named)))
-    validated = _validated(found, asked, known)
-    warnings = [*hidden, *_warnings(validated), *plugin_conflicts()]
-    with asked.watching.audience() as audience, shown(page):
+    question = Question(asked.torque, asked.torque_delay, asked.unwrap)
+    with ExitStack() as stack:
+        audience = _followed(stack, asked, path, question, named)
+        known, about_delay = read(path, question, named)
+        found, hidden = _shown(replace(named, logs=(known,), truth=_truth(stated, named)))
+        validated = _validated(found, asked, known)
+        warnings = [*hidden, *_warnings(validated), *plugin_conflicts()]
+        audience = audience or stack.enter_context(asked.watching.audience())
+        stack.enter_context(shown(page))
         with _explained(warnings):
             print_identified(page, found, str(asked.log))
             print_validated(page, validated)
@@ -68,6 +73,17 @@ def identify(asked: Identify) -> None:
             _show(found, audience)
         if asked.write_mjcf is not None:
             _write_mjcf(page, found, asked.write_mjcf)
+
+
+def _followed(stack: ExitStack, asked: Identify, path: Path, question: Question, named: Identified) -> Audience | None:
+    """Follow the log, if that is asked for, until it is complete; return who watches."""
+    if asked.follow is None:
+        return None
+    if not 0 < asked.follow < float("inf"):
+        raise ExperimentError(f"--follow {asked.follow:g} must be above 0: for how long [s] a complete log has not grown")
+    audience = stack.enter_context(asked.watching.audience())
+    Follower(path, question, named, audience).follow(asked.follow)
+    return audience
 
 
 def _shown(found: Identified) -> tuple[Identified, list[str]]:

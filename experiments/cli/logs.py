@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import final
+from typing import Annotated, final
 
 import tyro
 
@@ -37,6 +37,9 @@ class Identify:
     """all, explicit, implicit or power."""
     estimator: str = ESTIMATOR
     """OLS, WLS, GLS, ML, ML-delay (the last two: explicit model alone), or of a plug-in: idbench list."""
+    follow: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
+    """Identify a CSV log while it is being written, until it has not grown for so long; then as a whole. With --live or
+    --serve estimates and residuals are seen to grow."""
     validate: File = None
     """A second log, on which the result is judged; without it the last quarter of the first, by a fit of the rest."""
     write_mjcf: File = None
