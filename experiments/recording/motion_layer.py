@@ -15,6 +15,7 @@ from experiments.recording.layouts import tabs
 from experiments.recording.stream import Stream
 from experiments.recording.style import GREY, WIDTHS, joint_colors, kind_colors
 from identify import Array, MotionLog
+from sim.drives.electric import BetweenEdges
 from sim.engine.watch import Inner, Stretch
 from sim.robot.robot import Robot
 
@@ -151,6 +152,20 @@ class Base:
         for name in ELECTRIC:
             self._curves(self.inner, f"inner/{name}", times, getattr(inner.electric, name))
         self._curves(self.inner, "inner/torque", times, inner.tau)
+        if inner.edges is not None:
+            self._between_edges(self.inner, inner.t, inner.edges)
+
+    def _between_edges(self, stream: Stream, t: Array, edges: BetweenEdges) -> None:
+        """Send currents and voltages within the periods; edges of joints are not at the same times."""
+        for j, (joint, color) in enumerate(zip(self._joints, joint_colors(len(self._joints)), strict=True)):
+            at = (t + edges.t[:, :, j]).T.reshape(-1, 3)
+            lasts = at[:, 2] > at[:, 0]
+            times, current = at[lasts].ravel(), edges.current[:, :, j].T.reshape(-1, 3)[lasts].ravel()
+            stream.curve(f"edges/current/{joint}", [seconds(times)], current, f"current of {joint}", color, 1.0)
+            path, pulses = f"edges/voltage/{joint}", edges.voltage[:, :, j].T.reshape(-1, 3)[lasts, 0]
+            held = rr.components.InterpolationMode.StepAfter
+            stream.keep(path, rr.SeriesLines(names=[f"voltage of {joint}"], colors=[color], interpolation_mode=held))
+            stream.curves(path, [seconds(times[::3])], pulses)
 
 
 def _signals(stretch: Stretch) -> dict[str, Array]:

@@ -4,7 +4,21 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 
 from experiments.recording.chart import NARROW, SQUARE
-from experiments.recording.views import Part, Shelf, arm, charts, column, grid, keys, lanes, plot, side_by_side, tabbed, text
+from experiments.recording.views import (
+    Part,
+    Shelf,
+    arm,
+    charts,
+    column,
+    grid,
+    keys,
+    lanes,
+    plot,
+    side_by_side,
+    tabbed,
+    text,
+    window,
+)
 from identify import BLOCKS
 from identify.basis.body_regressor import KINDS
 
@@ -88,10 +102,11 @@ def drive(shelf: Shelf) -> Part:
         lanes(shelf, JOINT_STATES, "state/*"),
     )
     inside = column(
-        plot(shelf, "inside the loop: current [A], asked for and true", "inner/reference", "inner/current"),
-        plot(shelf, "inside the loop: voltage [V]", "inner/voltage"),
-        plot(shelf, "inside the loop: duty, share of the bus voltage", "inner/duty"),
-        plot(shelf, "inside the loop: torque [N m]", "inner/torque"),
+        window(shelf, "inside the loop: current [A], asked for, mean of each period", "inner/reference", "inner/current"),
+        window(shelf, "current [A], between the edges of the pulses", "edges/current/*"),
+        window(shelf, "voltage [V], the pulses", "edges/voltage/*") or window(shelf, "voltage [V]", "inner/voltage"),
+        window(shelf, "inside the loop: duty, share of the bus voltage", "inner/duty"),
+        window(shelf, "inside the loop: torque [N m]", "inner/torque"),
     )
     return side_by_side("drive", samples, inside, shares=[1, 1])
 

@@ -67,6 +67,13 @@ def plot(shelf: Shelf, name: str, *patterns: str) -> Part:
     return rrb.TimeSeriesView(name=name, contents=_contents(found), axis_x=linked, plot_legend=hidden)
 
 
+def window(shelf: Shelf, name: str, *patterns: str) -> Part:
+    """Return a view of curves over a time axis of its own: what lies inside the loop is short."""
+    found = shelf.of(*patterns)
+    hidden = rrb.PlotLegend(visible=False)
+    return rrb.TimeSeriesView(name=name, contents=_contents(found), plot_legend=hidden) if found else None
+
+
 def lanes(shelf: Shelf, name: str, *patterns: str) -> Part:
     """Return a view of states over time, if there are any."""
     found = shelf.of(*patterns)

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from sim.drives.electric import Electric
+from sim.drives.electric import BetweenEdges, Electric
 from sim.robot.motors import Array
 from sim.robot.robot import Robot
 
@@ -48,6 +48,11 @@ class AbstractAmplifier(ABC):
         dt : Array, shape (step, 1)
             How long each step was [s].
         """
+
+    def between_edges(self, trace: Trace) -> BetweenEdges | None:
+        """Return what windings of the first simulation did within the steps of a trace; None for a drive that has no edges."""
+        del trace
+        return None
 
 
 class AbstractDrive(ABC):

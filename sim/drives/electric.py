@@ -5,6 +5,22 @@ from typing import NamedTuple
 from sim.robot.motors import Array
 
 
+class BetweenEdges(NamedTuple):
+    """What a winding does within the periods of its chopper, as solved, all of shape (point, period, joint).
+
+    Points come in threes: beginning, middle and end of a time in which the voltage is constant, and which may be empty.
+    """
+
+    t: Array
+    """Since the beginning of the period [s]."""
+
+    current: Array
+    """[A]."""
+
+    voltage: Array
+    """At the winding [V]."""
+
+
 class Electric(NamedTuple):
     """What a drive does, step by step or in the mean over samples, all of shape (time, joint)."""
 

@@ -7,11 +7,11 @@ from pydantic import Field
 
 from sim.drives.averaged_drive import limits
 from sim.drives.drive import AbstractAmplifier, AbstractDrive, Trace, every
-from sim.drives.electric import Electric
+from sim.drives.electric import BetweenEdges, Electric
 from sim.drives.one_winding import Loop, OneWinding
 from sim.drives.passages import TabulatedPassages, passages
-from sim.drives.pwm import Modulation, Modulator
-from sim.drives.winding import Winding
+from sim.drives.pwm import Modulation, Modulator, pieces
+from sim.drives.winding import Winding, stretches
 from sim.errors import ScenarioError
 from sim.robot.motors import Array, Motors
 from sim.robot.robot import Robot
@@ -156,6 +156,20 @@ class SwitchedAmplifier(AbstractAmplifier):
         most = self._most[0] / V * (1 - 1e-9)  # as an index is rounded
         limited = (np.abs(reference) >= self._I[0]) | (np.abs(index) >= most)
         return Electric(reference, charge / dt, voltage, index, limited.astype(np.float64))
+
+    def between_edges(self, trace: Trace) -> BetweenEdges:
+        """Return current and voltage at the edges of PWM periods, and in the middle between them."""
+        _, _, before, _, e, index = trace
+        one = Winding(*(np.broadcast_to(x[0], before.shape).ravel() for x in self._winding))
+        period = pieces(self._passages.modulator, index.ravel())
+        start, _, goal, dt = stretches(before.ravel(), e.ravel(), one, period)
+        begins = np.cumsum(dt, axis=0) - dt
+        since = np.array([0.0, 0.5, 1.0])[:, None, None] * dt
+        current = goal + (start - goal) * np.exp(-since * (one.R / one.L))
+        voltage = np.broadcast_to(goal * one.R + e.ravel(), current.shape)
+        return BetweenEdges(*(
+            np.swapaxes(x, 0, 1).reshape(-1, *before.shape) for x in (begins + since, current, voltage)
+        ))  # fmt: skip
 
     @property
     def copper(self) -> Array:

@@ -81,7 +81,7 @@ def straight(i: Array, e: Array, winding: Winding, pattern: Pattern, period: flo
     return Passage(after, charge, V * (pattern.base * charge + extra)), np.array([*edges, after])
 
 
-class _Stretch(NamedTuple):
+class Stretch(NamedTuple):
     """Current that goes from `start` to `end` in `dt`, exponentially towards `goal`."""
 
     start: Array
@@ -92,24 +92,30 @@ class _Stretch(NamedTuple):
 
 def step_by_step(i: Array, e: Array, winding: Winding, period: Pieces) -> Passage:
     """Return the passage of a current that may change its sign; all arrays have the shape (winding,)."""
+    _, R, L = winding
+    start, end, goal, dt = stretches(i, e, winding, period)
+    charge = goal * dt + (start - end) * (L / R)
+    # In the order of time: empty stretches, which others need, change no bit.
+    total, electrical = (np.add.accumulate(x, axis=0)[-1] for x in (charge, (goal * R + e) * charge))
+    return Passage(end[-1], total, electrical)
+
+
+def stretches(i: Array, e: Array, winding: Winding, period: Pieces) -> Stretch:
+    """Return the parts of a period in which the current is one exponential, shape (stretch, winding) each."""
     V, R, L = winding
     ahead, behind = (period.forward * V - e) / R, (period.backward * V - e) / R
     kept, dead = np.exp(-period.duration * (R / L)), ahead != behind
     some_dead, found = dead.any(axis=1), []
     for k, dt in enumerate(period.duration):
         goal = np.where(i > 0, ahead[k], behind[k]) if some_dead[k] else ahead[k]
-        whole = _Stretch(i, goal + (i - goal) * kept[k], goal, dt)
+        whole = Stretch(i, goal + (i - goal) * kept[k], goal, dt)
         at_zero = dead[k] & (i * whole.end <= 0)
         found += _over_zero(at_zero, whole, ahead[k], behind[k], R / L) if at_zero.any() else [whole]
         i = found[-1].end
-    start, end, goal, dt = (np.array(x) for x in zip(*found, strict=True))
-    charge = goal * dt + (start - end) * (L / R)
-    # In the order of time: empty stretches, which others need, change no bit.
-    total, electrical = (np.add.accumulate(x, axis=0)[-1] for x in (charge, (goal * R + e) * charge))
-    return Passage(i, total, electrical)
+    return Stretch(*(np.array(x) for x in zip(*found, strict=True)))
 
 
-def _over_zero(at_zero: npt.NDArray[np.bool_], whole: _Stretch, ahead: Array, behind: Array, rate: Array) -> list[_Stretch]:
+def _over_zero(at_zero: npt.NDArray[np.bool_], whole: Stretch, ahead: Array, behind: Array, rate: Array) -> list[Stretch]:
     """Return the stretch up to the instant at which the current is zero and the one after it, empty where it never is.
 
     At zero the current stays, unless the back-EMF drives it on.
@@ -121,4 +127,4 @@ def _over_zero(at_zero: npt.NDArray[np.bool_], whole: _Stretch, ahead: Array, be
     onward = np.maximum(ahead, 0.0) + np.minimum(behind, 0.0)
     meeting = np.where(at_zero, 0.0, after)
     end = np.where(at_zero, -onward * np.expm1(-rest * rate), after)
-    return [_Stretch(i, meeting, goal, dt - rest), _Stretch(meeting, end, onward, rest)]
+    return [Stretch(i, meeting, goal, dt - rest), Stretch(meeting, end, onward, rest)]

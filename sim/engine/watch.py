@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.drives.drive import AbstractAmplifier, Trace
-from sim.drives.electric import Electric
+from sim.drives.electric import BetweenEdges, Electric
 from sim.robot.motors import Array
 from sim.trajectories.reference import Reference
 
@@ -26,11 +26,14 @@ class Inner:
         Shape (step, joint) each.
     tau : Array, shape (step, joint)
         Mean torque of the motors, ripple included [N m].
+    edges : BetweenEdges, optional
+        What happens within the steps, of a drive that chops.
     """
 
     t: Array
     electric: Electric
     tau: Array
+    edges: BetweenEdges | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +150,7 @@ class Watcher:
         if taken and taken[0].trace:
             rows = _Rows.of(taken, drive, self._h)
             electric = rows.means(self._told, final, per_sample)
-            inner = rows.inside(self._watch.window, self._h, self._skipped / self._fs) if self._watch.window else None
+            inner = rows.inside(self._watch.window, self._h, self._skipped / self._fs, drive) if self._watch.window else None
         self._watch.receive(Stretch(self._told - self._skipped, reference, electric=electric, inner=inner, **parts))
         self._told = final
 
@@ -164,6 +167,7 @@ class _Rows:
     length: Array
     electric: Electric
     tau: Array
+    trace: Trace
 
     @classmethod
     def of(cls, taken: Sequence[Step], drive: AbstractAmplifier, h: float) -> "_Rows":
@@ -174,11 +178,12 @@ class _Rows:
         length = np.repeat(steps // count, count)
         within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
         start = np.repeat([s.step for s in taken], count) + within * length
-        traces = (_unrolled(x, rows) for x in zip(*(s.trace for s in taken), strict=True))
-        whole = drive.electric(tuple(traces), (np.repeat(steps / rows, rows) * h)[:, None])
+        traces = tuple(_unrolled(x, rows) for x in zip(*(s.trace for s in taken), strict=True))
+        whole = drive.electric(traces, (np.repeat(steps / rows, rows) * h)[:, None])
         again = np.repeat(count // rows, rows)  # a mean over several steps holds for each of them
         electric = Electric(*(np.repeat(x, again, axis=0) for x in whole))
-        return cls(start, length.astype(np.float64), electric, _unrolled([s.tau for s in taken], count))
+        trace = tuple(np.repeat(x, again, axis=0) for x in traces)
+        return cls(start, length.astype(np.float64), electric, _unrolled([s.tau for s in taken], count), trace)
 
     def means(self, first: int, final: int, per_sample: int) -> Electric:
         """Return the means over the samples from `first` to before `final`."""
@@ -188,13 +193,14 @@ class _Rows:
         weights = (self.length[keep] / per_sample)[:, None]
         return Electric(*(np.add.reduceat(x[keep] * weights, begins, axis=0) for x in self.electric))
 
-    def inside(self, window: tuple[float, float], h: float, before: float) -> Inner | None:
+    def inside(self, window: tuple[float, float], h: float, before: float, drive: AbstractAmplifier) -> Inner | None:
         """Return what lies in the window [s], None if nothing does."""
         t = self.start * h - before
         within = (t > window[0] - h / 2) & (t < window[1] - h / 2)  # half a step aside, where rounding decides nothing
         if not within.any():
             return None
-        return Inner(t[within], Electric(*(x[within] for x in self.electric)), self.tau[within])
+        edges = drive.between_edges(tuple(x[within] for x in self.trace))
+        return Inner(t[within], Electric(*(x[within] for x in self.electric)), self.tau[within], edges)
 
 
 def _unrolled(arrays: Sequence[Array], count: npt.NDArray[np.int64]) -> Array:

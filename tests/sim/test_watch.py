@@ -126,3 +126,30 @@ def test_the_window_is_on_the_time_of_the_log():
     simulate(scenario(drive=SWITCHED, start=[0.5, 0.5]), watch=Watch(heard.append, 0.1, (0.25, 0.45)))
     t = np.concatenate([s.inner.t for s in heard if s.inner])
     np.testing.assert_allclose(t, 0.25 + np.arange(200) / 1000, atol=1e-9)
+
+
+@pytest.mark.parametrize("drive", [SWITCHED, SWITCHED | {"dead_time": 2e-6}, SWITCHED | {"modulation": "unipolar"}])
+def test_between_the_edges_the_current_is_that_of_the_period(drive):
+    """It begins where the period before ends, its mean is that of the period, and so is that of the voltage."""
+    heard, h = [], 1e-3
+    simulate(scenario(drive=drive), watch=Watch(heard.append, np.inf, (0.5, 0.6)))
+    inner = heard[0].inner
+    t, current, voltage = (np.moveaxis(x, 0, -1) for x in inner.edges)
+    assert (np.diff(t) >= -1e-15).all()
+    np.testing.assert_allclose(t[..., -1], h, rtol=1e-12)
+    np.testing.assert_allclose(current[1:, :, 0], current[:-1, :, -1], atol=1e-9)
+    parts = t.shape[-1] // 3
+    a, b, c = (current.reshape(*t.shape[:2], parts, 3)[..., k] for k in range(3))
+    dt = np.diff(t.reshape(*t.shape[:2], parts, 3)[..., [0, 2]])[..., 0]
+    mean = np.sum(dt * (a + 4 * b + c) / 6, axis=-1) / h  # Simpson's rule: exponentials over a quarter of L/R
+    np.testing.assert_allclose(mean, inner.electric.current, rtol=1e-4, atol=1e-5)
+    pulses = np.sum(dt * voltage.reshape(*t.shape[:2], parts, 3)[..., 0], axis=-1) / h
+    np.testing.assert_allclose(pulses, inner.electric.voltage, rtol=1e-9, atol=1e-9)
+
+
+def test_what_is_heard_of_the_log_is_what_comes_into_it():
+    """Noise, gain, offset and converter included, from stretch to stretch."""
+    torque = {"noise": [0.1], "gain_error": [0.02], "offset": [0.3], "resolution": [0.01]}
+    heard, described = [], scenario(torque=torque, start=[0.5, 0.5])
+    run = simulate(described, [5, 6], watch=Watch(heard.append, 0.37))
+    np.testing.assert_array_equal(np.concatenate([stretch.logged for stretch in heard]), run.log.tau[0])
