@@ -1,10 +1,14 @@
 """Tables and numbers as text."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from copy import copy
+from dataclasses import replace
+from itertools import groupby
 
 from rich import box
 from rich.console import Console
-from rich.table import Table
+from rich.measure import Measurement
+from rich.table import Column, Table
 from rich.text import Text
 
 WORTHLESS = 999.0
@@ -22,10 +26,35 @@ def new_table(title: str, columns: Iterable[str]) -> Table:
     return grid
 
 
-def print_titled(console: Console, title: str, grid: Table) -> None:
+def print_titled(console: Console, title: str, grid: Table, stub: int = 1) -> None:
     """Print a table below a title that may be wider than it."""
     console.print(Text(title, style="bold"), soft_wrap=True)
-    console.print(grid)
+    print_table(console, grid, stub)
+
+
+def print_table(console: Console, grid: Table, stub: int = 1) -> None:
+    """Print a table, in several below each other where it is wider than the console.
+
+    Columns with the same first line of their heading stay together; the first `stub` columns stand in every part.
+    """
+    groups = [list(group) for _, group in groupby(grid.columns[stub:], lambda column: str(column.header).partition("\n")[0])]
+    while groups:
+        taken = [groups.pop(0)]
+        while groups and _fits(console, _of_columns(grid, stub, [*taken, groups[0]])):
+            taken.append(groups.pop(0))
+        console.print(_of_columns(grid, stub, taken))
+
+
+def _fits(console: Console, grid: Table) -> bool:
+    return Measurement.get(console, console.options.update(max_width=10_000), grid).maximum <= console.width
+
+
+def _of_columns(grid: Table, stub: int, groups: Sequence[Sequence[Column]]) -> Table:
+    """Return a table of some of the columns."""
+    chosen = [*grid.columns[:stub], *(column for group in groups for column in group)]
+    made = copy(grid)
+    made.columns = [replace(column, _index=k) for k, column in enumerate(chosen)]
+    return made
 
 
 def number(x: float) -> str:

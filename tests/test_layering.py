@@ -25,6 +25,8 @@ ALLOWED_IN = {
     "experiments/recording/scales.py": {"matplotlib"},
     "experiments/recording/comparison_recording.py": {"pyarrow"},
     "experiments/recording/compared.py": {"scipy"},
+    "experiments/starters/starters.py": {"jinja2"},
+    "experiments/starters/plugins/friction.py": {"mujoco"},
     "experiments/study/study.py": {"pydantic"},
     "experiments/study/shard_file.py": {"pyarrow"},
     "experiments/study/store.py": {"pyarrow", "tomli_w"},

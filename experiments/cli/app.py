@@ -11,6 +11,20 @@ from experiments.errors import ExperimentError
 
 DESCRIPTION = "A MuJoCo testbench for the dynamic identification of robots."
 
+OVERVIEW = """\
+idbench: identify the dynamics of robots, on simulated data whose truth is known, and on logs of real ones
+
+  idbench table1                  the paper's comparison of three models; half a minute
+  idbench run ripple              simulate a scenario, identify it, record it
+  idbench view                    look at the latest results
+  idbench identify LOG.csv        identify a log; --robot names the arm
+  idbench robot panda             what can be identified of an arm
+  idbench study encoder           ask a question of many simulated robots
+  idbench new scenario mine       begin a scenario, a study or a plug-in of your own
+  idbench list                    what can be combined
+  idbench --help, idbench COMMAND --help"""
+"""What `idbench` alone prints."""
+
 APP = SubcommandApp()
 """What the commands register with."""
 
@@ -31,7 +45,9 @@ def run(args: Sequence[str] | None = None) -> int:
     try:
         with terminating():
             if words == ["--version"]:
-                _print_version()
+                _print(f"idbench {_version()}")
+            elif not words:
+                _print(OVERVIEW)
             else:
                 with importing():
                     command = APP.cli(prog="idbench", description=DESCRIPTION, args=words)
@@ -56,13 +72,17 @@ def _on_purpose(error: Exception) -> bool:
     return any(isinstance(error, root) for root in roots)
 
 
-def _print_version() -> None:
+def _version() -> str:
     from importlib.metadata import version
 
+    return version("idbench")
+
+
+def _print(text: str) -> None:
     from experiments.cli.page import new_page, show
 
     page = new_page()
-    page.print(f"idbench {version('idbench')}")
+    page.print(text)
     show(page)
 
 

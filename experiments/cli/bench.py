@@ -8,7 +8,7 @@ import tyro
 
 from experiments.cli.app import APP
 from experiments.cli.interruption import importing
-from experiments.cli.options import Asked, Count, File, Folder, Number, Robot, Scenario, Watched, Window
+from experiments.cli.options import Asked, Count, File, Folder, Json, Number, Robot, Scenario, Watched, Window
 from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.parameters import Parameters
 from experiments.recording.audience import Watching
@@ -45,6 +45,8 @@ class Run:
     """Simulate more than a thousand million physics steps."""
     parameters: Asked = Parameters()  # noqa: RUF009  # frozen
     """Which parameters are identified."""
+    json: Json = False
+    """Print summary and warnings as JSON; what is for people goes to the error stream."""
     watching: Watched = Watching()  # noqa: RUF009  # frozen
     """How it is watched."""
 
@@ -79,6 +81,8 @@ class Study:
     """Address of a Dask scheduler to run on instead, as tcp://host:8786 (needs the extra `cluster`)."""
     yes: bool = False
     """Run more than a hundred thousand runs."""
+    json: Json = False
+    """Print summary and warnings as JSON; what is for people goes to the error stream."""
     watching: Watched = Watching()  # noqa: RUF009  # frozen
     """How it is watched; runs show as they are finished."""
 

@@ -1,19 +1,18 @@
 """The command that identifies a log."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.text import Text
 
 from experiments.cli.follow import Follower
 from experiments.cli.logs import Identify
-from experiments.cli.page import new_page, shown
+from experiments.cli.page import Page, new_page, shown
 from experiments.cli.plugins import plugin_conflicts
 from experiments.cli.reading import Question, file_of, read, stated_by
 from experiments.errors import ExperimentError, ResultsError
@@ -25,7 +24,16 @@ from experiments.identification.results import Place, beside, results_folder, te
 from experiments.identification.subject import CLOSED_FORM, Subject, absolute
 from experiments.identification.validated import Validated
 from experiments.identification.verdict import Remedies, Verdict
-from experiments.identification.warnings import helpful_moves, warnings_of_result, warnings_of_robot
+from experiments.identification.warnings import (
+    DELAY,
+    FILE,
+    LOG,
+    MODEL,
+    MOTION,
+    helpful_moves,
+    warnings_of_result,
+    warnings_of_robot,
+)
 from experiments.recording.audience import Audience, Watching
 from identify import MODELS, ExcitationError, IdentificationError, LogError, MotionLog
 from identify.data.log_file import write_log
@@ -39,7 +47,7 @@ MOST_STARTS = 1000
 
 def identify(asked: Identify) -> None:
     """Identify a log, judge the result, write it."""
-    page, models, out = new_page(), tuple(MODELS) if asked.model == "all" else (asked.model,), asked.out
+    page, models, out = new_page(machine=asked.json), tuple(MODELS) if asked.model == "all" else (asked.model,), asked.out
     path, stated = file_of(asked.log), stated_by(asked.log)
     _require_label(asked.label)
     subject = Subject(stated.get("robot", CLOSED_FORM) if asked.robot is None else absolute(asked.robot), asked.parameters)
@@ -56,15 +64,17 @@ def identify(asked: Identify) -> None:
         known, about_delay = read(path, question, named)
         found, hidden = _shown(replace(named, logs=(known,), truth=_truth(stated, named)))
         validated = _validated(found, asked, known)
-        warnings = [*hidden, *_warnings(validated), *plugin_conflicts()]
+        of_file = [*warnings_of_robot(found.subject.robot), *plugin_conflicts()]
+        warnings = {LOG: _warnings(validated), FILE: of_file, MOTION: hidden}
         audience = audience or stack.enter_context(asked.watching.audience())
         stack.enter_context(shown(page))
-        with _explained(warnings):
+        with _explained([warning for group in warnings.values() for warning in group]):
             print_identified(page, found, str(asked.log))
             print_validated(page, validated)
-        _say(page, [*warnings, *warnings_of_result(found), *_advice(validated, asked)])
+        _warn(page, warnings, warnings_of_result(found), _advice(validated, asked))
         if about_delay:
             page.print(about_delay)
+        page.found |= _summary(validated, asked.log.absolute())
         if place is not None:
             _write_results(page, place, validated, asked.watching, audience)
         elif asked.log.is_dir() and asked.watching.rerun and not is_long([known]):
@@ -103,21 +113,21 @@ def _shown(found: Identified) -> tuple[Identified, list[str]]:
     return found, notes
 
 
-def _advice(validated: Validated, asked: Identify) -> list[str]:
+def _advice(validated: Validated, asked: Identify) -> dict[str, list[str]]:
     """Return what the log says of the delay, and what is most likely to mend a result that is not good."""
     try:
         good = "good" in {Verdict(validated, model).word for model in validated.torques}
     except IdentificationError:
-        return []
+        return {}
     if is_long(validated.found.logs):
-        return []
+        return {}
     remedies = Remedies(validated)
     # Friction takes a wrong delay in, and the verdict may be good: the log itself is asked.
     delay = list(remedies.delay()) if asked.torque_delay != "estimate" else []
-    return delay + ([] if good else list(remedies.options()))
+    return {DELAY: delay, MODEL: [] if good else list(remedies.options())}
 
 
-def _add_layer(page: Console, folder: Path, found: Identified, watching: Watching, audience: Audience | None) -> None:
+def _add_layer(page: Page, folder: Path, found: Identified, watching: Watching, audience: Audience | None) -> None:
     from experiments.recording.identification_recording import add_layer
 
     with beside(folder) as hidden:
@@ -151,9 +161,9 @@ def _require_target(target: Path | None, subject: Subject) -> None:
 
 
 def _warnings(validated: Validated) -> list[str]:
-    """Return what is suspicious about the robot's file and the logs."""
+    """Return what is suspicious about the logs."""
     subject, second = validated.found.subject, validated.second
-    found = [*warnings_of_log(validated.found.logs[0], subject.tree), *warnings_of_robot(subject.robot)]
+    found = warnings_of_log(validated.found.logs[0], subject.tree)
     return found + ([f"{validated.name}: {warning}" for warning in warnings_of_log(second, subject.tree)] if second else [])
 
 
@@ -194,12 +204,12 @@ def _explained(warnings: Sequence[str]) -> Iterator[None]:
         raise ExperimentError("; ".join([str(error), *(f"warning: {warning}" for warning in warnings)])) from error
 
 
-def _say(page: Console, warnings: Sequence[str]) -> None:
-    for warning in warnings:
-        page.print(Text(f"warning: {warning}"), soft_wrap=True)
+def _warn(page: Page, *groups: Mapping[str, Sequence[str]]) -> None:
+    """Print warnings of several sources, the log first, as what comes first may be what makes the others."""
+    page.warn({about: [w for group in groups for w in group.get(about, ())] for about in (LOG, DELAY, FILE, MOTION, MODEL)})
 
 
-def _write_mjcf(page: Console, found: Identified, path: Path) -> None:
+def _write_mjcf(page: Page, found: Identified, path: Path) -> None:
     """Write the robot's file; raise ResultsError if that fails, which takes nothing else away."""
     try:
         written = Written(found, next(iter(found.estimates)))
@@ -207,21 +217,14 @@ def _write_mjcf(page: Console, found: Identified, path: Path) -> None:
     except (IdentificationError, BenchError) as error:
         raise ResultsError(f"--write-mjcf {path}: {error}; everything else is as printed") from error
     page.print(Text(f"written to {path}: the robot with the parameters of the {written.model} model"), soft_wrap=True)
-    _say(page, written.warnings)
+    page.warn({"the file that was written": written.warnings})
 
 
-def _write_results(page: Console, place: Place, validated: Validated, watching: Watching, audience: Audience | None) -> None:
+def _write_results(page: Page, place: Place, validated: Validated, watching: Watching, audience: Audience | None) -> None:
     lost, found = "", validated.found
     with results_folder(place) as folder:
         write_log(found.logs[0], folder / "log.parquet")
-        summary = {
-            "experiment": "identify",
-            "log": Path(place.of).name,
-            "path": place.of,
-            **found.summary(),
-            "validation": _judged(validated),
-        }
-        write_summary(folder / "summary.json", summary)
+        write_summary(folder / "summary.json", _summary(validated, Path(place.of)))
         if is_long(found.logs):
             page.print("not recorded: the rows of so long a log are not kept; identify a part of it to look inside")
         elif watching.rerun:
@@ -230,6 +233,12 @@ def _write_results(page: Console, place: Place, validated: Validated, watching: 
             lost = write_recording(folder, record_log(found, audience))
     tell_of(lost, place.out)
     page.print(f"written to {place.out}{watching.hint(place.out)}", soft_wrap=True)
+
+
+def _summary(validated: Validated, log: Path) -> dict[str, Any]:
+    """Return what a summary.json says of an identification."""
+    found = {"experiment": "identify", "log": log.name, "path": str(log)}
+    return {**found, **validated.found.summary(), "validation": _judged(validated)}
 
 
 def _judged(validated: Validated) -> dict[str, Any]:

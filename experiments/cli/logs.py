@@ -8,7 +8,7 @@ import tyro
 
 from experiments.cli.app import APP
 from experiments.cli.interruption import importing
-from experiments.cli.options import Asked, Delay, File, Folder, Robot, Torque, Watched
+from experiments.cli.options import Asked, Delay, File, Folder, Json, Robot, Torque, Watched
 from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.parameters import Parameters
 from experiments.recording.audience import Watching
@@ -53,6 +53,8 @@ class Identify:
     """What to call this identification in a recording; by default chain and estimator. One of that name is replaced."""
     parameters: Asked = Parameters()  # noqa: RUF009  # frozen
     """Which parameters are asked for."""
+    json: Json = False
+    """Print summary and warnings as JSON; what is for people goes to the error stream."""
     watching: Watched = Watching()  # noqa: RUF009  # frozen
     """How it is watched."""
 
@@ -71,6 +73,8 @@ class DescribeRobot:
 
     name: tyro.conf.Positional[str]
     """Name of a robot that ships, or a file that describes it (MJCF or URDF)."""
+    json: Json = False
+    """Print joints and parameters as JSON; what is for people goes to the error stream."""
     parameters: Asked = Parameters()  # noqa: RUF009  # frozen
     """Which parameters are asked for."""
 

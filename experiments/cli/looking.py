@@ -8,7 +8,7 @@ import tyro
 
 from experiments.cli.app import APP
 from experiments.cli.interruption import importing
-from experiments.cli.options import File
+from experiments.cli.options import File, Json
 
 
 @APP.command(name="list")
@@ -17,11 +17,14 @@ from experiments.cli.options import File
 class List:
     """List the plug-ins: what can be combined, one line each."""
 
+    json: Json = False
+    """Print it as JSON instead."""
+
     def __call__(self) -> None:
         """Run it."""
         with importing():
             from experiments.cli.plugins import list_plugins
-        list_plugins()
+        list_plugins(machine=self.json)
 
 
 @APP.command(name="view")

@@ -16,6 +16,9 @@ Count = Annotated[int | None, tyro.conf.arg(metavar="INT")]
 Number = Annotated[int | None, tyro.conf.arg(metavar="N")]
 Window = Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="FROM TO")]
 
+Json = Annotated[bool, tyro.conf.FlagCreatePairsOff]
+"""Whether standard output is for a program: what summary.json has, and warnings; text goes to the error stream."""
+
 Meaning = Literal["held", "instantaneous", "averaged"]
 Torque = Annotated[Meaning | None, tyro.conf.arg(metavar="held|instantaneous|averaged")]
 Delay = Annotated[str | None, tyro.conf.arg(metavar="SECONDS|estimate")]

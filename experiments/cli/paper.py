@@ -6,7 +6,7 @@ from typing import final
 
 from experiments.cli.app import APP
 from experiments.cli.interruption import importing
-from experiments.cli.options import Count, File, Folder, Scenario, Watched, Window
+from experiments.cli.options import Count, File, Folder, Json, Scenario, Watched, Window
 from experiments.recording.audience import Watching
 
 
@@ -29,6 +29,8 @@ class Table1:
     """Name of a scenario, or a file (TOML), as `idbench search` writes it, instead of the one that ships."""
     force: bool = False
     """Replace results of another experiment in the folder."""
+    json: Json = False
+    """Print summary and warnings as JSON; what is for people goes to the error stream."""
     watching: Watched = Watching()  # noqa: RUF009  # frozen
     """How it is watched."""
 
@@ -71,6 +73,8 @@ class Table2:
     """From when to when [s] the signals inside the loop are recorded at the full rate of the drive, such as 10 10.5."""
     force: bool = False
     """Replace results of another experiment in the folder."""
+    json: Json = False
+    """Print summary and warnings as JSON; what is for people goes to the error stream."""
     watching: Watched = Watching()  # noqa: RUF009  # frozen
     """How it is watched."""
 

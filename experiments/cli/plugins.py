@@ -36,10 +36,11 @@ TABLES: tuple[PluginTable[Any], ...] = (
 """Every plug-in point."""
 
 
-def list_plugins() -> None:
+def list_plugins(*, machine: bool = False) -> None:
     """List every plug-in."""
-    page = new_page()
+    page = new_page(machine=machine)
     print_plugins(page)
+    page.found |= {table.point: {name: table.summary(name) for name in table} for table in TABLES}
     show(page)
 
 

@@ -2,6 +2,7 @@
 
 import sys
 from math import isfinite
+from typing import Any
 
 import numpy as np
 from rich.console import Console
@@ -11,7 +12,7 @@ from experiments.cli.logs import DescribeRobot
 from experiments.cli.page import new_page, show
 from experiments.identification.budget import Budget
 from experiments.identification.subject import Subject, absolute
-from experiments.identification.warnings import warnings_of_robot
+from experiments.identification.warnings import FILE, warnings_of_robot
 from experiments.text import new_table, print_titled
 from sim.errors import BenchError
 from sim.trajectories import RandomMoves
@@ -22,7 +23,7 @@ MANY = 30
 
 def describe(asked: DescribeRobot) -> None:
     """Show what can be identified of a robot."""
-    subject, page = Subject(absolute(asked.name), asked.parameters), new_page()
+    subject, page = Subject(absolute(asked.name), asked.parameters), new_page(machine=asked.json)
     if subject.robot.n > MANY:
         sys.stderr.write(f"idbench: grouping the parameters of {subject.robot.n} joints takes a while\n")
     truth = subject.truth(subject.robot)
@@ -33,9 +34,26 @@ def describe(asked: DescribeRobot) -> None:
         _print_budget(page, Budget(subject.robot, moves))
     except BenchError as error:  # the parameters are worth knowing all the same
         page.print(Text(f"no torque budget: {error}"), soft_wrap=True)
-    for warning in warnings_of_robot(subject.robot):
-        page.print(Text(f"warning: {warning}"), soft_wrap=True)
+    page.warn({FILE: warnings_of_robot(subject.robot)})
+    page.found |= _summary(subject, truth)
     show(page)
+
+
+def _summary(subject: Subject, truth: dict[str, float]) -> dict[str, Any]:
+    """Return what --json says of a robot."""
+    base, tree = subject.base, subject.tree
+    return {
+        "robot": subject.name,
+        "joints": [
+            {"name": joint.name, "kind": joint.kind, "range": [x if isfinite(x) else None for x in joint.range]}
+            for joint in tree.joints
+        ],
+        "parameters": [
+            {"name": p.name, "unit": p.unit, "kind": p.kind, "joint": p.joint, "value": truth[p.name]}
+            for p in subject.basis.parameters
+        ],
+        "made_of": None if base is None else dict(zip(base.names, map(base.grouping, range(len(base.names))), strict=True)),
+    }
 
 
 def _print_joints(page: Console, subject: Subject) -> None:

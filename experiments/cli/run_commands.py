@@ -5,11 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Console
 from rich.text import Text
 
 from experiments.cli.bench import Run
-from experiments.cli.page import new_page, shown
+from experiments.cli.page import Page, new_page, shown
 from experiments.cli.paper import Table2 as Repeated
 from experiments.cli.plugins import plugin_conflicts
 from experiments.cli.progress import progress_of
@@ -18,7 +17,7 @@ from experiments.identification.identification_text import print_identified
 from experiments.identification.results import Place, results_folder, tell_of, write_recording, write_summary
 from experiments.identification.scenario_run import ScenarioRun
 from experiments.identification.subject import Subject, absolute
-from experiments.identification.warnings import warnings_of_robot
+from experiments.identification.warnings import FILE, warnings_of_robot
 from experiments.paper.table2 import Table2
 from experiments.paper.table2_text import print_table2
 from experiments.recording.audience import Audience, Watching
@@ -38,7 +37,7 @@ if TYPE_CHECKING:
 
 def run(asked: Run) -> None:
     """Simulate a scenario, identify it and record it."""
-    page, watching, inner = new_page(), asked.watching, asked.inner
+    page, watching, inner = new_page(machine=asked.json), asked.watching, asked.inner
     if asked.scenario is None:
         if asked.robot is not None:
             raise ExperimentError(f"--robot {asked.robot}: a run of a study is of the study's robot")
@@ -56,10 +55,10 @@ def run(asked: Run) -> None:
             recording = _recording(described, audience, inner, made.subject) if watching.rerun else None
             ran = replace(made, progress=progress, watch=recording.watch if recording else None)
             print_identified(page, ran.identified, f"Scenario {described.name}")
-            for warning in [*warnings_of_robot(ran.run.robots[0]), *plugin_conflicts()]:
-                page.print(f"warning: {warning}", soft_wrap=True)
+            page.warn({FILE: [*warnings_of_robot(ran.run.robots[0]), *plugin_conflicts()]})
             write_log(ran.run.alone(), folder / "log.parquet")
             (folder / "scenario.toml").write_text(to_toml(described))
+            page.found |= ran.summary() | {"folder": str(place.out)}
             write_summary(folder / "summary.json", ran.summary())
             if recording:
                 lost = write_recording(folder, recording.finish(ran))
@@ -70,7 +69,7 @@ def run(asked: Run) -> None:
         page.print(f"written to {place.out}{watching.hint(place.out)}", soft_wrap=True)
 
 
-def _with_robot(page: Console, scenario: Scenario, robot: str | None) -> Scenario:
+def _with_robot(page: Page, scenario: Scenario, robot: str | None) -> Scenario:
     """Return a scenario with another robot, and moves that fit it."""
     if robot is None:
         return scenario
@@ -96,7 +95,7 @@ def _require_window(inner: tuple[float, float] | None, watching: Watching) -> No
         raise ExperimentError(f"--inner {inner[0]:g} {inner[1]:g} must be two times [s], in order, and needs a recording")
 
 
-def _doubt_window(page: Console, inner: tuple[float, float] | None, recording: "RunRecording | None") -> None:
+def _doubt_window(page: Page, inner: tuple[float, float] | None, recording: "RunRecording | None") -> None:
     if inner is not None and recording is not None and recording.base.inner is None:
         page.print(
             f"warning: nothing lies inside the loop from {inner[0]:g} to {inner[1]:g} s: the drive has no currents, "
@@ -122,7 +121,7 @@ def _alone(scenario: str, study: Path | None, index: int | None) -> str:
     return scenario
 
 
-def _again(page: Console, folder: Path | None, index: int | None, method: int | None) -> ScenarioRun:
+def _again(page: Page, folder: Path | None, index: int | None, method: int | None) -> ScenarioRun:
     """Return a run of a study, whose rows come out again, to be identified by one of its methods."""
     from experiments.study.again import compare_again
     from experiments.study.store import Store
@@ -153,7 +152,7 @@ def table2(asked: Repeated) -> None:
     watching, place = asked.watching, Place(asked.out, "table2", force=asked.force)
     _require_window(asked.inner, watching)
     place.check()
-    page, described, lost = new_page(), load(asked.scenario), ""
+    page, described, lost = new_page(machine=asked.json), load(asked.scenario), ""
     with watching.audience() as audience, shown(page):
         with results_folder(place) as folder, progress_of("simulating") as progress:
             recording = _recording(described, audience, asked.inner) if watching.rerun else None
@@ -161,6 +160,7 @@ def table2(asked: Repeated) -> None:
                 print_table2(page, table)
                 for i in range(len(table.run.seeds)):
                     write_log(table.run.alone(i), folder / f"log{i}.parquet")
+                page.found |= table.summary() | {"folder": str(asked.out)}
                 write_summary(folder / "summary.json", table.summary())
                 if recording:
                     from experiments.recording.table2_recording import finish_table2

@@ -36,10 +36,11 @@ def study(asked: Study) -> None:
     shard, threads, workers, scheduler = asked.shard, asked.threads, asked.workers, asked.scheduler
     if watching.pace is not None:
         raise StudyError(f"--pace {watching.pace:g}: a study has no one time that could pass; leave it out")
-    page = new_page()
+    page = new_page(machine=asked.json)
     if asked.study is None and resume is None:
         for name in names():
             page.out(f"{name:16} {load_study(name).question}")
+            page.found[name] = load_study(name).question
         show(page)
         return
     for name, value in (("seeds", seeds), ("shard", shard), ("threads", threads), ("workers", workers)):
@@ -55,7 +56,7 @@ def study(asked: Study) -> None:
         if pool is not None:
             with counting(store.study, sum(len(r) for r in store.missing(runs))) as watch:
                 run_missing(store, pool, runs, watch, receive)
-        write_results(page, store, recording)
+        page.found |= write_results(page, store, recording) | {"folder": str(store.folder)}
 
 
 def _recording(store: Store, audience: Audience | None) -> "StudyRecording":

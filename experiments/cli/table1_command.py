@@ -31,12 +31,13 @@ def compare(asked: Compared) -> None:
     chains = CHAINS_COMPARED if asked.chain == "all" else (asked.chain,)
     place = Place(asked.out or Path("runs/table1"), "table1", force=asked.force)
     place.check()
-    page, lost = new_page(), ""
+    page, lost = new_page(machine=asked.json), ""
     with asked.watching.audience() as audience, shown(page):
         with results_folder(place) as folder:
             table = Table1(load(asked.scenario or SCENARIO) if asked.seed is None else _searched(asked.seed), chains)
             print_table1(page, table)
             write_log(table.log, folder / "log.parquet")
+            page.found |= table.summary() | {"folder": str(place.out)}
             write_summary(folder / "summary.json", table.summary())
             if asked.watching.rerun:
                 from experiments.recording.table1_recording import record_table1
@@ -52,13 +53,15 @@ def _over_motions(asked: Compared, motions: int) -> None:
         raise ExperimentError(
             "--motions draws motions of its own and compares the paper's chains: leave --scenario and --chain out"
         )
-    place, page = Place(asked.out or Path("runs/table1-motions"), "table1-motions", force=asked.force), new_page()
+    place = Place(asked.out or Path("runs/table1-motions"), "table1-motions", force=asked.force)
+    page = new_page(machine=asked.json)
     place.check()
     with shown(page):
         with results_folder(place) as folder, progress_of("drawing and identifying motions") as progress:
             found = Table1Motions(motions, asked.seed or 0, progress=progress)
             print_motions(page, found)
             (folder / "motions.png").write_bytes(picture(found))
+            page.found |= found.summary() | {"folder": str(place.out)}
             write_summary(folder / "summary.json", found.summary())
         page.print(f"written to {place.out}: the picture is motions.png", soft_wrap=True)
 

@@ -1,5 +1,6 @@
 """Identifications as text."""
 
+from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite, log2, pi
 
 from rich.console import Console
@@ -8,6 +9,7 @@ from rich.text import Text
 from experiments.identification.identified import Identified
 from experiments.identification.validated import Validated
 from experiments.identification.verdict import SURE, Verdict
+from experiments.identification.warnings import FLAGS, doubtful
 from experiments.text import WORTHLESS, new_table, number, percent, percentage, print_titled
 from identify import AsLogged, Estimate, IdentificationError
 
@@ -20,10 +22,11 @@ def print_identified(console: Console, found: Identified, title: str) -> None:
     known = found.truth is not None
     what = ("X", "%e" if known else "sigma", "%sigma")
     heads = [f"{model}\n{w}" for model in found.estimates for w in what]
-    grid = new_table("", [*(["true\nX"] if known else []), *heads])
+    grid, flags = new_table("", [*(["true\nX"] if known else []), *heads]), doubtful(found)
     for i, name in enumerate(found.basis.names):
         true = [f"{list(found.truth.values())[i]:g}"] if found.truth is not None else []
-        grid.add_row(name, *true, *(cell for e in found.estimates.values() for cell in _cells(e, found, i)))
+        cells = (cell for model, e in found.estimates.items() for cell in _flagged(_cells(e, found, i), flags[model][i], flags))
+        grid.add_row(name, *true, *cells)
     grid.add_section()
     lead = [""] if known else []
     grid.add_row("Cond(W)", *lead, *(c for e in found.estimates.values() for c in (f"{e.condition_number:.1f}", "", "")))
@@ -31,7 +34,9 @@ def print_identified(console: Console, found: Identified, title: str) -> None:
     for j in range(found.basis.n):
         shares = [_explained(share[j]) for share in found.explained.values()]
         grid.add_row(f"tau{j + 1} explained", *lead, *(c for share in shares for c in (share, "", "")))
-    print_titled(console, f"{title}: chain {found.chain}, {found.estimator}", grid)
+    print_titled(console, f"{title}: chain {found.chain}, {found.estimator}", grid, 1 + known)
+    if used := {flag for of_model in flags.values() for of_row in of_model for flag in of_row if flag.strip()}:
+        console.print(Text("; ".join(f"{flag} {FLAGS[flag]}" for flag in FLAGS if flag in used)))
     channel = found.logs[0].torque
     read = f"{channel.meaning}, delay {1e3 * channel.delay:.4g} ms"
     logged = isinstance(found.processing.alignment, AsLogged)
@@ -46,6 +51,12 @@ def print_identified(console: Console, found: Identified, title: str) -> None:
         console.print(Text(words), soft_wrap=True)
     console.print(Text(_noise(found)), soft_wrap=True)
     console.print()
+
+
+def _flagged(cells: Sequence[str], marks: Sequence[str], flags: Mapping[str, Sequence[Sequence[str]]]) -> Iterator[str]:
+    """Yield cells with their mark, or as much room as one takes, if there is any in the table."""
+    any_marks = any(flag.strip() for of_model in flags.values() for of_row in of_model for flag in of_row)
+    yield from (f"{cell}{mark if any_marks else ''}" for cell, mark in zip(cells, marks, strict=True))
 
 
 def _noise(found: Identified) -> str:
@@ -92,9 +103,8 @@ def print_validated(console: Console, validated: Validated) -> None:
     for j, joint in enumerate(validated.found.subject.robot.joints):
         noise = percentage(first.percent_of_level(first.noise)[j])
         grid.add_row(joint, noise, *(cell for model in torques for cell in _validation_cells(validated, model, j)))
-    print_titled(
-        console, f"{validated.title}: torque error while moving [N m, N], position error of the simulated robot [rad, m]", grid
-    )
+    what = "torque error while moving [N m, N], position error of the simulated robot [rad, m]"
+    print_titled(console, f"{validated.title}: {what}", grid)
     still = first.standing
     joints = validated.found.subject.robot.joints
     apart = [f"{joint} {rms:.2g}" for joint, rms in zip(joints, still, strict=True) if isfinite(rms)]

@@ -28,20 +28,65 @@ MUCH_LONGER = 100
 FAR_OFF = 30.0
 """Factor between measured and expected torques that no missing rotor or friction makes in the joint that carries most."""
 
+FAR = 4.0
+"""Errors of more than so many sigma are marked: normal ones come once in 16 000."""
+
+WEAK = 0.5
+"""Share of its value that the sigma of a parameter may have before it is marked as weak."""
+
 OPEN = 0.02
 """Share of a joint's torque on a brisk motion that one sigma of a parameter may make before it counts as left open."""
 
 
-def warnings_of_result(found: Identified) -> list[str]:
-    """Return what no healthy identification shows, and what the log leaves open."""
-    messages = [*wrong_sign(found), *wrong_unit(found)]
-    for name, estimate in found.estimates.items():
-        friction = zip(found.basis.parameters, estimate.X, estimate.best_sigma, strict=True)
-        negative = [p.name for p, x, sigma in friction if p.kind in NOT_NEGATIVE and _surely_negative(x, sigma)]
-        if negative and not messages:
-            messages.append(f"{', '.join(negative)} below zero in the {name} model: is the torque's meaning or delay wrong?")
-        messages += list(_too_little(found, name)) or list(_badly_explained(found, name))
-    return messages or _left_open(found)
+LOG, DELAY, FILE, MOTION, MODEL = "the log", "the torque's delay", "the robot's file", "the motion", "the model"
+"""What warnings are about, in the order in which to see to them: what comes first may be what makes the others."""
+
+
+def warnings_of_result(found: Identified) -> dict[str, list[str]]:
+    """Return what no healthy identification shows, and what the log leaves open, by what it is about."""
+    log, motion, model = [*wrong_sign(found), *wrong_unit(found)], list[str](), list[str]()
+    negative = {name: _negative(found, name) for name in found.estimates}
+    if any(negative.values()) and not log:
+        models: dict[tuple[str, ...], list[str]] = {}
+        for name, names in negative.items():
+            models.setdefault(tuple(names), []).append(name)
+        each = (f"{', '.join(names)} below zero in the {' and the '.join(of)} model" for names, of in models.items() if names)
+        model.append(f"{'; '.join(each)}: is the torque's meaning or delay wrong?")
+    for name in found.estimates:
+        little = list(_too_little(found, name))
+        motion += little
+        model += [] if little else list(_badly_explained(found, name))
+    if not (log or motion or model):
+        motion = _left_open(found)
+    return {LOG: log, MOTION: motion, MODEL: model}
+
+
+FLAGS = {
+    "!": "below zero, which it cannot be",
+    "*": "off by more than 4 sigma",
+    "?": "known to no better than half of its value",
+}
+"""What is doubtful of a parameter."""
+
+
+def doubtful(found: Identified) -> dict[str, list[tuple[str, str, str]]]:
+    """Return, of each model, a mark for every parameter's estimate, its error and its sigma; blank where nothing is wrong."""
+    marks = {}
+    for model, estimate in found.estimates.items():
+        negative, sigma = _negative(found, model), estimate.best_sigma
+        off = np.zeros(len(sigma)) if found.truth is None else np.abs(estimate.X - list(found.truth.values()))
+        marks[model] = [
+            ("!" if name in negative else " ", "*" if error > FAR * s > 0 else " ", "?" if s > WEAK * abs(x) else " ")
+            for name, x, error, s in zip(estimate.names, estimate.X, off, sigma, strict=True)
+        ]
+    return marks
+
+
+def _negative(found: Identified, model: str) -> list[str]:
+    """Return what cannot be below zero and surely is."""
+    estimate = found.estimates[model]
+    friction = zip(found.basis.parameters, estimate.X, estimate.best_sigma, strict=True)
+    return [p.name for p, x, sigma in friction if p.kind in NOT_NEGATIVE and _surely_negative(x, sigma)]
 
 
 def _too_little(found: Identified, name: str) -> Iterator[str]:

@@ -11,6 +11,7 @@ from rich.text import Text
 
 from experiments.paper.causes import COMPARED, causes
 from experiments.paper.table1 import PAPER, Table1
+from experiments.text import print_table
 from identify import Array, Estimate
 
 WHY = (
@@ -31,9 +32,10 @@ def print_table1(console: Console, table: Table1) -> None:
     """Print, for each model, estimates and errors of every chain beside the paper's, Cond(W) and rows."""
     console.print(Text(f"Trajectory {table.scenario.name}: {table.scenario.origin}\n"))
     for form in next(iter(table.estimates.values())):
-        console.print(_model_table(table, form))
+        print_table(console, _model_table(table, form), 2)
     if {"paper", "paper_masked"} <= set(table.chains):
-        console.print(Text(WHY.format(**_times_the_papers(table))), _causes_table(table))
+        console.print(Text(WHY.format(**_times_the_papers(table))))
+        print_table(console, _causes_table(table))
     if "idbench" in table.chains:
         console.print(Text(EXACT))
 

@@ -5,7 +5,7 @@ from rich.table import Table
 from rich.text import Text
 
 from experiments.paper.table2 import PAPER, PAPER_ROWS, REALIZATIONS, Table2
-from experiments.text import new_table, percent
+from experiments.text import new_table, percent, print_table
 from identify import Estimate
 
 
@@ -13,7 +13,7 @@ def print_table2(console: Console, table: Table2) -> None:
     """Print the paper's Table 2 beside its twin, processed twice, and what each imperfection does alone."""
     console.print(Text(f"Scenario {table.scenario.name}: {table.scenario.origin}\n"))
     for model in REALIZATIONS:
-        console.print(_twin(table, model))
+        print_table(console, _twin(table, model), 2)
     console.print(
         Text("2s: 2 sigma, %s: %sigma, %e: error. Processed as in the paper (chain paper, OLS), and by chain idbench, WLS.\n")
     )
@@ -22,7 +22,7 @@ def print_table2(console: Console, table: Table2) -> None:
         grid = new_table(f"{form} model", table.truth)
         for name, errors in table.attribution.items():
             grid.add_row(name, *(percent(error) for error in errors[form]))
-        console.print(grid)
+        print_table(console, grid)
 
 
 def _twin(table: Table2, model: str) -> Table:

@@ -16,7 +16,7 @@ from experiments.study.statistics import Cell, cells
 from experiments.study.store import Store
 from experiments.study.study_report import report
 from experiments.study.versions import versions
-from experiments.text import new_table
+from experiments.text import new_table, print_table
 
 MOST_REASONS = 3
 """Reasons of failures that are printed; the report has all."""
@@ -25,19 +25,20 @@ if TYPE_CHECKING:
     from experiments.recording.study_recording import StudyRecording
 
 
-def write_results(page: Console, store: Store, recording: "StudyRecording | None") -> list[Cell]:
-    """Write summary.json, report.html and the recording into the folder of a study, and print its answer."""
+def write_results(page: Console, store: Store, recording: "StudyRecording | None") -> dict[str, Any]:
+    """Write summary.json, report.html and the recording into the folder of a study, and print its answer; return the first."""
     study, seconds = store.study, store.seconds()
     found = cells(arrays(store.table()), study.varied, study.parameters)
     with beside(store.folder) as folder:
         (folder / "report.html").write_text(report(study, found, seconds, store.folder), encoding="utf-8")
-        write_summary(folder / "summary.json", _summary(store, found, seconds))
+        summary = _summary(store, found, seconds)
+        write_summary(folder / "summary.json", summary)
         lost = write_recording(folder, recording.finish(found)) if recording else ""
     _print(page, store, found)
     tell_of(lost, store.folder)
     if not any(cell.runs for cell in found):
         raise ResultsError(f"no run of study {study.name} gave an estimate: {_reasons(found)[0]}")
-    return found
+    return summary
 
 
 def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:
@@ -54,7 +55,7 @@ def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:
         judged = *errors, f"{100 * cell.coverage(cell.sigma).mean():.0f} %" if cell.runs else ""
         grid.add_row(*settings, method(cell, found), *numbers, *judged)
     grid.columns[0].header = axes[0]
-    page.print(grid)
+    print_table(page, grid, len(axes) + 1)
     page.print(Text(answer(found)))
     for reason in _reasons(found)[:MOST_REASONS]:
         page.print(Text(f"failed: {reason}"), soft_wrap=True)

@@ -104,14 +104,14 @@ def test_a_starved_power_model_is_told_to_be_so_and_the_explicit_one_recommended
     found = Identified((part,), Subject(PUMA), models=("explicit", "power"))
     rows, p = int(found.estimates["power"].row_count), len(found.basis.names)
     assert p < rows < 4 * p
-    warnings = [warning for warning in warnings_of_result(found) if "identifies too little" in warning]
+    warnings = [warning for warning in warnings_of_result(found)["the motion"] if "identifies too little" in warning]
     assert any(f"the power model identifies too little: {rows} rows for {p} parameters" in warning for warning in warnings)
     assert not any("units" in warning for warning in warnings_of_result(found))
 
 
 def test_torques_in_other_units_are_pointed_out(pair):
     milli = [torques(log, lambda tau: 1000 * tau) for log in pair]
-    warnings = warnings_of_result(validated(milli).found)
+    warnings = warnings_of_result(validated(milli).found)["the log"]
     assert any("are they in N m?" in warning for warning in warnings)
     assert not any("are they in N m?" in warning for warning in warnings_of_result(validated(pair).found))
 

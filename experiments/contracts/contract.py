@@ -1,0 +1,106 @@
+"""What a contract is made of: examples to try a plug-in with, and complaints that say what is wrong."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from experiments.errors import ExperimentError
+from experiments.paper.table1 import SCENARIO, Table1
+from identify import Array, MotionLog
+from sim.robot.robot import Robot
+from sim.scenario.scenario_file import load
+from sim.trajectories import Reference
+
+FS = 100.0
+"""Sampling frequency of the examples [Hz]."""
+
+RUNS = 3
+"""Runs, or simulations, of the examples."""
+
+
+class ContractError(ExperimentError):
+    """A plug-in does not keep its contract."""
+
+
+@dataclass(frozen=True, eq=False)
+class Example:
+    """What plug-ins are tried with: the paper's SCARA on noise-free moves, and signals of three runs of two joints."""
+
+    @cached_property
+    def _table(self) -> Table1:
+        return Table1(load(SCENARIO), ())
+
+    @cached_property
+    def log(self) -> MotionLog:
+        """A log without noise."""
+        return self._table.log
+
+    @cached_property
+    def truth(self) -> Array:
+        """Its parameters."""
+        return np.array(list(self._table.truth.values()))
+
+    @property
+    def robot(self) -> Robot:
+        """The SCARA."""
+        return Robot.load("scara")
+
+    @property
+    def reference(self) -> Reference:
+        """Its motion."""
+        return self._table.reference
+
+    @cached_property
+    def t(self) -> Array:
+        """Times of the signals [s]."""
+        return np.arange(1200) / FS
+
+    @cached_property
+    def signals(self) -> Array:
+        """Signals, shape (run, joint, time)."""
+        return np.stack([np.stack([np.sin(a * self.t), np.cos(b * self.t)]) for a, b in ((1, 2), (3, 1), (2, 5))])
+
+
+Clause = Callable[[Any, Example], None]
+"""A part of a contract: raises if a plug-in does not keep it; its docstring says what it asks."""
+
+
+def require(kept: object, complaint: str) -> None:
+    """Raise ContractError unless something is kept."""
+    if not kept:
+        raise ContractError(complaint)
+
+
+def require_equal(found: Any, expected: Any, what: str, rtol: float = 0.0, atol: float = 0.0) -> None:
+    """Raise ContractError if arrays differ, saying by how much."""
+    found, expected = np.asarray(found), np.asarray(expected)
+    if np.shape(found) != np.shape(np.broadcast_to(expected, np.broadcast_shapes(found.shape, expected.shape))):
+        raise ContractError(f"{what} has the shape {found.shape}, expected {expected.shape}")
+    if not np.allclose(found, expected, rtol=rtol, atol=atol, equal_nan=True):
+        with np.errstate(invalid="ignore"):
+            off = np.nanmax(np.abs(found - expected)) if np.isfinite(found).any() else np.nan
+        raise ContractError(f"{what} is off by up to {off:.3g}")
+
+
+def untouched(function: Callable[..., Array], *arrays: Array) -> Array:
+    """Return what a function gives of read-only arrays; raise ContractError if it is not the same bits twice."""
+    for array in arrays:
+        array.setflags(write=False)
+    first, second = function(*arrays), function(*arrays)
+    require_equal(first, second, "the result of a second call")
+    return first
+
+
+def checked(plugin: Any, clauses: tuple[Clause, ...], example: Example) -> Iterator[tuple[str, str]]:
+    """Yield what each clause asks, and why the plug-in does not keep it; empty if it does."""
+    for clause in clauses:
+        asked = (clause.__doc__ or "").splitlines()[0]
+        try:
+            clause(plugin, example)
+        except Exception as error:  # whatever a plug-in raises
+            yield asked, f"{type(error).__name__}: {error}" if not isinstance(error, ContractError) else str(error)
+        else:
+            yield asked, ""

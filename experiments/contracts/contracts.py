@@ -1,0 +1,82 @@
+"""The contract of every plug-in point."""
+
+import importlib
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from experiments.cli.plugins import TABLES
+from experiments.contracts import identification_contracts as identification
+from experiments.contracts import simulation_contracts as simulation
+from experiments.contracts.contract import Clause, Example, checked
+from experiments.errors import ExperimentError
+from identify.plugins import PluginTable, did_you_mean
+
+CONTRACTS: Mapping[str, tuple[Clause, ...]] = {
+    "blocks": (
+        identification.is_immutable,
+        identification.block_names_its_parameters,
+        identification.block_keeps_its_identities,
+    ),
+    "models": (identification.is_immutable, identification.model_says_a_true_sentence),
+    "prefilters": (
+        identification.is_immutable,
+        identification.prefilter_keeps_constants,
+        identification.prefilter_has_no_phase,
+    ),
+    "differentiators": (identification.is_immutable, identification.differentiator_knows_a_line),
+    "alignments": (identification.is_immutable, identification.alignment_keeps_constants),
+    "masks": (identification.is_immutable, identification.mask_gives_weights),
+    "operators": (identification.is_immutable, identification.operator_agrees_with_its_step),
+    "chains": (identification.chain_is_made_anew_alike, identification.chain_recovers_ideal_data),
+    "estimators": (
+        identification.is_immutable,
+        identification.estimator_recovers_noiseless_rows,
+        identification.estimator_takes_every_run_by_itself,
+    ),
+    "trajectories": (identification.is_immutable, simulation.trajectory_rests_at_both_ends),
+    "controllers": (identification.is_immutable, simulation.controller_commands_every_simulation_by_itself),
+    "drives": (identification.is_immutable, simulation.drive_gives_finite_torques),
+    "frictions": (identification.is_immutable, simulation.friction_resists),
+    "encoders": (identification.is_immutable, simulation.encoder_reads_to_a_count),
+}
+"""Plug-in point -> what its plug-ins are asked."""
+
+
+def found(name: str) -> tuple[PluginTable[Any], Any]:
+    """Return the table and the plug-in of a name, such as TLS, drives/averaged or mybench:TotalLeastSquares.
+
+    Raises
+    ------
+    ExperimentError
+        If there is none, several have the name, or it cannot be loaded.
+    """
+    if ":" in name:
+        return _loaded(name)
+    point, _, short = name.rpartition("/")
+    there = [table for table in TABLES if short in table and point in ("", table.point)]
+    if not there:
+        known = [other for table in TABLES for other in table]
+        raise ExperimentError(
+            f"no plug-in {name!r}{did_you_mean(short, known)}: idbench list has them all, or name MODULE:CLASS"
+        )
+    if len(there) > 1:
+        raise ExperimentError(f"{name!r} is several plug-ins: {', '.join(f'{table.point}/{short}' for table in there)}")
+    return there[0], there[0].create(short)
+
+
+def _loaded(name: str) -> tuple[PluginTable[Any], Any]:
+    module, _, attribute = name.partition(":")
+    try:
+        made = getattr(importlib.import_module(module), attribute)()
+    except Exception as error:  # whatever another package raises
+        raise ExperimentError(f"{name} cannot be made without arguments: {type(error).__name__}: {error}") from error
+    there = [table for table in TABLES if isinstance(made, table.kind)]
+    if not there:
+        raise ExperimentError(f"{name} makes {type(made).__name__}, which is a plug-in of no point")
+    return there[0], made
+
+
+def kept(name: str, example: Example) -> Iterator[tuple[str, str]]:
+    """Yield what a plug-in is asked, and why it does not keep it; empty if it does."""
+    table, plugin = found(name)
+    yield from checked(plugin, CONTRACTS[table.point], example)

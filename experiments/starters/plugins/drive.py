@@ -1,0 +1,50 @@
+"""A drive: what stands between the commanded torque and that of the motor."""
+
+from typing import final
+
+import numpy as np
+
+from sim.drives.drive import AbstractAmplifier, AbstractDrive, Trace
+from sim.drives.electric import Electric
+from sim.robot.motors import Array
+from sim.robot.robot import Robot
+from sim.settings import Positive, settings
+
+
+@final
+@settings
+class Starter(AbstractDrive):
+    """A torque that follows its command with a time constant."""
+
+    time_constant: Positive = 0.002
+    """Of the first-order lag [s]."""
+
+    def start(self, robot: Robot, nsim: int, h: float) -> AbstractAmplifier:
+        """Return the drive at rest, to be advanced by steps of `h` [s]."""
+        return _Amplifier(np.zeros((nsim, robot.n)), -np.expm1(-h / self.time_constant))
+
+    def lag(self, robot: Robot) -> Array:
+        """Return the time constant, by which the torque follows a slow command [s]."""
+        return np.full(robot.n, self.time_constant)
+
+    @property
+    def steady(self) -> bool:
+        """False: the torque changes from step to step."""
+        return False
+
+
+class _Amplifier(AbstractAmplifier):
+    def __init__(self, tau: Array, share: float) -> None:
+        self._tau, self._share = tau, share
+
+    def step(self, demand: Array, speed: Array, steps: int) -> Array:
+        del speed
+        torques = np.empty((steps, *demand.shape))
+        for k in range(steps):
+            self._tau = self._tau + self._share * (demand - self._tau)
+            torques[k] = self._tau
+        return torques
+
+    def electric(self, trace: Trace, dt: Array) -> Electric:
+        del trace  # it has no currents
+        return Electric(*np.zeros((5, *dt.shape)))

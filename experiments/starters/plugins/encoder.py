@@ -1,0 +1,36 @@
+"""An encoder: what the controller sees, and logs, of a joint's position."""
+
+from collections.abc import Sequence
+from typing import final
+
+import numpy as np
+
+from sim.encoders.encoder import AbstractEncoder, AbstractReader
+from sim.robot.motors import Array
+from sim.settings import NotNegative, settings
+
+
+@final
+@settings
+class Starter(AbstractEncoder):
+    """Positions with white noise, as of a resolver."""
+
+    noise: NotNegative = 5e-6
+    """rms [rad]."""
+
+    def start(self, n: int, samples: int, fs: float, rngs: Sequence[np.random.Generator]) -> AbstractReader:
+        """Return the encoders of `n` joints; a generator for each simulation, so that none depends on the others."""
+        del fs
+        return _Reader(self.noise * np.stack([rng.standard_normal((samples, n)) for rng in rngs], axis=1))
+
+    def spread(self, n: int) -> Array:
+        """Return the noise of `n` joints [rad]."""
+        return np.full(n, self.noise)
+
+
+class _Reader(AbstractReader):
+    def __init__(self, noise: Array) -> None:
+        self._noise = noise
+
+    def read(self, k: int, q: Array) -> Array:
+        return q + self._noise[k]

@@ -1,0 +1,99 @@
+"""What authors begin with runs as it is; a plug-in that breaks its contract is told where."""
+
+import subprocess
+import sys
+import tomllib
+
+import pytest
+
+from experiments.cli import main
+from experiments.starters.starters import KINDS
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_plugin_is_begun_that_keeps_its_contract(kind, here, monkeypatch, capsys):
+    assert main(["new", "plugin", f"begun-{kind}", "--kind", kind]) == 0
+    package = here / f"begun-{kind}"
+    project = tomllib.loads((package / "pyproject.toml").read_text())
+    ((point, entries),) = project["project"]["entry-points"].items()
+    assert point == f"idbench.{KINDS[kind].point}"
+    monkeypatch.syspath_prepend(package)
+    capsys.readouterr()
+    assert main(["check", entries[f"begun-{kind}"]]) == 0
+    assert f"of the {KINDS[kind].point}" in capsys.readouterr().out
+
+
+def test_its_own_test_passes(here):
+    assert main(["new", "plugin", "begun"]) == 0
+    words = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-c", "pyproject.toml", "--rootdir", "."]
+    alone = {"PYTHONPATH": ".", "PATH": ""}
+    command = [sys.executable, *words]
+    done = subprocess.run(command, cwd=here / "begun", env=alone, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "3 passed" in done.stdout
+
+
+def test_a_scenario_and_a_study_are_begun_that_run(here, capsys):
+    assert main(["new", "scenario", "mine", "--like", "quantization"]) == 0
+    assert main(["run", "mine.toml", "--no-rerun"]) == 0
+    assert main(["new", "study", "asked"]) == 0
+    assert main(["study", "asked.toml", "--seeds", "2", "--no-rerun"]) == 0
+    printed = capsys.readouterr().out
+    assert "Scenario mine" in printed
+    assert "How much noise of the torque can asked bear?" in printed
+
+
+BROKEN = '''
+from dataclasses import dataclass
+import numpy as np
+from identify import AbstractFriction
+
+@dataclass(frozen=True)
+class Half(AbstractFriction):
+    """Drag whose dissipation is half of its power."""
+
+    symbol = "Fh"
+    unit = "N m"
+
+    def force(self, q, qd):
+        return np.abs(qd) * qd
+
+    def dissipation(self, state):
+        return {at: x / 2 for at, x in super().dissipation(state).items()}
+'''
+
+
+def test_a_broken_contract_is_told(here, monkeypatch, capsys):
+    (here / "halved.py").write_text(BROKEN)
+    monkeypatch.syspath_prepend(here)
+    assert main(["check", "halved:Half"]) == 2
+    printed, told = capsys.readouterr()
+    assert "no   Explicit columns are d/dt momentum + remainder" in printed
+    assert "the power of Fh1 is off by up to" in printed
+    assert "does not keep 1 of 3 parts of its contract" in told
+
+
+def test_what_cannot_be_begun_or_checked_is_refused(here, capsys):
+    def complaint(*words):
+        assert main(list(words)) == 2
+        return capsys.readouterr().err
+
+    assert "no kind of plug-in 'drives' (did you mean 'drive'?)" in complaint("new", "plugin", "x", "--kind", "drives")
+    assert "cannot be a name" in complaint("new", "study", "a b")
+    (here / "there.toml").write_text("")
+    assert "there.toml exists" in complaint("new", "scenario", "there")
+    assert "(did you mean 'GLS'?)" in complaint("check", "GSL")
+    assert "'none' is several plug-ins: prefilters/none, masks/none" in complaint("check", "none")
+    assert "cannot be made without arguments: ModuleNotFoundError" in complaint("check", "nowhere:Thing")
+    assert "is a plug-in of no point" in complaint("check", "pathlib:Path")
+
+
+def test_alone_it_says_what_there_is_to_do_in_ten_lines(capsys):
+    assert main([]) == 0
+    assert len([line for line in capsys.readouterr().out.splitlines() if line.strip()]) <= 10
