@@ -99,4 +99,4 @@ def _text(study: Study, cells: Sequence[Cell], folder: Path) -> str:
         f"- {name} {100 * e:+.2g} %: {where(cell, cells)}\n  `{command(study, folder, cell, run)}`"
         for cell, name, e, run in worst_runs([cell for cell in cells if cell.runs])
     ]
-    return "\n\n".join([f"# {study.question}", answer(cells), "## Worst runs", "\n".join(worst)])
+    return "\n\n".join([f"# {study.question}", answer(cells, study.edges), "## Worst runs", "\n".join(worst)])

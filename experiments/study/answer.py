@@ -8,18 +8,39 @@ from typing import Any
 import numpy as np
 
 from experiments.study.comparison import differences
+from experiments.study.requirement import in_words, requirements
 from experiments.study.statistics import Cell
 
 SURE = 0.01
 """Probability below which two ways of identification count as different."""
 
 
-def answer(cells: Sequence[Cell]) -> str:
-    """Return which model, in which chain, errs least and how clearly, and whether its sigma can be believed."""
+def answer(cells: Sequence[Cell], edges: int = 4) -> str:
+    """Return which model, in which chain, errs least and how clearly, and whether its sigma can be believed.
+
+    Parameters
+    ----------
+    cells : sequence of Cell
+        All of a study.
+    edges : int
+        Edges that are counted in a line of an encoder.
+    """
     solved = [cell for cell in cells if cell.runs]
     if not solved:
         return f"No run gave an estimate. {failures(cells)}"
-    return f"{_who(solved)} {_sigmas(solved)} {failures(cells)}".strip()
+    parts = _who(solved), _asked(solved, edges), _sigmas(solved), failures(cells)
+    return " ".join(filter(None, parts))
+
+
+def headline(cells: Sequence[Cell], edges: int = 4) -> str:
+    """Return the sentence of the answer that says most: what an error of a size takes, or else what errs least."""
+    return _asked(cells, edges) or _who(cells)
+
+
+def _asked(cells: Sequence[Cell], edges: int) -> str:
+    """Return what typical errors of the best methods ask of what varies, as a sentence; empty if nothing does."""
+    asked = requirements([_best(group) for group in grouped(cells).values()], edges)
+    return f"{asked[0].upper()}{asked[1:]}." if asked else ""
 
 
 def grouped(cells: Sequence[Cell]) -> dict[str, list[Cell]]:
@@ -31,6 +52,7 @@ def grouped(cells: Sequence[Cell]) -> dict[str, list[Cell]]:
 
 
 def _who(cells: Sequence[Cell]) -> str:
+    """Return what errs least, how clearly, and how much."""
     groups = list(grouped(cells).values())
     best = [_best(group) for group in groups]
     low, high = min(best, key=lambda c: c.typical), max(best, key=lambda c: c.typical)
@@ -49,22 +71,25 @@ def _who(cells: Sequence[Cell]) -> str:
 
 
 def _winners(groups: Sequence[Sequence[Cell]], best: Sequence[Cell], cells: Sequence[Cell]) -> str:
-    """Return which methods are least often surely worse than another, where they have the least error, and how surely."""
+    """Return which methods are least often surely worse than another, and how often they are surely better than all others.
+
+    A combination in which another errs less, but not surely, does not count against them.
+    """
     rivals = [_not_worse(group, cell, cells) for group, cell in zip(groups, best, strict=True)]
     counts = Counter(name for names in rivals for name in names)
     winners = [name for name, count in counts.items() if count == max(counts.values())]
-    least = sum(method(cell, cells) in winners for cell in best)
+    unbeaten = max(counts.values())
     lonely = sum(len(group) == 1 for group in groups)
-    alone = f" (in {lonely} nothing else gave an estimate)" if lonely else ""
-    sure = sum(set(names) <= set(winners) for names in rivals)
+    words = [f"Least error: {' and '.join(winners)}"]
+    if len(groups) > 1 or unbeaten < len(groups):
+        alone = f" (in {lonely} nothing else gave an estimate)" if lonely else ""
+        words.append(f"not surely worse than any other in {unbeaten} of {len(groups)} combinations{alone}")
+    if len({method(c, cells) for c in cells}) > len(winners):
+        sure = sum(set(names) <= set(winners) for names in rivals)
+        words.append(f"surely less than all others {f'in {sure} ' if len(groups) > 1 else ''}(p < {SURE:g})" if sure else "")
     tied = sum(len(set(names) & set(winners)) > 1 for names in rivals)
-    tie = f", with no sure difference between them in {tied} (p >= {SURE:g})" if tied else ""
-    clear = (
-        f", surely less than all others in {sure} (p < {SURE:g})"
-        if len({method(c, cells) for c in cells}) > len(winners)
-        else ""
-    )
-    return f"Least error in {least} of {len(groups)} combinations{alone}: {' and '.join(winners)}{tie}{clear}"
+    between = f"between them no sure difference{f' in {tied}' if len(groups) > 1 else ''}" if len(winners) > 1 else ""
+    return ", ".join(filter(None, words)) + (f"; {between}" if between else "")
 
 
 def _best(group: Sequence[Cell]) -> Cell:
@@ -129,7 +154,7 @@ def short(field: str) -> str:
 
 def value(x: Any) -> str:
     """Return the value of an axis as text."""
-    return f"{x:.6g}" if isinstance(x, float) else str(x)
+    return in_words("", x)
 
 
 def percent(share: float) -> str:

@@ -1,6 +1,6 @@
 """The figures of a study's report, as SVG."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from io import StringIO
 from typing import Any
 
@@ -12,16 +12,51 @@ from matplotlib.figure import Figure
 from experiments.recording.style import FORMS
 from experiments.study.answer import value
 from experiments.study.axis import Axis
+from experiments.study.requirement import in_words
 from experiments.study.statistics import RIGHT, SIGMAS, Cell
 from identify import Array
 
 OTHER = [90, 90, 90]
 """Colour of models that have none of their own."""
 
+ACROSS = 3
+"""Panels beside each other."""
+
+TICKS = 8
+"""Values of an axis that have room beside it."""
+
 WIDE = 8.0
 """Ratio of the largest to the smallest value above which an axis is logarithmic."""
 
 mpl.rcParams.update({"svg.hashsalt": "idbench", "svg.fonttype": "none", "font.size": 8, "axes.grid": True, "grid.alpha": 0.3})
+
+
+def typical_figure(families: Mapping[str, Sequence[Cell]], axis: Axis, edges: int) -> str:
+    """Return the typical error over an axis, a panel a family of cells, a line a model, with intervals."""
+    columns = min(ACROSS, len(families))
+    rows = -(-len(families) // columns)
+    figure = Figure(figsize=(11, 2.6 * rows + 0.9), layout="constrained")
+    grid = np.atleast_1d(figure.subplots(rows, columns, sharex=True, sharey=True)).ravel()
+    for spare in grid[len(families) :]:
+        spare.set_visible(False)
+    for panel, (title, cells) in zip(grid, families.items(), strict=False):
+        for model, group in _models(cells).items():
+            x, y = _places(panel, group, axis, edges), np.array([100 * c.typical for c in group])
+            ends = np.abs(100 * np.array([c.typical_interval for c in group]).T - y)
+            panel.errorbar(x, y, ends, color=_color(model), label=model, lw=_width(cells, model), marker=".", capsize=2)
+            if np.isfinite(least := np.array([100 * c.typical_least for c in group])).any():
+                panel.plot(x, least, color="black", ls=":", lw=1.0, label="bound" if model == _last(cells) else None)
+        panel.set_yscale("log")
+        panel.set_title(title)
+    handles, labels = grid[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=6, frameon=False)
+    figure.supylabel("typical error [%]", fontsize=9)
+    figure.supxlabel(axis.field, fontsize=9)
+    return _svg(figure)
+
+
+def _last(cells: Sequence[Cell]) -> str:
+    return list(_models(cells))[-1]
 
 
 def error_figure(cells: Sequence[Cell], axis: Axis) -> str:
@@ -92,8 +127,11 @@ def _models(cells: Sequence[Cell]) -> dict[str, list[Cell]]:
     return groups
 
 
-def _places(panel: Panel, group: Sequence[Cell], axis: Axis) -> Array:
-    """Return where the cells lie on an axis, logarithmic if its values are far apart, counted if they are words."""
+def _places(panel: Panel, group: Sequence[Cell], axis: Axis, edges: int = 4) -> Array:
+    """Return where the cells lie on an axis, logarithmic if its values are far apart, counted if they are words.
+
+    What is written beside the axis are its own values.
+    """
     values = [cell.settings[axis.field] for cell in group]
     if not axis.numeric:
         words = [axis.label(v) for v in axis.points]
@@ -106,6 +144,10 @@ def _places(panel: Panel, group: Sequence[Cell], axis: Axis) -> Array:
             panel.set_xscale("log")
         else:
             panel.set_xscale("symlog", linthresh=float(positive.min()))
+    some = numbers[:: 1 + len(numbers) // TICKS]
+    written = [in_words(axis.field, x, edges).replace(" (", "\n(") for x in some.tolist()]
+    panel.set_xticks(some.tolist(), labels=written, fontsize=7)
+    panel.set_xticks([], minor=True)
     return np.array(values, dtype=np.float64)
 
 

@@ -177,6 +177,11 @@ class Study:
         return json.dumps(self.content, sort_keys=True)
 
     @property
+    def edges(self) -> int:
+        """Edges that are counted in a line of its encoders."""
+        return int(self.scenario.get("encoder", {}).get("quadrature", 4))
+
+    @property
     def content(self) -> dict[str, Any]:
         """The study as the keys of a TOML document."""
         axes = []

@@ -10,10 +10,10 @@ import numpy as np
 import tomli_w
 from jinja2 import Environment
 
-from experiments.study.answer import answer, grouped, method, percent, short, value, where
+from experiments.study.answer import answer, grouped, headline, method, percent, short, value, where
 from experiments.study.axis import Axis
 from experiments.study.comparison import differences
-from experiments.study.figures import cost_figure, coverage_figure, error_figure
+from experiments.study.figures import cost_figure, coverage_figure, error_figure, typical_figure
 from experiments.study.statistics import Cell
 from experiments.study.study import Study
 from experiments.study.versions import versions
@@ -32,7 +32,9 @@ def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folde
     return template.render(
         study=study,
         methods=len(study.methods),
-        answer=answer(cells),
+        headline=headline(solved, study.edges) if solved else "",
+        answer=answer(cells, study.edges),
+        typical=typical_figure(dict(families(study, solved)), main_axis(study), study.edges) if solved else "",
         axes=[short(name) for name in cells[0].settings],
         overview=[_overview(cell) for cell in cells],
         families=[_family(title, group, main_axis(study)) for title, group in families(study, solved)],

@@ -56,7 +56,7 @@ def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:
         grid.add_row(*settings, method(cell, found), *numbers, *judged)
     grid.columns[0].header = axes[0]
     print_table(page, grid, len(axes) + 1)
-    page.print(Text(answer(found)))
+    page.print(Text(answer(found, store.study.edges)))
     for reason in _reasons(found)[:MOST_REASONS]:
         page.print(Text(f"failed: {reason}"), soft_wrap=True)
     page.print(Text(f"\nwritten to {store.folder}: open {store.folder / 'report.html'}"), soft_wrap=True)
@@ -77,7 +77,7 @@ def _summary(store: Store, found: Sequence[Cell], seconds: dict[str, float]) -> 
         "seed": store.study.seed,
         "study": store.study.content,
         "scenario": store.study.scenario,
-        "answer": answer(found),
+        "answer": answer(found, store.study.edges),
         "parameters": list(store.study.parameters),
         "cells": [_cell(cell) for cell in found],
         "seconds": {**seconds, "runs": store.study.size},

@@ -52,7 +52,7 @@ def test_the_report_is_one_file_with_everything_in_it(done):
     text = (done / "report.html").read_text()
     page = Page()
     page.feed(text)
-    assert page.tags.count("svg") == 2 * 2 + 1  # error and coverage of two cut-offs, and cost
+    assert page.tags.count("svg") == 2 * 2 + 2  # error and coverage of two cut-offs, the typical error, and cost
     assert not page.loads
     assert "script" not in page.tags
     summary = json.loads((done / "summary.json").read_text())
