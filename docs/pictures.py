@@ -7,6 +7,7 @@ software Vulkan driver, such as Debian's mesa-vulkan-drivers. Names are those of
 """
 
 import os
+import shutil
 import socket
 import subprocess
 import sys
@@ -49,7 +50,7 @@ class Picture:
 
 
 DELAY = ("run delay --out OUT", "identify OUT --torque held --torque-delay 0 --label no-delay")
-COGGING = ("run ripple --out OUT --inner 10 10.02",)
+COGGING = ("run ripple --out OUT --inner 10 10.004",)
 GAIN = ("run gain --out OUT",)
 
 PICTURES = {
@@ -57,7 +58,7 @@ PICTURES = {
     "recording-filters": Picture(("run quantization --out OUT",), "filters"),
     "recording-excitation": Picture(("run quantization --out OUT",), "excitation"),
     "recording-delay": Picture(DELAY),
-    "recording-delay-parameters": Picture(DELAY, "parameters"),
+    "recording-delay-friction": Picture(DELAY, "friction"),
     "recording-cogging": Picture(COGGING, "friction"),
     "recording-drive": Picture(COGGING, "drive"),
     "recording-gain": Picture(GAIN),
@@ -66,6 +67,8 @@ PICTURES = {
     "any-arm": Picture(("run arm --out OUT",), "", 0.4),
     "table1": Picture(("table1 --out OUT",), "", 0.6),
     "table2": Picture(("table2 --out OUT",), "", 0.6),
+    "recording-compare": Picture(("run quantization --out OUT/quantization", "run ripple --out OUT/ripple"), "compare"),
+    "recording-study": Picture(("study encoder --out OUT",), "study"),
 }
 
 
@@ -82,21 +85,25 @@ def make(names: list[str]) -> None:
                         sys.exit(f"{command} failed")
             with viewer(Path(folder)) as client:  # one a picture: a viewer keeps the layout that it opens first
                 take(client, done[picture.commands], picture, DOCS / f"{name}.png")
+            if (report := done[picture.commands] / "report.html").is_file():
+                photograph(report, DOCS / "study.png")
 
 
 def take(client, out: Path, picture: Picture, path: Path) -> None:  # type: ignore[no-untyped-def]
     """Open a recording and write what is seen, once it has stopped changing."""
     one = out / f"{path.stem}.rrd"
-    if idbench(["view", str(out), "--tab", picture.tab, "--save", str(one)]):
+    folders = [str(out)] if (out / "summary.json").is_file() else sorted(str(run) for run in out.iterdir() if run.is_dir())
+    if idbench(["view", *folders, "--tab", picture.tab, "--save", str(one)]):
         sys.exit(f"{one} cannot be written")
     client.open([str(one)])
     while (state := client.get_state()).loading or not state.recordings:
         time.sleep(0.2)
     (shown,) = state.recordings
     client.set_location(shown.location)
-    (timeline,) = [t for t in shown.timelines if t.name == "sim_time"]
-    now = np.timedelta64(timeline.start + int(picture.at * (timeline.end - timeline.start)), "ns")
-    client.set_time("sim_time", duration=now, play_state="paused")
+    for timeline in shown.timelines:  # a study has none
+        if timeline.name == "sim_time":
+            now = np.timedelta64(timeline.start + int(picture.at * (timeline.end - timeline.start)), "ns")
+            client.set_time("sim_time", duration=now, play_state="paused")
     start, last, image = time.monotonic(), b"", client.take_screenshot(max_size=1600)
     while time.monotonic() - start < 15 and (image != last or time.monotonic() - start < 4):
         time.sleep(0.5)  # axes fit themselves over some frames, and notices fade; some views never rest
@@ -104,6 +111,17 @@ def take(client, out: Path, picture: Picture, path: Path) -> None:  # type: igno
     Image.open(BytesIO(image)).convert("RGB").quantize(256, kmeans=1).save(path, optimize=True)
     complaints = [f"{view.name}: {report.summary}" for view in client.get_state().views for report in view.reports]
     print(f"{path.name}: {', '.join(complaints) or 'no complaints'}")
+
+
+def photograph(page: Path, path: Path) -> None:
+    """Write the first screen of an HTML page, if there is a browser that can (Debian's chromium)."""
+    if not (browser := shutil.which("chromium")):
+        print(f"{path.name}: there is no chromium, the old one stays")
+        return
+    words = ["--headless", "--no-sandbox", "--disable-gpu", "--window-size=1200,900", f"--screenshot={path}", page.as_uri()]
+    subprocess.run([browser, *words], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    Image.open(path).convert("RGB").quantize(256, kmeans=1).save(path, optimize=True)
+    print(f"{path.name}: the first screen of {page.name}")
 
 
 @contextmanager

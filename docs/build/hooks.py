@@ -1,0 +1,148 @@
+"""Pages of the site that are made of the code: commands, settings, the Python reference, notebooks."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import is_dataclass
+from pathlib import Path
+from typing import Any
+
+from mkdocs.structure.files import File, Files
+
+ROOT = Path(__file__).parent.parent.parent
+sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
+
+COMMANDS = [
+    "table1",
+    "table2",
+    "run",
+    "view",
+    "identify",
+    "robot",
+    "study",
+    "scenario",
+    "new",
+    "check",
+    "list",
+    "resample",
+    "export",
+    "search",
+]
+"""In the order in which people meet them."""
+
+KINDS_OF_NAMES = (
+    ("Logs", ("MotionLog", "TorqueChannel", "encoder_steps", "smoothed_log")),
+    ("Robots", ("scara", "tree_basis", "Basis", "Parameter", "KinematicTree", "Joint", "BaseParameters", "transfer")),
+    ("Identification", ("identify", "identify_each", "attempt_each", "estimate", "Problem", "Estimate", "Status")),
+)
+
+
+def on_files(files: Files, config: Any) -> Files:
+    """Add the pages that are made of the code."""
+    from notebooks import pages as notebook_pages
+
+    made = {"reference/commands.md": commands(), "reference/settings.md": "\n".join(settings())}
+    made |= {"reference/identify.md": "\n".join(package("identify")), "reference/sim.md": "\n".join(simulator())}
+    made |= notebook_pages()
+    for path, text in made.items():
+        files.append(File.generated(config, path, content=text))
+    return files
+
+
+def commands() -> str:
+    """Return what every command says of itself."""
+    pages = ["# Commands\n\n`idbench COMMAND --help`, as it is printed. `uv run idbench` runs it from a clone."]
+    for name in COMMANDS:
+        pages.append(f"## {name}\n\n```text\n{_help(name)}\n```")
+    return "\n\n".join(pages)
+
+
+def _help(name: str) -> str:
+    code = "import sys; from experiments.cli import entry; entry()"
+    plain = os.environ | {"COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb"}
+    done = subprocess.run([sys.executable, "-c", code, name, "--help"], cwd=ROOT, env=plain, capture_output=True, check=True)
+    return done.stdout.decode().replace("usage: -c", "usage: idbench").strip()
+
+
+def settings() -> Iterator[str]:
+    """Yield every setting of a scenario, with its unit and what it is by default."""
+    from sim.scenario.scenario import Scenario
+    from sim.scenario.scenario_file import KINDS
+    from sim.settings import fields_of
+
+    yield "# Settings of a scenario\n"
+    yield "A scenario is a TOML file. `idbench new scenario mine` writes one with all of this in it.\n"
+    yield from _table(Scenario)
+    for key, field in fields_of(Scenario).items():
+        if key in KINDS:
+            for name in KINDS[key].builtin:
+                made = KINDS[key].create(name)
+                yield f'\n## [{key}] kind = "{name}"\n\n{(type(made).__doc__ or "").strip().splitlines()[0]}\n'
+                yield from _table(type(made))
+        elif is_dataclass(field.default):
+            yield f"\n## [{key}]\n\n{(type(field.default).__doc__ or '').strip().splitlines()[0]}\n"
+            yield from _table(type(field.default))
+
+
+def _table(cls: type) -> Iterator[str]:
+    from sim.settings import description, fields_of
+
+    if not fields_of(cls):
+        yield "It has no settings."
+        return
+    yield "| setting | by default | what it is |\n|---|---|---|"
+    for key, field in fields_of(cls).items():
+        default = "" if field.is_required() else _shown(field.default)
+        yield f"| `{key}` | {default} | {description(cls, key).replace('|', '&#124;')} |"
+
+
+def _shown(value: Any) -> str:
+    return "its own section below" if is_dataclass(value) else "none" if value is None else f"`{value}`"
+
+
+def package(name: str) -> Iterator[str]:
+    """Yield the public names of a package, those of one kind together."""
+    import identify
+
+    public = [
+        key for key in vars(identify) if not key.startswith("_") and getattr(identify, key).__class__.__name__ != "module"
+    ]
+    yield f"# {name}\n\nWhat `from {name} import ...` has. Shapes and units stand in [ ]; equation numbers are the paper's.\n"
+    taken = set[str]()
+    for title, names in KINDS_OF_NAMES:
+        taken |= set(names)
+        yield f"## {title}\n"
+        yield from (f"::: identify.{key}\n" for key in names)
+    tables = [key for key in public if key.isupper()]
+    yield "## Plug-in tables\n"
+    yield f"{', '.join(f'`{key}`' for key in tables)}: mappings from a name to what makes the plug-in. `idbench list` prints them.\n"
+    yield "## Everything else\n"
+    documented = [key for key in public if key not in taken | set(tables) | {"Array", "Columns"}]
+    yield from (f"::: identify.{key}\n" for key in sorted(documented, key=str.lower))
+
+
+def simulator() -> Iterator[str]:
+    """Yield what of the simulator other programs use."""
+    yield "# sim\n\nThe virtual robot. Its settings are on [a page of their own](settings.md).\n"
+    yield "\n".join(
+        f"::: {name}\n"
+        for name in (
+            "sim.engine.simulation.simulate",
+            "sim.engine.run.Run",
+            "sim.engine.watch.Watch",
+            "sim.engine.ideal_log.ideal_log",
+            "sim.robot.robot.Robot",
+            "sim.robot.tree.kinematic_tree",
+            "sim.scenario.scenario.Scenario",
+            "sim.scenario.scenario_file.load",
+            "sim.scenario.scenario_file.to_toml",
+            "sim.controllers.controller.AbstractController",
+            "sim.controllers.controller.AbstractLaw",
+            "sim.drives.drive.AbstractDrive",
+            "sim.drives.drive.AbstractAmplifier",
+            "sim.encoders.encoder.AbstractEncoder",
+            "sim.frictions.friction_law.AbstractFrictionLaw",
+            "sim.trajectories.trajectory.AbstractTrajectory",
+        )
+    )

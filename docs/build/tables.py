@@ -1,0 +1,168 @@
+"""Tables of the pages, from the results of the studies that ship.
+
+    uv run python docs/build/tables.py [FOLDER]
+
+FOLDER has a folder of results for each study, as `idbench study NAME --out FOLDER/NAME` leaves them; without it the results
+that were kept in docs/results are written into the pages anew. A test holds that pages and results agree.
+"""
+
+import json
+import re
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from math import exp, log, log2
+from pathlib import Path
+from typing import Any
+
+DOCS = Path(__file__).parent.parent
+RESULTS = DOCS / "results"
+PAGES = ("answers.md", "noise.md")
+KEPT = ("settings", "chain", "estimator", "model", "runs", "rmse_percent", "coverage", "paper_coverage", "bound_percent")
+"""What is kept of a cell."""
+
+MARK = re.compile(r"<!-- table: ([\w-]+) -->\n.*?<!-- end -->", re.DOTALL)
+
+Cell = dict[str, Any]
+Column = tuple[str, str]
+
+I, P = "idbench", "paper"
+FOUR: Sequence[Column] = ((I, "explicit"), (I, "power"), (P, "explicit"), (P, "power"))
+TWO: Sequence[Column] = ((I, "explicit"), (I, "power"))
+
+
+def keep(folder: Path) -> None:
+    """Keep of the results of studies what the pages need."""
+    for path in sorted(folder.glob("*/summary.json")):
+        summary = json.loads(path.read_text())
+        cells = [{key: _short(cell.get(key)) for key in KEPT if key in cell} for cell in summary["cells"]]
+        text = "[\n" + ",\n".join(json.dumps(cell) for cell in cells) + "\n]\n"
+        (RESULTS / f"{path.parent.name}.json").write_text(text)
+
+
+def _short(value: Any) -> Any:
+    """Return numbers to six digits: what is printed has two."""
+    if isinstance(value, list):
+        return [_short(x) for x in value]
+    return float(f"{value:.6g}") if isinstance(value, float) else value
+
+
+def filled(text: str) -> str:
+    """Return a page with its tables as the results have them."""
+    return MARK.sub(lambda found: f"<!-- table: {found[1]} -->\n{''.join(TABLES[found[1]]())}<!-- end -->", text)
+
+
+def cells(study: str) -> list[Cell]:
+    """Return the cells of a study."""
+    found: list[Cell] = json.loads((RESULTS / f"{study}.json").read_text())
+    return found
+
+
+def _by_settings(study: str) -> Iterator[tuple[dict[str, Any], dict[Column, Cell]]]:
+    groups: dict[str, dict[Column, Cell]] = {}
+    for cell in cells(study):
+        groups.setdefault(json.dumps(cell["settings"], sort_keys=True), {})[cell["chain"], cell["model"]] = cell
+    for settings, group in groups.items():
+        yield json.loads(settings), group
+
+
+def typical(cell: Cell) -> str:
+    """Return the geometric mean of the rms errors, to two digits."""
+    errors = [float(x) for x in cell["rmse_percent"]]
+    mean = exp(sum(map(log, errors)) / len(errors))
+    return f"{mean:.0f}" if mean >= 10 else f"{mean:#.2g}"
+
+
+def coverage(cell: Cell, key: str = "coverage", digits: int = 0) -> str:
+    """Return the mean share of truths within two sigma, with the lowest and the highest parameter's."""
+    shares = [100 * float(x) for x in cell[key]]
+    mean, low, high = (f"{x:.{digits}f}" for x in (sum(shares) / len(shares), min(shares), max(shares)))
+    return mean if low == high else f"{mean} ({low}-{high})"
+
+
+def _table(head: Sequence[str], rows: Iterator[Sequence[str]]) -> Iterator[str]:
+    yield f"\n| {' | '.join(head)} |\n|---|{'---:|' * (len(head) - 1)}\n"
+    for row in rows:
+        yield f"| {' | '.join(row)} |\n"
+    yield "\n"
+
+
+def _usual(study: str, name: str, label: Callable[[dict[str, Any]], str], columns: Sequence[Column]) -> Iterator[str]:
+    """Yield typical errors and coverages of chains and models, a row a setting."""
+    several = len({chain for chain, _ in columns}) > 1
+    names = [f"{model}, {chain}" if several else model for chain, model in columns]
+    head = [name, *names, f"coverage: {names[0]}", *names[1:]]
+    rows = (
+        [label(settings), *(typical(group[c]) for c in columns), *(coverage(group[c]) for c in columns)]
+        for settings, group in _by_settings(study)
+    )
+    yield from _table(head, rows)
+
+
+def _lines(settings: dict[str, Any]) -> str:
+    lines = settings["encoder.lines"]
+    return f"{lines:g} ({log2(4 * lines):g} bits)"
+
+
+def _birdy(settings: dict[str, Any]) -> str:
+    position = f"{settings['encoder.noise']:.3g}".replace("e-0", "e-").replace("0.000175", "1.75e-4")
+    return f"{position}, {settings['torque.noise']:g}"
+
+
+def _one(key: str, scale: float = 1.0) -> Callable[[dict[str, Any]], str]:
+    return lambda settings: f"{float(f'{scale * settings[key]:.3g}'):g}"
+
+
+def _sigma() -> Iterator[str]:
+    def rows() -> Iterator[Sequence[str]]:
+        for cell in cells("sigma"):
+            noise = ", ".join(f"{x:g}" for x in json.loads(str(cell["settings"]["torque.noise"])))
+            shares = (coverage(cell, key, 1) for key in ("coverage", "paper_coverage"))
+            yield [noise, cell["estimator"], cell["model"], *shares]
+
+    yield from _table(["torque noise [N m]", "estimator", "model", "corrected", "the paper's"], rows())
+
+
+def _cutoffs() -> Iterator[str]:
+    outer, inner = "chain.prefilter.cutoff", "chain.operator.cutoff"
+    found = {(c["settings"][outer], c["settings"][inner]): typical(c) for c in cells("cutoffs") if c["model"] == "explicit"}
+    operators = sorted({o for _, o in found})
+    rows = ([f"{p:g}", *(found[p, o] for o in operators)] for p in sorted({p for p, _ in found}))
+    yield from _table(["prefilter \\ decimation", *(f"{o:g}" for o in operators)], rows)
+
+
+def _bound(study: str, name: str, label: Callable[[dict[str, Any]], str]) -> Callable[[], Iterator[str]]:
+    methods = ("WLS", "GLS", "ML")
+
+    def rows() -> Iterator[Sequence[str]]:
+        groups: dict[str, dict[str, Cell]] = {}
+        for cell in cells(study):
+            if cell["model"] == "explicit":
+                groups.setdefault(json.dumps(cell["settings"]), {})[cell["estimator"]] = cell
+        for settings, group in groups.items():
+            bound = typical({"rmse_percent": group["WLS"]["bound_percent"]})
+            errors, shares = (typical(group[m]) for m in methods), (coverage(group[m]) for m in methods)
+            yield [label(json.loads(settings)), *errors, bound, *shares]
+
+    return lambda: _table([name, *methods, "bound", "coverage: WLS", "GLS", "ML"], rows())
+
+
+TABLES: dict[str, Callable[[], Iterator[str]]] = {
+    "encoder": lambda: _usual("encoder", "lines (counts)", _lines, FOUR),
+    "torque-noise": lambda: _usual("torque-noise", "rms [N m]", _one("torque.noise"), FOUR),
+    "birdy": lambda: _usual("birdy", "position [rad], torque [N m]", _birdy, FOUR),
+    "decimation": lambda: _usual("decimation", "cut-off [Hz]", _one("chain.operator.cutoff"), TWO),
+    "sample-rate": lambda: _usual("sample-rate", "fs [Hz]", _one("fs"), TWO),
+    "ripple": lambda: _usual("ripple", "cogging", _one("ripple.cogging"), TWO),
+    "delay": lambda: _usual("delay", "delay [ms]", _one("timing.delay", 1e3), FOUR),
+    "sigma": _sigma,
+    "cutoffs": _cutoffs,
+    "bound-encoder": _bound("bound-encoder", "lines (counts)", _lines),
+    "bound-torque": _bound("bound-torque", "torque noise [N m]", _one("torque.noise")),
+}
+
+if __name__ == "__main__":
+    RESULTS.mkdir(exist_ok=True)
+    for place in sys.argv[1:]:
+        keep(Path(place))
+    for page in PAGES:
+        (DOCS / page).write_text(filled((DOCS / page).read_text()))
