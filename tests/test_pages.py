@@ -1,9 +1,16 @@
 """The pages: their tables are those of the results, their sentences can be read, their code runs."""
 
+import json
 import re
+import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
+
+from identify.data.log_file import write_log
+from sim.engine import simulate
+from sim.scenario.scenario_file import load
 
 
 @pytest.fixture(scope="module")
@@ -44,3 +51,37 @@ def test_sentences_are_short_and_paragraphs_no_walls(root):
         assert max(lengths) <= 50, f"{path.name}: {max(sentences, key=lambda s: len(s.split()))}"
         longest = max(paragraphs, key=len)
         assert len(longest) <= 5 * 128, f"{path.name}: {longest}"
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory, table1):
+    """A folder with the logs that the pages name."""
+    folder = tmp_path_factory.mktemp("pages")
+    for place in ("runs/table1", "runs/arm-puma560"):
+        (folder / place).mkdir(parents=True)
+    write_log(table1.log, folder / "runs/table1/log.parquet")
+    write_log(simulate(load("quantization")).alone(), folder / "log.csv")
+    arm = replace(load("arm"), robot="puma560", fs=500.0)
+    short = replace(arm, trajectory=replace(arm.trajectory, moves=15))
+    write_log(simulate(short).alone(), folder / "runs/arm-puma560/log.parquet")
+    return folder
+
+
+@pytest.mark.parametrize("page", ["identification.md", "noise.md", "any-arm.md", "plugins.md"])
+def test_the_code_of_a_page_runs(root, logs, page):
+    for code in re.findall(r"```python\n(.*?)```", (root / "docs" / page).read_text(), re.DOTALL):
+        done = subprocess.run([sys.executable, "-c", code], cwd=logs, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+
+
+def test_notebooks_are_those_of_their_scripts(root):
+    """What the site runs are the scripts; the notebooks beside them hold the same cells, without outputs."""
+    scripts = sorted((root / "docs" / "notebooks").glob("*.py"))
+    assert len(scripts) == 2
+    for script in scripts:
+        cells = json.loads(script.with_suffix(".ipynb").read_text())["cells"]
+        code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
+        assert all(not cell.get("outputs") for cell in cells)
+        source = script.read_text()
+        assert all(piece in source for piece in code), "uv run --group docs python docs/build/notebooks.py"
+        assert len(cells) - len(code) == source.count('"""') // 2, script.name

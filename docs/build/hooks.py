@@ -6,29 +6,17 @@ import sys
 from collections.abc import Iterator
 from dataclasses import is_dataclass
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).parent.parent.parent
-sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
 
-COMMANDS = [
-    "table1",
-    "table2",
-    "run",
-    "view",
-    "identify",
-    "robot",
-    "study",
-    "scenario",
-    "new",
-    "check",
-    "list",
-    "resample",
-    "export",
-    "search",
-]
+COMMANDS = (
+    *("table1", "table2", "run", "view", "identify", "robot", "study", "scenario", "new", "check", "list"),
+    *("resample", "export", "search"),
+)
 """In the order in which people meet them."""
 
 KINDS_OF_NAMES = (
@@ -40,6 +28,7 @@ KINDS_OF_NAMES = (
 
 def on_files(files: Files, config: Any) -> Files:
     """Add the pages that are made of the code."""
+    sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
     from notebooks import pages as notebook_pages
 
     made = {"reference/commands.md": commands(), "reference/settings.md": "\n".join(settings())}
@@ -105,9 +94,8 @@ def package(name: str) -> Iterator[str]:
     """Yield the public names of a package, those of one kind together."""
     import identify
 
-    public = [
-        key for key in vars(identify) if not key.startswith("_") and getattr(identify, key).__class__.__name__ != "module"
-    ]
+    named = {key: value for key, value in vars(identify).items() if not key.startswith("_")}
+    public = [key for key, value in named.items() if not isinstance(value, ModuleType)]
     yield f"# {name}\n\nWhat `from {name} import ...` has. Shapes and units stand in [ ]; equation numbers are the paper's.\n"
     taken = set[str]()
     for title, names in KINDS_OF_NAMES:
@@ -116,7 +104,7 @@ def package(name: str) -> Iterator[str]:
         yield from (f"::: identify.{key}\n" for key in names)
     tables = [key for key in public if key.isupper()]
     yield "## Plug-in tables\n"
-    yield f"{', '.join(f'`{key}`' for key in tables)}: mappings from a name to what makes the plug-in. `idbench list` prints them.\n"
+    yield f"{', '.join(f'`{key}`' for key in tables)}: from a name to what makes the plug-in. `idbench list` prints them.\n"
     yield "## Everything else\n"
     documented = [key for key in public if key not in taken | set(tables) | {"Array", "Columns"}]
     yield from (f"::: identify.{key}\n" for key in sorted(documented, key=str.lower))

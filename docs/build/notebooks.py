@@ -36,9 +36,8 @@ def pages() -> dict[str, str]:
 
 def notebook(script: Path) -> nbformat.NotebookNode:
     """Return the notebook of a script."""
-    made = nbformat.v4.new_notebook(
-        metadata={"kernelspec": {"name": "python3", "display_name": "Python 3", "language": "python"}}
-    )
+    kernel = {"name": "python3", "display_name": "Python 3", "language": "python"}
+    made = nbformat.v4.new_notebook(metadata={"kernelspec": kernel})
     made.cells = list(_cells(script.read_text(encoding="utf-8")))
     for number, cell in enumerate(made.cells):
         cell.id = f"cell-{number}"

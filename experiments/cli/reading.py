@@ -42,7 +42,7 @@ def stated_by(log: Path) -> dict[str, Any]:
         names, values = stated["parameters"], stated["truth"]
         known = None if values is None else dict(zip(names, map(float, values), strict=True))
         return {"robot": str(stated.get("robot") or stated["scenario"]["robot"]), "truth": known}
-    except (ValueError, KeyError, TypeError, OSError) as error:
+    except (ValueError, KeyError, TypeError, OSError, RecursionError) as error:
         raise ExperimentError(f"{path} is no summary of a run ({error}): name the log itself, {log / 'log.parquet'}") from error
 
 

@@ -82,7 +82,7 @@ def _experiment_of(folder: Path) -> str | None:
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
         named = summary["scenario"]["name"] if summary["experiment"] == "run" else summary.get("path", summary.get("log", ""))
         return " ".join(filter(None, (str(summary["experiment"]), str(named))))
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return "something whose summary.json cannot be read"
 
 

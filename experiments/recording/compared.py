@@ -48,7 +48,7 @@ class Compared:
         try:
             found: dict[str, Any] = json.loads((self.folder / "summary.json").read_text())
             _ = found["parameters"], found["models"]
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
             raise ResultsError(f"{self.folder} holds no run or identification to compare ({error!r:.80})") from error
         return found
 

@@ -41,6 +41,8 @@ def read_toml(path: Path) -> dict[str, Any]:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise StudyError(f"cannot read study {path}: {error.strerror}") from error
+    except RecursionError as error:
+        raise StudyError(f"cannot read {path}: its tables are nested too deeply") from error
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise StudyError(f"cannot read study {path}: {error}") from error
 

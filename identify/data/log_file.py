@@ -1,6 +1,7 @@
 """Motion logs on disk: CSV or Parquet with the columns t, q1, q2, ..., tau1, tau2, ... in SI units."""
 
 import json
+import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -173,7 +174,7 @@ def _table(path: Path) -> "tuple[pa.Table, list[str]]":
     is_csv = path.suffix.lower() == CSV
     try:
         with path.open("rb") as file:
-            table = csv.read_csv(file, **_dialect(path)) if is_csv else parquet.read_table(file)
+            table = csv.read_csv(file, **_dialect(path)) if is_csv else _numeric_columns(path, parquet.ParquetFile(file))
         return table, [name.strip(' "') for name in table.column_names]
     except OSError as error:
         raise LogError(f"cannot read the log {path}: {error.strerror or error}") from error
@@ -182,6 +183,32 @@ def _table(path: Path) -> "tuple[pa.Table, list[str]]":
     except pa.ArrowException as error:
         kind = "CSV" if is_csv else "Parquet (a CSV file's name must end with .csv)"
         raise LogError(f"cannot read the log {path} as {kind}: {str(error).splitlines()[0]}") from error
+
+
+def _numeric_columns(path: Path, file: Any) -> "pa.Table":
+    """Return the columns of a Parquet file that a log has; raise LogError before anything is read that no memory holds.
+
+    A file of some kilobytes may hold a column of terabytes, all values being the same.
+    """
+    types, schema = _arrow().types, file.schema_arrow
+    wanted = [field for field in schema if re.fullmatch(r"t|(q|tau).+", field.name.strip(' "'))]
+    for field in wanted:
+        if not (types.is_floating(field.type) or types.is_integer(field.type) or types.is_null(field.type)):
+            raise LogError(f"{path}: column {field.name} holds {field.type}, not numbers")
+    rows = file.metadata.num_rows
+    size, room = 8e-9 * rows * len(wanted), _memory()
+    if size > room:
+        what = f"{rows:.3g} samples of {len(wanted)} columns, {size:.3g} GB"
+        raise LogError(f"{path} says that it holds {what}; this machine has {room:.3g} GB: cut the log")
+    return file.read(columns=[field.name for field in wanted])
+
+
+def _memory() -> float:
+    """Return the memory of this machine [GB]; infinity where it does not say."""
+    try:
+        return 1e-9 * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return float("inf")
 
 
 def _dialect(path: Path) -> "dict[str, Any]":

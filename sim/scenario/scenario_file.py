@@ -33,6 +33,10 @@ KINDS: Mapping[str, PluginTable[Any]] = {
 """The parts of a scenario that are plug-ins: their tables say `kind` which."""
 
 
+OF_0_1_0 = ("waypoints", "durations", "rest")
+"""What a scenario of idbench 0.1.0 has at its top, and later ones in their trajectory."""
+
+
 def names() -> tuple[str, ...]:
     """Return the names of the scenarios that ship."""
     return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
@@ -63,6 +67,8 @@ def _content(name: str) -> dict[str, Any]:
         return tomllib.loads(path.read_text())
     except OSError as error:
         raise ScenarioError(f"cannot read scenario {path}: {error.strerror}") from error
+    except RecursionError as error:
+        raise ScenarioError(f"cannot read {path}: its tables are nested too deeply") from error
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise ScenarioError(f"cannot read scenario {path}: {error}") from error
 
@@ -70,6 +76,10 @@ def _content(name: str) -> dict[str, Any]:
 def from_dict(content: Mapping[str, Any]) -> Scenario:
     """Make a scenario from the keys of a TOML document; raise ScenarioError as `load`."""
     made = dict(content)
+    if "trajectory" not in made and (old := [key for key in OF_0_1_0 if key in made]):
+        raise ScenarioError(
+            f'this is a scenario of idbench 0.1.0: write {", ".join(old)} below a line [trajectory], with kind = "quintic"'
+        )
     if isinstance(made.get("trajectory"), str):
         made["trajectory"] = _trajectory_of(made["trajectory"])
     wrong = []
