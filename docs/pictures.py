@@ -15,7 +15,7 @@ import tempfile
 import time
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import chdir, contextmanager
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -27,7 +27,7 @@ from experiments.cli import main as idbench
 
 warnings.filterwarnings("ignore")  # the viewer's client is declared unstable; our pin holds it
 
-DOCS = Path(__file__).parent
+DOCS = Path(__file__).absolute().parent
 
 
 @dataclass(frozen=True)
@@ -74,12 +74,12 @@ PICTURES = {
 
 def make(names: list[str]) -> None:
     """Run what is to be seen, each once, and take the pictures."""
-    with tempfile.TemporaryDirectory(prefix="idbench-") as folder:
+    with tempfile.TemporaryDirectory(prefix="idbench-") as folder, chdir(folder):
         done: dict[tuple[str, ...], Path] = {}
         for name in names:
             picture = PICTURES[name]
             if picture.commands not in done:
-                out = done[picture.commands] = Path(folder) / f"run{len(done)}"
+                out = done[picture.commands] = Path("runs") / picture.commands[0].split()[1]  # what is shown names it
                 for command in picture.commands:
                     if idbench(command.replace("OUT", str(out)).split()):
                         sys.exit(f"{command} failed")
@@ -95,7 +95,7 @@ def take(client, out: Path, picture: Picture, path: Path) -> None:  # type: igno
     folders = [str(out)] if (out / "summary.json").is_file() else sorted(str(run) for run in out.iterdir() if run.is_dir())
     if idbench(["view", *folders, "--tab", picture.tab, "--save", str(one)]):
         sys.exit(f"{one} cannot be written")
-    client.open([str(one)])
+    client.open([str(one.absolute())])
     while (state := client.get_state()).loading or not state.recordings:
         time.sleep(0.2)
     (shown,) = state.recordings
@@ -118,7 +118,7 @@ def photograph(page: Path, path: Path) -> None:
     if not (browser := shutil.which("chromium")):
         print(f"{path.name}: there is no chromium, the old one stays")
         return
-    words = ["--headless", "--no-sandbox", "--disable-gpu", "--window-size=1200,900", f"--screenshot={path}", page.as_uri()]
+    words = ["--headless", "--no-sandbox", "--disable-gpu", "--window-size=1200,900", f"--screenshot={path}", page.absolute().as_uri()]
     subprocess.run([browser, *words], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     Image.open(path).convert("RGB").quantize(256, kmeans=1).save(path, optimize=True)
     print(f"{path.name}: the first screen of {page.name}")
