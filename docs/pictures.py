@@ -79,7 +79,7 @@ def make(names: list[str]) -> None:
         for name in names:
             picture = PICTURES[name]
             if picture.commands not in done:
-                out = done[picture.commands] = Path("runs") / picture.commands[0].split()[1]  # what is shown names it
+                out = done[picture.commands] = Path("runs") / called(name, picture)
                 for command in picture.commands:
                     if idbench(command.replace("OUT", str(out)).split()):
                         sys.exit(f"{command} failed")
@@ -87,6 +87,14 @@ def make(names: list[str]) -> None:
                 take(client, done[picture.commands], picture, DOCS / f"{name}.png")
             if (report := done[picture.commands] / "report.html").is_file():
                 photograph(report, DOCS / "study.png")
+
+
+def called(name: str, picture: Picture) -> str:
+    """Return what the folder of a picture is called: as the command would by itself, since what is shown names it."""
+    command, first = picture.commands[0].split()[:2]
+    if len({line.split()[1] for line in picture.commands if "OUT/" in line}) > 1:
+        return name
+    return command if first.startswith("--") else first
 
 
 def take(client, out: Path, picture: Picture, path: Path) -> None:  # type: ignore[no-untyped-def]
@@ -118,7 +126,14 @@ def photograph(page: Path, path: Path) -> None:
     if not (browser := shutil.which("chromium")):
         print(f"{path.name}: there is no chromium, the old one stays")
         return
-    words = ["--headless", "--no-sandbox", "--disable-gpu", "--window-size=1200,900", f"--screenshot={path}", page.absolute().as_uri()]
+    words = [
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--window-size=1200,900",
+        f"--screenshot={path}",
+        page.absolute().as_uri(),
+    ]
     subprocess.run([browser, *words], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     Image.open(path).convert("RGB").quantize(256, kmeans=1).save(path, optimize=True)
     print(f"{path.name}: the first screen of {page.name}")

@@ -114,7 +114,8 @@ class PluginTable(Mapping[str, Callable[[], T]], Generic[T]):
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Return the known name that is nearest to one that is not known, as a question; empty if none is near."""
     by_small = {other.lower(): other for other in known}
-    near = get_close_matches(name.lower(), list(by_small), 1)
+    near = get_close_matches(name.lower(), list(by_small), 3)
+    near.sort(key=lambda other: sorted(other) != sorted(name.lower()))  # letters that changed places are most likely
     return f" (did you mean {by_small[near[0]]!r}?)" if near else ""
 
 

@@ -14,9 +14,10 @@ from math import exp, log, log2
 from pathlib import Path
 from typing import Any
 
-DOCS = Path(__file__).parent.parent
+DOCS = Path(__file__).absolute().parent.parent
+sys.path.insert(0, str(DOCS.parent))
 RESULTS = DOCS / "results"
-PAGES = ("answers.md", "noise.md")
+PAGES = ("answers.md", "noise.md", "table2.md")
 KEPT = ("settings", "chain", "estimator", "model", "runs", "rmse_percent", "coverage", "paper_coverage", "bound_percent")
 """What is kept of a cell."""
 
@@ -34,6 +35,10 @@ def keep(folder: Path) -> None:
     """Keep of the results of studies what the pages need."""
     for path in sorted(folder.glob("*/summary.json")):
         summary = json.loads(path.read_text())
+        if "attribution_percent" in summary:
+            kept = {name: summary[name] for name in ("parameters", "attribution_percent")}
+            (RESULTS / f"{path.parent.name}.json").write_text(json.dumps(kept, indent=1) + "\n")
+            continue
         cells = [{key: _short(cell.get(key)) for key in KEPT if key in cell} for cell in summary["cells"]]
         text = "[\n" + ",\n".join(json.dumps(cell) for cell in cells) + "\n]\n"
         (RESULTS / f"{path.parent.name}.json").write_text(text)
@@ -146,6 +151,20 @@ def _bound(study: str, name: str, label: Callable[[dict[str, Any]], str]) -> Cal
     return lambda: _table([name, *methods, "bound", "coverage: WLS", "GLS", "ML"], rows())
 
 
+def _causes(form: str) -> Callable[[], Iterator[str]]:
+    """Return what makes the table of Table 2's causes, of one model."""
+
+    def table() -> Iterator[str]:
+        from experiments.text import percent
+
+        found = json.loads((RESULTS / "table2.json").read_text())
+        causes = found["attribution_percent"].items()
+        rows = ([cause, *(percent(error) for error in errors[form])] for cause, errors in causes)
+        yield from _table(["", *found["parameters"]], rows)
+
+    return table
+
+
 TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "encoder": lambda: _usual("encoder", "lines (counts)", _lines, FOUR),
     "torque-noise": lambda: _usual("torque-noise", "rms [N m]", _one("torque.noise"), FOUR),
@@ -156,6 +175,8 @@ TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "delay": lambda: _usual("delay", "delay [ms]", _one("timing.delay", 1e3), FOUR),
     "sigma": _sigma,
     "cutoffs": _cutoffs,
+    "table2-explicit": _causes("explicit"),
+    "table2-power": _causes("power"),
     "bound-encoder": _bound("bound-encoder", "lines (counts)", _lines),
     "bound-torque": _bound("bound-torque", "torque noise [N m]", _one("torque.noise")),
 }

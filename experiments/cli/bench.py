@@ -30,7 +30,7 @@ class Run:
     """Signal processing."""
     estimator: str = ESTIMATOR
     """OLS, WLS, GLS, ML, ML-delay (the last two: explicit model alone), or of a plug-in: idbench list."""
-    study: Annotated[Path | None, tyro.conf.arg(name="from", metavar="DIR")] = None
+    study: Annotated[Path | None, tyro.conf.arg(name="from", metavar="DIR", help_behavior_hint="")] = None
     """Instead of a scenario: the folder of a study, one run of which is made again."""
     index: Number = None
     """Number of that run; its rows must come out with the same bits."""
@@ -63,7 +63,7 @@ class Run:
 class Study:
     """Run a study: a scenario over a grid and many seeds, identified by every method; without a name, list those that ship."""
 
-    study: tyro.conf.Positional[Annotated[str | None, tyro.conf.arg(metavar="STUDY")]] = None
+    study: tyro.conf.Positional[Annotated[str | None, tyro.conf.arg(metavar="STUDY", help_behavior_hint="")]] = None
     """Name of a study that ships, or a file (TOML)."""
     out: Folder = None
     """Folder of the study; runs/<name of the study> by default."""
@@ -77,7 +77,7 @@ class Study:
     """Shards at a time; all processors by default."""
     workers: Count = None
     """Processes of this machine to run on instead (needs the extra `cluster`)."""
-    scheduler: Annotated[str | None, tyro.conf.arg(metavar="URL")] = None
+    scheduler: Annotated[str | None, tyro.conf.arg(metavar="URL", help_behavior_hint="")] = None
     """Address of a Dask scheduler to run on instead, as tcp://host:8786 (needs the extra `cluster`)."""
     yes: bool = False
     """Run more than a hundred thousand runs."""

@@ -37,7 +37,7 @@ class Identify:
     """all, explicit, implicit or power."""
     estimator: str = ESTIMATOR
     """OLS, WLS, GLS, ML, ML-delay (the last two: explicit model alone), or of a plug-in: idbench list."""
-    follow: Annotated[float | None, tyro.conf.arg(metavar="SECONDS")] = None
+    follow: Annotated[float | None, tyro.conf.arg(metavar="SECONDS", help_behavior_hint="")] = None
     """Identify a CSV log while it is being written, until it has not grown for so long; then as a whole. With --live or
     --serve estimates and residuals are seen to grow."""
     validate: File = None

@@ -25,9 +25,9 @@ DEAF = 6
 
 LEAVING = "idbench-leaving"
 
-Url = Annotated[str | None, tyro.conf.arg(metavar="URL")]
-Times = Annotated[float | None, tyro.conf.arg(metavar="FLOAT")]
-Window = Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="FROM TO")]
+Url = Annotated[str | None, tyro.conf.arg(metavar="URL", help_behavior_hint="")]
+Times = Annotated[float | None, tyro.conf.arg(metavar="FLOAT", help_behavior_hint="")]
+Window = Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="FROM TO", help_behavior_hint="")]
 
 
 @dataclass(frozen=True)
