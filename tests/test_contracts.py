@@ -2,9 +2,9 @@
 
 import pytest
 
-from experiments.cli.plugins import TABLES
 from experiments.contracts.contract import Example
 from experiments.contracts.contracts import CONTRACTS, kept
+from experiments.plugin_tables import TABLES
 from identify import BLOCKS, CHAINS, MODELS, Basis, identify, scara
 
 EVERY = [f"{table.point}/{name}" for table in TABLES for name in table.builtin]

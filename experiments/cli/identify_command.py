@@ -13,7 +13,6 @@ from rich.text import Text
 from experiments.cli.follow import Follower
 from experiments.cli.logs import Identify
 from experiments.cli.page import Page, new_page, shown
-from experiments.cli.plugins import plugin_conflicts
 from experiments.cli.reading import Question, file_of, read, stated_by
 from experiments.errors import ExperimentError, ResultsError
 from experiments.identification.consistent_robot import Written
@@ -34,6 +33,7 @@ from experiments.identification.warnings import (
     warnings_of_result,
     warnings_of_robot,
 )
+from experiments.plugin_tables import plugin_conflicts
 from experiments.recording.audience import Audience, Watching
 from identify import MODELS, ExcitationError, IdentificationError, LogError, MotionLog
 from identify.data.log_file import write_log

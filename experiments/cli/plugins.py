@@ -1,39 +1,11 @@
 """What can be combined."""
 
-from typing import Any
-
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from experiments.cli.page import new_page, show
-from identify import (
-    ALIGNMENTS,
-    BLOCKS,
-    CHAINS,
-    DIFFERENTIATORS,
-    ESTIMATORS,
-    MASKS,
-    MODELS,
-    OPERATORS,
-    PREFILTERS,
-)
-from identify.plugins import PluginTable
-from sim.scenario.scenario_file import KINDS
-
-TABLES: tuple[PluginTable[Any], ...] = (
-    BLOCKS,
-    MODELS,
-    PREFILTERS,
-    DIFFERENTIATORS,
-    ALIGNMENTS,
-    MASKS,
-    OPERATORS,
-    CHAINS,
-    ESTIMATORS,
-    *KINDS.values(),
-)
-"""Every plug-in point."""
+from experiments.plugin_tables import TABLES, plugin_conflicts
 
 
 def list_plugins(*, machine: bool = False) -> None:
@@ -53,8 +25,3 @@ def print_plugins(console: Console) -> None:
         console.print(Text(f"{table.point} (entry points: idbench.{table.point})", style="bold"), grid, sep="\n")
     for conflict in plugin_conflicts():
         console.print(Text(f"warning: {conflict}"), soft_wrap=True)
-
-
-def plugin_conflicts() -> list[str]:
-    """Return which plug-ins of other packages cannot be used, since their names are taken."""
-    return [f"{table.point} plug-in {conflict}" for table in TABLES for conflict in table.conflicts]

@@ -10,7 +10,6 @@ from rich.text import Text
 from experiments.cli.bench import Run
 from experiments.cli.page import Page, new_page, shown
 from experiments.cli.paper import Table2 as Repeated
-from experiments.cli.plugins import plugin_conflicts
 from experiments.cli.progress import progress_of
 from experiments.errors import ExperimentError
 from experiments.identification.identification_text import print_identified
@@ -20,6 +19,7 @@ from experiments.identification.subject import Subject, absolute
 from experiments.identification.warnings import FILE, warnings_of_robot
 from experiments.paper.table2 import Table2
 from experiments.paper.table2_text import print_table2
+from experiments.plugin_tables import plugin_conflicts
 from experiments.recording.audience import Audience, Watching
 from identify.data.log_file import write_log
 from identify.rows.long_logs import is_long

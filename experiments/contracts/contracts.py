@@ -4,11 +4,11 @@ import importlib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from experiments.cli.plugins import TABLES
 from experiments.contracts import identification_contracts as identification
 from experiments.contracts import simulation_contracts as simulation
 from experiments.contracts.contract import Clause, Example, checked
 from experiments.errors import ExperimentError
+from experiments.plugin_tables import TABLES
 from identify.plugins import PluginTable, did_you_mean
 
 CONTRACTS: Mapping[str, tuple[Clause, ...]] = {
