@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from copy import copy
 from dataclasses import replace
 from itertools import groupby
+from math import isnan
 
 from rich import box
 from rich.console import Console
@@ -65,6 +66,8 @@ def number(x: float) -> str:
 def percent(share: float) -> str:
     """Return a signed percentage to two decimals, to none from a hundred on, to one digit below a hundredth."""
     size = abs(share)
+    if isnan(share):
+        return ""
     if size >= WORTHLESS:
         return f"{'-' if share < 0 else ''}>{WORTHLESS:g}"
     return f"{share:+.0f}" if size >= 100 else f"{share:+.2f}" if size >= 0.01 else f"{share:+.0e}" if size else "0"
@@ -72,4 +75,4 @@ def percent(share: float) -> str:
 
 def percentage(x: float) -> str:
     """Return a percentage without a sign, to two digits; empty if it is not known."""
-    return f"{x:.2g}" if x < WORTHLESS else f">{WORTHLESS:g}" if x >= WORTHLESS else ""
+    return f"{x:.2g}" if x < 100 else f"{x:.0f}" if x < WORTHLESS else f">{WORTHLESS:g}" if x >= WORTHLESS else ""

@@ -82,7 +82,13 @@ def test_a_parquet_file_of_terabytes_in_kilobytes_is_refused_before_it_is_read(t
 
 
 def test_columns_that_a_log_does_not_have_are_not_read(tmp_path, monkeypatch):
-    columns = {"t": np.arange(50) / 100, "q1": np.zeros(50), "tau1": np.zeros(50), "video": ["x" * 1000] * 50}
+    columns = {
+        "t": np.arange(50) / 100,
+        "q1": np.zeros(50),
+        "tau1": np.zeros(50),
+        "video": ["x" * 1000] * 50,
+        "quality": ["good"] * 50,
+    }
     pq.write_table(pa.table(columns), tmp_path / "log.parquet")
     monkeypatch.setattr("identify.data.log_file._memory", lambda: 1.1 * 50 * 8 * 3e-9)
     assert len(read_columns(tmp_path / "log.parquet").t) == 50

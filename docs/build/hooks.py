@@ -87,7 +87,8 @@ def _table(cls: type) -> Iterator[str]:
 
 
 def _shown(value: Any) -> str:
-    return "its own section below" if is_dataclass(value) else "none" if value is None else f"`{value}`"
+    nothing = value is None or value in ("", ())
+    return "its own section below" if is_dataclass(value) else "none" if nothing else f"`{value}`"
 
 
 def package(name: str) -> Iterator[str]:

@@ -7,7 +7,7 @@ from rich.text import Text
 from experiments.cli.authors import Check, New
 from experiments.cli.page import new_page, show
 from experiments.contracts.contract import Example
-from experiments.contracts.contracts import found, kept
+from experiments.contracts.contracts import found, keeps
 from experiments.errors import ExperimentError
 from experiments.starters.starters import new_plugin, new_scenario, new_study
 
@@ -32,7 +32,7 @@ def check(asked: Check) -> None:
     """Print what a plug-in is asked, and what of it is kept; raise ExperimentError if something is not."""
     page, (table, plugin) = new_page(machine=asked.json), found(asked.plugin)
     page.print(Text(f"{asked.plugin}: {type(plugin).__name__}, of the {table.point}", style="bold"))
-    answers = list(kept(asked.plugin, Example()))
+    answers = list(keeps(table, plugin, Example()))
     for clause, complaint in answers:
         page.print(Text(f"{'no ' if complaint else 'yes'}  {clause}"), soft_wrap=True)
         if complaint:

@@ -5,6 +5,7 @@ import tempfile
 import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,14 +13,18 @@ from experiments.cli.reading import Question, read
 from experiments.errors import ExperimentError
 from experiments.identification.identified import Identified
 from experiments.recording.audience import Audience
-from experiments.recording.columns import part
-from experiments.recording.live_layer import LiveIdentification
-from experiments.recording.motion_layer import Base
 from identify import IdentificationError, MotionLog
 from identify.data.log_file import CSV
 
+if TYPE_CHECKING:
+    from experiments.recording.live_layer import LiveIdentification
+    from experiments.recording.motion_layer import Base
+
 EVERY = 0.25
 """Time between two looks at the file [s]."""
+
+REST = 3.0
+"""Rest after a look, as a multiple of what it took: the work stays a quarter of a processor's, however long the log."""
 
 FEW = 20
 """Lines up to which a log that cannot be read has only just begun."""
@@ -48,8 +53,10 @@ class Follower:
     question: Question
     named: Identified
     audience: Audience | None = None
-    _samples: int = 0
-    _base: Base | None = field(default=None, init=False)
+    _samples: int = field(default=0, init=False)
+    _live: "LiveIdentification | None" = field(default=None, init=False)
+    _base: "Base | None" = field(default=None, init=False)
+    _complaint: str = field(default="", init=False)
 
     def follow(self, patience: float) -> None:
         """Show the log until it has not grown for `patience` [s], or Ctrl-C; then it counts as complete.
@@ -57,37 +64,56 @@ class Follower:
         Raises
         ------
         ExperimentError
-            If it is no CSV file, or cannot be read.
+            If it is no CSV file.
         """
-        if self.path.suffix != CSV:
+        if self.path.suffix.lower() != CSV:
             raise ExperimentError(f"--follow {patience:g}: only a CSV log can be read while it is written, not {self.path}")
         sys.stderr.write(f"idbench: following {self.path} until it has not grown for {patience:g} s; Ctrl-C ends it before\n")
         size, since = -1, time.monotonic()
         try:
-            while time.monotonic() - since < patience:
-                now = self.path.stat().st_size if self.path.is_file() else 0
+            while True:
+                now, rest = self._size(), min(EVERY, patience / 2)
                 if now != size:
+                    size, began = now, time.monotonic()
                     self._look()
-                    size, since = now, time.monotonic()  # what a look takes is not the log's rest
-                time.sleep(EVERY)
+                    since = time.monotonic()  # what a look takes is not the log's rest
+                    rest = max(rest, REST * (since - began))
+                elif time.monotonic() - since >= patience:
+                    return
+                time.sleep(rest)
         except KeyboardInterrupt:
             sys.stderr.write("idbench: following has ended; this is what there is so far\n")
+
+    def complete(self, folder: Path) -> Path:
+        """Return the log, or a copy of it in `folder` without a last line that was never finished, which is said."""
+        whole = self.path.read_bytes() if self.path.is_file() else b""
+        end = whole.rfind(b"\n") + 1
+        if not whole[end:].strip() or whole[end:].count(b",") == whole[: whole.find(b"\n")].count(b","):
+            return self.path
+        sys.stderr.write(f"idbench: the last line of {self.path} is not complete: left out\n")
+        copy = folder / self.path.name
+        copy.write_bytes(whole[:end])
+        return copy
+
+    def _size(self) -> int:
+        return self.path.stat().st_size if self.path.is_file() else 0
 
     def _look(self) -> None:
         log = self._so_far()
         if log is None or log.samples <= self._samples:
             return
-        base = self._base = self._base or self._begun(log)
-        new = slice(self._samples, log.samples)
-        qd = np.gradient(log.q[max(0, new.start - 1) :], axis=0)[-(log.samples - new.start) :] * log.fs
-        anew = base.live is not None and base.live.grow(log.q[new], log.tau[new])
-        base.add(new.start, {"q/measured": log.q[new], "torque/log": log.tau[new]}, {"measured": log.q[new]}, qd)
+        live, new = self._begun(log), slice(self._samples, log.samples)
+        anew = live.grow(log.q[new], log.tau[new])
+        if self._base is not None:
+            qd = np.gradient(log.q[max(0, new.start - 2) :], axis=0)[-(log.samples - new.start) :] * log.fs
+            signals = {"q/measured": log.q[new], "torque/log": log.tau[new]}
+            self._base.add(new.start, signals, {"measured": log.q[new]}, qd)
         self._samples = log.samples
         if anew:
-            sys.stderr.write(f"idbench: {self._words(float(log.t[-1]))}\n")
+            sys.stderr.write(f"idbench: {_words(live, float(log.t[-1]))}\n")
 
     def _so_far(self) -> MotionLog | None:
-        """Return what the complete lines of the file hold; None if they are too few to tell."""
+        """Return what the complete lines of the file hold; None if nothing can be made of them yet, which is said once."""
         whole = self.path.read_bytes() if self.path.is_file() else b""
         lines = whole[: whole.rfind(b"\n") + 1]
         with tempfile.TemporaryDirectory(prefix="idbench-") as folder:
@@ -96,31 +122,44 @@ class Follower:
             try:
                 return read(copy, replace(self.question, delay=self._delay), self.named)[0]
             except (ExperimentError, IdentificationError) as error:
-                if lines.count(b"\n") <= FEW:
-                    return None
-                raise ExperimentError(str(error).replace(str(copy), str(self.path))) from error
+                complaint = str(error).replace(str(copy), str(self.path))
+                if lines.count(b"\n") > FEW and complaint != self._complaint:
+                    self._complaint = complaint
+                    sys.stderr.write(f"idbench: not yet: {complaint}\n")
+                return None
 
     @property
     def _delay(self) -> str | None:
         """What is asked for, but for an estimate: that comes at the end."""
         return None if self.question.delay == "estimate" else self.question.delay
 
-    def _begun(self, log: MotionLog) -> Base:
-        robot, subject = self.named.subject.robot, self.named.subject
-        base = Base(f"following-{self.path.stem}", robot, log.fs, ("measured",), self.audience)
-        joints = [part(joint) for joint in robot.joints]
-        base.live = LiveIdentification(base.stream, subject, self.named.chain, log.torque, log.fs, joints)
-        return base
+    def _begun(self, log: MotionLog) -> "LiveIdentification":
+        """Return what grows, begun with the first look; a recording of the motion is made for who watches alone."""
+        if self._live is not None:
+            return self._live
+        from experiments.recording.columns import parts
+        from experiments.recording.live_layer import LiveIdentification
+        from experiments.recording.motion_layer import Base
+        from experiments.recording.stream import Stream
 
-    def _words(self, now: float) -> str:
-        found = self._base.live.found if self._base and self._base.live else None
-        if found is None:
-            return f"{now:.1f} s"
-        estimate = next(iter(found.estimates.values()))
-        shares = 100 * estimate.best_sigma / np.maximum(np.abs(estimate.X), 1e-300)
-        weakest = int(np.argmax(np.nan_to_num(shares, nan=np.inf)))
-        known = np.count_nonzero(shares < WEAK)
-        return (
-            f"{now:.1f} s: {known} of {len(shares)} parameters known to {WEAK:g} %; "
-            f"weakest {estimate.names[weakest]}, sigma {shares[weakest]:.2g} %"
-        )
+        subject, name = self.named.subject, f"following-{self.path.stem}"
+        if self.audience:
+            self._base = Base(name, subject.robot, log.fs, ("measured",), self.audience)
+        stream = self._base.stream if self._base else Stream(name)
+        joints = parts(subject.robot.joints)
+        self._live = LiveIdentification(stream, subject, self.named.chain, log.torque, log.fs, joints)
+        return self._live
+
+
+def _words(live: "LiveIdentification", now: float) -> str:
+    """Return how much is known of the parameters after `now` [s]."""
+    if live.found is None:
+        return f"{now:.1f} s"
+    estimate = next(iter(live.found.estimates.values()))
+    shares = 100 * estimate.best_sigma / np.maximum(np.abs(estimate.X), 1e-300)
+    weakest = int(np.argmax(np.nan_to_num(shares, nan=np.inf)))
+    known = np.count_nonzero(shares < WEAK)
+    return (
+        f"{now:.1f} s: {known} of {len(shares)} parameters known to {WEAK:g} %; "
+        f"weakest {estimate.names[weakest]}, sigma {shares[weakest]:.2g} %"
+    )

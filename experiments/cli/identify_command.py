@@ -1,6 +1,7 @@
 """The command that identifies a log."""
 
 import re
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
@@ -10,7 +11,6 @@ from typing import Any
 import numpy as np
 from rich.text import Text
 
-from experiments.cli.follow import Follower
 from experiments.cli.logs import Identify
 from experiments.cli.page import Page, new_page, shown
 from experiments.cli.reading import Question, file_of, read, stated_by
@@ -60,7 +60,7 @@ def identify(asked: Identify) -> None:
     )
     question = Question(asked.torque, asked.torque_delay, asked.unwrap)
     with ExitStack() as stack:
-        audience = _followed(stack, asked, path, question, named)
+        audience, path = _followed(stack, asked, path, question, named)
         known, about_delay = read(path, question, named)
         found, hidden = _shown(replace(named, logs=(known,), truth=_truth(stated, named)))
         validated = _validated(found, asked, known)
@@ -85,15 +85,20 @@ def identify(asked: Identify) -> None:
             _write_mjcf(page, found, asked.write_mjcf)
 
 
-def _followed(stack: ExitStack, asked: Identify, path: Path, question: Question, named: Identified) -> Audience | None:
-    """Follow the log, if that is asked for, until it is complete; return who watches."""
+def _followed(
+    stack: ExitStack, asked: Identify, path: Path, question: Question, named: Identified
+) -> tuple[Audience | None, Path]:
+    """Follow the log, if that is asked for, until it is complete; return who watches, and where the complete log is."""
     if asked.follow is None:
-        return None
+        return None, path
     if not 0 < asked.follow < float("inf"):
         raise ExperimentError(f"--follow {asked.follow:g} must be above 0: for how long [s] a complete log has not grown")
+    from experiments.cli.follow import Follower
+
     audience = stack.enter_context(asked.watching.audience())
-    Follower(path, question, named, audience).follow(asked.follow)
-    return audience
+    follower = Follower(path, question, named, audience)
+    follower.follow(asked.follow)
+    return audience, follower.complete(Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="idbench-"))))
 
 
 def _shown(found: Identified) -> tuple[Identified, list[str]]:

@@ -13,6 +13,9 @@ from experiments.recording.comparison_recording import compare
 from experiments.recording.folder import BASE, files, merge
 from experiments.recording.viewers import LOOPBACK, require_display, viewer_binary
 
+RECORDING = b"RR"
+"""What every recording begins with."""
+
 LATEST = Path("runs")
 """Where the latest results are looked for."""
 
@@ -61,6 +64,8 @@ def save(folders: Sequence[Path], tab: str, out: Path) -> None:
         raise ResultsError(f"--save {out} must end with .rrd")
     if out.name.startswith("recording.") and out.absolute().parent in [folder.absolute() for folder in folders]:
         raise ResultsError(f"--save {out} would be a part of the recording itself: choose another name")
+    if out.is_file() and not out.read_bytes()[:2] == RECORDING:
+        raise ResultsError(f"--save {out} is a file that is no recording: choose another name")
     with beside(out.parent) as hidden:
         _merge(folders, tab, hidden / out.name)
 

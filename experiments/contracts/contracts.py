@@ -27,7 +27,7 @@ CONTRACTS: Mapping[str, tuple[Clause, ...]] = {
     "alignments": (identification.is_immutable, identification.alignment_keeps_constants),
     "masks": (identification.is_immutable, identification.mask_gives_weights),
     "operators": (identification.is_immutable, identification.operator_agrees_with_its_step),
-    "chains": (identification.chain_is_made_anew_alike, identification.chain_recovers_ideal_data),
+    "chains": (identification.is_immutable, identification.chain_recovers_ideal_data),
     "estimators": (
         identification.is_immutable,
         identification.estimator_recovers_noiseless_rows,
@@ -77,6 +77,11 @@ def _loaded(name: str) -> tuple[PluginTable[Any], Any]:
 
 
 def kept(name: str, example: Example) -> Iterator[tuple[str, str]]:
-    """Yield what a plug-in is asked, and why it does not keep it; empty if it does."""
+    """Yield what the plug-in of a name is asked, and why it does not keep it; empty if it does."""
     table, plugin = found(name)
+    yield from keeps(table, plugin, example)
+
+
+def keeps(table: PluginTable[Any], plugin: Any, example: Example) -> Iterator[tuple[str, str]]:
+    """Yield what a plug-in of a table is asked, and why it does not keep it; empty if it does."""
     yield from checked(plugin, CONTRACTS[table.point], example)

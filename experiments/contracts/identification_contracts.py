@@ -10,7 +10,6 @@ from experiments.contracts.contract import FS, Example, require, require_equal, 
 from identify import (
     AbstractEstimator,
     Array,
-    Chain,
     ExplicitModel,
     MotionLog,
     PowerModel,
@@ -34,11 +33,6 @@ def is_immutable(plugin: Any, _: Example) -> None:
     require(type(plugin).__dataclass_params__.frozen, f"{type(plugin).__name__} is not frozen: @dataclass(frozen=True)")
     require(replace(plugin) == plugin, "a copy of it is not equal to it")
     require(len((type(plugin).__doc__ or "").strip()) > 10, "its docstring does not say what it is")
-
-
-def chain_is_made_anew_alike(chain: Any, _: Example) -> None:
-    """It is a chain of stages."""
-    require(isinstance(chain, Chain), f"{type(chain).__name__} is no Chain")
 
 
 def prefilter_keeps_constants(prefilter: Any, example: Example) -> None:

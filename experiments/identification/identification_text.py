@@ -98,21 +98,28 @@ def print_validated(console: Console, validated: Validated) -> None:
             raise
         console.print(Text(f"not validated on {validated.title}: {error}\n"), soft_wrap=True)
         return
-    heads = [f"{model}\n{what}" for model in torques for what in ("rms", "%", "R2", "q rms")]
+    simulated = any(validated.position_error(model) is not None for model in torques)
+    heads = [f"{model}\n{what}" for model in torques for what in ("rms", "%", "R2", "q rms")[: 3 + simulated]]
     grid, first = new_table("", ["noise of\nthe log %", *heads]), next(iter(torques.values()))
     for j, joint in enumerate(validated.found.subject.robot.joints):
         noise = percentage(first.percent_of_level(first.noise)[j])
-        grid.add_row(joint, noise, *(cell for model in torques for cell in _validation_cells(validated, model, j)))
-    what = "torque error while moving [N m, N], position error of the simulated robot [rad, m]"
-    print_titled(console, f"{validated.title}: {what}", grid)
+        cells = (cell for model in torques for cell in _validation_cells(validated, model, j)[: 3 + simulated])
+        grid.add_row(joint, noise, *cells)
+    what = "torque error while moving [N m, N]" + (", position error of the simulated robot [rad, m]" if simulated else "")
+    print_titled(console, f"{validated.title}: {what}", grid, 2)
     still = first.standing
     joints = validated.found.subject.robot.joints
     apart = [f"{joint} {rms:.2g}" for joint, rms in zip(joints, still, strict=True) if isfinite(rms)]
     if apart:
         console.print(Text(f"standing and turning, where friction is not determined: {', '.join(apart)} N m"), soft_wrap=True)
+    unsimulated = dict[str, list[str]]()
     for model in torques:
         verdict = Verdict(validated, model)
         console.print(Text(f"{model}: {verdict.word}: {'; '.join(verdict.reasons)}"), soft_wrap=True)
+        if verdict.unsimulated:
+            unsimulated.setdefault(verdict.unsimulated, []).append(model)
+    for why, models in unsimulated.items():
+        console.print(Text(f"{', '.join(models)}: not simulated: {why}"), soft_wrap=True)
     for model, why in validated.judged.failures.items():
         console.print(Text(f"{model}: not judged: {why}"), soft_wrap=True)
     console.print()

@@ -67,6 +67,12 @@ class Verdict:
         return "good" if beyond <= GOOD else "fair"
 
     @property
+    def unsimulated(self) -> str:
+        """Why the identified robot was not simulated; empty if it was."""
+        replayed = self.validated.replays[self.model]
+        return replayed if isinstance(replayed, str) else ""
+
+    @property
     def reasons(self) -> list[str]:
         """Why, the worst joint first."""
         wrong = [reason.partition(":")[0] for reason in wrong_sign(self.validated.judged)]
@@ -97,12 +103,11 @@ class Verdict:
             yield f"what is left of {', '.join(coloured)} is no noise"
         elif self.word == "good" and (validation.rms <= MARGIN * validation.expected).all():
             yield "noise and sigma explain all of it"
-        if isinstance(self.validated.replays[self.model], str):
-            yield f"not simulated: {self.validated.replays[self.model]}"
 
     def summary(self) -> dict[str, Any]:
         """Return what a summary.json says of it."""
-        return {"verdict": self.word, "reasons": self.reasons}
+        apart = [f"not simulated: {self.unsimulated}"] if self.unsimulated else []
+        return {"verdict": self.word, "reasons": [*self.reasons, *apart]}
 
 
 @final

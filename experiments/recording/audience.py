@@ -27,7 +27,6 @@ LEAVING = "idbench-leaving"
 
 Url = Annotated[str | None, tyro.conf.arg(metavar="URL", help_behavior_hint="")]
 Times = Annotated[float | None, tyro.conf.arg(metavar="FLOAT", help_behavior_hint="")]
-Window = Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="FROM TO", help_behavior_hint="")]
 
 
 @dataclass(frozen=True)
@@ -83,10 +82,6 @@ class Watching:
                 _until_interrupted()
         else:
             yield None
-
-
-Watched = Annotated[Watching, tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes]
-"""The same options for every command."""
 
 
 class Audience:

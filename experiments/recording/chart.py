@@ -137,19 +137,17 @@ class Chart:
         return np.stack([self._width * self._x.at(x), HEIGHT * (1 - self._y.at(y))], axis=-1)  # the view's y points down
 
     def _strips(self, name: str, strips: Sequence[Array], color: Color, width: float, order: float) -> None:
-        if strips:
-            lines = rr.LineStrips2D(strips, colors=[color], radii=[-width], draw_order=order, show_labels=False)
-            self._stream.keep(f"{self._path}/{name}", lines)
+        lines = rr.LineStrips2D(strips, colors=[color], radii=[-width], draw_order=order, show_labels=False)
+        self._stream.keep(f"{self._path}/{name}", lines)
 
     def _texts(
         self, name: str, where: "Iterable[tuple[float, float]] | Array", texts: Sequence[str], color: Color = TEXT
     ) -> None:
         """Write texts, each in the middle of a line too short to be seen: beside points, they stand below."""
         shown = [(text, np.array([at, at]) - (0, RAISE)) for text, at in zip(texts, where, strict=True) if text]
-        if shown:
-            words, strips = zip(*shown, strict=True)
-            lines = rr.LineStrips2D(list(strips), colors=[color], radii=[0.0], labels=list(words), show_labels=True)
-            self._stream.keep(f"{self._path}/{name}", lines)
+        words, strips = [text for text, _ in shown], [strip for _, strip in shown]
+        lines = rr.LineStrips2D(strips, colors=[color], radii=[0.0], labels=words, show_labels=True)
+        self._stream.keep(f"{self._path}/{name}", lines)
 
 
 def send_keys(stream: Stream, path: str, entries: Mapping[str, Color]) -> None:

@@ -19,6 +19,12 @@ def part(name: str) -> str:
     return re.sub(r"[^\w.-]+", "_", name)
 
 
+def parts(names: Sequence[str]) -> list[str]:
+    """Return names as parts of paths, each another one."""
+    found = [part(name) for name in names]
+    return [name if name not in found[:k] else f"{name}.{k + 1}" for k, name in enumerate(found)]
+
+
 class TimeColumn:
     """A timeline's times, made once for all columns that share them."""
 

@@ -1,6 +1,7 @@
 """Several runs, read to be compared: what differs in what was simulated, in when it moves, and in what was found."""
 
 import json
+import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,6 +12,7 @@ import numpy as np
 import scipy
 
 from experiments.errors import ExperimentError, ResultsError
+from experiments.recording.columns import part
 from identify import Array, LogError, MotionLog
 from identify.data.log_file import read_log
 
@@ -80,7 +82,8 @@ def named_runs(folders: Sequence[Path]) -> list[Compared]:
     if len(set(whole)) < len(whole):
         raise ExperimentError(f"{' '.join(map(str, folders))}: a folder is given twice")
     short = [path.name for path in whole]
-    names = short if len(set(short)) == len(short) else ["_".join(path.parts[-2:]) for path in whole]
+    alike = len({part(name) for name in short}) < len(short)
+    names = [f"{k}-{name}" for k, name in enumerate(short, 1)] if alike else short
     runs = [Compared(folder, name) for folder, name in zip(folders, names, strict=True)]
     _ = [run.summary for run in runs]
     first = runs[0]
@@ -153,7 +156,8 @@ def difference(first: MotionLog, other: MotionLog, shift: float) -> tuple[Array,
 
 def _of(run: Compared, model: str) -> dict[str, tuple[float, float]]:
     found = run.summary["models"][model]
-    sigma = found.get("corrected_sigma") or found["sigma"]
+    both = zip(found["sigma"], found.get("corrected_sigma") or found["sigma"], strict=True)
+    sigma = [plain if corrected is None else corrected for plain, corrected in both]
     return dict(zip(run.summary["parameters"], zip(found["estimate"], sigma, strict=True), strict=True))
 
 
@@ -170,4 +174,6 @@ def _flat(settings: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, 
 
 
 def _shown(value: Any) -> str:
-    return "" if value is None else f"{value:g}" if isinstance(value, float) else str(value)[:60]
+    if value is None or isinstance(value, float):
+        return "" if value is None else f"{value:g}"
+    return textwrap.shorten(str(value), 26, placeholder=" ...")

@@ -1,6 +1,7 @@
 """The recording of a comparison: several runs laid over each other, with what differs said first."""
 
 from collections.abc import Iterator, Sequence
+from collections.abc import Set as AbstractSet
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,12 @@ from experiments.errors import ResultsError
 from experiments.recording.chart import send_keys
 from experiments.recording.columns import NANOSECONDS, part, seconds
 from experiments.recording.compared import Compared, difference, differences, estimates, named_runs, shift_of
-from experiments.recording.folder import files
+from experiments.recording.folder import BASE, INNER, files
 from experiments.recording.layouts import tabs
 from experiments.recording.stream import Stream
 from experiments.recording.style import FORM_WIDTHS, FORMS, GREY, joint_colors, lighter, model_color
 
-SIGNALS = ("q/measured", "q/true", "qd/true", "torque/log", "torque/true", "torque/command")
+SIGNALS = ("q/measured", "qd/true", "torque/log")
 """Of the second run and of those after it, what is laid over the first one's."""
 
 
@@ -55,13 +56,15 @@ def _copy(stream: Stream, run: Compared, number: int, shift: float) -> None:
     paths = files(run.folder)
     if not paths:
         raise ResultsError(f"there is no recording in {run.folder}: run it without --no-rerun")
-    labels = {path.name.split(".")[1] for path in paths} - {"rrd", "inner"}
+    labels = [path for path in paths if path.name not in (BASE, INNER)]
+    copied = set[str]()
     for path in reversed(paths):
         for chunk in _chunks(path):
             place = _place(chunk.entity_path.strip("/"), run.name, number, len(labels) > 1)
             if place is not None:
                 stream.add(_moved(chunk, shift).with_entity_path(f"/{place}"), place)
-    _restyle(stream, run, number)
+                copied.add(place)
+    _restyle(stream, run, number, copied)
 
 
 def _chunks(path: Path) -> Iterator[Chunk]:
@@ -91,27 +94,33 @@ def _moved(chunk: Chunk, shift: float) -> Chunk:
     return found
 
 
-def _restyle(stream: Stream, run: Compared, number: int) -> None:
+def _restyle(stream: Stream, run: Compared, number: int, copied: AbstractSet[str]) -> None:
     """Give the curves of a run colours and names of its own; the second one's lie thin over the first one's."""
-    for path in sorted(stream.paths):
+    for path in sorted(copied):
         match path.split("/"):
-            case ["other", k, *signal] if int(k) == number:
-                colors = [lighter(color, 1 + number) for color in joint_colors(run.log.n)]
+            case ["other", _, *signal]:
+                colors = [lighter(color, 2) for color in joint_colors(run.log.n)]
                 names = [f"{signal[-1]} {j + 1}, {run.name}" for j in range(run.log.n)]
-                stream.style(path, names, colors, 1.5)
-            case ["identify", method, model, "predicted" | "residual", _] if _mine(method, run):
+                stream.style(path, names, colors, 1.2)
+            case [*signal] if path in SIGNALS:
+                names = [f"{signal[-1]} {j + 1}, {run.name}" for j in range(run.log.n)]
+                stream.style(path, names, joint_colors(run.log.n), 4.0)
+            case ["identify", _, *_, "lines" | "marks" | "segments" | "legend", name] if _model(name, run):
+                stream.keep(path, rr.LineStrips2D.from_fields(colors=[model_color(_model(name, run), number)]))
+            case ["identify", _, model, "predicted" | "residual", _]:
                 width = FORM_WIDTHS.get(model, 1.5) / (1 + number)
                 stream.style(path, [f"{model}, {run.name}"], [model_color(model, number)], width)
-            case ["identify", method, model, "estimate", _] if _mine(method, run):
+            case ["identify", _, model, "estimate", _]:
                 style = rr.Measurements.from_fields(names=[f"{model}, {run.name}"], colors=[model_color(model, number)])
                 stream.keep(path, style)
-            case ["legend", method] if _mine(method, run):
+            case ["legend", method] if method != "joints":
                 models = {model: model_color(model, number) for model in FORMS if model in run.summary["models"]}
                 send_keys(stream, path, {f"{method}:": GREY, **models})
 
 
-def _mine(method: str, run: Compared) -> bool:
-    return method == part(run.name) or method.startswith(f"{part(run.name)}-")
+def _model(name: str, run: Compared) -> str:
+    """Return the model that a line of a chart belongs to, empty if it is no model's."""
+    return next((model for model in run.summary["models"] if model in name.split("_")), "")
 
 
 def _send_differences(stream: Stream, first: Compared, run: Compared, shift: float) -> None:

@@ -8,7 +8,7 @@ import rerun as rr
 from experiments.identification.identified import Identified
 from experiments.recording.audience import Audience
 from experiments.recording.chart import send_keys
-from experiments.recording.columns import part, seconds, time_columns
+from experiments.recording.columns import part, parts, seconds, time_columns
 from experiments.recording.lanes import Lanes, mask_states
 from experiments.recording.layouts import tabs
 from experiments.recording.parameter_charts import send_parameters
@@ -52,7 +52,7 @@ class Layer:
         self, name: str, found: Identified, joints: Sequence[str], known: set[str], audience: Audience | None = None
     ) -> None:
         self.stream, self._found, self._known = Stream(name, audience, layer=True), found, known
-        self._joints = [part(joint) for joint in joints]
+        self._joints = parts(joints)
         self._log, self._chain, self._at = found.logs[0], found.processing, f"identify/{found.label}"
         methods = {path.strip("/").split("/")[1] for path in known if path.strip("/").startswith("identify/")}
         self._shade = len(methods - {found.label})
@@ -72,8 +72,8 @@ class Layer:
             for fit in estimate.fits.values():
                 send_smoothed(self.stream, self._at, fit, self._joints)
         self._truth()
-        ResidualCharts(self.stream, self._at, self._found, self._joints).send()
-        send_parameters(self.stream, self._at, self._found)
+        ResidualCharts(self.stream, self._at, self._found, self._joints, self._shade).send()
+        send_parameters(self.stream, self._at, self._found, self._shade)
         keys = {f"{self._found.label}:": GREY, **{form: self._color(form) for form in self._found.estimates}}
         send_keys(self.stream, f"legend/{self._found.label}", keys)
         for name, text in (
@@ -113,7 +113,9 @@ class Layer:
         if form != "implicit":  # whose W is the explicit one's, but for the differences
             for kind, row in enumerate(names):
                 rows = (found.group == kind) & found.valid
-                used = np.flatnonzero(np.abs(W[rows]).max(axis=0) > 0)
+                used = np.flatnonzero(np.abs(W[rows]).max(axis=0, initial=0.0) > 0)
+                if not len(used):  # a joint that never moves
+                    continue
                 path, colors = f"{at}/columns/{row}", [JOINTS[p % len(JOINTS)] for p in used]
                 self.stream.style(path, [estimate.names[p] for p in used], colors)
                 self.stream.curves(path, [seconds(found.time[rows])], W[rows][:, used])
@@ -131,7 +133,7 @@ class Layer:
         for p, name in enumerate(estimate.names):
             settled = np.logical_or.accumulate(running.sigma[:, p] < WIDEST * np.abs(running.X[-1, p]))
             known = np.isfinite(running.X[:, p]) & (settled | (t > t[-1] / 2))
-            path, variance = f"{at}/estimate/{name}", running.sigma[known, p] ** 2
+            path, variance = f"{at}/estimate/{part(name)}", running.sigma[known, p] ** 2
             self.stream.keep(path, rr.Measurements.from_fields(names=[form], colors=[color], widths=[2.0]))
             columns = rr.Measurements.columns(values=running.X[known, p], variances=variance)
             self.stream.send(path, [seconds(t[known])], columns)
@@ -141,7 +143,7 @@ class Layer:
         ends: Mapping[str, float] = self._found.truth or {}
         for name, value in ends.items():
             times = time_columns(self._log.t[[0, -1]], self._log.fs)
-            self.stream.curve(f"truth/{name}", times, np.array([value, value]), "true", GREY, 3.0)
+            self.stream.curve(f"truth/{part(name)}", times, np.array([value, value]), "true", GREY, 3.0)
 
 
 def row_names(form: str, kinds: int, joints: Sequence[str]) -> Sequence[str]:

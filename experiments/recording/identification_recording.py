@@ -12,7 +12,7 @@ from experiments.identification.identified import Identified
 from experiments.identification.scenario_run import ScenarioRun
 from experiments.identification.subject import Subject
 from experiments.recording.audience import Audience
-from experiments.recording.columns import part
+from experiments.recording.columns import parts
 from experiments.recording.folder import BASE, INNER, files, known, layer_file, rearranged
 from experiments.recording.identification_layer import Layer
 from experiments.recording.live_layer import LiveIdentification
@@ -59,7 +59,7 @@ class RunRecording:
         self.base.stream.describe(scenario=written, seed=str(scenario.seed), fs_hz=f"{scenario.fs:g}")
         if audience:  # so that the view holds the whole motion from the beginning
             self.base.make_room(scenario.trajectory.sample(scenario.real_robot, scenario.fs).q)
-            joints = [part(joint) for joint in scenario.real_robot.joints]
+            joints = parts(scenario.real_robot.joints)
             subject = Subject(scenario.robot) if subject is None else subject
             self.base.live = LiveIdentification(self.base.stream, subject, CHAIN, scenario.channel, scenario.fs, joints)
         self.watch = Watch(self.base.stretch, audience.every if audience else UNWATCHED, window)

@@ -18,7 +18,7 @@ from experiments.recording.run_layouts import (
     residuals,
     torques,
 )
-from experiments.recording.views import Part, Shelf, arm, charts, column, grid, keys, plot, side_by_side, tabbed, text
+from experiments.recording.views import Part, Shelf, arm, charts, column, grid, height, keys, plot, side_by_side, tabbed, text
 
 HIGHER = 26
 """How much higher a layout is than the legend above it."""
@@ -62,10 +62,10 @@ def study(shelf: Shelf) -> Part:
     """Return a study: errors over the values of each axis, all parameters together and one by one, and the answer."""
     axes = list(dict.fromkeys(path.split("/")[1] for path in shelf.of("study/*/typical/frame")))
     pages = [_over_axis(shelf, axis) for axis in axes]
-    if not pages:  # an answer alone, if no run gave an estimate
-        return text(shelf, "answer")
     sigmas = charts(shelf, "all errors over their sigma", "study/sigmas")
     answer = column(text(shelf, "answer"), *sigmas, shares=[5.0, *[2.0] * len(sigmas)])
+    if not pages:  # nothing varies, or no run gave an estimate
+        return answer
     return side_by_side("study", answer, pages[0] if len(pages) == 1 else tabbed(pages, "axes"), shares=[2, 5])
 
 
@@ -105,5 +105,6 @@ def tabs(paths: AbstractSet[str], active: str = "") -> rrb.Blueprint:
     if active and active not in made:
         raise ResultsError(f"this recording has no tab {active!r}; it has {', '.join(made)}")
     number = list(made).index(active) if active else 0
-    pages = [column(keys(shelf, "legend/*"), part, shares=[1, HIGHER], name=name) or part for name, part in made.items()]
+    high = height(shelf, "legend/*")
+    pages = [column(keys(shelf, "legend/*"), part, shares=[high, HIGHER], name=name) or part for name, part in made.items()]
     return rrb.Blueprint(rrb.Tabs(*pages, active_tab=number), time, collapse_panels=True)

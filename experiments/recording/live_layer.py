@@ -7,11 +7,12 @@ import rerun as rr
 
 from experiments.identification.identified import Identified
 from experiments.identification.subject import Subject
-from experiments.recording.columns import seconds
+from experiments.recording.columns import part, seconds
 from experiments.recording.identification_layer import row_names, send_rows
 from experiments.recording.stream import Stream
 from experiments.recording.style import FORM_WIDTHS, FORMS, GREY
 from identify import Array, Estimate, IdentificationError, MotionLog, TorqueChannel
+from identify.rows.long_logs import is_long
 
 GROWTH = 1.05
 """How much longer the log must be before it is identified again: so often that the work stays in proportion to the log."""
@@ -73,9 +74,11 @@ class LiveIdentification:
         at, color = f"identify/{LABEL}/{form}", FORMS.get(form, GREY)
         for name, x, sigma in zip(estimate.names, estimate.X, estimate.best_sigma, strict=True):
             if form not in self._shown:
-                self._stream.keep(f"{at}/estimate/{name}", rr.Measurements.from_fields(names=[form], colors=[color]))
+                self._stream.keep(f"{at}/estimate/{part(name)}", rr.Measurements.from_fields(names=[form], colors=[color]))
             columns = rr.Measurements.columns(values=[x], variances=[sigma**2])
-            self._stream.send(f"{at}/estimate/{name}", [seconds(np.array([now]))], columns)
+            self._stream.send(f"{at}/estimate/{part(name)}", [seconds(np.array([now]))], columns)
+        if is_long(estimate.problem.logs):  # of which no rows are kept
+            return
         names = row_names(form, estimate.rows.kinds, self._joints)
         last = self._shown.get(form, -np.inf)
         send_rows(self._stream, at, form, estimate, names, color, FORM_WIDTHS.get(form, 1.5), after=last)

@@ -9,7 +9,7 @@ import rerun as rr
 from experiments.recording.arm import Arm
 from experiments.recording.audience import Audience
 from experiments.recording.chart import send_keys
-from experiments.recording.columns import Times, part, seconds, time_columns
+from experiments.recording.columns import Times, parts, seconds, time_columns
 from experiments.recording.lanes import Lanes, joint_states
 from experiments.recording.layouts import tabs
 from experiments.recording.stream import Stream
@@ -51,7 +51,9 @@ class Base:
         self.inner: Stream | None = None
         self.live: LiveIdentification | None = None
         self._shown = 0
-        self._joints, self._fs, self._roles = [part(joint) for joint in robot.joints], fs, roles
+        self._joints, self._fs, self._roles = parts(robot.joints), fs, roles
+        for number, joint in enumerate(self._joints):  # for layouts, which see entities alone, in the order of their names
+            self.stream.keep(f"joints/{number:03}/{joint}", rr.TextDocument(joint))
         self._arm, self._lanes = Arm(self.stream, robot, roles), Lanes(self.stream, fs)
         self._before, self._turning = (np.empty(0), np.empty((0, robot.n))), np.zeros(robot.n)
         keys = {"measured": GREY, **dict(zip(self._joints, joint_colors(robot.n), strict=True))}

@@ -7,9 +7,10 @@ import numpy.typing as npt
 
 from experiments.identification.identified import Identified
 from experiments.recording.chart import NARROW, SQUARE, SYMBOLS, Chart
+from experiments.recording.columns import part
 from experiments.recording.scales import Signed, decades, linear, listed
 from experiments.recording.stream import Stream
-from experiments.recording.style import FORMS, GREY
+from experiments.recording.style import GREY, model_color
 from identify import Array
 
 MOST = 13
@@ -24,21 +25,26 @@ ASIDE = 0.22
 PERCENT = 100.0
 
 
-def send_parameters(stream: Stream, at: str, found: Identified) -> None:
+def send_parameters(stream: Stream, at: str, found: Identified, number: int = 0) -> None:
     """Send every parameter's error, or its deviation from the first model's, with its interval; and the singular values."""
-    names, scale = found.basis.names, _scale(found)
-    for k, part in enumerate(_parts(found)):
-        chart = Chart(stream, f"{at}/parameters/{k}", scale, listed("", [names[p] for p in part]), SQUARE)
-        ends = np.array([-0.5, len(part) - 0.5])
+    names, scale = (
+        [f"{name} = 0" if x == 0 else name for name, x in zip(found.basis.names, _reference(found), strict=True)],
+        _scale(found),
+    )
+    for k, members in enumerate(_parts(found)):
+        mine = [names[p] for p in members]
+        place = f"{at}/parameters/{k}_{part(found.basis.names[members[0]])}_to_{part(found.basis.names[members[-1]])}"
+        chart = Chart(stream, place, scale, listed("", mine), SQUARE)
+        ends = np.array([-0.5, len(members) - 0.5])
         chart.line("true" if found.truth else next(iter(found.estimates)), np.zeros(2), ends, GREY, listed=False)
         for i, (form, estimate) in enumerate(found.estimates.items()):
-            off, sigma = _deviation(found, estimate.X)[part], _in_percent(found, estimate.best_sigma)[part]
-            y = np.arange(float(len(part))) + ASIDE * (i - (len(found.estimates) - 1) / 2)
-            color = FORMS.get(form, GREY)
+            off, sigma = _deviation(found, estimate.X)[members], _in_percent(found, estimate.best_sigma)[members]
+            y = np.arange(float(len(members))) + ASIDE * (i - (len(found.estimates) - 1) / 2)
+            color = model_color(form, number)
             reach = np.stack([off - SIGMAS * sigma, off + SIGMAS * sigma], axis=1)
             chart.segments(form, reach, np.stack([y, y], axis=1), color, 1.5)
             chart.marks(form, off, y, color, SYMBOLS[i % len(SYMBOLS)])
-    _singular_values(stream, at, found)
+    _singular_values(stream, at, found, number)
 
 
 def _parts(found: Identified) -> list[npt.NDArray[np.intp]]:
@@ -70,10 +76,10 @@ def _scale(found: Identified) -> Signed:
     low, high = (float(every.min()), float(every.max())) if len(every) else (1.0, 1.0)
     bend = 10.0 ** np.floor(np.log10(max(low, high * 1e-6)))
     what = "error" if found.truth else f"difference from {next(iter(found.estimates))}"
-    return Signed(f"{what} [%], with its interval of two sigma", -1.3 * high, 1.3 * high, bend)
+    return Signed(f"{what} [%], and two sigma; beyond {bend:g} in decades", -1.3 * high, 1.3 * high, bend)
 
 
-def _singular_values(stream: Stream, at: str, found: Identified) -> None:
+def _singular_values(stream: Stream, at: str, found: Identified, number: int) -> None:
     """Send the singular values of W, over the largest; beyond the conditions that they allow, parameters are not told apart."""
     values = {
         form: np.linalg.svd(estimate.problem.factors.together.R_W, compute_uv=False)
@@ -84,5 +90,5 @@ def _singular_values(stream: Stream, at: str, found: Identified) -> None:
     x, y = linear("number", numbers), decades("over the largest", *shares.values())
     chart = Chart(stream, f"{at}/singular_values", x, y, NARROW)
     for i, (form, share) in enumerate(shares.items()):
-        chart.marks(form, numbers, share, FORMS.get(form, GREY), SYMBOLS[i % len(SYMBOLS)])
-        chart.line(f"{form}: {1 / share[-1]:.3g}", numbers, share, FORMS.get(form, GREY))
+        chart.marks(form, numbers, share, model_color(form, number), SYMBOLS[i % len(SYMBOLS)])
+        chart.line(f"{form}: {1 / share[-1]:.3g}", numbers, share, model_color(form, number))

@@ -9,11 +9,14 @@ from experiments.identification.identified import Identified
 from experiments.recording.chart import NARROW, Chart
 from experiments.recording.scales import decades, linear
 from experiments.recording.stream import Stream
-from experiments.recording.style import FORMS, GREY, JOINTS, Color
+from experiments.recording.style import GREY, JOINTS, Color, model_color
 from identify import MODELS, Array, Estimate, Instants, binned, cutoffs, instants, noise_spectra, spectrum
 
 BINS = {"over_velocity": 41, "over_position": 240}
 """Bins of residuals: over position fine enough for a motor of many slots."""
+
+FEWEST = 5
+"""Samples from which on a bin has a mean."""
 
 DOTS = 2500
 """Dots of a chart: more would only hide each other."""
@@ -48,12 +51,15 @@ class ResidualCharts:
         The identification.
     joints : sequence of str
         Names of the joints, as parts of paths.
+    number : int
+        Which identification of the log it is, from 0: each has its own colours.
     """
 
     stream: Stream
     at: str
     found: Identified
     joints: Sequence[str]
+    number: int = 0
 
     def send(self) -> None:
         """Send them all."""
@@ -66,6 +72,9 @@ class ResidualCharts:
             self._spectrum(self.joints[j], j, of_joints)
         for form in left.keys() - of_joints.keys():
             self._spectrum(form, 0, {form: left[form]})
+
+    def _color(self, name: str) -> Color:
+        return COLORS.get(name) or model_color(name, self.number)
 
     def _instants(self, form: str, estimate: Estimate) -> Instants:
         return instants(self.found.problem.signals[0], self.found.basis, MODELS.create(form), self.found.processing, estimate.X)
@@ -85,13 +94,16 @@ class ResidualCharts:
         seen, weight = self._state(kind, j, leading), leading.weight[j]
         x = linear(f"qd [{way}/s]" if kind == "over_velocity" else f"q [{way}]", seen)
         edges: Array = np.linspace(seen.min(), seen.max(), BINS[kind] + 1)
-        means = {form: binned(seen, one.residual[j], one.weight[j], edges) for form, one in left.items()}
+        enough = np.histogram(seen[weight > 0], edges)[0] >= FEWEST
+        means = {
+            form: np.where(enough, binned(seen, one.residual[j], one.weight[j], edges), np.nan) for form, one in left.items()
+        }
         y = linear(f"residual of {self.joints[j]} [{force}]", _most(leading.residual[j][weight > 0]), *means.values())
         chart = Chart(self.stream, f"{self.at}/{kind}/{self.joints[j]}", x, y, NARROW)
         self._dots(chart, seen, leading.residual[j], weight, GREY)
         for form, mean in means.items():
             width = 2.5 if form == next(iter(left)) else 1.2  # models may agree: what is below shows
-            chart.line(f"mean, {form}", (edges[1:] + edges[:-1]) / 2, mean, _color(form), width)
+            chart.line(f"mean, {form}", (edges[1:] + edges[:-1]) / 2, mean, self._color(form), width)
 
     def _dots(self, chart: Chart, x: Array, y: Array, weight: Array, color: Color) -> None:
         some = np.arange(len(x)) % max(1, len(x) // DOTS) == 0
@@ -113,12 +125,12 @@ class ResidualCharts:
         if self.found.truth is not None:
             laws["true"] = self._law(leading, np.where(mine, list(self.found.truth.values()), 0.0), j)
         torque, weight = leading.residual[j] + laws[form], leading.weight[j]
-        y = linear(f"friction of {self.joints[j]} [{force}]", _most(torque[weight > 0]), *laws.values())
+        y = linear(f"friction of {self.joints[j]} [{force}]", _around(np.concatenate(list(laws.values()))))
         chart = Chart(self.stream, f"{self.at}/friction/{self.joints[j]}", linear(f"qd [{way}/s]", qd), y, NARROW)
         self._dots(chart, qd, torque, weight, GREY)
         order = np.argsort(qd)[:: max(1, len(qd) // LAW)]
         for name, law in laws.items():
-            chart.line(name, qd[order], law[order], _color(name), 2.5 if name == "explicit" else 1.2)
+            chart.line(name, qd[order], law[order], self._color(name), 2.5 if name == "explicit" else 1.2)
 
     def _law(self, left: Instants, X: Array, j: int) -> Array:
         return left.equations.predicted(X)[j, left.inner]
@@ -140,9 +152,15 @@ class ResidualCharts:
         y = decades(f"residual of {row} [{unit}/√Hz]", *shown)
         chart = Chart(self.stream, f"{self.at}/spectrum/{row}", decades("f [Hz]", f[1:]), y)
         for name, density in lines.items():
-            chart.line(name, f[1:], density[1:], _color(name), 2.5 if name == "explicit" else 1.2)
+            chart.line(name, f[1:], density[1:], self._color(name), 2.5 if name == "explicit" else 1.2)
         for name, cutoff in cutoffs(self.found.processing, fs).items():
             chart.line(f"cut-off {name}", np.full(2, cutoff), np.array([y.low, y.high]), DARK)
+
+
+def _around(x: Array) -> Array:
+    """Return the ends of an axis on which a law fills the middle third: dots beyond it are noise that would hide it."""
+    low, high = float(x.min()), float(x.max())
+    return np.array([low, high]) + (high - low) * np.array([-1.0, 1.0])
 
 
 def _most(x: Array) -> Array:
@@ -152,7 +170,3 @@ def _most(x: Array) -> Array:
 
 
 COLORS: dict[str, Color] = {"true": GREY, "torque noise": JOINTS[1], "position noise": JOINTS[0]}
-
-
-def _color(name: str) -> Color:
-    return COLORS.get(name) or FORMS.get(name, GREY)

@@ -67,9 +67,8 @@ def friction(shelf: Shelf) -> Part:
         return None
     if len(joints) * len(shelf.methods) <= FEW:
         return _friction(shelf, "friction", joints, names)
-    pages = [
-        _friction(shelf, joint, [joint], [x for x in names if _number(x) == number]) for number, joint in enumerate(joints, 1)
-    ]
+    number = {joint: 1 + shelf.joints.index(joint) for joint in joints}
+    pages = [_friction(shelf, joint, [joint], [x for x in names if _number(x) == number[joint]]) for joint in joints]
     return tabbed(pages, "friction")
 
 
@@ -155,7 +154,7 @@ def excitation(shelf: Shelf) -> Part:
 
 def parameters(shelf: Shelf) -> Part:
     """Return every parameter with its interval beside the truth, and how every estimate comes about."""
-    found = charts(shelf, "{1}: parameters, two sigma", "identify/*/parameters/*", SQUARE)
+    found = charts(shelf, "{1}: parameters {3}", "identify/*/parameters/*", SQUARE)
     names = sorted(shelf.last("identify/*/*/estimate/*"), key=_order)
     table, running = text(shelf, "identify/*/report"), _estimates(shelf, names) if names else None
     if not found:  # of a log that still grows

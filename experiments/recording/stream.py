@@ -95,7 +95,7 @@ class Stream:
 
     def curve(self, path: str, times: Times, values: Array, name: str, color: Color, width: float) -> None:
         """Announce one curve, once, and send values of shape (time,)."""
-        if path not in self.shown:
+        if path not in (self._drafted if self._draft else self.paths):
             self.style(path, [name], [color], width)
         self.curves(path, times, values)
 

@@ -127,11 +127,15 @@ class AxisCharts:
             chart.dots(name, np.full(len(some), self._place(cell)), some, lighter(FORMS.get(cell.names[2], GREY), 1))
         for line in self._lines.values():
             self._draw(chart, line, np.array([PERCENT * cell.rmse[p] for cell in line]))
-        for cell, _, error, run, command in worst:
-            at = np.array([self._place(cell)]), np.array([PERCENT * abs(error)])
-            chart.marks(f"run_{run}", *at, WORST)
-            chart.write(f"worst/run_{run}", *at, [f"run {run}"])
-            self.stream.keep(f"{path}/marks/run_{run}", rr.AnyValues(command=command, error_percent=PERCENT * error))
+        self._worst(chart, path, worst)
+
+    def _worst(self, chart: Chart, path: str, worst: Sequence[Worst]) -> None:
+        """Mark the worst runs, by their number, with the command that makes them again; none where they are others'."""
+        x = np.array([self._place(cell) for cell, *_ in worst])
+        y = np.array([PERCENT * abs(error) for _, _, error, _, _ in worst])
+        chart.marks("worst", x, y, WORST)
+        chart.write("worst", x, y, [f"run {run}" for *_, run, _ in worst])
+        self.stream.keep(f"{path}/marks/worst", rr.AnyValues(commands=[command for *_, command in worst]))
 
 
 _SIGNS: dict[Symbol, str] = {"square": "□", "triangle": "△", "diamond": "◇", "cross": "x", "circle": "o"}

@@ -24,7 +24,10 @@ EDGES = np.arange(-6.25, 6.3, 0.5)
 """Bins of errors in sigma; what lies beyond counts in the outermost."""
 
 EVERY = 2.0
-"""Time between two drawings for who watches [s]."""
+"""Least time between two drawings for who watches [s]."""
+
+REST = 10.0
+"""The same, as a multiple of what the last drawing took: all runs are drawn anew each time."""
 
 
 class StudyRecording:
@@ -41,21 +44,25 @@ class StudyRecording:
     """
 
     def __init__(self, study: Study, folder: Path, audience: Audience | None = None) -> None:
-        self._study, self._folder, self._drawn = study, folder, 0.0
+        self._study, self._folder, self._next, self._shown = study, folder, 0.0, set[str]()
         self.stream = Stream(f"study-{study.name}-{study.fingerprint[:10]}", audience)
 
     @property
     def due(self) -> bool:
         """Whether it is time to draw again."""
-        return time.monotonic() > self._drawn + EVERY
+        return time.monotonic() > self._next
 
     def show(self, cells: Sequence[Cell]) -> None:
         """Draw what is there so far for who watches."""
+        began = time.monotonic()
         with self.stream.draft():
             self._draw(cells)
-        self.stream.show(tabs(self.stream.shown))
+        if self._shown != self.stream.shown:  # a layout that comes again would take who watches back to its first tab
+            self._shown = set(self.stream.shown)
+            self.stream.show(tabs(self._shown))
         self.stream.breathe(0.0)
-        self._drawn = time.monotonic()
+        now = time.monotonic()
+        self._next = now + max(EVERY, REST * (now - began))
 
     def finish(self, cells: Sequence[Cell]) -> list[tuple[str, Stream]]:
         """Draw everything, to be kept; return the stream by the name of its file."""
@@ -66,7 +73,7 @@ class StudyRecording:
     def _draw(self, cells: Sequence[Cell]) -> None:
         solved = [cell for cell in cells if cell.runs]
         worst = worst_runs(solved)
-        written = rr.TextDocument(_text(self._study, cells, self._folder), media_type=rr.MediaType.MARKDOWN)
+        written = rr.TextDocument(_text(self._study, cells, self._folder, worst), media_type=rr.MediaType.MARKDOWN)
         self.stream.keep("answer", written)
         if not solved:
             return
@@ -94,9 +101,9 @@ def _send_sigmas(stream: Stream, cells: Sequence[Cell]) -> None:
         chart.line(model, middle, share, FORMS.get(model, GREY))
 
 
-def _text(study: Study, cells: Sequence[Cell], folder: Path) -> str:
-    worst = [
+def _text(study: Study, cells: Sequence[Cell], folder: Path, worst: Sequence[tuple[Cell, str, float, int]]) -> str:
+    lines = [
         f"- {name} {100 * e:+.2g} %: {where(cell, cells)}\n  `{command(study, folder, cell, run)}`"
-        for cell, name, e, run in worst_runs([cell for cell in cells if cell.runs])
+        for cell, name, e, run in worst
     ]
-    return "\n\n".join([f"# {study.question}", answer(cells, study.edges), "## Worst runs", "\n".join(worst)])
+    return "\n\n".join([f"# {study.question}", answer(cells, study.edges), "## Worst runs", "\n".join(lines)])

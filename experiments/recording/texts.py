@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from experiments.identification.identified import Identified
+from experiments.identification.warnings import FLAGS, doubtful
 from identify import Array, Estimate
 
 
@@ -26,7 +27,7 @@ def estimates_table(found: Identified) -> str:
 
 def short_table(found: Identified) -> str:
     """Return the estimates of the models alone, beside the truth if it is known, as a markdown table."""
-    known = found.truth is not None
+    known, marks = found.truth is not None, doubtful(found)
     lines = [
         f"Chain **{found.chain}**, {found.estimator}\n",
         f"|{' | true' if known else ''} | {' | '.join(found.estimates)} |",
@@ -34,8 +35,10 @@ def short_table(found: Identified) -> str:
     lines.append("|---|" + "---:|" * (len(found.estimates) + known))
     for i, name in enumerate(found.basis.names):
         true = f" {list(found.truth.values())[i]:g} |" if found.truth is not None else ""
-        lines.append(f"| {name} |{true} {' | '.join(f'{e.X[i]:.4g}' for e in found.estimates.values())} |")
-    return "\n".join(lines)
+        cells = (f"{e.X[i]:.4g}{''.join(marks[form][i]).strip()}" for form, e in found.estimates.items())
+        lines.append(f"| {name} |{true} {' | '.join(cells)} |")
+    used = {flag for of_form in marks.values() for of_row in of_form for flag in of_row if flag.strip()}
+    return "\n".join([*lines, "", "; ".join(f"{flag} {FLAGS[flag]}" for flag in FLAGS if flag in used)])
 
 
 def noise_table(found: Identified, joints: Sequence[str]) -> str:

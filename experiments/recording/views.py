@@ -10,8 +10,11 @@ from experiments.recording.chart import HEIGHT, WIDE
 LEGEND, EDGE = 0.66, 0.1
 """Room to the right of a chart, with a legend and without one, in heights of its frame."""
 
-KEYS = rrb.VisualBounds2D(x_range=[0, 32], y_range=[-0.5, 0.5])
+KEYS = rrb.VisualBounds2D(x_range=[0, 42], y_range=[-0.5, 0.5])
 """What a row of keys shows: some eight of them."""
+
+ACROSS = 2
+"""Legends beside each other."""
 
 Part = rrb.Container | rrb.View | None
 
@@ -26,15 +29,19 @@ class Shelf:
     """
 
     def __init__(self, paths: AbstractSet[str]) -> None:
-        self.paths = sorted(path.strip("/") for path in paths)
+        stripped = [path.strip("/") for path in paths]
+        numbered = sorted(path.split("/")[1:] for path in stripped if path.startswith("joints/"))
+        self.joints = [joint for _, joint in numbered]
+        self.paths = sorted(stripped, key=self._place)
+
+    def _place(self, path: str) -> list[str]:
+        """Return what paths are sorted by: their names, but joints by their order in the robot."""
+        rank = {joint: f"{number:03}" for number, joint in enumerate(self.joints)}
+        return [rank.get(part, part) for part in path.split("/")]
 
     def of(self, *patterns: str) -> list[str]:
         """Return the entities that match one of the patterns, in which * stands for one part of a path."""
         return [path for pattern in patterns for path in self.paths if _matches(path.split("/"), pattern.split("/"))]
-
-    def by_method(self, pattern: str) -> list[str]:
-        """Return, of the entities that match, the first of every method: what other models show is the same."""
-        return list({path.split("/")[1]: path for path in reversed(self.of(pattern))}.values())
 
     def parents(self, pattern: str) -> list[str]:
         """Return what the parts before the last of the matching entities are, each once."""
@@ -102,14 +109,19 @@ def charts(shelf: Shelf, name: str, pattern: str, width: float = WIDE, words: fl
 
 def _chart(shelf: Shelf, name: str, path: str, width: float, words: float) -> Part:
     right = LEGEND if shelf.of(f"{path}/legend/*") else EDGE
-    bounds = rrb.VisualBounds2D(x_range=[-0.32 - words, width + right], y_range=[-0.17, HEIGHT + 0.3])
+    bounds = rrb.VisualBounds2D(x_range=[-0.32 - words, width + right], y_range=[-0.17, HEIGHT + 0.36])
     return rrb.Spatial2DView(origin=f"/{path}", name=name, visual_bounds=bounds)
 
 
 def keys(shelf: Shelf, *patterns: str) -> Part:
     """Return legends, side by side in a row that is as low as it can be."""
     rows = [rrb.Spatial2DView(origin=f"/{path}", name=path, titlebar=False, visual_bounds=KEYS) for path in shelf.of(*patterns)]
-    return rrb.Horizontal(*rows) if len(rows) > 1 else next(iter(rows), None)
+    return rrb.Grid(*rows, grid_columns=ACROSS) if len(rows) > 1 else next(iter(rows), None)
+
+
+def height(shelf: Shelf, *patterns: str) -> int:
+    """Return how many rows legends take."""
+    return -(-len(shelf.of(*patterns)) // ACROSS)
 
 
 def text(shelf: Shelf, *patterns: str) -> Part:

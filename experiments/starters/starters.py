@@ -4,15 +4,18 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from importlib.resources import files
+from importlib.util import find_spec
+from keyword import iskeyword
 from pathlib import Path
 
 from jinja2 import Environment, StrictUndefined
 
 from experiments.errors import ExperimentError, ResultsError
+from experiments.plugin_tables import TABLES
 from identify.plugins import did_you_mean
 from sim.scenario.scenario_file import load, to_toml
 
-NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+NAME = re.compile(r"[A-Za-z]([A-Za-z0-9_-]*[A-Za-z0-9])?")
 
 
 @dataclass(frozen=True)
@@ -73,6 +76,10 @@ def new_plugin(name: str, kind: str, out: Path) -> None:
     words = {"name": name, "module": module, "name_of_class": made, "point": of.point, "what": of.what, "folder": out.name}
     words["use"] = of.use.replace("NAME", name)
     source = files("experiments.starters").joinpath("plugins", f"{kind}.py").read_text(encoding="utf-8")
+    if any(name in table for table in TABLES):
+        raise ExperimentError(f"{name!r} is the name of a plug-in already, which would be used instead: choose another")
+    if iskeyword(made) or re.search(rf"\b{made}\b", source) or find_spec(module):
+        raise ExperimentError(f"{name!r} is taken, by a module {module} or by a class that {made} would hide: add a word")
     contents = {
         f"{module}.py": re.sub(r"\bStarter\b", made, source),
         f"tests/test_{module}.py": _rendered("test.py.j2", words),
@@ -84,7 +91,7 @@ def new_plugin(name: str, kind: str, out: Path) -> None:
 
 def _checked(name: str) -> str:
     if not NAME.fullmatch(name):
-        raise ExperimentError(f"{name!r} cannot be a name: letters, digits, hyphens and underscores, a letter first")
+        raise ExperimentError(f"{name!r} cannot be a name: letters, digits, - and _; a letter first, a letter or digit last")
     return name
 
 

@@ -48,8 +48,8 @@ def typical_figure(families: Mapping[str, Sequence[Cell]], axis: Axis, edges: in
                 panel.plot(x, least, color="black", ls=":", lw=1.0, label="bound" if model == _last(cells) else None)
         panel.set_yscale("log")
         panel.set_title(title)
-    handles, labels = grid[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=6, frameon=False)
+    named = {label: handle for panel in grid for handle, label in zip(*panel.get_legend_handles_labels(), strict=True)}
+    figure.legend(named.values(), named.keys(), loc="outside upper center", ncols=6, frameon=False)
     figure.supylabel("typical error [%]", fontsize=9)
     figure.supxlabel(axis.field, fontsize=9)
     return _svg(figure)

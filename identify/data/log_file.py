@@ -190,17 +190,19 @@ def _numeric_columns(path: Path, file: Any) -> "pa.Table":
 
     A file of some kilobytes may hold a column of terabytes, all values being the same.
     """
-    types, schema = _arrow().types, file.schema_arrow
-    wanted = [field for field in schema if re.fullmatch(r"t|(q|tau).+", field.name.strip(' "'))]
-    for field in wanted:
-        if not (types.is_floating(field.type) or types.is_integer(field.type) or types.is_null(field.type)):
-            raise LogError(f"{path}: column {field.name} holds {field.type}, not numbers")
+    types, wanted = _arrow().types, list[str]()
+    for field in file.schema_arrow:
+        name, kind = field.name.strip(' "'), field.type
+        if types.is_floating(kind) or types.is_integer(kind) or types.is_null(kind):
+            wanted += [field.name] if re.fullmatch(r"t|(q|tau)(\d+|_.+)", name) else []
+        elif re.fullmatch(r"t|(q|tau)\d+", name):
+            raise LogError(f"{path}: column {name} holds {kind}, not numbers")
     rows = file.metadata.num_rows
     size, room = 8e-9 * rows * len(wanted), _memory()
     if size > room:
         what = f"{rows:.3g} samples of {len(wanted)} columns, {size:.3g} GB"
         raise LogError(f"{path} says that it holds {what}; this machine has {room:.3g} GB: cut the log")
-    return file.read(columns=[field.name for field in wanted])
+    return file.read(columns=wanted)
 
 
 def _memory() -> float:

@@ -5,7 +5,9 @@ from importlib.metadata import files
 import numpy as np
 import pytest
 
-from identify.data.log_file import read_log
+from experiments.cli import main
+from identify import MotionLog
+from identify.data.log_file import read_log, write_log
 
 NEEDED = "--robot", "puma560", "--model", "explicit"
 
@@ -150,3 +152,12 @@ def test_grids_that_hardly_end_are_refused_at_once(idbench, tmp_path):
     code, _, err = idbench("study", "g.toml", "--yes")
     assert code == 2
     assert "the grid has 100,000,000 combinations, more than 1,000,000" in err
+
+
+def test_a_joint_that_never_moves_does_not_keep_the_others_from_being_recorded(tmp_path, table1, capsys):
+    log = table1.log
+    q = np.column_stack([log.q[:, 0], np.zeros(log.samples)])
+    write_log(MotionLog(log.fs, q, log.tau, log.torque), tmp_path / "still.parquet")
+    assert main(["identify", str(tmp_path / "still.parquet"), "--out", str(tmp_path / "found")]) == 0
+    assert "joint2 never moves" in capsys.readouterr().out
+    assert (tmp_path / "found" / "recording.rrd").is_file()

@@ -81,6 +81,7 @@ def test_options_that_make_no_sense_are_told(complaint, out, options, said):
 def test_without_rerun_it_is_not_even_loaded(tmp_path):
     code = "import sys; from experiments.cli import main\n"
     code += "code = main(['run', 'ideal', '--no-rerun', '--out', 'run'])\n"
+    code += "code = code or main(['identify', 'run/log.parquet', '--no-rerun'])\n"
     code += "sys.exit(code or [name for name in sys.modules if name.startswith('rerun')] != [])"
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

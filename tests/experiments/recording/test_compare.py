@@ -1,5 +1,7 @@
 """Runs laid over each other: what differs is said first, and a motion that begins later is moved back."""
 
+import shutil
+
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
@@ -80,3 +82,28 @@ def test_another_motion_is_not_laid_over(table1):
     rng = np.random.default_rng(0)
     q = np.cumsum(np.cumsum(rng.normal(size=(3000, 2)), axis=0), axis=0) / 1e5
     assert shift_of(table1.log, MotionLog(100.0, q, np.zeros_like(q), TorqueChannel("held"))) is None
+
+
+def test_runs_of_equal_names_and_of_names_that_begin_alike_stay_apart(folder, tmp_path, reading):
+    """Of every run its own curves, named and coloured as its own."""
+    copies = [shutil.copytree(folder / "ideal", tmp_path / "copies" / name) for name in ("x/run", "y/run", "rip-2", "rip")]
+    for first, second in (copies[:2], copies[2:]):
+        one = tmp_path / "one.rrd"
+        assert main(["view", str(first), str(second), "--save", str(one)]) == 0
+        names = sorted({path.split("/")[1] for path in reading.entities(one) if path.startswith("identify/")})
+        assert len(names) == 2
+        for name in names:
+            found = RrdReader(one).stream().filter(content=f"/identify/{name}/explicit/residual/joint1").to_chunks()
+            styles = [c.to_record_batch().column("SeriesLines:names").to_pylist() for c in found if c.is_static]
+            assert [f"explicit, {name}"] in [row for rows in styles for row in rows]
+            assert not any(other != name and [f"explicit, {other}"] in rows for rows in styles for other in names)
+
+
+def test_layers_whose_labels_have_dots_stay_apart(folder, tmp_path, reading):
+    run = shutil.copytree(folder / "ideal", tmp_path / "run")
+    for label in ("v.0", "v.1"):
+        assert main(["identify", str(run), "--label", label, "--model", "explicit"]) == 0
+    one = tmp_path / "one.rrd"
+    assert main(["view", str(run), str(folder / "delay"), "--save", str(one)]) == 0
+    methods = {path.split("/")[1] for path in reading.entities(one) if path.startswith("identify/")}
+    assert methods == {"run-idbench-GLS", "run-v.0", "run-v.1", "delay"}

@@ -8,7 +8,10 @@ from rerun.chunk import RrdReader
 
 from experiments.cli import main
 from experiments.errors import ResultsError
+from experiments.recording.columns import parts
 from experiments.recording.folder import files, known, merge
+from experiments.recording.run_layouts import friction
+from experiments.recording.views import Shelf
 
 
 @pytest.fixture
@@ -116,3 +119,19 @@ def test_a_run_and_a_study_of_one_name_do_not_share_a_folder(tmp_path, complaint
         (tmp_path / "runs" / "ripple" / file).write_text("")
         assert f"runs/ripple {printed}: choose another --out" in complaint(command, "ripple")
         (tmp_path / "runs" / "ripple" / file).unlink()
+
+
+def test_joints_come_in_the_order_of_the_robot():
+    """Not in that of their names: elbow is the third."""
+    names = ["shoulder", "upper", "elbow", "wrist"]
+    there = {f"joints/{k:03}/{name}" for k, name in enumerate(names)}
+    there |= {f"identify/one/over_velocity/{name}/frame" for name in names} | {"identify/one/report"}
+    there |= {f"identify/one/explicit/estimate/F{kind}{k + 1}" for kind in "vs" for k in range(4)}
+    pages = friction(Shelf(there))
+    assert [page.name for page in pages.contents] == names
+    shown = [view.name for view in pages.contents[2].contents[1].contents]
+    assert shown == ["Fv3 [N m s/rad]", "Fs3 [N m]"]
+
+
+def test_names_that_make_the_same_path_stay_apart():
+    assert parts(["lift/z", "lift z", "turn"]) == ["lift_z", "lift_z.2", "turn"]

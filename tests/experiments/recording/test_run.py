@@ -148,9 +148,9 @@ def test_the_table_and_the_chart_of_parameters_tell_the_errors(recorded):
     truth = np.array(list(found.truth.values()))
     for name, true in found.truth.items():
         assert f"{name} | {true:g} |" in table
-    assert static(recorded, "parameters/0/ticks_y", "LineStrips2D:labels") == list(names)
+    assert static(recorded, "parameters/0_ZZR1_to_Fs2/ticks_y", "LineStrips2D:labels") == list(names)
     for form, estimate in found.estimates.items():
-        strips = static(recorded, f"parameters/0/marks/{form}", "LineStrips2D:strips")
+        strips = static(recorded, f"parameters/0_ZZR1_to_Fs2/marks/{form}", "LineStrips2D:strips")
         x = np.array([(min(p[0] for p in strip) + max(p[0] for p in strip)) / 2 for strip in strips])
         error = (estimate.X - truth) / truth
         np.testing.assert_array_equal(np.argsort(x), np.argsort(error))
