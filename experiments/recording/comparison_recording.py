@@ -80,7 +80,7 @@ def _place(path: str, name: str, number: int, several: bool) -> str | None:
         return "/".join([head, f"{part(name)}-{rest[0]}" if several else part(name), *rest[1:]])
     if not number:
         return None if head.startswith("__") else path
-    return f"other/{number}/{path}" if path in SIGNALS else None
+    return f"versus/{number}/{path}" if path in SIGNALS else None
 
 
 def _moved(chunk: Chunk, shift: float) -> Chunk:
@@ -98,7 +98,7 @@ def _restyle(stream: Stream, run: Compared, number: int, copied: AbstractSet[str
     """Give the curves of a run colours and names of its own; the second one's lie thin over the first one's."""
     for path in sorted(copied):
         match path.split("/"):
-            case ["other", _, *signal]:
+            case ["versus", _, *signal]:
                 colors = [lighter(color, 2) for color in joint_colors(run.log.n)]
                 names = [f"{signal[-1]} {j + 1}, {run.name}" for j in range(run.log.n)]
                 stream.style(path, names, colors, 1.2)

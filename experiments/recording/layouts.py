@@ -46,9 +46,9 @@ def compare(shelf: Shelf) -> Part:
     if not shelf.of("comparison"):
         return None
     together = column(
-        plot(shelf, "q [rad]", "q/measured", "other/*/q/measured"),
-        plot(shelf, "torque in the log [N m]", "torque/log", "other/*/torque/log"),
-        plot(shelf, "true velocity [rad/s]", "qd/true", "other/*/qd/true"),
+        plot(shelf, "q [rad]", "q/measured", "versus/*/q/measured"),
+        plot(shelf, "torque in the log [N m]", "torque/log", "versus/*/torque/log"),
+        plot(shelf, "true velocity [rad/s]", "qd/true", "versus/*/qd/true"),
     )
     apart = column(
         plot(shelf, "difference of q [rad]", "difference/q/*"),

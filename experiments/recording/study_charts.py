@@ -135,7 +135,7 @@ class AxisCharts:
         y = np.array([PERCENT * abs(error) for _, _, error, _, _ in worst])
         chart.marks("worst", x, y, WORST)
         chart.write("worst", x, y, [f"run {run}" for *_, run, _ in worst])
-        self.stream.keep(f"{path}/marks/worst", rr.AnyValues(commands=[command for *_, command in worst]))
+        self.stream.keep(f"{path}/marks/worst", rr.AnyValues(commands=[command for *_, command in worst] or ["none"]))
 
 
 _SIGNS: dict[Symbol, str] = {"square": "□", "triangle": "△", "diamond": "◇", "cross": "x", "circle": "o"}

@@ -38,7 +38,7 @@ def short_table(found: Identified) -> str:
         cells = (f"{e.X[i]:.4g}{''.join(marks[form][i]).strip()}" for form, e in found.estimates.items())
         lines.append(f"| {name} |{true} {' | '.join(cells)} |")
     used = {flag for of_form in marks.values() for of_row in of_form for flag in of_row if flag.strip()}
-    return "\n".join([*lines, "", "; ".join(f"{flag} {FLAGS[flag]}" for flag in FLAGS if flag in used)])
+    return "\n".join([*lines, "", "; ".join(f"`{flag}` {FLAGS[flag]}" for flag in FLAGS if flag in used)])
 
 
 def noise_table(found: Identified, joints: Sequence[str]) -> str:

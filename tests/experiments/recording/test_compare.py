@@ -36,7 +36,7 @@ def test_what_differs_stands_first_and_every_run_is_an_identification(folder, re
             f"identify/{name}/friction/joint2/frame",
         } <= there
     _, measured = reading.column(folder / "delay" / "recording.rrd", "q/measured")
-    _, shown = reading.column(one, "other/1/q/measured")
+    _, shown = reading.column(one, "versus/1/q/measured")
     np.testing.assert_array_equal(shown, measured)
     _, first = reading.column(folder / "ideal" / "recording.rrd", "q/measured")
     _, apart = reading.column(one, "difference/q/delay")
