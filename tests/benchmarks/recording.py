@@ -62,7 +62,7 @@ def cut(log: MotionLog, samples: int) -> MotionLog:
 
 def record(recording: RunRecording, ran: ScenarioRun, heard: Stretch, folder: Path) -> None:
     """Send the first 4000 samples of a run, and its identification, and write them."""
-    names = ("measured", "q", "qd", "tau", "command")
+    names = ("measured", "q", "qd", "tau", "command", "logged")
     parts = {name: getattr(heard, name)[:4000] for name in names}
     reference = replace(heard.reference, **{x: getattr(heard.reference, x)[:4000] for x in ("q", "qd", "qdd")})
     electric = heard.electric and type(heard.electric)(*(x[:4000] for x in heard.electric))

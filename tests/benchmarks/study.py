@@ -65,7 +65,7 @@ def timed(runs: int, workers: int, report: bool) -> tuple[float, float]:
             run_missing(store, pool, SHARD, lambda done: None)
             took = time.perf_counter() - start - up
         if report:
-            write_results(new_page(), store)
+            write_results(new_page(), store, None)
             print(f"  report, recording and summary: {time.perf_counter() - start - took - up:.1f} s more")
         seconds = store.seconds()
         print(f"  start {up:.1f} s, not in the ratio below")
