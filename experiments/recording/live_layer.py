@@ -14,7 +14,7 @@ from experiments.recording.style import FORM_WIDTHS, FORMS, GREY
 from identify import Array, Estimate, IdentificationError, MotionLog, TorqueChannel
 from identify.rows.long_logs import is_long
 
-GROWTH = 1.05
+GROWTH = 1.1
 """How much longer the log must be before it is identified again: so often that the work stays in proportion to the log."""
 
 ESTIMATOR = "WLS"
