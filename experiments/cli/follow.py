@@ -29,7 +29,7 @@ REST = 3.0
 FEW = 20
 """Lines up to which a log that cannot be read has only just begun."""
 
-WEAK = 10.0
+KNOWN = 10.0
 """%sigma up to which a parameter counts as known."""
 
 
@@ -86,14 +86,19 @@ class Follower:
 
     def complete(self, folder: Path) -> Path:
         """Return the log, or a copy of it in `folder` without a last line that was never finished, which is said."""
-        whole = self.path.read_bytes() if self.path.is_file() else b""
-        end = whole.rfind(b"\n") + 1
-        if not whole[end:].strip() or whole[end:].count(b",") == whole[: whole.find(b"\n")].count(b","):
+        lines, rest = self._read()
+        if not rest.strip() or rest.count(b",") == lines.partition(b"\n")[0].count(b","):
             return self.path
         sys.stderr.write(f"idbench: the last line of {self.path} is not complete: left out\n")
         copy = folder / self.path.name
-        copy.write_bytes(whole[:end])
+        copy.write_bytes(lines)
         return copy
+
+    def _read(self) -> tuple[bytes, bytes]:
+        """Return the complete lines of the file, and what has begun after them."""
+        whole = self.path.read_bytes() if self.path.is_file() else b""
+        end = whole.rfind(b"\n") + 1
+        return whole[:end], whole[end:]
 
     def _size(self) -> int:
         return self.path.stat().st_size if self.path.is_file() else 0
@@ -114,8 +119,7 @@ class Follower:
 
     def _so_far(self) -> MotionLog | None:
         """Return what the complete lines of the file hold; None if nothing can be made of them yet, which is said once."""
-        whole = self.path.read_bytes() if self.path.is_file() else b""
-        lines = whole[: whole.rfind(b"\n") + 1]
+        lines, _ = self._read()
         with tempfile.TemporaryDirectory(prefix="idbench-") as folder:
             copy = Path(folder) / self.path.name
             copy.write_bytes(lines)
@@ -158,8 +162,8 @@ def _words(live: "LiveIdentification", now: float) -> str:
     estimate = next(iter(live.found.estimates.values()))
     shares = 100 * estimate.best_sigma / np.maximum(np.abs(estimate.X), 1e-300)
     weakest = int(np.argmax(np.nan_to_num(shares, nan=np.inf)))
-    known = np.count_nonzero(shares < WEAK)
+    known = np.count_nonzero(shares < KNOWN)
     return (
-        f"{now:.1f} s: {known} of {len(shares)} parameters known to {WEAK:g} %; "
+        f"{now:.1f} s: {known} of {len(shares)} parameters known to {KNOWN:g} %; "
         f"weakest {estimate.names[weakest]}, sigma {shares[weakest]:.2g} %"
     )

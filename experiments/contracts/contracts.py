@@ -13,33 +13,30 @@ from identify.plugins import PluginTable, did_you_mean
 
 CONTRACTS: Mapping[str, tuple[Clause, ...]] = {
     "blocks": (
-        identification.is_immutable,
         identification.block_names_its_parameters,
         identification.block_keeps_its_identities,
     ),
-    "models": (identification.is_immutable, identification.model_says_a_true_sentence),
+    "models": (identification.model_says_a_true_sentence,),
     "prefilters": (
-        identification.is_immutable,
         identification.prefilter_keeps_constants,
         identification.prefilter_has_no_phase,
     ),
-    "differentiators": (identification.is_immutable, identification.differentiator_knows_a_line),
-    "alignments": (identification.is_immutable, identification.alignment_keeps_constants),
-    "masks": (identification.is_immutable, identification.mask_gives_weights),
-    "operators": (identification.is_immutable, identification.operator_agrees_with_its_step),
-    "chains": (identification.is_immutable, identification.chain_recovers_ideal_data),
+    "differentiators": (identification.differentiator_knows_a_line,),
+    "alignments": (identification.alignment_keeps_constants,),
+    "masks": (identification.mask_gives_weights,),
+    "operators": (identification.operator_agrees_with_its_step,),
+    "chains": (identification.chain_recovers_ideal_data,),
     "estimators": (
-        identification.is_immutable,
         identification.estimator_recovers_noiseless_rows,
         identification.estimator_takes_every_run_by_itself,
     ),
-    "trajectories": (identification.is_immutable, simulation.trajectory_rests_at_both_ends),
-    "controllers": (identification.is_immutable, simulation.controller_commands_every_simulation_by_itself),
-    "drives": (identification.is_immutable, simulation.drive_gives_finite_torques),
-    "frictions": (identification.is_immutable, simulation.friction_resists),
-    "encoders": (identification.is_immutable, simulation.encoder_reads_to_a_count),
+    "trajectories": (simulation.trajectory_rests_at_both_ends,),
+    "controllers": (simulation.controller_commands_every_simulation_by_itself,),
+    "drives": (simulation.drive_gives_finite_torques,),
+    "frictions": (simulation.friction_resists,),
+    "encoders": (simulation.encoder_reads_to_a_count,),
 }
-"""Plug-in point -> what its plug-ins are asked."""
+"""Plug-in point -> what its plug-ins are asked, after what every plug-in is."""
 
 
 def found(name: str) -> tuple[PluginTable[Any], Any]:
@@ -69,7 +66,9 @@ def _loaded(name: str) -> tuple[PluginTable[Any], Any]:
     try:
         made = getattr(importlib.import_module(module), attribute)()
     except Exception as error:  # whatever another package raises
-        raise ExperimentError(f"{name} cannot be made without arguments: {type(error).__name__}: {error}") from error
+        raise ExperimentError(
+            f"{name} cannot be made without arguments: {type(error).__name__}: {error}"
+        ) from error
     there = [table for table in TABLES if isinstance(made, table.kind)]
     if not there:
         raise ExperimentError(f"{name} makes {type(made).__name__}, which is a plug-in of no point")
@@ -84,4 +83,4 @@ def kept(name: str, example: Example) -> Iterator[tuple[str, str]]:
 
 def keeps(table: PluginTable[Any], plugin: Any, example: Example) -> Iterator[tuple[str, str]]:
     """Yield what a plug-in of a table is asked, and why it does not keep it; empty if it does."""
-    yield from checked(plugin, CONTRACTS[table.point], example)
+    yield from checked(plugin, (identification.is_immutable, *CONTRACTS[table.point]), example)

@@ -1,6 +1,6 @@
 """Identifications as text."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from math import isfinite, log2, pi
 
 from rich.console import Console
@@ -9,7 +9,7 @@ from rich.text import Text
 from experiments.identification.identified import Identified
 from experiments.identification.validated import Validated
 from experiments.identification.verdict import SURE, Verdict
-from experiments.identification.warnings import FLAGS, doubtful
+from experiments.identification.warnings import FLAGS, doubtful, used
 from experiments.text import WORTHLESS, new_table, number, percent, percentage, print_titled
 from identify import AsLogged, Estimate, IdentificationError
 
@@ -22,10 +22,15 @@ def print_identified(console: Console, found: Identified, title: str) -> None:
     known = found.truth is not None
     what = ("X", "%e" if known else "sigma", "%sigma")
     heads = [f"{model}\n{w}" for model in found.estimates for w in what]
-    grid, flags = new_table("", [*(["true\nX"] if known else []), *heads]), doubtful(found)
+    grid, marks = new_table("", [*(["true\nX"] if known else []), *heads]), doubtful(found)
+    flags = used(marks)
     for i, name in enumerate(found.basis.names):
         true = [f"{list(found.truth.values())[i]:g}"] if found.truth is not None else []
-        cells = (cell for model, e in found.estimates.items() for cell in _flagged(_cells(e, found, i), flags[model][i], flags))
+        cells = (
+            cell
+            for model, e in found.estimates.items()
+            for cell in _flagged(_cells(e, found, i), marks[model][i] if flags else ("", "", ""))
+        )
         grid.add_row(name, *true, *cells)
     grid.add_section()
     lead = [""] if known else []
@@ -35,8 +40,8 @@ def print_identified(console: Console, found: Identified, title: str) -> None:
         shares = [_explained(share[j]) for share in found.explained.values()]
         grid.add_row(f"tau{j + 1} explained", *lead, *(c for share in shares for c in (share, "", "")))
     print_titled(console, f"{title}: chain {found.chain}, {found.estimator}", grid, 1 + known)
-    if used := {flag for of_model in flags.values() for of_row in of_model for flag in of_row if flag.strip()}:
-        console.print(Text("; ".join(f"{flag} {FLAGS[flag]}" for flag in FLAGS if flag in used)))
+    if flags:
+        console.print(Text("; ".join(f"{flag} {FLAGS[flag]}" for flag in flags)))
     channel = found.logs[0].torque
     read = f"{channel.meaning}, delay {1e3 * channel.delay:.4g} ms"
     logged = isinstance(found.processing.alignment, AsLogged)
@@ -53,10 +58,9 @@ def print_identified(console: Console, found: Identified, title: str) -> None:
     console.print()
 
 
-def _flagged(cells: Sequence[str], marks: Sequence[str], flags: Mapping[str, Sequence[Sequence[str]]]) -> Iterator[str]:
-    """Yield cells with their mark, or as much room as one takes, if there is any in the table."""
-    any_marks = any(flag.strip() for of_model in flags.values() for of_row in of_model for flag in of_row)
-    yield from (f"{cell}{mark if any_marks else ''}" for cell, mark in zip(cells, marks, strict=True))
+def _flagged(cells: Sequence[str], marks: Sequence[str]) -> Iterator[str]:
+    """Yield cells, each with its mark."""
+    return (f"{cell}{mark}" for cell, mark in zip(cells, marks, strict=True))
 
 
 def _noise(found: Identified) -> str:

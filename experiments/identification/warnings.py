@@ -1,6 +1,6 @@
 """What is suspicious about what was identified from a log, and what would help."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -63,8 +63,8 @@ def warnings_of_result(found: Identified) -> dict[str, list[str]]:
 
 FLAGS = {
     "!": "below zero, which it cannot be",
-    "*": "off by more than 4 sigma",
-    "?": "known to no better than half of its value",
+    "*": f"off by more than {FAR:g} sigma",
+    "?": f"sigma above {100 * WEAK:g} % of its value",
 }
 """What is doubtful of a parameter."""
 
@@ -80,6 +80,12 @@ def doubtful(found: Identified) -> dict[str, list[tuple[str, str, str]]]:
             for name, x, error, s in zip(estimate.names, estimate.X, off, sigma, strict=True)
         ]
     return marks
+
+
+def used(marks: Mapping[str, Sequence[Sequence[str]]]) -> list[str]:
+    """Return the flags that occur among the marks of all models, in the order of `FLAGS`."""
+    there = {mark for of_model in marks.values() for of_row in of_model for mark in of_row}
+    return [flag for flag in FLAGS if flag in there]
 
 
 def _negative(found: Identified, model: str) -> list[str]:

@@ -22,15 +22,11 @@ SIGMAS = 2.0
 ASIDE = 0.22
 """How far the models of a parameter stand apart, of its room."""
 
-PERCENT = 100.0
-
 
 def send_parameters(stream: Stream, at: str, found: Identified, number: int = 0) -> None:
     """Send every parameter's error, or its deviation from the first model's, with its interval; and the singular values."""
-    names, scale = (
-        [f"{name} = 0" if x == 0 else name for name, x in zip(found.basis.names, _reference(found), strict=True)],
-        _scale(found),
-    )
+    names = [f"{name} = 0" if x == 0 else name for name, x in zip(found.basis.names, _reference(found), strict=True)]
+    scale = _scale(found)
     for k, members in enumerate(_parts(found)):
         mine = [names[p] for p in members]
         place = f"{at}/parameters/{k}_{part(found.basis.names[members[0]])}_to_{part(found.basis.names[members[-1]])}"
@@ -60,7 +56,7 @@ def _reference(found: Identified) -> Array:
 
 def _in_percent(found: Identified, values: Array) -> Array:
     reference = np.abs(_reference(found))
-    return PERCENT * values / np.where(reference == 0, np.nan, reference)
+    return 100 * values / np.where(reference == 0, np.nan, reference)
 
 
 def _deviation(found: Identified, X: Array) -> Array:

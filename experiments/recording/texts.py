@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from experiments.identification.identified import Identified
-from experiments.identification.warnings import FLAGS, doubtful
+from experiments.identification.warnings import FLAGS, doubtful, used
 from identify import Array, Estimate
 
 
@@ -37,8 +37,7 @@ def short_table(found: Identified) -> str:
         true = f" {list(found.truth.values())[i]:g} |" if found.truth is not None else ""
         cells = (f"{e.X[i]:.4g}{''.join(marks[form][i]).strip()}" for form, e in found.estimates.items())
         lines.append(f"| {name} |{true} {' | '.join(cells)} |")
-    used = {flag for of_form in marks.values() for of_row in of_form for flag in of_row if flag.strip()}
-    return "\n".join([*lines, "", "; ".join(f"`{flag}` {FLAGS[flag]}" for flag in FLAGS if flag in used)])
+    return "\n".join([*lines, "", "; ".join(f"`{flag}` {FLAGS[flag]}" for flag in used(marks))])
 
 
 def noise_table(found: Identified, joints: Sequence[str]) -> str:
