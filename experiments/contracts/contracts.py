@@ -66,9 +66,7 @@ def _loaded(name: str) -> tuple[PluginTable[Any], Any]:
     try:
         made = getattr(importlib.import_module(module), attribute)()
     except Exception as error:  # whatever another package raises
-        raise ExperimentError(
-            f"{name} cannot be made without arguments: {type(error).__name__}: {error}"
-        ) from error
+        raise ExperimentError(f"{name} cannot be made without arguments: {type(error).__name__}: {error}") from error
     there = [table for table in TABLES if isinstance(made, table.kind)]
     if not there:
         raise ExperimentError(f"{name} makes {type(made).__name__}, which is a plug-in of no point")
