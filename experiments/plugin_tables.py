@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from experiments.excite.excitation import EXCITATIONS
 from identify import (
     ALIGNMENTS,
     BLOCKS,
@@ -27,6 +28,7 @@ TABLES: tuple[PluginTable[Any], ...] = (
     CHAINS,
     ESTIMATORS,
     *KINDS.values(),
+    EXCITATIONS,
 )
 """Every plug-in point."""
 

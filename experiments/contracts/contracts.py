@@ -35,6 +35,10 @@ CONTRACTS: Mapping[str, tuple[Clause, ...]] = {
     "drives": (simulation.drive_gives_finite_torques,),
     "frictions": (simulation.friction_resists,),
     "encoders": (simulation.encoder_reads_to_a_count,),
+    "excitations": (
+        simulation.excitation_leads_back_to_rest,
+        simulation.excitation_becomes_its_trajectory,
+    ),
 }
 """Plug-in point -> what its plug-ins are asked, after what every plug-in is."""
 

@@ -7,6 +7,7 @@ import numpy as np
 from experiments.contracts.contract import FS, RUNS, Example, require, require_equal
 from sim.controllers import Task
 from sim.engine.plant import Plant
+from sim.robot.robot import Robot
 from sim.scenario.scenario import Physics
 
 COUNT = 2 * np.pi / 2**16
@@ -55,6 +56,31 @@ def friction_resists(law: Any, example: Example) -> None:
     for _ in range(50):
         torque = np.asarray(contact.torque(qd))
     require((torque * qd <= 0).all(), f"at velocities of {qd[0]} rad/s it drives with {torque.ravel()} N m")
+
+
+def excitation_leads_back_to_rest(excitation: Any, _: Example) -> None:
+    """Its shapes rest where they begin and end, at the same place, and their derivatives are those of their positions."""
+    T, f = 8.0, 1.0
+    ends = excitation.shapes(np.array([0.0, T * (1 - 1e-9)]), T, f).values
+    require_equal(ends[1:3], 0.0, "a velocity or acceleration at an end", atol=1e-5)
+    require_equal(ends[0, 1], ends[0, 0], "a position at the end", atol=1e-5)
+    t, h = np.linspace(0.1, T - 0.1, 50), 1e-5
+    before, here, after = (excitation.shapes(t + step, T, f).values for step in (-h, 0.0, h))
+    for order, what in ((0, "a velocity"), (1, "an acceleration")):
+        require_equal(here[order + 1], (after[order] - before[order]) / (2 * h), what, atol=1e-3)
+
+
+def excitation_becomes_its_trajectory(excitation: Any, _: Example) -> None:
+    """The trajectory of coefficients moves along the sum of their shapes, after its rest."""
+    T, f = 8.0, 1.0
+    t, robot = np.arange(0.25, T, 0.5), Robot.load("scara")
+    shapes = excitation.shapes(t, T, f)
+    c = 0.1 * np.random.default_rng(0).standard_normal((shapes.count, 2))
+    planned = excitation.trajectory(c, np.array([0.1, -0.2]), T, 1).plan(robot)
+    rest = (planned.duration - T) / 2
+    require(rest >= 0, f"it lasts {planned.duration:g} s, less than the {T:g} s that it was given")
+    q = planned.at(rest + t, FS).q
+    require_equal(q, shapes.at(c)[0] + [0.1, -0.2], "a position", atol=1e-9)
 
 
 def trajectory_rests_at_both_ends(trajectory: Any, example: Example) -> None:

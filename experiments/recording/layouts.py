@@ -6,7 +6,7 @@ from collections.abc import Set as AbstractSet
 import rerun.blueprint as rrb
 
 from experiments.errors import ResultsError
-from experiments.recording.chart import NARROW
+from experiments.recording.chart import NARROW, SQUARE
 from experiments.recording.run_layouts import (
     drive,
     excitation,
@@ -58,6 +58,26 @@ def compare(shelf: Shelf) -> Part:
     return side_by_side("compare", text(shelf, "comparison"), together, apart, shares=[4, 5, 5])
 
 
+def excited(shelf: Shelf) -> Part:
+    """Return a designed motion: the arm, limits in use, what is told, and when."""
+    sigmas = charts(shelf, "predicted sigma", "excited/sigma/*", SQUARE)
+    told = charts(shelf, "which stretch tells which parameter: bright tells most", "excited/told/*")
+    if not told:
+        return None
+    limits = column(*(plot(shelf, _limit(path), f"limits/{path}") for path in sorted(shelf.last("limits/*"))))
+    left = column(arm(shelf), text(shelf, "about"), shares=[5, 3])
+    middle = column(plot(shelf, "q [rad]", "q/designed"), plot(shelf, "qd [rad/s]", "qd/designed"), limits, shares=[1, 1, 4])
+    names = [path.partition("_")[2].replace("_", " ") for path in sorted(shelf.parents("excited/told/*/frame"))]
+    pairs = zip(names, sigmas or [None] * len(told), told, strict=True)
+    each = [column(*pair, shares=[1, 1], name=name) for name, *pair in pairs]
+    return side_by_side("excited", left, middle, tabbed(each) if len(each) > 1 else each[0], shares=[5, 5, 6])
+
+
+def _limit(path: str) -> str:
+    """Return the title of a plot of limits/2_acceleration."""
+    return f"{path.partition('_')[2].replace('_', ' ')} [% of its limit]"
+
+
 def study(shelf: Shelf) -> Part:
     """Return a study: errors over the values of each axis, all parameters together and one by one, and the answer."""
     axes = list(dict.fromkeys(path.split("/")[1] for path in shelf.of("study/*/typical/frame")))
@@ -79,6 +99,7 @@ LAYOUTS: dict[str, Callable[[Shelf], Part]] = {
     "study": study,
     "table2": table2,
     "compare": compare,
+    "excited": excited,
     "overview": overview,
     "torques": torques,
     "friction": friction,

@@ -95,7 +95,7 @@ class Robot:
         try:
             text = path.read_text(encoding="utf-8")
             urdf = "<robot" in text
-            spec = mujoco.MjSpec.from_string(_without_shapes(text)) if urdf else mujoco.MjSpec.from_file(str(path))
+            spec = _from_urdf(text) if urdf else mujoco.MjSpec.from_file(str(path))
             spec.compiler.fusestatic = False  # bodies stay those of the file
             return spec
         except OSError as error:
@@ -135,6 +135,20 @@ class Robot:
         unlimited = np.tile([-np.inf, np.inf], (self.n, 1))
         return np.where(self.model.jnt_limited[:, None].astype(bool), self.model.jnt_range, unlimited)
 
+    def most(self, rate: str) -> Array:
+        """Return the largest velocity, acceleration or jerk of every joint, shape (joint,), infinite where the file has none.
+
+        MJCF has no word for them: they are numbers of its own, as `<custom><numeric name="max_velocity" data="2 2"/></custom>`.
+        Of a URDF they are the limits of its joints.
+        """
+        name, found = f"max_{rate}", np.full(self.n, np.inf)
+        custom = {self.model.numeric(i).name: self.model.numeric(i).data for i in range(self.model.nnumeric)}
+        if name in custom and len(custom[name]) != self.n:
+            raise RobotError(f"robot {self.name!r}: {name} has {len(custom[name])} values for {self.n} joints")
+        for j, joint in enumerate(self.joints):
+            found[j] = custom[name][j] if name in custom else custom.get(f"{name} {joint}", [np.inf])[0]
+        return found
+
     @property
     def slides(self) -> npt.NDArray[np.bool_]:
         """Whether each joint slides, shape (joint,); the others are hinges."""
@@ -144,9 +158,10 @@ class Robot:
     def torque_limits(self) -> Array:
         """Largest torque of every joint's actuator [N m], shape (joint,), infinite where the model has no limits.
 
-        From the range of forces, and from that of controls where the control is a force, as in `motor`.
+        From the range of forces, and from that of controls where the control is a force, as in `motor`; of a URDF its efforts.
         """
-        limits, model = np.full(self.n, np.inf), self.model
+        model = self.model
+        limits = np.where(model.jnt_actfrclimited.astype(bool), np.abs(model.jnt_actfrcrange).max(axis=1), np.inf)
         for a in range(model.nu):
             if model.actuator_trntype[a] != int(mujoco.mjtTrn.mjTRN_JOINT):
                 continue
@@ -159,13 +174,18 @@ class Robot:
         return limits
 
 
-def _without_shapes(urdf: str) -> str:
-    """Return a URDF without its shapes."""
+def _from_urdf(urdf: str) -> mujoco.MjSpec:
+    """Return the description of a URDF without its shapes, with the velocities that it allows."""
     root = ElementTree.fromstring(urdf)
     for link in root.iter("link"):
         for shape in [child for child in link if child.tag in ("visual", "collision")]:
             link.remove(shape)
-    return ElementTree.tostring(root, encoding="unicode")
+    spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
+    for joint in root.iter("joint"):
+        limit = joint.find("limit")
+        if limit is not None and float(limit.get("velocity", 0)) > 0:
+            spec.add_numeric(name=f"max_velocity {joint.get('name')}", data=[float(limit.get("velocity", 0))], size=1)
+    return spec
 
 
 def _called(model: mujoco.MjModel, joint: int) -> str:

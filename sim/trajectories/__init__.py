@@ -1,6 +1,7 @@
 """Trajectories, and their table."""
 
 from identify.plugins import PluginTable
+from sim.trajectories.fourier import Fourier as Fourier
 from sim.trajectories.point_to_point import PointToPoint as PointToPoint
 from sim.trajectories.quintic import Quintic as Quintic
 from sim.trajectories.random_moves import RandomMoves as RandomMoves
@@ -12,6 +13,7 @@ TRAJECTORIES: PluginTable[AbstractTrajectory] = PluginTable(
     "trajectories",
     AbstractTrajectory,  # type: ignore[type-abstract]  # only asked whether an instance is one
     {
+        "fourier": Fourier,
         "quintic": Quintic,
         "random": RandomMoves,
         "time_optimal": TimeOptimal,

@@ -18,11 +18,14 @@ REST = 0.2
 def approach(robot: Robot, start: Array, goal: Array, fs: float) -> Reference:
     """Return ruckig's move from `start` to `goal` [rad], shape (joint,), gentle, at rest at both ends.
 
+    No faster than the file of the robot allows.
+
     Raises
     ------
     ScenarioError
         If `start` is not a position of the robot's joints.
     """
     require_in_range(robot, start[None])
-    limits = np.repeat([[VELOCITY], [ACCELERATION], [JERK]], robot.n, axis=1)
+    most = np.stack([robot.most(rate) for rate in ("velocity", "acceleration", "jerk")])
+    limits = np.minimum(most, np.array([[VELOCITY], [ACCELERATION], [JERK]]))
     return JerkLimited.between(np.stack([start, goal]), limits, REST).sample(fs)

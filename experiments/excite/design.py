@@ -1,0 +1,280 @@
+"""The design of a motion: what is asked, what random motions reach, what the search finds."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import ceil
+
+import numpy as np
+
+from experiments.errors import ExperimentError
+from experiments.excite.excitation import EXCITATIONS, AbstractExcitation
+from experiments.excite.limit_use import FS, Inspector, LimitUse
+from experiments.identification.parameters import Parameters
+from experiments.identification.subject import Subject
+from identify import CHAINS, Array, FirLowPass, MotionLog, NoiseLevels
+from identify.design.criteria import CRITERIA, LogSigma
+from identify.design.information import Information
+from identify.design.limits import Limits
+from identify.design.plan import Plan
+from identify.design.predicted import predicted_information
+from identify.design.search import Search
+from identify.parameters.base_parameters import random_states
+from identify.plugins import did_you_mean
+from identify.rows.linearization import slopes
+from sim.planning.clearance import Clearance
+from sim.planning.motion_limits import Bounds, MotionLimits, surroundings
+from sim.scenario.scenario import Scenario
+from sim.trajectories.approach import approach
+from sim.trajectories.reference import Reference
+from sim.trajectories.trajectory import AbstractTrajectory
+
+SIGMA, DETERMINANT = "sigma", "determinant"
+"""What is minimised by default, and what that begins with."""
+
+RANDOM, DRAWS = 60, 600
+"""Random motions that a motion is compared with, and draws after which fewer will do."""
+
+STARTS, BASINS = 4, 12
+"""Least starts of the search, and starts times joints: few joints take little time."""
+
+STAGES = (0.3, 0, 40), (3.0, 2, 50), (30.0, 1, 60)
+"""Of the search: what exceeding limits costs, how many of the best are followed, all if 0, and steps from each. Limits that
+are hard from the first lead to poor motions, or nowhere."""
+
+HARDER = 300.0, 3000.0
+"""What exceeding limits costs while some are still broken."""
+
+STATES = 12.0
+"""States for each period of the highest frequency; at least 8 a second."""
+
+FINER = 4
+"""Instants at which limits are kept, for each state."""
+
+PREDICTED = 100.0
+"""Frequency [Hz] at which sigmas are predicted, with the noise that a faster log has in this band."""
+
+TOGETHER = 10
+"""Motions whose sigmas are predicted together."""
+
+WAY = 10
+"""Instants of the way to the start that the search looks at."""
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """What is asked of a motion.
+
+    Parameters
+    ----------
+    robot : str
+        Its name or file.
+    scenario : Scenario
+        Noise, sampling frequency, and how it will be simulated; its trajectory does not matter.
+    kind : str
+        Of motion, of `EXCITATIONS`.
+    duration : float
+        Time of the motion, without ways and rest [s].
+    frequency : float
+        How fast it may change [Hz].
+    asked : MotionLimits
+        What it must keep.
+    repeat : int
+        Times that it is run.
+    seed : int
+        Of random motions and starts.
+    weights : mapping of str to float
+        Parameters that count more than others, or less; all count 1.
+    criterion : str
+        What is minimised: of `CRITERIA`, or sigma, the weighted mean of ln sigma, begun with the determinant.
+    logs : tuple of MotionLog
+        What is logged already.
+    parameters : Parameters
+        Which parameters are asked for.
+    """
+
+    robot: str
+    scenario: Scenario
+    kind: str = "fourier"
+    duration: float = 10.0
+    frequency: float = 1.0
+    asked: MotionLimits = field(default_factory=MotionLimits)
+    repeat: int = 1
+    seed: int = 0
+    weights: Mapping[str, float] = field(default_factory=dict)
+    criterion: str = SIGMA
+    logs: tuple[MotionLog, ...] = ()
+    parameters: Parameters = Parameters()  # noqa: RUF009  # frozen
+
+    def __post_init__(self) -> None:
+        names = self.subject.basis.names
+        for name in self.weights:
+            if name not in names:
+                raise ExperimentError(
+                    f"--weigh {name}: no such parameter{did_you_mean(name, names)}; known: {', '.join(names)}"
+                )
+        if self.criterion not in (known := (SIGMA, *CRITERIA)):
+            hint = did_you_mean(self.criterion, known)
+            raise ExperimentError(f"--criterion {self.criterion}: no such criterion{hint}; known: {', '.join(known)}")
+        for log in self.logs:
+            if log.n != self.subject.robot.n:
+                raise ExperimentError(f"an earlier log has {log.n} joints, robot {self.robot} {self.subject.robot.n}")
+
+    @cached_property
+    def subject(self) -> Subject:
+        """The robot."""
+        return Subject(self.robot, self.parameters)
+
+    @cached_property
+    def excitation(self) -> AbstractExcitation:
+        """The kind of motion."""
+        return EXCITATIONS.create(self.kind)
+
+    @cached_property
+    def bounds(self) -> Bounds:
+        """Limits of the joints."""
+        return Bounds.of(self.subject.robot, self.asked)
+
+    @cached_property
+    def clearance(self) -> Clearance:
+        """Distances of shapes, from each other and from what stands around."""
+        found = Clearance(surroundings(self.robot, self.asked), self.bounds.position, self.asked.clearance)
+        home = self.bounds.home[None]
+        if touch := found.nearest(home, 0 * home, FS):
+            raise ExperimentError(
+                f"home = {np.round(home[0], 3).tolist()}: {' and '.join(touch.shapes)} are {1000 * touch.distance:.0f} mm "
+                "apart; give another home, or a smaller clearance, in a file of --limits"
+            )
+        return found
+
+    @cached_property
+    def X(self) -> Array:
+        """Parameters as the robot's file has them."""
+        return np.array(list(self.subject.truth(self.subject.robot).values()))
+
+    @cached_property
+    def levels(self) -> NoiseLevels:
+        """Noise of the log."""
+        n = self.subject.robot.n
+        levels = NoiseLevels(self.scenario.torque.spread(n), self.scenario.encoder.spread(n))
+        if not (levels.torque > 0).all():
+            raise ExperimentError("sigmas need a noise of the torques above 0 N m: give --torque-noise, or another --noise")
+        return levels
+
+    @cached_property
+    def known(self) -> Array:
+        """Information of earlier logs, shape (p, p)."""
+        p, chain = len(self.X), CHAINS.create("idbench")
+        each = [predicted_information(log, self.subject.basis, self.X, self.levels, chain) for log in self.logs]
+        return np.sum(each, axis=0) if each else np.zeros((p, p))
+
+    @cached_property
+    def plan(self) -> Plan:
+        """What the search minimises."""
+        robot, bounds = self.subject.robot, self.bounds
+        q, qd, qdd = random_states(self.subject.tree, 200)
+        inertia = slopes(self.subject.basis, self.X, q, qd, qdd, qd).inertia.mean(axis=-1)
+        rate = max(8.0, STATES * self.frequency)
+        count = ceil(rate * self.duration)
+        rate = count / self.duration
+        criterion = CRITERIA[self.criterion if self.criterion != SIGMA else DETERMINANT]
+        levels = self.levels if criterion.noise else NoiseLevels(np.ones(robot.n), np.zeros(robot.n))
+        information = Information(
+            self.subject.basis, levels, inertia, self.scenario.fs, rate, min(FirLowPass().cutoff, self.scenario.fs / 2)
+        )
+        limits = Limits(bounds.position, bounds.velocity, bounds.acceleration, bounds.jerk, bounds.torque, bounds.rms_torque)
+        middles = np.asarray((np.arange(count) + 0.5) / rate)
+        finer = np.asarray(np.arange(FINER * count) / (FINER * rate))
+        states = self.excitation.shapes(middles, self.duration, self.frequency)
+        instants = self.excitation.shapes(finer, self.duration, self.frequency)
+        self._require_enough(count * robot.n)
+        return Plan(
+            information,
+            criterion,
+            limits,
+            states,
+            instants,
+            self.X,
+            self.known if criterion.noise else np.zeros_like(self.known),
+            self.asked.prior_error,
+            self.asked.torque_share,
+            self.repeat,
+            self.clearance.cost if self.clearance.checks else None,
+        )
+
+    def _require_enough(self, rows: int) -> None:
+        """Raise ExperimentError if a motion is too short for the parameters, whatever it is."""
+        p, least = len(self.X), 2 * FirLowPass().cutoff * self.duration * self.subject.robot.n
+        if min(rows, least) < p:
+            raise ExperimentError(
+                f"{self.duration:g} s make {least:.0f} rows behind a filter at {FirLowPass().cutoff:g} Hz, fewer than the {p} "
+                f"parameters: give a --duration of at least {ceil(4 * p / least * self.duration)} s"
+            )
+
+    @cached_property
+    def sigma_criterion(self) -> LogSigma:
+        """The mean of ln sigma, weighted as asked."""
+        weights = np.array([self.weights.get(name, 1.0) for name in self.subject.basis.names])
+        return LogSigma(tuple(weights / weights.sum()))
+
+    @cached_property
+    def inspector(self) -> Inspector:
+        """What looks at motions."""
+        return Inspector(self.subject.robot, self.bounds, self.asked, self.clearance, self.subject.basis, self.X)
+
+    def trajectory(self, c: Array, repeat: int | None = None) -> AbstractTrajectory:
+        """Return the trajectory of coefficients."""
+        scaled = self.plan.coefficients(c)
+        return self.excitation.trajectory(scaled, self.plan.limits.middle, self.duration, repeat or self.repeat)
+
+    def information(self, each: list[Array]) -> Array:
+        """Return the information of motions, as generalized least squares has it, and of earlier logs, shape (motion, p, p)."""
+        fs, found = min(PREDICTED, self.scenario.fs), []
+        share = np.sqrt(fs / self.scenario.fs)
+        levels = NoiseLevels(self.levels.torque * share, self.levels.position * share)
+        for i in range(0, len(each), TOGETHER):
+            planned = [self.trajectory(c, 1).plan(self.subject.robot).sample(fs).q for c in each[i : i + TOGETHER]]
+            q = np.stack(planned)
+            log = MotionLog(fs, q, np.zeros_like(q), self.scenario.channel)
+            found.append(predicted_information(log, self.subject.basis, self.X, levels, CHAINS.create("idbench")))
+        return self.known + self.repeat * np.concatenate(found)
+
+    def random_motions(self, count: int = RANDOM) -> tuple[list[Array], int]:
+        """Return coefficients of random motions that keep the limits, and how many were drawn."""
+        rng, kept, drawn = np.random.default_rng([self.seed, 1]), list[Array](), 0
+        while len(kept) < count and drawn < DRAWS:
+            c, drawn = self.excitation.random(rng, self.plan, self.duration, self.frequency), drawn + 1
+            if self.plan.excess(c) == 0:
+                kept.append(c)
+        return kept, drawn
+
+    def search(self, random: list[Array], progress: Callable[[float], None] | None = None) -> Search:
+        """Return the search of the best motion, begun with the best of random ones and those of the kind's own."""
+        rng, starts = np.random.default_rng([self.seed, 2]), max(STARTS, BASINS // self.subject.robot.n)
+        own = self.excitation.starts(rng, self.plan, self.duration, self.frequency, starts - bool(random))
+        cheapest = sorted(random, key=lambda c: self.plan.value(c)[0])[:1]
+        counts = [keep or starts for _, keep, _ in STAGES]
+        steps = sum(count * rounds for count, (_, _, rounds) in zip(counts, STAGES, strict=True))
+        _, _, last = STAGES[-1]
+        search = Search([*own, *cheapest], steps + last * (self.criterion == SIGMA), progress)
+        for count, (hard, _, rounds) in zip(counts, STAGES, strict=True):
+            search.run(replace(self.plan, hard=hard), count, rounds)
+        polished = self.plan
+        if self.criterion == SIGMA:
+            polished = replace(self.plan, criterion=self.sigma_criterion)
+            search.run(replace(polished, hard=hard), 1, rounds)
+        for harder in HARDER:
+            if any(self.look(search.best).broken()):
+                search.run(replace(polished, hard=harder), 1, rounds)
+        if search.interrupted and cheapest and any(self.look(search.best).broken()):
+            search.found = cheapest
+        return search
+
+    def way(self, c: Array) -> Reference:
+        """Return the way from home to where a motion starts, at FS."""
+        start = self.trajectory(c).plan(self.subject.robot).sample(FS).q[0]
+        return approach(self.subject.robot, self.bounds.home, start, FS)
+
+    def look(self, c: Array) -> LimitUse:
+        """Return how far a motion uses its limits."""
+        return self.inspector.look(self.trajectory(c, 1).plan(self.subject.robot).sample(FS))

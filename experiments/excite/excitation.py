@@ -1,0 +1,139 @@
+"""Kinds of motions that can be made exciting."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from experiments.errors import ExperimentError
+from identify.arrays import Array
+from identify.design.greedy import Greedy
+from identify.design.plan import Plan
+from identify.design.shapes import Shapes
+from identify.plugins import PluginTable
+from sim.trajectories import Fourier, Quintic
+from sim.trajectories.trajectory import AbstractTrajectory
+
+REST = 1.0
+"""Time at rest before and after a motion [s]: as much as filters look to either side."""
+
+
+class AbstractExcitation(ABC):
+    """A kind of motion that is linear in its coefficients, and rests where it begins and ends, at the same place.
+
+    Its frequency [Hz] says how fast it may change: of the paces that a duration allows, the nearest is taken.
+    """
+
+    @abstractmethod
+    def shapes(self, t: Array, duration: float, frequency: float) -> Shapes:
+        """Return the unit motions at times `t` [s]."""
+
+    @abstractmethod
+    def random(self, rng: np.random.Generator, plan: Plan, duration: float, frequency: float) -> Array:
+        """Return coefficients of a random motion, shape (m, joint), before it is scaled into its limits."""
+
+    @abstractmethod
+    def trajectory(self, c: Array, middle: Array, duration: float, repeat: int) -> AbstractTrajectory:
+        """Return the trajectory, of a scenario, of coefficients that are scaled, about the middle of the ranges [rad]."""
+
+    def starts(self, rng: np.random.Generator, plan: Plan, duration: float, frequency: float, count: int) -> list[Array]:
+        """Return coefficients to begin the search with; random ones unless a kind knows better."""
+        return [self.random(rng, plan, duration, frequency) for _ in range(count)]
+
+
+@final
+@dataclass(frozen=True)
+class FourierExcitation(AbstractExcitation):
+    """Finite Fourier series, whose period is the duration."""
+
+    def shapes(self, t: Array, duration: float, frequency: float) -> Shapes:
+        """Return a constant and harmonics up to the frequency."""
+        harmonics = int(frequency * duration + 1e-9)
+        if harmonics < 2:
+            raise ExperimentError(
+                f"{duration:g} s have no two harmonics up to {frequency:g} Hz: give a longer --duration or a higher --frequency"
+            )
+        return Shapes.fourier(t, duration, harmonics)
+
+    def random(self, rng: np.random.Generator, plan: Plan, duration: float, frequency: float) -> Array:
+        """Return harmonics of like velocities, about any position."""
+        del frequency
+        c = rng.standard_normal((plan.states.count, len(plan.limits.velocity)))
+        c[0] = rng.uniform(-0.5, 0.5, c.shape[1]) * np.diff(plan.limits.position, axis=1)[:, 0] / 2 * 2 * np.pi / duration
+        c[1:] *= plan.limits.velocity * rng.uniform(0.2, 1.0)
+        return c
+
+    def starts(self, rng: np.random.Generator, plan: Plan, duration: float, frequency: float, count: int) -> list[Array]:
+        """Return the series nearest to moves that are chosen one after the other: of random ones fewer end well."""
+        t = (np.arange(plan.states.values.shape[1]) + 0.5) * duration / plan.states.values.shape[1]
+        moves = MovesExcitation()
+        number = moves.count(duration, frequency)
+        shapes = Shapes.moves(t, duration, number)
+        each = moves.starts(rng, plan, duration, frequency, count)
+        return [self._nearest(plan.states, shapes.at(c), duration / number) for c in each]
+
+    def _nearest(self, states: Shapes, motion: Array, T: float) -> Array:
+        """Return the coefficients of the series with positions, velocities and accelerations nearest to a motion's."""
+        scale = (T / np.pi) ** np.arange(3)[:, None, None]
+        B, y = (states.values[:3] * scale).reshape(-1, states.count), (motion[:3] * scale).reshape(-1, motion.shape[-1])
+        return np.asarray(np.linalg.lstsq(B, y, rcond=None)[0])
+
+    def trajectory(self, c: Array, middle: Array, duration: float, repeat: int) -> Fourier:
+        """Return the series."""
+        mean, sines, cosines = Shapes.series(c, duration)
+        return Fourier(duration, tuple(mean + middle), _rows(sines), _rows(cosines), repeat, 0.0, REST)
+
+
+@final
+@dataclass(frozen=True)
+class MovesExcitation(AbstractExcitation):
+    """Fifth-order point-to-point moves of equal time, as controllers have that know nothing else."""
+
+    def shapes(self, t: Array, duration: float, frequency: float) -> Shapes:
+        """Return a waypoint each."""
+        return Shapes.moves(t, duration, self.count(duration, frequency))
+
+    def random(self, rng: np.random.Generator, plan: Plan, duration: float, frequency: float) -> Array:
+        """Return a random walk that leads back."""
+        greedy, reached = self._greedy(plan, duration, frequency), [np.zeros(len(plan.limits.velocity))]
+        for left in range(self.count(duration, frequency) - 1, 0, -1):
+            reached.append(greedy.pool(rng, reached[-1], left, 1)[0])
+        return np.array(reached)
+
+    def starts(self, rng: np.random.Generator, plan: Plan, duration: float, frequency: float, count: int) -> list[Array]:
+        """Return moves that are chosen one after the other."""
+        greedy, moves = self._greedy(plan, duration, frequency), self.count(duration, frequency)
+        return [greedy.waypoints(rng, moves) for _ in range(count)]
+
+    def trajectory(self, c: Array, middle: Array, duration: float, repeat: int) -> Quintic:
+        """Return the moves."""
+        points = _rows(np.concatenate([np.tile(c, (repeat, 1)), c[:1]]) + middle)
+        return Quintic(points, (duration / len(c),) * (repeat * len(c)), REST)
+
+    def _greedy(self, plan: Plan, duration: float, frequency: float) -> Greedy:
+        T = duration / self.count(duration, frequency)
+        return Greedy(plan.information, plan.limits, T, plan.known)
+
+    def count(self, duration: float, frequency: float) -> int:
+        """Return the number of moves; raise ExperimentError if there are too few to lead back."""
+        count = round(duration * frequency)
+        if count < 3:
+            raise ExperimentError(
+                f"{duration:g} s are no three moves, {frequency:g} a second: give a longer --duration or a higher --frequency"
+            )
+        return count
+
+
+def _rows(x: Array) -> tuple[tuple[float, ...], ...]:
+    return tuple(tuple(float(value) for value in row) for row in x)
+
+
+EXCITATIONS: PluginTable[AbstractExcitation] = PluginTable(
+    "excitations",
+    AbstractExcitation,  # type: ignore[type-abstract]  # only asked whether an instance is one
+    {
+        "fourier": FourierExcitation,
+        "moves": MovesExcitation,
+    },
+)

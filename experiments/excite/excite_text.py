@@ -1,0 +1,66 @@
+"""Designed motions as text."""
+
+from math import isfinite
+
+import numpy as np
+from rich.console import Console
+from rich.text import Text
+
+from experiments.excite.excited import BINDING, Excited
+from experiments.text import WORTHLESS, new_table, number, percentage, print_titled
+from identify import brisk_shares
+
+
+def print_excited(console: Console, found: Excited) -> None:
+    """Print the predicted sigma of every parameter beside random motions, and how limits are used."""
+    d = found.design
+    title = f"{d.robot}: {d.kind}, {d.duration:g} s" + (f" x {d.repeat}" if d.repeat > 1 else "")
+    _print_sigmas(console, found, title)
+    _print_limits(console, found)
+    for line in lines(found):
+        console.print(Text(line), soft_wrap=True)
+
+
+def lines(found: Excited) -> list[str]:
+    """Return what is to be said of a motion beside its tables."""
+    median, best = found.ratios
+    count = f"{len(found.random)} random motions of equal length and limits"
+    told = [f"typical sigma: {median:.2f} of the median of {count}, {best:.2f} of the best"] if found.random else []
+    if len(found.random) < found.drawn:
+        told.append(f"{found.drawn} random motions were drawn, {len(found.random)} keep the limits")
+    told.append(f"Cond(W) = {found.condition:.3g}, for the curious: it says nothing about sigma")
+    held = "; ".join(found.binding)
+    told.append(
+        f"what holds the motion back: {held}" if held else "no limit holds the motion back: a higher --frequency may do"
+    )
+    if found.unchecked:
+        told.append(f"note: {found.unchecked}")
+    if found.interrupted:
+        told.append("interrupted: this is the best motion so far")
+    return told
+
+
+def _print_sigmas(console: Console, found: Excited, title: str) -> None:
+    d = found.design
+    heads = ["X", "sigma", "%sigma", "of brisk\ntorque %", "random\nmedian", "random\nbest"]
+    grid = new_table("", [*heads, *(["earlier\nlogs"] if found.earlier is not None else [])])
+    brisk = 100 * brisk_shares(d.subject.tree, d.subject.basis, d.X, found.sigma)
+    for i, name in enumerate(d.subject.basis.names):
+        share = 100 * found.sigma[i] / abs(d.X[i]) if d.X[i] else np.inf
+        own = [number(d.X[i]), f"{found.sigma[i]:.2g}", percentage(share) or f">{WORTHLESS:g}", f"{brisk[i]:.2g}"]
+        others = [_sigma(x[i]) for x in (found.median, found.best, found.earlier) if x is not None]
+        grid.add_row(name, *own, *others)
+    print_titled(console, f"{title}: predicted sigma", grid)
+
+
+def _sigma(x: float) -> str:
+    return f"{x:.2g}" if isfinite(x) else "-"
+
+
+def _print_limits(console: Console, found: Excited) -> None:
+    largest = found.use.largest
+    grid = new_table("", [name.replace(" ", "\n", 1) for name in largest])
+    for j, joint in enumerate(found.use.joints):
+        cells = (f"{100 * share[j]:.0f} %{'!' if share[j] > BINDING else ' '}" for share in largest.values())
+        grid.add_row(joint, *cells)
+    print_titled(console, "shares of the limits that it uses, at 1 kHz; ! holds it back", grid)

@@ -1,0 +1,242 @@
+"""A motion that was designed: what it tells, beside random motions and earlier logs."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.errors import ExperimentError
+from experiments.excite.design import Design
+from experiments.excite.excitation import REST
+from experiments.excite.limit_use import FS, LimitUse
+from experiments.identification.subject import absolute
+from identify import Array
+from sim.engine.simulation import Progress
+from sim.scenario.scenario import Scenario
+from sim.scenario.scenario_file import to_dict
+from sim.trajectories.reference import Reference
+
+BINDING = 0.9
+"""Share of a limit from which on it counts as what holds the motion back."""
+
+STRETCHES = 20
+"""Parts of a motion whose share in each parameter is told."""
+
+
+@dataclass(frozen=True, eq=False)
+class Excited:
+    """The outcome of a design.
+
+    Parameters
+    ----------
+    design : Design
+        What was asked.
+    c : Array, shape (m, joint)
+        Coefficients of the motion.
+    random : list of Array
+        Those of random motions that keep the limits.
+    drawn : int
+        How many were drawn for them.
+    interrupted : bool
+        Whether the search was ended before its time.
+    """
+
+    design: Design
+    c: Array
+    random: list[Array]
+    drawn: int
+    interrupted: bool = False
+
+    @classmethod
+    def of(cls, design: Design, progress: Progress | None = None) -> "Excited":
+        """Search a motion; raise ExperimentError if none is found that keeps all limits, with what it breaks."""
+        random, drawn = design.random_motions()
+        search = design.search(random, progress)
+        found = cls(design, search.best, random, drawn, search.interrupted)
+        if broken := [*found.use.broken(), *(f"on the way from home, {what}" for what in found.way_use.broken())]:
+            more = f", and {len(broken) - 1} more" if len(broken) > 1 else ""
+            raise ExperimentError(
+                f"no motion was found that keeps all limits: {broken[0]}{more}; widen that limit, narrow the [position] of "
+                "joints, or try another --duration, --frequency, --seed or home"
+            )
+        return found
+
+    @cached_property
+    def use(self) -> LimitUse:
+        """How far the motion uses its limits."""
+        return self.design.look(self.c)
+
+    @cached_property
+    def way(self) -> Reference:
+        """The way from home to its start, at 1 kHz."""
+        return self.design.way(self.c)
+
+    @cached_property
+    def way_use(self) -> LimitUse:
+        """How far the way uses them."""
+        return self.design.inspector.look(self.way)
+
+    @cached_property
+    def information(self) -> Array:
+        """Information of the motion, and of random ones, shape (1 + motion, p, p)."""
+        return self.design.information([self.c, *self.random])
+
+    @cached_property
+    def sigmas(self) -> Array:
+        """Standard deviations that estimates will have, from the motion and from random ones, shape (1 + motion, p)."""
+        return sigmas_of(self.information)
+
+    @cached_property
+    def earlier(self) -> Array | None:
+        """Standard deviations from the earlier logs, shape (p,), infinite where they tell nothing; None without logs."""
+        return sigmas_of(self.design.known) if self.design.logs else None
+
+    @property
+    def sigma(self) -> Array:
+        """Standard deviations from the motion, shape (p,)."""
+        return np.asarray(self.sigmas[0])
+
+    @cached_property
+    def typical(self) -> Array:
+        """Geometric means of the standard deviations, over that of the motion, shape (1 + motion,)."""
+        each = np.log(self.sigmas).mean(axis=1)
+        return np.asarray(np.exp(each - each[0]))
+
+    @property
+    def median(self) -> Array:
+        """Standard deviations from the median random motion, parameter by parameter, shape (p,); NaN without any."""
+        return np.median(self.sigmas[1:], axis=0) if self.random else np.full(len(self.sigma), np.nan)
+
+    @property
+    def best(self) -> Array:
+        """Standard deviations from the random motion that tells most, shape (p,); NaN without any."""
+        return self.sigmas[1 + int(self.typical[1:].argmin())] if self.random else np.full(len(self.sigma), np.nan)
+
+    @property
+    def ratios(self) -> tuple[float, float]:
+        """Typical sigma over that of the median random motion, and over that of the best; NaN without any."""
+        others = self.typical[1:]
+        return (1 / float(np.median(others)), 1 / float(others.min())) if len(others) else (np.nan, np.nan)
+
+    @cached_property
+    def condition(self) -> float:
+        """Cond(W), of the rows of joints that move."""
+        plan = self.design.plan
+        motion = plan.motion(self.c)
+        W = plan.information.columns(motion) * plan.information.weight(motion)[..., None]
+        return float(np.linalg.cond(W.reshape(-1, W.shape[-1])))
+
+    @cached_property
+    def shares(self) -> Array:
+        """How much of what is told of each parameter each stretch of the motion tells, shape (stretch, p)."""
+        plan = self.design.plan
+        motion = plan.motion(self.c)
+        W = plan.information.columns(motion) * plan.information.weight(motion)[..., None]
+        V = np.linalg.inv(plan.matrix(motion))
+        told = np.sum((plan.repeat * plan.information.whitened(W) @ V) * (W @ V), axis=1) / np.diag(V)
+        return np.stack([part.sum(axis=0) for part in np.array_split(told, STRETCHES)])
+
+    @property
+    def binding(self) -> list[str]:
+        """Which limits hold the motion back, in words."""
+        joints = self.use.joints
+        found = []
+        for name, largest in self.use.largest.items():
+            near = [joint for joint, share in zip(joints, largest, strict=True) if share > BINDING]
+            if near:
+                found.append(f"{name} of {'all joints' if len(near) == len(joints) else ', '.join(near)}")
+        return found
+
+    @cached_property
+    def scenario(self) -> Scenario:
+        """What simulates it."""
+        d = self.design
+        name = f"excited-{Path(d.robot).stem}"
+        origin = (
+            f"idbench excite {Path(d.robot).name}, {d.kind}, {d.duration:g} s, {d.frequency:g} Hz, {d.criterion}, seed {d.seed}"
+        )
+        return replace(
+            d.scenario,
+            name=name,
+            origin=origin,
+            robot=absolute(d.robot),
+            trajectory=d.trajectory(self.c),
+            start=tuple(float(x) for x in d.bounds.home),
+        )
+
+    def planned(self, fs: float) -> tuple[Array, Reference]:
+        """Return the part of each sample (0 there, 1 motion, 2 back), and the whole way of the arm, from home to home."""
+        step = max(1, round(FS / fs))
+        main = self.design.trajectory(self.c).plan(self.design.subject.robot).sample(fs)
+        there = [x[::step] for x in (self.way.q, self.way.qd, self.way.qdd)]
+        signs = 1.0, -1.0, 1.0
+        back = [sign * x[::-1] for sign, x in zip(signs, there, strict=True)]
+        parts = [np.concatenate(x) for x in zip(there, (main.q, main.qd, main.qdd), back, strict=True)]
+        return np.repeat([0.0, 1.0, 2.0], [len(there[0]), len(main.q), len(back[0])]), Reference(fs, *parts)
+
+    def summary(self) -> dict[str, Any]:
+        """Return summary.json."""
+        d, names = self.design, self.design.subject.basis.names
+        median, best = self.ratios
+        table = {"sigma": self.sigma, "random_median": self.median, "random_best": self.best}
+        if self.earlier is not None:
+            table["earlier"] = self.earlier
+        return {
+            "experiment": "excite",
+            "path": Path(d.robot).stem,
+            "robot": absolute(d.robot),
+            "kind": d.kind,
+            "criterion": d.criterion,
+            "duration": d.duration,
+            "frequency": d.frequency,
+            "repeat": d.repeat,
+            "rest": REST,
+            "seed": d.seed,
+            "earlier_logs": len(d.logs),
+            "interrupted": self.interrupted,
+            "parameters": list(names),
+            "prior": d.X.tolist(),
+            **{key: [float(x) if np.isfinite(x) else None for x in values] for key, values in table.items()},
+            "over_random_median": _finite(median),
+            "over_random_best": _finite(best),
+            "random_motions": len(self.random),
+            "random_drawn": self.drawn,
+            "condition_number": self.condition,
+            "noise": {"torque": d.levels.torque.tolist(), "position": d.levels.position.tolist()},
+            "limits_used": {name: share.tolist() for name, share in self.use.largest.items()},
+            "binding": self.binding,
+            "unchecked": self.unchecked,
+            "scenario": to_dict(self.scenario),
+        }
+
+    @property
+    def unchecked(self) -> str:
+        """What could not be checked, in words; empty if there is nothing."""
+        clearance = self.design.clearance
+        if not clearance.checks:
+            return "nothing is known of the robot's shapes: whether it hits itself or the floor was not checked"
+        pairs = [" and ".join(pair) for pair in clearance.left_out]
+        return f"left out, since they touch whatever the posture: {'; '.join(pairs)}" if pairs else ""
+
+
+def sigmas_of(M: Array) -> Array:
+    """Return standard deviations, shape (..., p), of information, shape (..., p, p); infinite where it tells nothing."""
+    size = np.sqrt(np.maximum(np.diagonal(M, axis1=-2, axis2=-1), 1e-300))
+    values, vectors = np.linalg.eigh(M / size[..., :, None] / size[..., None, :])
+    told = values > SINGULAR * values[..., -1:]
+    variance = np.sum(np.where(told, 1 / np.where(told, values, 1.0), 0.0)[..., None, :] * vectors**2, axis=-1)
+    hidden = np.sum(np.where(told, 0.0, 1.0)[..., None, :] * vectors**2, axis=-1) > HIDDEN
+    return np.where(hidden, np.inf, np.sqrt(variance) / size)
+
+
+SINGULAR = 1e-13
+"""Share of the largest eigenvalue, of scaled information, below which a direction counts as not told."""
+
+HIDDEN = 1e-6
+"""Share of a parameter in such directions from which on it is unknown."""
+
+
+def _finite(x: float) -> float | None:
+    return x if np.isfinite(x) else None

@@ -1,0 +1,117 @@
+"""How far a motion uses its limits, looked at instant by instant."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.basis.basis import Basis
+from identify.parameters.base_parameters import columns_at
+from sim.planning.clearance import Clearance, Touch
+from sim.planning.motion_limits import Bounds, MotionLimits
+from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
+from sim.robot.robot import Robot
+from sim.trajectories.reference import Reference
+
+FS = 1000.0
+"""Frequency [Hz] at which limits are looked at."""
+
+BLOCK = 2000
+"""States whose columns are made together."""
+
+ROUNDING = 1e-6
+"""Share by which a limit may be exceeded: coefficients are rounded where they are written."""
+
+UNITS = {"position": "rad", "velocity": "rad/s", "acceleration": "rad/s^2", "jerk": "rad/s^3"}
+
+
+@dataclass(frozen=True, eq=False)
+class LimitUse:
+    """Shares of limits that a motion uses.
+
+    Parameters
+    ----------
+    shares : dict of str to Array, shape (time, joint), or (1, joint)
+        Of positions, from the middle of the range, velocities, accelerations, jerks, torques, torques of parameters that are
+        off, and of torques on average; 1 at the limit, without those that have none.
+    touch : Touch, optional
+        The nearest that shapes come, if nearer than they may.
+    least : float
+        Distance that they must keep [m].
+    joints : tuple of str
+        Names.
+    """
+
+    shares: dict[str, Array]
+    touch: Touch | None
+    least: float
+    joints: tuple[str, ...]
+
+    @property
+    def largest(self) -> dict[str, Array]:
+        """Largest shares, shape (joint,)."""
+        return {name: share.max(axis=0) for name, share in self.shares.items()}
+
+    def broken(self) -> Iterator[str]:
+        """Yield which limits are broken, by whom and when."""
+        for name, share in self.shares.items():
+            k, j = np.unravel_index(int(share.argmax()), share.shape)
+            if share[k, j] > 1 + ROUNDING:
+                when = f" at {k / FS:.3f} s" if len(share) > 1 else ""
+                yield f"{name} of {self.joints[j]} is {share[k, j]:.1%} of its limit{when}"
+        if self.touch:
+            one, two = self.touch.shapes
+            how = f"are {1000 * self.touch.distance:.0f} mm apart" if self.touch.distance > 0 else "touch"
+            yield f"{one} and {two} {how} at {self.touch.instant / FS:.3f} s ({1000 * self.least:.0f} mm are asked for)"
+
+
+@dataclass(frozen=True, eq=False)
+class Inspector:
+    """Looks at motions of a robot.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    bounds : Bounds
+        Its limits.
+    asked : MotionLimits
+        How they are to be kept.
+    clearance : Clearance
+        Its distances.
+    basis : Basis
+        Its parameters.
+    X : Array, shape (p,)
+        As far as they are known.
+    """
+
+    robot: Robot
+    bounds: Bounds
+    asked: MotionLimits
+    clearance: Clearance
+    basis: Basis
+    X: Array
+
+    def look(self, motion: Reference) -> LimitUse:
+        """Return how far a motion, sampled at FS, uses its limits."""
+        low, high = self.bounds.position.T
+        jerk = np.gradient(motion.qdd, 1 / FS, axis=0)
+        rates = {"velocity": motion.qd, "acceleration": motion.qdd, "jerk": jerk}
+        shares = {"position": np.abs(motion.q - (low + high) / 2) / ((high - low) / 2)}
+        shares |= {name: np.abs(x) / getattr(self.bounds, name) for name, x in rates.items()}
+        tau = inverse_dynamics(self.robot, motion.q, motion.qd, motion.qdd) + coulomb_torque(self.robot, motion.qd)
+        shares["torque"] = np.abs(tau) / (self.asked.torque_share * self.bounds.torque)
+        shares["torque if off"] = (np.abs(tau) + self.asked.prior_error * self._spread(motion)) / self.bounds.torque
+        shares["rms torque"] = np.sqrt(np.mean(tau**2, axis=0, keepdims=True)) / self.bounds.rms_torque
+        limited = {name: share for name, share in shares.items() if share.any()}
+        touch = self.clearance.nearest(motion.q, motion.qd, FS)
+        return LimitUse(limited, touch, self.asked.clearance, self.robot.joints)
+
+    def _spread(self, motion: Reference) -> Array:
+        """Return the torques that all parameters make together if none were opposed, shape (time, joint) [N m]."""
+        blocks = [slice(i, i + BLOCK) for i in range(0, len(motion.q), BLOCK)]
+        states = np.stack([motion.q, motion.qd, motion.qdd]).swapaxes(-1, -2)
+        return np.concatenate(
+            [np.einsum("jpt,p->tj", np.abs(columns_at(self.basis, states[..., b])), np.abs(self.X)) for b in blocks]
+        )

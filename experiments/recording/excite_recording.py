@@ -1,0 +1,99 @@
+"""The recording of a designed motion: the arm along it, limits in use, and which stretch tells which parameter."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from experiments.excite.excite_text import lines
+from experiments.excite.excited import STRETCHES, Excited
+from experiments.excite.limit_use import FS
+from experiments.recording.audience import Audience
+from experiments.recording.chart import SQUARE, Chart
+from experiments.recording.columns import part, seconds
+from experiments.recording.folder import BASE
+from experiments.recording.identification_recording import recording_id
+from experiments.recording.motion_layer import Base
+from experiments.recording.scales import decades, linear, listed
+from experiments.recording.stream import Stream
+from experiments.recording.style import FORMS, GREY, Color, joint_colors
+from sim.scenario.scenario_file import to_toml
+
+SHOWN = 50.0
+"""Frequency [Hz] of the curves."""
+
+DARK, BRIGHT = np.array([32.0, 32.0, 36.0]), np.array([90.0, 200.0, 120.0])
+"""Colours of cells: of a stretch that tells nothing, and of that which tells most."""
+
+MOST = 13
+"""Parameters of a chart."""
+
+NOTABLE = 0.2
+"""Largest share of a limit below which it is not shown: it is in nobody's way."""
+
+
+def record_excited(found: Excited, audience: Audience | None = None) -> list[tuple[str, Stream]]:
+    """Return the stream of the recording, by the name of its file."""
+    scenario, robot = found.scenario, found.design.subject.robot
+    base = Base(recording_id(scenario.name, to_toml(scenario).encode()), robot, SHOWN, ("planned",), audience)
+    base.stream.describe(scenario=to_toml(scenario), seed=str(found.design.seed), fs_hz=f"{scenario.fs:g}")
+    _, motion = found.planned(SHOWN)
+    base.make_room(motion.q)
+    curves = {"q/designed": motion.q, "qd/designed": motion.qd, "qdd/designed": motion.qdd}
+    base.add(0, curves, {"planned": motion.q}, motion.qd)
+    _send_limits(base.stream, found)
+    _send_sigmas(base.stream, found)
+    _send_told(base.stream, found)
+    base.finish("\n\n".join(["## Designed motion", *lines(found)]))
+    return [(BASE, base.stream)]
+
+
+def _send_limits(stream: Stream, found: Excited) -> None:
+    """Send which share of each limit the motion uses over time, from the end of the way on."""
+    step, joints = round(FS / SHOWN), [part(joint) for joint in found.use.joints]
+    begin = len(found.way.q) / FS
+    for number, (kind, share) in enumerate(found.use.shares.items()):
+        if len(share) > 1 and share.max() > NOTABLE:
+            path = f"limits/{number}_{part(kind)}"
+            stream.style(path, [f"{kind} {joint}" for joint in joints], joint_colors(len(joints)))
+            stream.curves(path, [seconds(begin + np.arange(len(share))[::step] / FS)], 100 * share[::step])
+
+
+def _send_sigmas(stream: Stream, found: Excited) -> None:
+    """Send predicted sigmas over those of the median random motion."""
+    if not found.random:
+        return
+    names = found.design.subject.basis.names
+    others = np.sort(found.sigmas[1:] / found.median, axis=0)
+    x = decades("sigma over that of the median random motion", others, found.sigma / found.median)
+    for at, members in _parts(names):
+        chart = Chart(stream, f"excited/sigma/{at}", x, listed("", [names[p] for p in members]), SQUARE)
+        y = np.arange(float(len(members)))
+        chart.segments(
+            "random", np.stack([others[0, members], others[-1, members]], axis=1), np.stack([y, y], axis=1), GREY, 3.0
+        )
+        chart.list_entry("random motions", GREY)
+        chart.marks("this motion", (found.sigma / found.median)[members], y, FORMS["explicit"])
+        chart.list_entry("this motion", FORMS["explicit"])
+
+
+def _send_told(stream: Stream, found: Excited) -> None:
+    """Send which stretch of the motion tells how much of each parameter."""
+    names, shares, duration = found.design.subject.basis.names, found.shares, found.design.duration
+    begin = len(found.way.q) / FS
+    middles = begin + (np.arange(STRETCHES) + 0.5) * duration / STRETCHES
+    for at, members in _parts(names):
+        x = linear("time [s]", begin, begin + duration)
+        chart = Chart(stream, f"excited/told/{at}", x, listed("", [names[p] for p in members]))
+        for row, p in enumerate(members):
+            strength = np.clip(shares[:, p] / shares[:, p].max(), 0.0, 1.0)
+            for stretch in range(STRETCHES):
+                color: Color = [int(v) for v in DARK + (BRIGHT - DARK) * strength[stretch]]
+                ends = middles[stretch] + np.array([[-0.5, 0.5]]) * 0.92 * duration / STRETCHES
+                chart.segments(f"{row}-{stretch}", ends, np.full((1, 2), float(row)), color, 5.0)
+
+
+def _parts(names: Sequence[str]) -> Iterator[tuple[str, npt.NDArray[np.intp]]]:
+    """Yield the name of each chart and the parameters in it."""
+    for k, members in enumerate(np.array_split(np.arange(len(names)), -(-len(names) // MOST))):
+        yield f"{k}_{part(names[members[0]])}_to_{part(names[members[-1]])}", members

@@ -1,0 +1,128 @@
+"""What a planned motion tells of the parameters, from few states, with its slope."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy
+
+from identify.arrays import Array
+from identify.basis.basis import Basis
+from identify.rows.noise_propagation import NoiseLevels
+from identify.signals.state import State
+
+SLOW = 0.15
+"""Speed [rad/s] below which a joint's rows count little: masks leave them out."""
+
+STEP = 1e-6
+"""Step [rad, rad/s] of differences; accelerations enter linearly, so that theirs are exact."""
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """M = W' C^-1 W of motions, as generalized least squares has it, with one inertia matrix for all postures.
+
+    Rows whose joint hardly moves count little. In the frequency domain (cosines: a motion need not be periodic) the covariance
+    is a matrix of the joints at each frequency, S(f) = diag(torque noise^2) + w^4 M diag(position noise^2) M'; beyond the
+    pass band of the rows nothing counts.
+
+    Parameters
+    ----------
+    basis : Basis
+        The robot.
+    levels : NoiseLevels
+        Of its log, shape (joint,) each.
+    inertia : Array, shape (joint, joint)
+        Of the robot, on average over postures [kg m^2].
+    fs, rate : float
+        Frequencies of the log and of the states [Hz].
+    cutoff : float
+        End of the pass band [Hz].
+    """
+
+    basis: Basis
+    levels: NoiseLevels
+    inertia: Array
+    fs: float
+    rate: float
+    cutoff: float
+
+    def columns(self, motion: Array) -> Array:
+        """Return the columns of D at a motion, shape (..., 4, time, joint), as (..., time, joint, p)."""
+        state = _state(motion)
+        found = np.zeros((*state.q.shape[:-2], state.q.shape[-1], self.basis.n, len(self.basis.names)))
+        for (row, name), column in self.basis.explicit(state).items():
+            found[..., row, self._place[name]] = column
+        return found
+
+    def weight(self, motion: Array) -> Array:
+        """Return how much rows count, qd^2 / (qd^2 + SLOW^2), shape (..., time, joint)."""
+        squares = motion[..., 1, :, :] ** 2
+        return np.asarray(squares / (squares + SLOW**2))
+
+    def whitened(self, W: Array) -> Array:
+        """Return C^-1 W of weighted columns, shape (..., time, joint, p)."""
+        spectrum = scipy.fft.dct(W, type=2, axis=-3, norm="ortho")
+        count = min(W.shape[-3], int(2 * self.cutoff / self.rate * W.shape[-3]) + 1)
+        spectrum[..., count:, :, :] = 0.0
+        spectrum[..., :count, :, :] = np.matmul(self._weights(W.shape[-3])[:count], spectrum[..., :count, :, :])
+        return np.asarray(scipy.fft.idct(spectrum, type=2, axis=-3, norm="ortho"))
+
+    def matrix(self, W: Array) -> Array:
+        """Return W' C^-1 W of weighted columns, shape (..., p, p)."""
+        flat = (*W.shape[:-3], -1, W.shape[-1])
+        return np.matmul(np.swapaxes(W.reshape(flat), -1, -2), self.whitened(W).reshape(flat))
+
+    def _weights(self, count: int) -> Array:
+        """Return S^-1 at the frequencies of `count` cosines, shape (count, joint, joint)."""
+        w = np.pi * self.rate * np.arange(count) / count
+        by_position = self.inertia @ np.diag(self.levels.position**2) @ self.inertia.T
+        S = np.diag(self.levels.torque**2) + w[:, None, None] ** 4 * by_position
+        return np.asarray(np.linalg.inv(S) * self.fs / self.rate)
+
+    @cached_property
+    def _place(self) -> dict[str, int]:
+        return {name: i for i, name in enumerate(self.basis.names)}
+
+    @cached_property
+    def _frictions(self) -> frozenset[str]:
+        return frozenset(p.name for p in self.basis.parameters if "friction" in p.kind)
+
+    def slope(self, motion: Array, of_rows: Array, of_torques: Array) -> Array:
+        """Return how sums of products with columns grow with positions, velocities and accelerations.
+
+        Parameters
+        ----------
+        motion : Array, shape (4, time, joint)
+            [rad], [rad/s], ...
+        of_rows, of_torques : Array, shape (time, joint, p)
+            What weighted columns are multiplied by, and what those are of which frictions alone are weighted.
+
+        Returns
+        -------
+        Array, shape (3, time, joint)
+            Derivatives of the sum over the row and the parameter.
+        """
+        n = self.basis.n
+        copies = np.broadcast_to(motion, (3 * n + 1, *motion.shape)).copy()
+        steps = np.array([STEP, STEP, 1.0])
+        for order in range(3):
+            for j in range(n):
+                copies[1 + order * n + j, order, :, j] += steps[order]
+        weight, sums = self.weight(copies), np.zeros((3 * n + 1, motion.shape[-2]))
+        for (row, name), column in self.basis.explicit(_state(copies)).items():
+            p, w = self._place[name], weight[..., row]
+            by_torque = of_torques[:, row, p] * (w if name in self._frictions else 1.0)
+            sums += column * (w * of_rows[:, row, p] + by_torque)
+        slopes = (sums[1:] - sums[0]).reshape(3, n, -1) / steps[:, None, None]
+        return np.swapaxes(slopes, -1, -2)
+
+    def torques(self, motion: Array, W: Array, X: Array) -> Array:
+        """Return what each parameter adds to the torques, shape (..., time, joint, p), frictions fading at low speed."""
+        frictions = np.array([name in self._frictions for name in self.basis.names])
+        return W * X * np.where(frictions, self.weight(motion)[..., None], 1.0)
+
+
+def _state(motion: Array) -> State:
+    q, qd, qdd = (np.ascontiguousarray(np.swapaxes(motion[..., i, :, :], -1, -2)) for i in range(3))
+    return State(q, qd, lambda _: qdd)

@@ -1,0 +1,52 @@
+"""What a motion must keep."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identify.arrays import Array, frozen
+from identify.errors import SettingError
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """Limits of the joints; infinite where there are none.
+
+    Parameters
+    ----------
+    position : array_like, shape (joint, 2)
+        Lowest and highest [rad], finite.
+    velocity, acceleration, jerk : array_like, shape (joint,)
+        [rad/s], [rad/s^2], [rad/s^3]; velocities finite.
+    torque, rms_torque : array_like, shape (joint,)
+        Largest, and on average over the motion [N m].
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+    torque: Array
+    rms_torque: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "position", frozen(self.position))
+        n = len(self.position)
+        for name in ("velocity", "acceleration", "jerk", "torque", "rms_torque"):
+            values = frozen(np.broadcast_to(getattr(self, name), n))
+            if not (values > 0).all():
+                raise SettingError(f"limits: {name} = {values.tolist()} must be above 0")
+            object.__setattr__(self, name, values)
+        if self.position.shape != (n, 2) or not (self.position[:, 0] < self.position[:, 1]).all():
+            raise SettingError(f"limits: position = {self.position.tolist()} must be pairs, the lowest first")
+
+    @property
+    def middle(self) -> Array:
+        """Middle of the ranges [rad], shape (joint,)."""
+        return np.asarray(self.position.mean(axis=1))
+
+    @property
+    def sizes(self) -> Array:
+        """Half of the ranges, and the largest velocity, acceleration and jerk, shape (4, 1, joint)."""
+        half = np.diff(self.position, axis=1)[:, 0] / 2
+        return np.stack([half, self.velocity, self.acceleration, self.jerk])[:, None]

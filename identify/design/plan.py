@@ -1,0 +1,150 @@
+"""What coefficients are worth: information, and how far limits are kept, with slopes."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.design.criteria import AbstractCriterion
+from identify.design.information import Information
+from identify.design.limits import Limits
+from identify.design.shapes import Shapes
+
+POWER = 64
+"""Of the norm that stands for the largest of many values, and is smooth."""
+
+NEAR = 0.97
+"""Share of a torque limit from which on it costs: states lie between those that are looked at."""
+
+HARD = 30.0
+"""What exceeding a limit by all of it costs, squared; halving all sigmas gains 0.7."""
+
+SLACK = 0.99
+"""Share of the limits that motions use, since limits are kept at instants."""
+
+Obstacles = Callable[[Array], tuple[float, Array]]
+"""Positions, shape (time, joint) -> what being too near to something costs, and its slope."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What is asked of a motion, and what it must keep.
+
+    Positions, velocities, accelerations and jerks keep their limits whatever the coefficients: with u the largest share of a
+    limit that a joint uses, in a smooth norm, its motion is divided by (1 + u^p)^(1/p). Torques and obstacles cost.
+
+    Parameters
+    ----------
+    information : Information
+        What a motion tells.
+    criterion : AbstractCriterion
+        What is asked of it.
+    limits : Limits
+        What it must keep.
+    states, instants : Shapes
+        The unit motions at the states whose rows count, and at more instants, where limits are kept.
+    X : Array, shape (p,)
+        Parameters as far as they are known.
+    known : Array, shape (p, p)
+        Information of earlier logs.
+    prior_error : float
+        Share by which each of X may be off, for torques.
+    torque_share : float
+        Share of the largest torques that X may take.
+    repeat : int
+        Times that the motion is run.
+    obstacles : callable, optional
+        What to keep away from.
+    hard : float
+        What exceeding a limit by all of it costs, squared.
+    """
+
+    information: Information
+    criterion: AbstractCriterion
+    limits: Limits
+    states: Shapes
+    instants: Shapes
+    X: Array
+    known: Array
+    prior_error: float = 0.3
+    torque_share: float = 0.8
+    repeat: int = 1
+    obstacles: Obstacles | None = None
+    hard: float = HARD
+
+    def motion(self, c: Array) -> Array:
+        """Return the motion at the states, shape (..., 4, time, joint), for coefficients c, shape (..., m, joint)."""
+        moved = self.states.at(c * self._scale(c)[0][..., None, :])
+        moved[..., 0, :, :] += self.limits.middle
+        return moved
+
+    def coefficients(self, c: Array) -> Array:
+        """Return the coefficients of the shapes that make the motion, offsets from the middle of the ranges."""
+        return c * self._scale(c)[0][..., None, :]
+
+    def matrix(self, motion: Array) -> Array:
+        """Return the information of a motion, with what is known."""
+        W = self.information.columns(motion) * self.information.weight(motion)[..., None]
+        return self.known + self.repeat * self.information.matrix(W)
+
+    def excess(self, c: Array) -> float:
+        """Return what coefficients, shape (m, joint), cost beyond what the criterion says: 0 where limits are kept."""
+        motion = self.motion(c)
+        cost, _ = self._torque_cost(motion, self.information.columns(motion))
+        return cost + (self.hard * self.obstacles(motion[0])[0] if self.obstacles else 0.0)
+
+    def value(self, c: Array) -> tuple[float, Array]:
+        """Return what coefficients, shape (m, joint), cost, and the slope."""
+        scale, of_scale = self._scale(c)
+        raw = self.states.at(c)
+        motion = raw * scale
+        motion[0] += self.limits.middle
+        cost, slope = self._cost(motion)
+        back = np.einsum("dtm,dtj->mj", self.states.values[:3], slope)
+        by_scale = np.einsum("dtj,dtj->j", slope, raw[:3])
+        return cost, back * scale + by_scale * of_scale
+
+    def _cost(self, motion: Array) -> tuple[float, Array]:
+        """Return what a motion costs, and the slope by its positions, velocities and accelerations, shape (3, time, joint)."""
+        D = self.information.columns(motion)
+        W = D * self.information.weight(motion)[..., None]
+        solved = self.information.whitened(W) * self.repeat
+        flat = W.reshape(-1, W.shape[-1])
+        M = self.known + flat.T @ solved.reshape(flat.shape)
+        cost = float(self.criterion.value(M))
+        of_rows = 2 * solved @ self.criterion.slope(M)
+        penalty, of_torques = self._torque_cost(motion, D)
+        slope = self.information.slope(motion, of_rows, of_torques)
+        if self.obstacles:
+            near, away = self.obstacles(motion[0])
+            penalty += self.hard * near
+            slope[0] += self.hard * away
+        return cost + penalty, slope
+
+    def _torque_cost(self, motion: Array, D: Array) -> tuple[float, Array]:
+        """Return what torques beyond their limits cost, and the slope by columns times parameters."""
+        parts = self.information.torques(motion, D, self.X)
+        tau, spread = parts.sum(axis=-1), np.abs(parts).sum(axis=-1)
+        most, worst = 1 / (self.torque_share * self.limits.torque), 1 / self.limits.torque
+        mean = np.sqrt(np.mean(tau**2, axis=0) + 1e-300)
+        over = np.maximum(np.abs(tau) * most - NEAR, 0.0)
+        above = np.maximum((np.abs(tau) + self.prior_error * spread) * worst - NEAR, 0.0)
+        warm = np.maximum(mean / self.limits.rms_torque - NEAR, 0.0)
+        cost = self.hard * (np.sum(over**2) + np.sum(above**2) + len(tau) * np.sum(warm**2))
+        by_tau = 2 * self.hard * (np.sign(tau) * (over * most + above * worst) + warm / mean / self.limits.rms_torque * tau)
+        by_spread = 2 * self.hard * self.prior_error * above * worst
+        return float(cost), (by_tau[..., None] + by_spread[..., None] * np.sign(parts)) * self.X
+
+    def _scale(self, c: Array) -> tuple[Array, Array]:
+        """Return what the joints' motions are multiplied by, shape (..., joint), and its slope, shape (..., m, joint)."""
+        sizes = SLACK * self.limits.sizes
+        use = self.instants.at(c) / sizes
+        largest = np.abs(use).max(axis=(-3, -2), keepdims=True)
+        relative = use / np.maximum(largest, 1e-300)
+        total = np.sum(relative**POWER, axis=(-3, -2))
+        norm = largest[..., 0, 0, :] * total ** (1 / POWER)
+        by_use = relative ** (POWER - 1) * total[..., None, None, :] ** (1 / POWER - 1)
+        of_norm = np.einsum("dtm,...dtj->...mj", self.instants.values, by_use / sizes)
+        scale = (1 + norm**POWER) ** (-1 / POWER)
+        return scale, -(scale ** (POWER + 1) * norm ** (POWER - 1))[..., None, :] * of_norm

@@ -1,0 +1,50 @@
+"""The covariance that an estimate from a planned motion will have."""
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.basis.basis import Basis
+from identify.data.motion_log import MotionLog
+from identify.models.explicit import ExplicitModel
+from identify.rows.chain import Chain
+from identify.rows.linearization import Linearization
+from identify.rows.noise_propagation import NoiseLevels, NoisyRows
+from identify.rows.whitening import Whitening, kept_rows
+from identify.signals.signals import Signals
+
+
+def predicted_information(log: MotionLog, basis: Basis, X: Array, levels: NoiseLevels, chain: Chain) -> Array:
+    """Return W' C^-1 W of the explicit model's rows, with the covariance C that noise will give them, shape (..., p, p).
+
+    As generalized least squares has it, but for the noise levels, which are given here and estimated there.
+
+    Parameters
+    ----------
+    log : MotionLog
+        The motion without noise; of its torques only the meaning counts. Leading axes are motions.
+    basis : Basis
+        The robot.
+    X : Array, shape (p,)
+        Its parameters as far as they are known: they make the inertias by which noise of positions counts.
+    levels : NoiseLevels
+        Standard deviations of the noise, shape (joint,) each.
+    chain : Chain
+        Signal processing.
+
+    Raises
+    ------
+    IdentificationError
+        If the log is too short for the chain.
+    """
+    signals = chain.signals(log)
+
+    def linear(of: Signals) -> Linearization:
+        return Linearization(of, basis, np.broadcast_to(X, (*log.q.shape[:-2], len(X))))
+
+    rows = chain.rows(signals, basis, ExplicitModel())
+    (to_rows,) = rows.maps
+    lead = (*log.q.shape[:-2], log.n)
+    noise = NoisyRows(NoiseLevels(np.broadcast_to(levels.torque, lead), np.broadcast_to(levels.position, lead)), linear)
+    kept = kept_rows(to_rows)
+    white = Whitening(noise.covariance(to_rows).kept(kept), kept).whiten(rows.W)
+    return np.matmul(np.swapaxes(white, -1, -2), white)

@@ -1,0 +1,1 @@
+"""What a motion must keep: limits of joints, and distance from everything that it could hit."""

@@ -1,0 +1,217 @@
+"""What a robot may do: from its file, and from limits.toml."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal, final
+
+import mujoco
+import numpy as np
+from pydantic import Field
+
+from identify.plugins import did_you_mean
+from sim.errors import ScenarioError
+from sim.robot.motors import Array
+from sim.robot.robot import Robot
+from sim.settings import EachPositiveOrNone, Number, Positive, Share, make, per_joint, settings
+
+Point = tuple[Number, Number, Number]
+
+RATES = ("velocity", "acceleration", "jerk")
+"""Limits that MJCF has no word for: a robot's file gives them as `<custom><numeric name="max_velocity" data="..."/>`."""
+
+FLOOR = "floor"
+
+
+@final
+@settings
+class KeepOut:
+    """A box that no part of the robot may enter, its edges along the axes of the world."""
+
+    name: str
+    """What stands there."""
+    lowest: Point
+    """Corner with the least x, y and z [m]."""
+    highest: Point
+    """Corner with the largest x, y and z [m]."""
+
+    def __post_init__(self) -> None:
+        if not all(a < b for a, b in zip(self.lowest, self.highest, strict=True)):
+            raise ScenarioError(
+                f"keep_out {self.name}: lowest = {list(self.lowest)} is not below highest = {list(self.highest)}"
+            )
+
+
+@final
+@settings
+class MotionLimits:
+    """What a motion must keep; what is not given is taken from the robot's file."""
+
+    position: Mapping[str, tuple[Number, Number]] = Field(default_factory=dict)
+    """Lowest and highest position of joints, by their names [rad]."""
+    velocity: EachPositiveOrNone = None
+    """Largest speed [rad/s], of all joints or of each."""
+    acceleration: EachPositiveOrNone = None
+    """Largest acceleration [rad/s^2], of all joints or of each."""
+    jerk: EachPositiveOrNone = None
+    """Largest jerk [rad/s^3], of all joints or of each."""
+    torque: EachPositiveOrNone = None
+    """Largest torque of the motors [N m], of all joints or of each."""
+    rms_torque: EachPositiveOrNone = None
+    """Largest torque on average over the motion, by which motors get hot [N m], of all joints or of each."""
+    torque_share: Annotated[Share, Field(gt=0)] = 0.8
+    """Share of the largest torque that the motion takes; the controller needs the rest."""
+    prior_error: Annotated[Number, Field(ge=0, le=1)] = 0.3
+    """Share by which every parameter of the robot's file may be off, with torques still below the largest."""
+    clearance: Positive = 0.01
+    """Least distance between shapes of the robot, and from what stands around it [m]."""
+    floor: Number | Literal["none"] | None = None
+    """Height of the floor [m], or "none"; by default the lowest point of what is fixed to the world."""
+    keep_out: tuple[KeepOut, ...] = ()
+    """Boxes that no part of the robot may enter."""
+    home: tuple[Number, ...] = ()
+    """Positions from which the arm comes, and to which it returns [rad]; the robot's own by default."""
+    way_velocity: Positive = 0.5
+    """Largest speed on the way to the start and back [rad/s]."""
+
+    @classmethod
+    def read(cls, path: Path | None) -> "MotionLimits":
+        """Return the limits of a TOML file, or none of one's own.
+
+        Raises
+        ------
+        ScenarioError
+            If it cannot be read, or a key is unknown or out of its range.
+        """
+        if path is None:
+            return cls()
+        try:
+            content = tomllib.loads(path.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise ScenarioError(f"cannot read limits {path}: {error.strerror}") from error
+        except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+            raise ScenarioError(f"cannot read limits {path}: {error}") from error
+        found: MotionLimits = make(cls, content, "")
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """Limits of every joint, infinite where there are none.
+
+    Parameters
+    ----------
+    position : Array, shape (joint, 2)
+        [rad].
+    velocity, acceleration, jerk : Array, shape (joint,)
+        [rad/s], [rad/s^2], [rad/s^3].
+    torque, rms_torque : Array, shape (joint,)
+        [N m].
+    home : Array, shape (joint,)
+        Where the arm comes from [rad].
+    """
+
+    position: Array
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+    torque: Array
+    rms_torque: Array
+    home: Array
+
+    @classmethod
+    def of(cls, robot: Robot, asked: MotionLimits) -> "Bounds":
+        """Return the limits of a robot.
+
+        Raises
+        ------
+        ScenarioError
+            If a joint has no range or no largest velocity, or one is not of the robot; the message says what to write.
+        """
+        position = _positions(robot, asked.position)
+        velocity, acceleration, jerk = (_rate(robot, name, getattr(asked, name)) for name in RATES)
+        torque = _each(robot, "torque", asked.torque, robot.torque_limits)
+        rms = _each(robot, "rms_torque", asked.rms_torque, np.full(robot.n, np.inf))
+        if unlimited := _names(robot, ~np.isfinite(velocity)):
+            raise ScenarioError(
+                f"nothing says how fast {unlimited} may turn: write velocity = ... [rad/s] into a file and give --limits FILE"
+            )
+        if unlimited := _names(robot, ~np.isfinite(acceleration) & ~np.isfinite(torque)):
+            raise ScenarioError(
+                f"nothing limits the acceleration or the torque of {unlimited}: write acceleration = ... [rad/s^2] or "
+                "torque = ... [N m] into a file and give --limits FILE"
+            )
+        return cls(position, velocity, acceleration, jerk, torque, rms, _home(robot, asked.home, position))
+
+
+def surroundings(name: str, asked: MotionLimits) -> Robot:
+    """Return a robot, by its name or file, with the floor and the boxes around it as shapes of the world."""
+    floor = _floor(Robot.load(name)) if asked.floor is None else asked.floor
+
+    def edit(spec: mujoco.MjSpec) -> None:
+        if isinstance(floor, float):
+            spec.worldbody.add_geom(name=FLOOR, type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], pos=[0, 0, floor])
+        for box in asked.keep_out:
+            low, high = np.array(box.lowest), np.array(box.highest)
+            spec.worldbody.add_geom(name=box.name, type=mujoco.mjtGeom.mjGEOM_BOX, size=(high - low) / 2, pos=(high + low) / 2)
+
+    return Robot.load(name, edit)
+
+
+def _floor(robot: Robot) -> float | None:
+    """Return the height of the lowest point of what is fixed to the world; None where that is a plane, or nothing."""
+    model, data = robot.model, mujoco.MjData(robot.model)
+    mujoco.mj_kinematics(model, data)
+    fixed = np.flatnonzero(model.body_weldid[model.geom_bodyid] == 0)
+    if not len(fixed) or (model.geom_type[fixed] == int(mujoco.mjtGeom.mjGEOM_PLANE)).any():
+        return None
+    up = data.geom_xmat[fixed].reshape(-1, 3, 3)[:, 2]
+    middle, half = np.split(model.geom_aabb[fixed], 2, axis=1)
+    return float(np.min(data.geom_xpos[fixed, 2] + np.sum(up * middle - np.abs(up) * half, axis=1)))
+
+
+def _positions(robot: Robot, asked: Mapping[str, tuple[float, float]]) -> Array:
+    """Return the ranges of the joints, narrowed."""
+    ranges = robot.ranges.copy()
+    for name, (low, high) in asked.items():
+        if name not in robot.joints:
+            hint = did_you_mean(name, robot.joints)
+            raise ScenarioError(f"limits: position.{name}: no such joint{hint}; there are {', '.join(robot.joints)}")
+        j = robot.joints.index(name)
+        if not low < high:
+            raise ScenarioError(f"limits: position.{name} = [{low:g}, {high:g}]: the lowest is not below the highest")
+        ranges[j] = max(ranges[j, 0], low), min(ranges[j, 1], high)
+        if not ranges[j, 0] < ranges[j, 1]:
+            raise ScenarioError(f"limits: position.{name} = [{low:g}, {high:g}] lies outside the range of its file")
+    if free := _names(robot, ~np.isfinite(ranges).all(axis=1)):
+        raise ScenarioError(
+            f"{free} has no range: write [position] and {robot.joints[int(np.argmax(~np.isfinite(ranges).all(axis=1)))]} = "
+            "[lowest, highest] into a file and give --limits FILE; leave room for the cables"
+        )
+    return ranges
+
+
+def _rate(robot: Robot, name: str, asked: tuple[float, ...] | None) -> Array:
+    """Return the largest velocity, acceleration or jerk of every joint."""
+    return _each(robot, name, asked, robot.most(name))
+
+
+def _each(robot: Robot, name: str, asked: tuple[float, ...] | None, known: Array) -> Array:
+    return known if asked is None else per_joint(asked, robot.n, f"limits: {name}")
+
+
+def _home(robot: Robot, asked: tuple[float, ...], position: Array) -> Array:
+    """Return where the arm comes from: what is asked for, the keyframe `home`, or where the file puts it."""
+    low, high = position.T
+    if asked:
+        home = per_joint(asked, robot.n, "limits: home")
+        if outside := _names(robot, (home < low) | (home > high)):
+            raise ScenarioError(f"limits: home = {list(asked)} puts {outside} outside its range")
+        return home
+    keys = [k for k in range(robot.model.nkey) if robot.model.key(k).name == "home"]
+    return np.clip(robot.model.key_qpos[keys[0]] if keys else robot.model.qpos0, low, high)
+
+
+def _names(robot: Robot, chosen: Any) -> str:
+    return ", ".join(robot.joints[j] for j in np.flatnonzero(chosen))
