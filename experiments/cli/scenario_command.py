@@ -4,7 +4,7 @@ from experiments.cli.bench import WriteScenario
 from experiments.cli.page import new_page, show
 from experiments.errors import ExperimentError
 from experiments.identification.results import write_whole
-from sim.scenario.scenario_file import load, names, to_toml
+from sim.scenario.scenario_file import designed, load, names, to_toml
 
 
 def write(asked: WriteScenario) -> None:
@@ -13,6 +13,7 @@ def write(asked: WriteScenario) -> None:
     if asked.name is None:
         for known in names():
             page.out(f"{known:16} {load(known).origin}")
+        page.out(f"{len(designed())} more with motions of idbench excite, for its studies: {', '.join(designed())}")
     elif asked.out is None:
         page.out(to_toml(load(asked.name)).rstrip("\n"))
     elif asked.out.exists():

@@ -13,7 +13,7 @@ from experiments.excite.limit_use import FS, Inspector, LimitUse
 from experiments.identification.parameters import Parameters
 from experiments.identification.subject import Subject
 from identify import CHAINS, Array, FirLowPass, MotionLog, NoiseLevels
-from identify.design.criteria import CRITERIA, LogSigma
+from identify.design.criteria import CRITERIA, AbstractCriterion, LogSigma
 from identify.design.information import Information
 from identify.design.limits import Limits
 from identify.design.plan import Plan
@@ -42,11 +42,15 @@ STAGES = (0.3, 0, 40), (3.0, 2, 50), (30.0, 1, 60)
 """Of the search: what exceeding limits costs, how many of the best are followed, all if 0, and steps from each. Limits that
 are hard from the first lead to poor motions, or nowhere."""
 
-HARDER = 300.0, 3000.0
-"""What exceeding limits costs while some are still broken."""
+HARDER = 300.0, 3000.0, 30000.0
+"""What exceeding limits costs while some are still broken; those of torques also become narrower, by as much as is exceeded:
+between the states that the search looks at torques may be larger, where a joint turns."""
 
 STATES = 12.0
 """States for each period of the highest frequency; at least 8 a second."""
+
+CLOSER = 1.005
+"""Factor by which limits of torques become narrower than what they are exceeded by."""
 
 FINER = 4
 """Instants at which limits are kept, for each state."""
@@ -57,8 +61,8 @@ PREDICTED = 100.0
 TOGETHER = 10
 """Motions whose sigmas are predicted together."""
 
-WAY = 10
-"""Instants of the way to the start that the search looks at."""
+PACES = 1.0, 0.5, 0.25
+"""Of the way from home, over that of any approach."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +143,13 @@ class Design:
     def clearance(self) -> Clearance:
         """Distances of shapes, from each other and from what stands around."""
         found = Clearance(surroundings(self.robot, self.asked), self.bounds.position, self.asked.clearance)
+        for pair in found.left_out:
+            if box := next((box.name for box in self.asked.keep_out if box.name in pair), None):
+                (other,) = set(pair) - {box}
+                raise ExperimentError(
+                    f"keep_out {box}: {other} is inside it, or nearer than {1000 * self.asked.clearance:.0f} mm, whatever the "
+                    "posture: make the box smaller, or move it"
+                )
         home = self.bounds.home[None]
         if touch := found.nearest(home, 0 * home, FS):
             raise ExperimentError(
@@ -177,7 +188,7 @@ class Design:
         rate = max(8.0, STATES * self.frequency)
         count = ceil(rate * self.duration)
         rate = count / self.duration
-        criterion = CRITERIA[self.criterion if self.criterion != SIGMA else DETERMINANT]
+        criterion = self._first
         levels = self.levels if criterion.noise else NoiseLevels(np.ones(robot.n), np.zeros(robot.n))
         information = Information(
             self.subject.basis, levels, inertia, self.scenario.fs, rate, min(FirLowPass().cutoff, self.scenario.fs / 2)
@@ -199,6 +210,7 @@ class Design:
             self.asked.prior_error,
             self.asked.torque_share,
             self.repeat,
+            bounds.home,
             self.clearance.cost if self.clearance.checks else None,
         )
 
@@ -210,6 +222,13 @@ class Design:
                 f"{self.duration:g} s make {least:.0f} rows behind a filter at {FirLowPass().cutoff:g} Hz, fewer than the {p} "
                 f"parameters: give a --duration of at least {ceil(4 * p / least * self.duration)} s"
             )
+
+    @property
+    def _first(self) -> AbstractCriterion:
+        """What the search begins with: the determinant, which leads far from anywhere, unless some parameters count more."""
+        if self.criterion == SIGMA and self.weights:
+            return self.sigma_criterion
+        return CRITERIA[DETERMINANT if self.criterion == SIGMA else self.criterion]
 
     @cached_property
     def sigma_criterion(self) -> LogSigma:
@@ -264,16 +283,25 @@ class Design:
             polished = replace(self.plan, criterion=self.sigma_criterion)
             search.run(replace(polished, hard=hard), 1, rounds)
         for harder in HARDER:
-            if any(self.look(search.best).broken()):
-                search.run(replace(polished, hard=harder), 1, rounds)
+            if not any((use := self.look(search.best)).broken()):
+                break
+            over = max(1.0, *(CLOSER * float(share.max()) for name, share in use.largest.items() if "torque" in name), 1.0)
+            torque, rms = polished.limits.torque / over, polished.limits.rms_torque / over
+            limits = replace(polished.limits, torque=torque, rms_torque=rms)
+            polished = replace(polished, limits=limits, hard=harder)
+            search.run(polished, 1, rounds)
         if search.interrupted and cheapest and any(self.look(search.best).broken()):
             search.found = cheapest
         return search
 
     def way(self, c: Array) -> Reference:
-        """Return the way from home to where a motion starts, at FS."""
+        """Return the way from home to where a motion starts, at FS: slower where its torques would be too large."""
         start = self.trajectory(c).plan(self.subject.robot).sample(FS).q[0]
-        return approach(self.subject.robot, self.bounds.home, start, FS)
+        for pace in PACES:
+            way = approach(self.subject.robot, self.bounds.home, start, FS, pace)
+            if not any(self.inspector.look(way).broken()):
+                break
+        return way
 
     def look(self, c: Array) -> LimitUse:
         """Return how far a motion uses its limits."""

@@ -112,7 +112,8 @@ class Setting:
                 table = table.setdefault(part, {})
                 if not isinstance(table, dict):
                     raise StudyError(f"axis {field}: {'.'.join(path[: i + 1])} is no table of settings")
-            if isinstance(self.value, dict) or key not in table or not isinstance(table[key], dict):
+            named = field == "trajectory" and isinstance(self.value, str)  # that of another scenario
+            if named or isinstance(self.value, dict) or key not in table or not isinstance(table[key], dict):
                 table[key] = self.value
             else:
                 raise StudyError(f"axis {field} is a table of settings: give tables as values, or name one of its settings")

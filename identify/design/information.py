@@ -11,11 +11,11 @@ from identify.basis.basis import Basis
 from identify.rows.noise_propagation import NoiseLevels
 from identify.signals.state import State
 
-SLOW = 0.15
-"""Speed [rad/s] below which a joint's rows count little: masks leave them out."""
+SLOW, TURNING = 0.1, 0.06
+"""Speed [rad/s] below which a joint's rows count little, and time [s] about its reversals: masks leave them out."""
 
 STEP = 1e-6
-"""Step [rad, rad/s] of differences; accelerations enter linearly, so that theirs are exact."""
+"""Step [rad, rad/s, rad/s^2] of differences."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +56,9 @@ class Information:
         return found
 
     def weight(self, motion: Array) -> Array:
-        """Return how much rows count, qd^2 / (qd^2 + SLOW^2), shape (..., time, joint)."""
+        """Return how much rows count, qd^2 / (qd^2 + SLOW^2 + (TURNING qdd)^2), shape (..., time, joint)."""
         squares = motion[..., 1, :, :] ** 2
-        return np.asarray(squares / (squares + SLOW**2))
+        return np.asarray(squares / (squares + SLOW**2 + (TURNING * motion[..., 2, :, :]) ** 2))
 
     def whitened(self, W: Array) -> Array:
         """Return C^-1 W of weighted columns, shape (..., time, joint, p)."""
@@ -105,16 +105,15 @@ class Information:
         """
         n = self.basis.n
         copies = np.broadcast_to(motion, (3 * n + 1, *motion.shape)).copy()
-        steps = np.array([STEP, STEP, 1.0])
         for order in range(3):
             for j in range(n):
-                copies[1 + order * n + j, order, :, j] += steps[order]
+                copies[1 + order * n + j, order, :, j] += STEP
         weight, sums = self.weight(copies), np.zeros((3 * n + 1, motion.shape[-2]))
         for (row, name), column in self.basis.explicit(_state(copies)).items():
             p, w = self._place[name], weight[..., row]
             by_torque = of_torques[:, row, p] * (w if name in self._frictions else 1.0)
             sums += column * (w * of_rows[:, row, p] + by_torque)
-        slopes = (sums[1:] - sums[0]).reshape(3, n, -1) / steps[:, None, None]
+        slopes = (sums[1:] - sums[0]).reshape(3, n, -1) / STEP
         return np.swapaxes(slopes, -1, -2)
 
     def torques(self, motion: Array, W: Array, X: Array) -> Array:

@@ -23,6 +23,9 @@ HARD = 30.0
 SLACK = 0.99
 """Share of the limits that motions use, since limits are kept at instants."""
 
+WAY = np.linspace(0.0, 1.0, 12)[1:-1]
+"""Shares of the way from home at which it is looked at."""
+
 Obstacles = Callable[[Array], tuple[float, Array]]
 """Positions, shape (time, joint) -> what being too near to something costs, and its slope."""
 
@@ -54,6 +57,8 @@ class Plan:
         Share of the largest torques that X may take.
     repeat : int
         Times that the motion is run.
+    home : Array, shape (joint,), optional
+        Where the arm comes from [rad]: limits hold on the way, too.
     obstacles : callable, optional
         What to keep away from.
     hard : float
@@ -70,6 +75,7 @@ class Plan:
     prior_error: float = 0.3
     torque_share: float = 0.8
     repeat: int = 1
+    home: Array | None = None
     obstacles: Obstacles | None = None
     hard: float = HARD
 
@@ -90,9 +96,9 @@ class Plan:
 
     def excess(self, c: Array) -> float:
         """Return what coefficients, shape (m, joint), cost beyond what the criterion says: 0 where limits are kept."""
-        motion = self.motion(c)
-        cost, _ = self._torque_cost(motion, self.information.columns(motion))
-        return cost + (self.hard * self.obstacles(motion[0])[0] if self.obstacles else 0.0)
+        whole = self._with_way(self.motion(c))
+        cost, _ = self._torque_cost(whole, self.information.columns(whole))
+        return cost + (self.hard * self.obstacles(whole[0])[0] if self.obstacles else 0.0)
 
     def value(self, c: Array) -> tuple[float, Array]:
         """Return what coefficients, shape (m, joint), cost, and the slope."""
@@ -107,20 +113,30 @@ class Plan:
 
     def _cost(self, motion: Array) -> tuple[float, Array]:
         """Return what a motion costs, and the slope by its positions, velocities and accelerations, shape (3, time, joint)."""
-        D = self.information.columns(motion)
-        W = D * self.information.weight(motion)[..., None]
+        whole, count = self._with_way(motion), motion.shape[-2]
+        D = self.information.columns(whole)
+        W = D[:count] * self.information.weight(motion)[..., None]
         solved = self.information.whitened(W) * self.repeat
         flat = W.reshape(-1, W.shape[-1])
         M = self.known + flat.T @ solved.reshape(flat.shape)
-        cost = float(self.criterion.value(M))
-        of_rows = 2 * solved @ self.criterion.slope(M)
-        penalty, of_torques = self._torque_cost(motion, D)
-        slope = self.information.slope(motion, of_rows, of_torques)
+        of_rows = np.zeros_like(D)
+        of_rows[:count] = 2 * solved @ self.criterion.slope(M)
+        penalty, of_torques = self._torque_cost(whole, D)
+        slope = self.information.slope(whole, of_rows, of_torques)
         if self.obstacles:
-            near, away = self.obstacles(motion[0])
+            near, away = self.obstacles(whole[0])
             penalty += self.hard * near
             slope[0] += self.hard * away
-        return cost + penalty, slope
+        slope[0, 0] += np.sum(WAY[:, None] * slope[0, count:], axis=0) if self.home is not None else 0.0
+        return float(self.criterion.value(M)) + penalty, slope[:, :count]
+
+    def _with_way(self, motion: Array) -> Array:
+        """Return a motion, shape (4, time, joint), with postures on the way from home to its start at the end."""
+        if self.home is None:
+            return motion
+        way = np.zeros((len(motion), len(WAY), motion.shape[-1]))
+        way[0] = self.home + WAY[:, None] * (motion[0, 0] - self.home)
+        return np.concatenate([motion, way], axis=1)
 
     def _torque_cost(self, motion: Array, D: Array) -> tuple[float, Array]:
         """Return what torques beyond their limits cost, and the slope by columns times parameters."""
@@ -146,5 +162,7 @@ class Plan:
         norm = largest[..., 0, 0, :] * total ** (1 / POWER)
         by_use = relative ** (POWER - 1) * total[..., None, None, :] ** (1 / POWER - 1)
         of_norm = np.einsum("dtm,...dtj->...mj", self.instants.values, by_use / sizes)
-        scale = (1 + norm**POWER) ** (-1 / POWER)
-        return scale, -(scale ** (POWER + 1) * norm ** (POWER - 1))[..., None, :] * of_norm
+        size = np.log(np.maximum(norm, 1e-300))  # powers of large motions would overflow
+        log_scale = -np.logaddexp(0.0, POWER * size) / POWER
+        scale, by_norm = np.exp(log_scale), -np.exp((POWER + 1) * log_scale + (POWER - 1) * size)
+        return scale, by_norm[..., None, :] * of_norm

@@ -42,6 +42,11 @@ def names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
 
 
+def designed() -> tuple[str, ...]:
+    """Return the names of the scenarios that ship with motions of `idbench excite`, such as excited/scara-sigma."""
+    return tuple(sorted(path.relative_to(FOLDER).with_suffix("").as_posix() for path in FOLDER.glob("*/*.toml")))
+
+
 def load(name: str) -> Scenario:
     """Return the scenario that ships as `name`, or that of a TOML file.
 
@@ -60,8 +65,8 @@ def load(name: str) -> Scenario:
 def _content(name: str) -> dict[str, Any]:
     """Return the TOML document of a scenario."""
     path = Path(name) if name.endswith(".toml") else FOLDER / f"{name}.toml"
-    if not name.endswith(".toml") and name not in names():
-        hint = did_you_mean(name, names())
+    if not name.endswith(".toml") and name not in (*names(), *designed()):
+        hint = did_you_mean(name, (*names(), *designed()))
         raise ScenarioError(f"no scenario {name!r}{hint}; known: {', '.join(names())}, or give the path of a TOML file (.toml)")
     try:
         return tomllib.loads(path.read_text())

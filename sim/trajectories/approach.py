@@ -15,10 +15,10 @@ REST = 0.2
 """Time at rest before and after it [s]."""
 
 
-def approach(robot: Robot, start: Array, goal: Array, fs: float) -> Reference:
+def approach(robot: Robot, start: Array, goal: Array, fs: float, pace: float = 1.0) -> Reference:
     """Return ruckig's move from `start` to `goal` [rad], shape (joint,), gentle, at rest at both ends.
 
-    No faster than the file of the robot allows.
+    No faster than the file of the robot allows; with another `pace`, so many times as fast.
 
     Raises
     ------
@@ -28,4 +28,5 @@ def approach(robot: Robot, start: Array, goal: Array, fs: float) -> Reference:
     require_in_range(robot, start[None])
     most = np.stack([robot.most(rate) for rate in ("velocity", "acceleration", "jerk")])
     limits = np.minimum(most, np.array([[VELOCITY], [ACCELERATION], [JERK]]))
+    limits *= pace ** np.arange(1.0, 4.0)[:, None]
     return JerkLimited.between(np.stack([start, goal]), limits, REST).sample(fs)

@@ -1,0 +1,227 @@
+"""The command that designs motions: what it writes keeps its limits, beats random motions, and comes out again."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.cli import main
+from experiments.excite.design import Design
+from experiments.excite.excitation import EXCITATIONS
+from experiments.excite.excited import Excited, sigmas_of
+from sim.planning.motion_limits import MotionLimits
+from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
+from sim.robot.robot import Robot
+from sim.scenario.measurement import TorqueMeasurement
+from sim.scenario.scenario_file import load
+
+TORQUES = (75.0, 110.0, 50.0, 7.0, 6.0, 5.0)
+"""Of the motors of the PUMA, smaller than they are [N m]: they hold motions back."""
+
+SHORT = ["--duration", "4", "--no-rerun"]
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    out = tmp_path_factory.mktemp("excite") / "scara"
+    assert main(["excite", "scara", "--duration", "6", "--out", str(out)]) == 0
+    return out
+
+
+def table(out):
+    lines = (out / "motion.csv").read_text().splitlines()
+    assert lines[0].startswith("# part: 0 the way")
+    return lines[1].split(","), np.loadtxt(lines[2:], delimiter=",")
+
+
+def test_it_writes_all_that_a_lab_needs(written):
+    files = {"motion.csv", "scenario.toml", "summary.json", "report.html", "recording.rrd"}
+    assert {path.name for path in written.iterdir()} == files
+    summary = json.loads((written / "summary.json").read_text())
+    assert summary["parameters"] == ["ZZR1", "Fv1", "Fs1", "ZZ2", "LMX2", "LMY2", "Fv2", "Fs2"]
+    assert summary["over_random_median"] < 0.62
+    assert summary["over_random_best"] < 0.75
+    page = (written / "report.html").read_text()
+    assert "typical sigma" in page
+    assert "src=" not in page
+
+
+def test_the_motion_starts_and_ends_at_rest_at_home_and_never_jumps(written):
+    names, rows = table(written)
+    assert names == ["t", "part", "q_joint1", "q_joint2", "qd_joint1", "qd_joint2", "qdd_joint1", "qdd_joint2"]
+    t, part, q, qd, qdd = rows[:, 0], rows[:, 1], rows[:, 2:4], rows[:, 4:6], rows[:, 6:8]
+    np.testing.assert_allclose(np.diff(t), 0.01, atol=1e-9)
+    assert np.unique(part).tolist() == [0, 1, 2]
+    assert (np.diff(part) >= 0).all()
+    np.testing.assert_allclose(q[[0, -1]], 0.0, atol=1e-6)
+    np.testing.assert_allclose(qd[[0, -1]], 0.0, atol=1e-6)
+    np.testing.assert_allclose(np.gradient(q, 0.01, axis=0)[1:-1], qd[1:-1], atol=0.05)
+    assert np.abs(qd).max() <= 7
+    assert np.abs(qdd).max() <= 25
+
+
+def test_its_scenario_runs_and_its_errors_are_as_predicted(written, tmp_path):
+    """Of one run: errors within four of the sigmas that were predicted before it."""
+    assert main(["run", str(written / "scenario.toml"), "--out", str(tmp_path / "run"), "--no-rerun"]) == 0
+    predicted = json.loads((written / "summary.json").read_text())
+    found = json.loads((tmp_path / "run" / "summary.json").read_text())
+    off = np.subtract(found["models"]["explicit"]["estimate"], found["truth"])
+    assert (np.abs(off) < 4 * np.array(predicted["sigma"])).all()
+
+
+@pytest.mark.parametrize("kind", EXCITATIONS.builtin)
+def test_limits_hold_at_a_thousand_hertz_by_mujocos_own_torques(kind):
+    """Also with the parameters of the file off by 30 %, every one to its worst side or at random."""
+    noisy = replace(load("arm"), torque=TorqueMeasurement(noise=(0.05,)))
+    found = Excited.of(Design("puma560", noisy, kind, 4.0, 1.0, MotionLimits(torque=TORQUES)))
+    robot, motion = Robot.load("puma560"), found.design.trajectory(found.c).plan(Robot.load("puma560")).sample(1000.0)
+    assert (motion.q >= robot.ranges[:, 0]).all()
+    assert (motion.q <= robot.ranges[:, 1]).all()
+    for values, rate in ((motion.qd, "velocity"), (motion.qdd, "acceleration")):
+        assert (np.abs(values) <= robot.most(rate) * (1 + 1e-6)).all()
+    tau = inverse_dynamics(robot, motion.q, motion.qd, motion.qdd) + coulomb_torque(robot, motion.qd)
+    limit = np.array(TORQUES)
+    assert (np.abs(tau) <= 0.8 * limit * (1 + 1e-6)).all()
+    rng, model = np.random.default_rng(0), robot.model
+    for _ in range(20):
+        for field in ("body_mass", "body_inertia", "dof_armature", "dof_damping", "dof_frictionloss"):
+            values = getattr(model, field)
+            values *= rng.uniform(0.7, 1.3, values.shape)
+        off = inverse_dynamics(robot, motion.q, motion.qd, motion.qdd) + coulomb_torque(robot, motion.qd)
+        assert (np.abs(off) <= limit).all()
+        robot = Robot.load("puma560")
+        model = robot.model
+
+
+def test_the_same_seed_gives_the_same_motion(tmp_path):
+    motions = []
+    for name in ("a", "b"):
+        assert main(["excite", "scara", *SHORT, "--seed", "3", "--out", str(tmp_path / name)]) == 0
+        motions.append((tmp_path / name / "motion.csv").read_bytes())
+    assert motions[0] == motions[1]
+
+
+def test_an_earlier_log_is_used(written, tmp_path, capsys):
+    """With ten times the same motion known, the next one tells other things, and sigmas are below those of the log."""
+    assert main(["run", str(written / "scenario.toml"), "--out", str(tmp_path / "run"), "--no-rerun"]) == 0
+    asked = ["--log", str(tmp_path / "run" / "log.parquet"), "--out", str(tmp_path / "next")]
+    assert main(["excite", "scara", *SHORT, *asked]) == 0
+    assert "earlier" in capsys.readouterr().out
+    summary = json.loads((tmp_path / "next" / "summary.json").read_text())
+    assert (np.array(summary["sigma"]) < summary["earlier"]).all()
+
+
+def test_what_is_weighed_comes_out_better(tmp_path):
+    sigmas = []
+    for weights in ([], ["--weigh", "ZZR1=20"]):
+        out = tmp_path / str(len(weights))
+        assert main(["excite", "scara", *SHORT, *weights, "--out", str(out)]) == 0
+        sigmas.append(json.loads((out / "summary.json").read_text())["sigma"][0])
+    assert sigmas[1] < 0.8 * sigmas[0]
+
+
+def test_a_keep_out_box_is_kept_out_of(tmp_path):
+    """Of the box of the file, by MuJoCo's own distances at every sample of what is written."""
+    from sim.planning.clearance import Clearance
+    from sim.planning.motion_limits import surroundings
+
+    limits = tmp_path / "limits.toml"
+    limits.write_text('[[keep_out]]\nname = "post"\nlowest = [0.3, 0.35, 0]\nhighest = [0.45, 0.5, 1]\n')
+    assert main(["excite", "scara", *SHORT, "--limits", str(limits), "--out", str(tmp_path / "out")]) == 0
+    _, rows = table(tmp_path / "out")
+    robot = surroundings("scara", MotionLimits.read(limits))
+    found = Clearance(robot, robot.ranges, 0.01)
+    assert any("post" in found._names(pair) for pair in found.pairs)
+    assert found.distances(rows[:, 2:4], 0.05).min() > 0.0095
+
+
+def test_motions_follow_until_all_is_known(tmp_path, capsys):
+    out = tmp_path / "out"
+    assert main(["excite", "scara", *SHORT, "--until", "0.35%", "--out", str(out)]) == 0
+    summary = json.loads((out / "summary.json").read_text())
+    shares = [each["brisk_share"] for each in summary["rounds"]]
+    assert shares == sorted(shares, reverse=True)
+    assert shares[-1] < 0.0035
+    assert len(shares) == 1 or shares[-2] >= 0.0035
+    assert "motion 1" in capsys.readouterr().out
+
+
+def test_what_stays_unknown_is_told(tmp_path, monkeypatch, complaint):
+    monkeypatch.setattr("experiments.excite.sequence.ROUNDS", 1)
+    line = complaint("excite", "scara", *SHORT, "--until", "0.0001%", "--out", str(tmp_path / "out"))
+    assert "after 1 motions one sigma of" in line
+    assert "give a longer --duration, less noise, or a higher --until" in line
+
+
+def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
+    from identify.design.plan import Plan
+
+    calls, value = [0], Plan.value
+
+    def interrupted(self, c):
+        calls[0] += 1
+        if calls[0] == 200:
+            raise KeyboardInterrupt
+        return value(self, c)
+
+    monkeypatch.setattr(Plan, "value", interrupted)
+    assert main(["excite", "scara", *SHORT, "--out", str(tmp_path / "out")]) == 0
+    assert "interrupted: this is the best motion so far" in capsys.readouterr().out
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["interrupted"] is True
+
+
+@pytest.mark.parametrize(
+    ("args", "message"),
+    [
+        (["panda", "--duration", "0.5", "--frequency", "6"], "fewer than the 62 parameters: give a --duration of at least"),
+        (["scara", "--duration", "1"], "have no two harmonics up to 1 Hz"),
+        (["scara", "--duration", "2", "--kind", "moves"], "are no three moves, 1 a second"),
+        (["scara", "--duration", "nan"], "--duration nan must be above 0"),
+        (["scara", "--frequency", "60"], "--frequency 60 must be above 0 and at most 25"),
+        (["scara", "--kind", "fourrier"], "no 'fourrier' among the excitations (did you mean 'fourier'?)"),
+        (["scara", "--weigh", "Fv3=2"], "--weigh Fv3: no such parameter (did you mean"),
+        (["scara", "--weigh", "Fv2"], "--weigh Fv2: give a parameter and a weight above 0"),
+        (["scara", "--criterion", "cond"], "--criterion cond: no such criterion"),
+        (["scara", "--torque-noise", "0"], "sigmas need a noise of the torques above 0"),
+        (["scara", "--torque-noise", "1", "2", "3"], "--torque-noise has 3 values for 2 joints"),
+        (["scara", "--encoder-bits", "99"], "--encoder-bits 99 must be between 4 and 40"),
+        (["scara", "--until", "200%"], "--until 200%: give a share between 0 and 100 %"),
+        (["scara", "--limits", "nowhere.toml"], "cannot read limits nowhere.toml"),
+        (["scara", "--repeat", "0"], "--repeat 0 must be at least 1"),
+        (["scara", "--noise", "ideal"], "sigmas need a noise of the torques above 0"),
+        (["scora"], "did you mean 'scara'?"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_wrong_input_is_one_line(args, message, tmp_path, monkeypatch, complaint):
+    monkeypatch.chdir(tmp_path)
+    assert message in complaint("excite", *args, "--no-rerun")
+    assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("torque = 0.1", "no motion was found that keeps all limits: "),
+        ("torque = 1e-3\n[position]\njoint1 = [-0.1, 0.1]", "no motion was found that keeps all limits: torque"),
+        ('[[keep_out]]\nname = "cage"\nlowest = [-1, -1, 0]\nhighest = [1, 1, 1]', "keep_out cage: link1_hub is inside it"),
+        ("home = [5, 0]", "limits: home = [5.0, 0.0] puts joint1 outside its range"),
+    ],
+    ids=["torque", "range", "cage", "home"],
+)
+def test_limits_that_nothing_keeps_are_told_by_name(text, message, tmp_path, complaint):
+    limits = tmp_path / "limits.toml"
+    limits.write_text(text)
+    assert message in complaint("excite", "scara", *SHORT, "--limits", str(limits), "--out", str(tmp_path / "out"))
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_log_of_another_robot_is_refused(logs, tmp_path, complaint):
+    line = complaint("excite", "scara", *SHORT, "--log", str(logs / "first.parquet"), "--out", str(tmp_path / "out"))
+    assert "the log has 6 joints, the robot 2" in line
+
+
+def test_sigmas_of_what_is_not_told_are_infinite():
+    M = np.diag([4.0, 0.0, 1e6])
+    np.testing.assert_allclose(sigmas_of(M), [0.5, np.inf, 1e-3])

@@ -1,0 +1,186 @@
+"""What a motion must keep: distances, floors, boxes, and limits from files."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sim.errors import RobotError, ScenarioError
+from sim.planning.clearance import Clearance
+from sim.planning.motion_limits import Bounds, KeepOut, MotionLimits, surroundings
+from sim.robot.robot import Robot
+from sim.trajectories import Fourier
+
+BALLS = """
+<mujoco><compiler angle="radian"/><option gravity="0 0 0"/><worldbody>
+  <geom name="post" type="sphere" size="0.1" pos="1 0 0.5"/>
+  <body pos="0 0 0.5"><joint name="turn" axis="0 0 1" range="-3 3"/><geom name="hub" size="0.2"/><inertial pos="0 0 0" mass="1"
+    diaginertia="1 1 1"/>
+    <body pos="0.5 0 0"><joint name="reach" type="slide" axis="1 0 0" range="-0.1 1"/><geom name="ball" size="0.1"/>
+    <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></body>
+</worldbody></mujoco>"""
+
+URDF = """
+<robot name="arm"><link name="base"/><link name="link"><inertial><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="one" type="revolute"><parent link="base"/><child link="link"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="33" velocity="2.5"/></joint></robot>"""
+
+
+@pytest.fixture
+def balls(tmp_path):
+    path = tmp_path / "balls.xml"
+    path.write_text(BALLS)
+    return str(path)
+
+
+@pytest.fixture
+def clear(balls):
+    robot = Robot.load(balls)
+    return Clearance(robot, robot.ranges, 0.05)
+
+
+def test_distances_are_those_of_spheres(clear):
+    q = np.array([[0.0, 0.0], [0.5, 0.3], [3.0, 0.0], [0.2, 0.45]])
+    ball = np.stack([(0.5 + q[:, 1]) * np.cos(q[:, 0]), (0.5 + q[:, 1]) * np.sin(q[:, 0])], axis=1)
+    post = np.linalg.norm(ball - [1.0, 0.0], axis=1) - 0.2
+    found = clear.distances(q, 10.0)
+    pair = [clear._names(p) for p in clear.pairs].index(("post", "ball"))
+    np.testing.assert_allclose(found[:, pair], post, atol=1e-6)
+
+
+def test_neighbours_are_left_out_and_what_always_touches_is_told(balls, clear):
+    assert ("hub", "ball") not in [clear._names(p) for p in clear.pairs]
+    asked = MotionLimits(keep_out=(KeepOut("cage", (-0.1, -0.1, 0.4), (0.1, 0.1, 0.6)),))
+    robot = surroundings(balls, asked)
+    assert ("cage", "hub") in [tuple(sorted(p)) for p in Clearance(robot, robot.ranges, 0.05).left_out]
+
+
+def test_the_slope_of_nearness_is_its_derivative(clear):
+    q, h = np.array([[0.1, 0.25], [-0.2, 0.3], [2.0, 0.0]]), 1e-6
+    direction = np.array([[0.4, -1.0], [1.0, 0.7], [0.3, 0.3]])
+    change = (clear.cost(q + h * direction)[0] - clear.cost(q - h * direction)[0]) / (2 * h)
+    cost, slope = clear.cost(q)
+    assert cost > 0
+    assert np.sum(slope * direction) == pytest.approx(change, rel=1e-5)
+
+
+def test_the_nearest_is_found_between_coarse_instants(clear):
+    """A fast pass within a few milliseconds: the ball sweeps by the post at 20 rad/s."""
+    fs = 1000.0
+    t = np.arange(0, 0.2, 1 / fs)
+    q = np.stack([-2.0 + 20 * t, np.full_like(t, 0.4)], axis=1)
+    qd = np.stack([np.full_like(t, 20.0), 0 * t], axis=1)
+    touch = clear.nearest(q, qd, fs)
+    dense = clear.distances(q, 0.05)
+    assert touch.distance == pytest.approx(dense.min())
+    assert set(touch.shapes) == {"post", "ball"}
+    assert clear.nearest(q[:20], qd[:20], fs) is None
+
+
+def test_the_floor_is_below_what_the_robot_stands_on():
+    robot = surroundings("panda", MotionLimits())
+    floor = robot.model.geom("floor")
+    assert floor.pos[2] == pytest.approx(0.0, abs=1e-9)
+    none = surroundings("panda", MotionLimits(floor="none"))
+    assert none.model.ngeom == robot.model.ngeom - 1
+
+
+def test_shipped_arms_are_clear_at_home():
+    for name in ("scara", "puma560", "panda"):
+        bounds = Bounds.of(Robot.load(name), MotionLimits())
+        clearance = Clearance(surroundings(name, MotionLimits()), bounds.position, 0.01)
+        assert clearance.distances(bounds.home[None], 0.05).min() > 0.01
+        assert not clearance.left_out
+
+
+def test_a_urdf_says_velocities_and_efforts_but_has_no_shapes(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(URDF)
+    robot = Robot.load(str(path))
+    bounds = Bounds.of(robot, MotionLimits())
+    assert bounds.velocity.tolist() == [2.5]
+    assert bounds.torque.tolist() == [33.0]
+    assert not Clearance(surroundings(str(path), MotionLimits()), bounds.position, 0.01).checks
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        ({}, "nothing says how fast turn, reach may turn"),
+        ({"velocity": (1.0,)}, "nothing limits the acceleration or the torque of turn, reach"),
+        ({"position": {"tirn": (0.0, 1.0)}}, "no such joint (did you mean 'turn'?)"),
+        ({"position": {"turn": (1.0, 0.0)}}, "the lowest is not below the highest"),
+        ({"position": {"turn": (4.0, 5.0)}}, "lies outside the range of its file"),
+        ({"velocity": (1.0,), "torque": (5.0,), "home": (9.0, 0.0)}, "puts turn outside its range"),
+        ({"velocity": (1.0, 2.0, 3.0), "torque": (5.0,)}, "3 values for 2 joints"),
+    ],
+)
+def test_limits_that_do_not_fit_say_what_to_write(balls, asked, message):
+    with pytest.raises(ScenarioError) as error:
+        Bounds.of(Robot.load(balls), MotionLimits(**asked))
+    assert message in str(error.value)
+
+
+def test_a_joint_without_a_range_is_asked_for_one(tmp_path):
+    path = tmp_path / "free.xml"
+    path.write_text(BALLS.replace(' range="-3 3"', ""))
+    with pytest.raises(ScenarioError, match=r"turn has no range: write \[position\] and turn = \[lowest, highest\]"):
+        Bounds.of(Robot.load(str(path)), MotionLimits(velocity=(1.0,)))
+
+
+def test_numbers_of_a_file_must_be_as_many_as_its_joints(tmp_path):
+    path = tmp_path / "wrong.xml"
+    path.write_text(BALLS.replace("<worldbody>", '<custom><numeric name="max_velocity" data="1"/></custom><worldbody>'))
+    with pytest.raises(RobotError, match="max_velocity has 1 values for 2 joints"):
+        Robot.load(str(path)).most("velocity")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("velocty = 1", "unknown key 'velocty' (did you mean 'velocity'?)"),
+        ("velocity = -1", "velocity[0] = -1"),
+        ("velocity = ", "cannot read limits"),
+        ('[[keep_out]]\nname = "a"\nlowest = [0, 0, 1]\nhighest = [1, 1, 0]', "is not below highest"),
+    ],
+)
+def test_wrong_limits_are_told(tmp_path, text, message):
+    path = tmp_path / "limits.toml"
+    path.write_text(text)
+    with pytest.raises(ScenarioError) as error:
+        MotionLimits.read(path)
+    assert message in str(error.value)
+    with pytest.raises(ScenarioError, match="cannot read limits"):
+        MotionLimits.read(tmp_path / "nowhere.toml")
+
+
+SERIES = Fourier(period=4.0, middle=(0.1, 0.2), sines=((0.3, 0.2), (0.1, -0.1)), cosines=((0.0, 0.1), (0.2, 0.0)), fade=1.0)
+
+
+@pytest.mark.parametrize("series", [SERIES, Fourier(), replace(Fourier(), repeat=3)], ids=["fading", "at rest", "three times"])
+def test_a_series_moves_as_its_derivatives_say(robot, series):
+    motion = series.plan(robot)
+    t, h = np.linspace(series.rest + 0.01, motion.duration - series.rest - 0.01, 500), 1e-6
+    before, here, after = (motion.at(t + d, 1.0) for d in (-h, 0.0, h))
+    np.testing.assert_allclose((after.q - before.q) / (2 * h), here.qd, atol=1e-7)
+    np.testing.assert_allclose((after.qd - before.qd) / (2 * h), here.qdd, atol=1e-6)
+    ends = motion.at(np.array([0.0, series.rest, motion.duration - series.rest, motion.duration + 1]), 1.0)
+    np.testing.assert_allclose(ends.qd, 0.0, atol=1e-9)
+
+
+def test_a_series_is_its_sum_in_the_middle(robot):
+    motion = replace(SERIES, repeat=2).plan(robot)
+    t = np.array([0.0, 0.7, 4.3])
+    w = 2 * np.pi / 4.0
+    one = 0.1 + 0.3 * np.sin(w * t) + 0.1 * np.sin(2 * w * t) + 0.2 * np.cos(2 * w * t)
+    np.testing.assert_allclose(motion.at(SERIES.rest + SERIES.fade + t, 1.0).q[:, 0], one)
+
+
+def test_a_series_that_does_not_rest_must_fade_in():
+    with pytest.raises(ScenarioError, match="does not begin at rest: give it a time to fade in"):
+        replace(SERIES, fade=0.0)
+    with pytest.raises(ScenarioError, match="needs 2 coefficients"):
+        replace(SERIES, sines=((0.1,), (0.2,)))
+    with pytest.raises(ScenarioError, match="give as many of both"):
+        replace(SERIES, sines=((0.1, 0.2),))
