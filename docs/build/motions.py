@@ -14,18 +14,21 @@ from pathlib import Path
 
 import numpy as np
 import tomli_w
+from scipy.stats import spearmanr
 
 DOCS = Path(__file__).absolute().parent.parent
 sys.path.insert(0, str(DOCS.parent))
 
 from experiments.excite.design import Design  # noqa: E402
 from experiments.excite.excited import Excited, sigmas_of  # noqa: E402
+from identify.design.criteria import CRITERIA as CRITERIA_OF_W  # noqa: E402
 from sim.encoders import IncrementalEncoder  # noqa: E402
 from sim.planning.motion_limits import MotionLimits  # noqa: E402
 from sim.scenario.measurement import TorqueMeasurement  # noqa: E402
 from sim.scenario.scenario_file import FOLDER, load, to_dict  # noqa: E402
 
 PREDICTED = DOCS / "results" / "excitation-motions.json"
+RANKS = DOCS / "results" / "excitation-ranks.json"
 ROBOTS = ("scara", "puma560", "panda")
 CRITERIA = ("sigma", "determinant", "smallest", "birdy", "condition")
 
@@ -71,6 +74,8 @@ def asked() -> Iterator[tuple[str, Asked]]:
 
 def main(names: list[str]) -> None:
     """Design motions, write them, and keep what is predicted of them."""
+    if not names or "ranks" in names:
+        RANKS.write_text(json.dumps({robot: ranks(robot) for robot in ROBOTS}, indent=1) + "\n")
     kept: dict[str, dict[str, object]] = json.loads(PREDICTED.read_text()) if PREDICTED.is_file() else {}
     for name, wanted in asked():
         if names and name not in names:
@@ -85,6 +90,30 @@ def main(names: list[str]) -> None:
             kept[f"{wanted.robot}-random"] = _predicted(random)
         print(name, round(found.ratios[0], 3), round(found.condition, 1), flush=True)
         PREDICTED.write_text("{\n" + ",\n".join(f'"{key}": {json.dumps(kept[key])}' for key in sorted(kept)) + "\n}\n")
+
+
+RANKED, STRONGEST = 120, 5.0
+"""Random motions whose order by each criterion is compared, and the most by which they are made smaller."""
+
+
+def ranks(robot: str) -> dict[str, tuple[float, float]]:
+    """Return the rank correlation of criteria with the typical sigma over random motions, and what the best by each is worth.
+
+    That is its typical sigma over the least of all. Motions are as they come, or slower, or smaller.
+    """
+    design = Asked(robot).design
+    rng, plan = np.random.default_rng(1), design.plan
+    drawn = [design.excitation.random(rng, plan, design.duration, design.frequency) for _ in range(RANKED)]
+    motions = [plan.motion(c / STRONGEST ** rng.uniform(0, 2)) for c in drawn]
+    columns = [plan.information.columns(motion) * plan.information.weight(motion)[..., None] for motion in motions]
+    typical = np.array([float(design.sigma_criterion.value(plan.information.matrix(W))) for W in columns])
+    found = {}
+    for name, criterion in CRITERIA_OF_W.items():
+        matrices = [plan.information.matrix(W) if criterion.noise else np.tensordot(W, W, ((0, 1), (0, 1))) for W in columns]
+        values = np.array([float(criterion.value(M)) for M in matrices])
+        pick = float(np.exp(typical[values.argmin()] - typical.min()))
+        found[name] = (round(float(spearmanr(values, typical).statistic), 3), round(pick, 3))
+    return found
 
 
 def _write(name: str, found: Excited) -> None:

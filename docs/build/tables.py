@@ -17,7 +17,7 @@ from typing import Any
 DOCS = Path(__file__).absolute().parent.parent
 sys.path.insert(0, str(DOCS.parent))
 RESULTS = DOCS / "results"
-PAGES = ("answers.md", "noise.md", "table2.md")
+PAGES = ("answers.md", "excitation.md", "noise.md", "table2.md")
 KEPT = ("settings", "chain", "estimator", "model", "runs", "rmse_percent", "coverage", "paper_coverage", "bound_percent")
 """What is kept of a cell."""
 
@@ -165,6 +165,97 @@ def _causes(form: str) -> Callable[[], Iterator[str]]:
     return table
 
 
+CRITERIA = {
+    "sigma": "mean ln sigma",
+    "determinant": "ln det(W' C⁻¹ W)",
+    "smallest": "s_min(W)",
+    "random": "none: the median of 60 random motions",
+    "birdy": "Cond(W' W) + 100 / s_min(W)",
+    "condition": "Cond(W)",
+}
+ARMS = {"scara": "", "puma560": "-puma", "panda": "-panda"}
+
+
+def _predicted(name: str, bits: str = "17") -> Cell:
+    """Return what is predicted of a motion, as if it were a cell."""
+    found = json.loads((RESULTS / "excitation-motions.json").read_text())[name]
+    return {"condition": found["condition"], "rmse_percent": [x for x in found["sigma_percent"][bits] if x]}
+
+
+def _of_motions(study: str) -> dict[str, Cell]:
+    return {str(c["settings"]["trajectory"]).removeprefix("excited/"): c for c in cells(study) if c["model"] == "explicit"}
+
+
+def _criteria() -> Iterator[str]:
+    def rows() -> Iterator[Sequence[str]]:
+        found = {arm: _of_motions(f"excitation-criteria{end}") for arm, end in ARMS.items()}
+        for criterion, words in CRITERIA.items():
+            row = [words]
+            for arm, cells_of in found.items():
+                name = f"{arm}-{criterion}"
+                predicted = _predicted(name)
+                row += [f"{predicted['condition']:.3g}", typical(predicted), typical(cells_of[name])]
+            yield row
+
+    heads = [f"{arm}: {what}" for arm in ARMS for what in ("Cond(W)", "predicted", "found")]
+    yield from _table(["what is optimised", *heads], rows())
+
+
+def _ranks() -> Iterator[str]:
+    found = json.loads((RESULTS / "excitation-ranks.json").read_text())
+    rows = (
+        [CRITERIA[c], *(f"{found[arm][c][i]:.2f}" for arm in ARMS for i in (0, 1))] for c in CRITERIA if c in found["scara"]
+    )
+    heads = [f"{arm}: {what}" for arm in ARMS for what in ("rank correlation", "its pick")]
+    yield from _table(["criterion", *heads], rows)
+
+
+def _motions(study: str, name: str, labels: dict[str, str]) -> Callable[[], Iterator[str]]:
+    """Return what makes the table of a study of motions."""
+
+    def rows() -> Iterator[Sequence[str]]:
+        found = _of_motions(study)
+        for motion, label in labels.items():
+            yield [label, typical(_predicted(motion)), typical(found[motion]), coverage(found[motion])]
+
+    return lambda: _table([name, "predicted typical sigma [%]", "found typical error [%]", "coverage"], rows())
+
+
+def _coarse() -> Iterator[str]:
+    made = {"scara-sigma": "17 bits", "scara-12bits": "12 bits", "scara-slow": "17 bits, at most 2 rad/s"}
+    found = {(c["settings"]["encoder.lines"], str(c["settings"]["trajectory"])[8:]): c for c in cells("excitation-coarse")}
+    lines = sorted({line for line, _ in found})
+    rows = ([words, *(typical(found[line, motion]) for line in lines)] for motion, words in made.items())
+    yield from _table(["designed for", *(f"{log2(4 * line):g} bits" for line in lines)], rows)
+
+
+def _foretold() -> Iterator[str]:
+    motions = json.loads((RESULTS / "excitation-motions.json").read_text())
+    bits = {0.0: ("24", "none"), 1.384e-05: ("17", "17 bits"), 1.107e-04: ("14", "14 bits")}
+
+    def rows() -> Iterator[Sequence[str]]:
+        for level, (number, words) in bits.items():
+            row = [words]
+            for arm, end in (("scara", ""), ("puma560", "-puma")):
+                each = {
+                    c["estimator"]: c for c in cells(f"excitation-predicted{end}") if c["settings"]["encoder.noise"] == level
+                }
+                predicted = json.loads((RESULTS / "excitation-motions.json").read_text())[f"{arm}-sigma"]["sigma_percent"][
+                    number
+                ]
+                row += [f"{_ratio(each[method], predicted):.2f}" for method in ("GLS", "ML")]
+            yield row
+
+    heads = [f"{arm}, {method}" for arm in ("scara", "puma560") for method in ("GLS", "ML")]
+    yield from _table(["noise of the positions", *heads], rows())
+
+
+def _ratio(cell: Cell, predicted: Sequence[float | None]) -> float:
+    """Return the geometric mean of errors over what was predicted."""
+    pairs = [(e, p) for e, p in zip(cell["rmse_percent"], predicted, strict=True) if e and p]
+    return exp(sum(log(e / p) for e, p in pairs) / len(pairs))
+
+
 TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "encoder": lambda: _usual("encoder", "lines (counts)", _lines, FOUR),
     "torque-noise": lambda: _usual("torque-noise", "rms [N m]", _one("torque.noise"), FOUR),
@@ -179,6 +270,23 @@ TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "table2-power": _causes("power"),
     "bound-encoder": _bound("bound-encoder", "lines (counts)", _lines),
     "bound-torque": _bound("bound-torque", "torque noise [N m]", _one("torque.noise")),
+    "excitation-criteria": _criteria,
+    "excitation-ranks": _ranks,
+    "excitation-length": _motions(
+        "excitation-length",
+        "length [s]",
+        {"scara-5s": "5", "scara-sigma": "10", "scara-20s": "20", "scara-40s": "40"},
+    ),
+    "excitation-frequency": _motions(
+        "excitation-frequency",
+        "up to [Hz]",
+        {"scara-0p3Hz": "0.3", "scara-0p5Hz": "0.5", "scara-sigma": "1", "scara-1p5Hz": "1.5", "scara-2Hz": "2"},
+    ),
+    "excitation-kind": _motions(
+        "excitation-kind", "kind", {"scara-sigma": "Fourier series", "scara-moves": "point-to-point moves"}
+    ),
+    "excitation-coarse": _coarse,
+    "excitation-predicted": _foretold,
 }
 
 if __name__ == "__main__":

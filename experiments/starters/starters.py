@@ -46,6 +46,7 @@ KINDS: Mapping[str, Kind] = {
     "trajectory": Kind("trajectories", "A trajectory", OF_SCENARIOS.format("trajectory")),
     "controller": Kind("controllers", "A controller", OF_SCENARIOS.format("controller")),
     "drive": Kind("drives", "A drive", OF_SCENARIOS.format("drive")),
+    "excitation": Kind("excitations", "A kind of motion that is designed", "`idbench excite scara --kind NAME`"),
     "encoder": Kind("encoders", "An encoder", OF_SCENARIOS.format("encoder")),
 }
 """Kinds of plug-ins that can be begun."""
