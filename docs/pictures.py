@@ -68,6 +68,7 @@ PICTURES = {
     "table1": Picture(("table1 --out OUT",), "", 0.6),
     "table2": Picture(("table2 --out OUT",), "", 0.6),
     "recording-compare": Picture(("run quantization --out OUT/quantization", "run ripple --out OUT/ripple"), "compare"),
+    "recording-excited": Picture(("excite panda --out OUT",), "", 0.55),
     "recording-study": Picture(("study encoder --out OUT",), "study"),
 }
 
@@ -86,7 +87,7 @@ def make(names: list[str]) -> None:
             with viewer(Path(folder)) as client:  # one a picture: a viewer keeps the layout that it opens first
                 take(client, done[picture.commands], picture, DOCS / f"{name}.png")
             if (report := done[picture.commands] / "report.html").is_file():
-                photograph(report, DOCS / "study.png")
+                photograph(report, DOCS / f"{picture.commands[0].split()[0]}.png")
 
 
 def called(name: str, picture: Picture) -> str:

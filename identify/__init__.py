@@ -27,6 +27,7 @@ from identify.data.kinematics import Joint as Joint
 from identify.data.kinematics import KinematicTree as KinematicTree
 from identify.data.motion_log import MotionLog as MotionLog
 from identify.data.motion_log import TorqueChannel as TorqueChannel
+from identify.design.predicted import predicted_information as predicted_information
 from identify.errors import ExcitationError as ExcitationError
 from identify.errors import IdentificationError as IdentificationError
 from identify.errors import KinematicsError as KinematicsError

@@ -14,7 +14,7 @@ from mkdocs.structure.files import File, Files
 ROOT = Path(__file__).parent.parent.parent
 
 COMMANDS = (
-    *("table1", "table2", "run", "view", "identify", "robot", "study", "scenario", "new", "check", "list"),
+    *("table1", "table2", "run", "view", "identify", "robot", "excite", "study", "scenario", "new", "check", "list"),
     *("resample", "export", "search"),
 )
 """In the order in which people meet them."""
@@ -72,6 +72,16 @@ def settings() -> Iterator[str]:
         elif is_dataclass(field.default):
             yield f"\n## [{key}]\n\n{(type(field.default).__doc__ or '').strip().splitlines()[0]}\n"
             yield from _table(type(field.default))
+    yield from _limits()
+
+
+def _limits() -> Iterator[str]:
+    from sim.planning.motion_limits import KeepOut, MotionLimits
+
+    yield "\n## limits.toml\n\nWhat a motion of `idbench excite` must keep (`--limits`).\n"
+    yield from _table(MotionLimits)
+    yield "\n## [[keep_out]] of limits.toml\n"
+    yield from _table(KeepOut)
 
 
 def _table(cls: type) -> Iterator[str]:
@@ -118,6 +128,7 @@ def simulator() -> Iterator[str]:
         f"::: {name}\n"
         for name in (
             "sim.engine.simulation.simulate",
+            "sim.planning.clearance.Clearance",
             "sim.engine.run.Run",
             "sim.engine.watch.Watch",
             "sim.engine.ideal_log.ideal_log",

@@ -49,7 +49,7 @@ class Asked:
     def design(self) -> Design:
         """The design."""
         noisy = replace(
-            load("arm"),
+            load("ideal"),
             fs=100.0,
             encoder=IncrementalEncoder(lines=(round(2**self.bits / 4),)),
             torque=TorqueMeasurement(noise=(0.05,)),

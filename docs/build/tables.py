@@ -237,12 +237,9 @@ def _foretold() -> Iterator[str]:
         for level, (number, words) in bits.items():
             row = [words]
             for arm, end in (("scara", ""), ("puma560", "-puma")):
-                each = {
-                    c["estimator"]: c for c in cells(f"excitation-predicted{end}") if c["settings"]["encoder.noise"] == level
-                }
-                predicted = json.loads((RESULTS / "excitation-motions.json").read_text())[f"{arm}-sigma"]["sigma_percent"][
-                    number
-                ]
+                study = cells(f"excitation-predicted{end}")
+                each = {c["estimator"]: c for c in study if c["settings"]["encoder.noise"] == level}
+                predicted = motions[f"{arm}-sigma"]["sigma_percent"][number]
                 row += [f"{_ratio(each[method], predicted):.2f}" for method in ("GLS", "ML")]
             yield row
 

@@ -100,7 +100,7 @@ def _scenario(asked: Excite, subject: Subject) -> Scenario:
         )
     lines = max(1, round(2**asked.encoder_bits / 4))
     return replace(
-        load("arm"),
+        load("ideal"),
         fs=asked.fs,
         encoder=IncrementalEncoder(lines=(lines,)),
         torque=TorqueMeasurement(noise=asked.torque_noise),

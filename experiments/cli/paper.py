@@ -45,7 +45,7 @@ class Table1:
 @final
 @dataclass(frozen=True)
 class Search:
-    """Search a trajectory with the paper's condition numbers."""
+    """Search a trajectory with the paper's condition numbers: to meet its figures. Those of `idbench excite` tell more."""
 
     seed: int = 0
     """The same seed gives the same trajectory."""

@@ -294,14 +294,17 @@ class Design:
             search.found = cheapest
         return search
 
-    def way(self, c: Array) -> Reference:
-        """Return the way from home to where a motion starts, at FS: slower where its torques would be too large."""
-        start = self.trajectory(c).plan(self.subject.robot).sample(FS).q[0]
+    def way(self, c: Array, fs: float, pace: float) -> Reference:
+        """Return the way from home to where a motion starts, sampled at `fs` [Hz]."""
+        start = self.trajectory(c).plan(self.subject.robot).sample(fs).q[0]
+        return approach(self.subject.robot, self.bounds.home, start, fs, pace)
+
+    def pace(self, c: Array) -> float:
+        """Return how fast the way may be: slower where its torques would be too large."""
         for pace in PACES:
-            way = approach(self.subject.robot, self.bounds.home, start, FS, pace)
-            if not any(self.inspector.look(way).broken()):
+            if not any(self.inspector.look(self.way(c, FS, pace)).broken()):
                 break
-        return way
+        return pace
 
     def look(self, c: Array) -> LimitUse:
         """Return how far a motion uses its limits."""

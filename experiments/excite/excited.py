@@ -69,9 +69,14 @@ class Excited:
         return self.design.look(self.c)
 
     @cached_property
+    def pace(self) -> float:
+        """How fast the way from home is."""
+        return self.design.pace(self.c)
+
+    @cached_property
     def way(self) -> Reference:
         """The way from home to its start, at 1 kHz."""
-        return self.design.way(self.c)
+        return self.design.way(self.c, FS, self.pace)
 
     @cached_property
     def way_use(self) -> LimitUse:
@@ -168,9 +173,9 @@ class Excited:
 
     def planned(self, fs: float) -> tuple[Array, Reference]:
         """Return the part of each sample (0 there, 1 motion, 2 back), and the whole way of the arm, from home to home."""
-        step = max(1, round(FS / fs))
         main = self.design.trajectory(self.c).plan(self.design.subject.robot).sample(fs)
-        there = [x[::step] for x in (self.way.q, self.way.qd, self.way.qdd)]
+        way = self.design.way(self.c, fs, self.pace)
+        there = way.q, way.qd, way.qdd
         signs = 1.0, -1.0, 1.0
         back = [sign * x[::-1] for sign, x in zip(signs, there, strict=True)]
         parts = [np.concatenate(x) for x in zip(there, (main.q, main.qd, main.qdd), back, strict=True)]
