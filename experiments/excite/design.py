@@ -1,7 +1,7 @@
 """The design of a motion: what is asked, what random motions reach, what the search finds."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import ceil
 
@@ -18,7 +18,6 @@ from identify.design.information import Information
 from identify.design.limits import Limits
 from identify.design.plan import Plan
 from identify.design.predicted import predicted_information
-from identify.design.search import Search
 from identify.parameters.base_parameters import random_states
 from identify.plugins import did_you_mean
 from identify.rows.linearization import slopes
@@ -35,22 +34,8 @@ SIGMA, DETERMINANT = "sigma", "determinant"
 RANDOM, DRAWS = 60, 600
 """Random motions that a motion is compared with, and draws after which fewer will do."""
 
-STARTS, BASINS = 4, 12
-"""Least starts of the search, and starts times joints: few joints take little time."""
-
-STAGES = (0.3, 0, 40), (3.0, 2, 50), (30.0, 1, 60)
-"""Of the search: what exceeding limits costs, how many of the best are followed, all if 0, and steps from each. Limits that
-are hard from the first lead to poor motions, or nowhere."""
-
-HARDER = 300.0, 3000.0, 30000.0
-"""What exceeding limits costs while some are still broken; those of torques also become narrower, by as much as is exceeded:
-between the states that the search looks at torques may be larger, where a joint turns."""
-
 STATES = 12.0
 """States for each period of the highest frequency; at least 8 a second."""
-
-CLOSER = 1.005
-"""Factor by which limits of torques become narrower than what they are exceeded by."""
 
 FINER = 4
 """Instants at which limits are kept, for each state."""
@@ -188,8 +173,7 @@ class Design:
         rate = max(8.0, STATES * self.frequency)
         count = ceil(rate * self.duration)
         rate = count / self.duration
-        criterion = self._first
-        levels = self.levels if criterion.noise else NoiseLevels(np.ones(robot.n), np.zeros(robot.n))
+        levels = self.levels if self.first_criterion.noise else NoiseLevels(np.ones(robot.n), np.zeros(robot.n))
         information = Information(
             self.subject.basis, levels, inertia, self.scenario.fs, rate, min(FirLowPass().cutoff, self.scenario.fs / 2)
         )
@@ -201,12 +185,12 @@ class Design:
         self._require_enough(count * robot.n)
         return Plan(
             information,
-            criterion,
+            self.first_criterion,
             limits,
             states,
             instants,
             self.X,
-            self.known if criterion.noise else np.zeros_like(self.known),
+            self.known if self.first_criterion.noise else np.zeros_like(self.known),
             self.asked.prior_error,
             self.asked.torque_share,
             self.repeat,
@@ -224,7 +208,7 @@ class Design:
             )
 
     @property
-    def _first(self) -> AbstractCriterion:
+    def first_criterion(self) -> AbstractCriterion:
         """What the search begins with: the determinant, which leads far from anywhere, unless some parameters count more."""
         if self.criterion == SIGMA and self.weights:
             return self.sigma_criterion
@@ -266,33 +250,6 @@ class Design:
             if self.plan.excess(c) == 0:
                 kept.append(c)
         return kept, drawn
-
-    def search(self, random: list[Array], progress: Callable[[float], None] | None = None) -> Search:
-        """Return the search of the best motion, begun with the best of random ones and those of the kind's own."""
-        rng, starts = np.random.default_rng([self.seed, 2]), max(STARTS, BASINS // self.subject.robot.n)
-        own = self.excitation.starts(rng, self.plan, self.duration, self.frequency, starts - bool(random))
-        cheapest = sorted(random, key=lambda c: self.plan.value(c)[0])[:1]
-        counts = [keep or starts for _, keep, _ in STAGES]
-        steps = sum(count * rounds for count, (_, _, rounds) in zip(counts, STAGES, strict=True))
-        _, _, last = STAGES[-1]
-        search = Search([*own, *cheapest], steps + last * (self.criterion == SIGMA), progress)
-        for count, (hard, _, rounds) in zip(counts, STAGES, strict=True):
-            search.run(replace(self.plan, hard=hard), count, rounds)
-        polished = self.plan
-        if self.criterion == SIGMA:
-            polished = replace(self.plan, criterion=self.sigma_criterion)
-            search.run(replace(polished, hard=hard), 1, rounds)
-        for harder in HARDER:
-            if not any((use := self.look(search.best)).broken()):
-                break
-            over = max(1.0, *(CLOSER * float(share.max()) for name, share in use.largest.items() if "torque" in name), 1.0)
-            torque, rms = polished.limits.torque / over, polished.limits.rms_torque / over
-            limits = replace(polished.limits, torque=torque, rms_torque=rms)
-            polished = replace(polished, limits=limits, hard=harder)
-            search.run(polished, 1, rounds)
-        if search.interrupted and cheapest and any(self.look(search.best).broken()):
-            search.found = cheapest
-        return search
 
     def way(self, c: Array, fs: float, pace: float) -> Reference:
         """Return the way from home to where a motion starts, sampled at `fs` [Hz]."""

@@ -11,6 +11,7 @@ from experiments.errors import ExperimentError
 from experiments.excite.design import Design
 from experiments.excite.excitation import REST
 from experiments.excite.limit_use import FS, LimitUse
+from experiments.excite.stages import searched
 from experiments.identification.subject import absolute
 from identify import Array
 from sim.engine.simulation import Progress
@@ -53,7 +54,7 @@ class Excited:
     def of(cls, design: Design, progress: Progress | None = None) -> "Excited":
         """Search a motion; raise ExperimentError if none is found that keeps all limits, with what it breaks."""
         random, drawn = design.random_motions()
-        search = design.search(random, progress)
+        search = searched(design, random, progress)
         found = cls(design, search.best, random, drawn, search.interrupted)
         if broken := [*found.use.broken(), *(f"on the way from home, {what}" for what in found.way_use.broken())]:
             more = f", and {len(broken) - 1} more" if len(broken) > 1 else ""

@@ -15,7 +15,7 @@ SLOW, TURNING = 0.1, 0.06
 """Speed [rad/s] below which a joint's rows count little, and time [s] about its reversals: masks leave them out."""
 
 STEP = 1e-6
-"""Step [rad, rad/s, rad/s^2] of differences."""
+"""Step [rad, rad/s] of differences of columns; accelerations enter them linearly, so that theirs are exact."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,18 +103,30 @@ class Information:
         Array, shape (3, time, joint)
             Derivatives of the sum over the row and the parameter.
         """
-        n = self.basis.n
+        n, place = self.basis.n, self._place
+        steps = np.array([STEP, STEP, 1.0])
         copies = np.broadcast_to(motion, (3 * n + 1, *motion.shape)).copy()
         for order in range(3):
             for j in range(n):
-                copies[1 + order * n + j, order, :, j] += STEP
-        weight, sums = self.weight(copies), np.zeros((3 * n + 1, motion.shape[-2]))
+                copies[1 + order * n + j, order, :, j] += steps[order]
+        weight, sums, weighted = self.weight(motion), np.zeros((3 * n + 1, motion.shape[-2])), np.zeros(motion.shape[-2:])
         for (row, name), column in self.basis.explicit(_state(copies)).items():
-            p, w = self._place[name], weight[..., row]
-            by_torque = of_torques[:, row, p] * (w if name in self._frictions else 1.0)
-            sums += column * (w * of_rows[:, row, p] + by_torque)
-        slopes = (sums[1:] - sums[0]).reshape(3, n, -1) / STEP
-        return np.swapaxes(slopes, -1, -2)
+            fading = of_rows[:, row, place[name]].copy()
+            whole = of_torques[:, row, place[name]]
+            if name in self._frictions:
+                fading, whole = fading + whole, np.zeros_like(whole)
+            sums += column * (weight[:, row] * fading + whole)
+            weighted[:, row] += column[0] * fading
+        slopes = np.swapaxes((sums[1:] - sums[0]).reshape(3, n, -1) / steps[:, None, None], -1, -2)
+        slopes[1:] += weighted * self._weight_slopes(motion)
+        return slopes
+
+    def _weight_slopes(self, motion: Array) -> Array:
+        """Return derivatives of the weights by velocity and acceleration, shape (2, time, joint)."""
+        qd, qdd = motion[1], motion[2]
+        slow = SLOW**2 + (TURNING * qdd) ** 2
+        total = (qd**2 + slow) ** 2
+        return np.stack([2 * qd * slow / total, -2 * TURNING**2 * qdd * qd**2 / total])
 
     def torques(self, motion: Array, W: Array, X: Array) -> Array:
         """Return what each parameter adds to the torques, shape (..., time, joint, p), frictions fading at low speed."""

@@ -11,8 +11,8 @@ from identify.design.information import Information
 from identify.design.limits import Limits
 from identify.design.shapes import Shapes
 
-POWER = 64
-"""Of the norm that stands for the largest of many values, and is smooth."""
+POWER = 64.0
+"""Of the norm that stands for the largest of many values, and is smooth; less is smoother, and further below the limits."""
 
 NEAR = 0.97
 """Share of a torque limit from which on it costs: states lie between those that are looked at."""
@@ -63,6 +63,8 @@ class Plan:
         What to keep away from.
     hard : float
         What exceeding a limit by all of it costs, squared.
+    power : float
+        That of the smooth norm by which motions are scaled into their limits.
     """
 
     information: Information
@@ -78,6 +80,7 @@ class Plan:
     home: Array | None = None
     obstacles: Obstacles | None = None
     hard: float = HARD
+    power: float = POWER
 
     def motion(self, c: Array) -> Array:
         """Return the motion at the states, shape (..., 4, time, joint), for coefficients c, shape (..., m, joint)."""
@@ -158,11 +161,11 @@ class Plan:
         use = self.instants.at(c) / sizes
         largest = np.abs(use).max(axis=(-3, -2), keepdims=True)
         relative = use / np.maximum(largest, 1e-300)
-        total = np.sum(relative**POWER, axis=(-3, -2))
-        norm = largest[..., 0, 0, :] * total ** (1 / POWER)
-        by_use = relative ** (POWER - 1) * total[..., None, None, :] ** (1 / POWER - 1)
+        total = np.sum(relative**self.power, axis=(-3, -2))
+        norm = largest[..., 0, 0, :] * total ** (1 / self.power)
+        by_use = relative ** (self.power - 1) * total[..., None, None, :] ** (1 / self.power - 1)
         of_norm = np.einsum("dtm,...dtj->...mj", self.instants.values, by_use / sizes)
         size = np.log(np.maximum(norm, 1e-300))  # powers of large motions would overflow
-        log_scale = -np.logaddexp(0.0, POWER * size) / POWER
-        scale, by_norm = np.exp(log_scale), -np.exp((POWER + 1) * log_scale + (POWER - 1) * size)
+        log_scale = -np.logaddexp(0.0, self.power * size) / self.power
+        scale, by_norm = np.exp(log_scale), -np.exp((self.power + 1) * log_scale + (self.power - 1) * size)
         return scale, by_norm[..., None, :] * of_norm
