@@ -7,7 +7,14 @@ import pytest
 
 OURS = {"models", "sim", "identify", "experiments", "tests"}
 
-CONTRACT = {"identify.data.motion_log", "identify.plugins", "identify.data.kinematics", "identify.errors", "identify.blame"}
+CONTRACT = {
+    "identify.data.motion_log",
+    "identify.data.limits",
+    "identify.plugins",
+    "identify.data.kinematics",
+    "identify.errors",
+    "identify.blame",
+}
 """What `sim` may know of `identify`: the contract types, the plug-in tables, and whose mistake it is if one goes wrong."""
 
 ALLOWED = {

@@ -3,26 +3,23 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import ceil
 
 import numpy as np
 
 from experiments.errors import ExperimentError
 from experiments.excite.excitation import EXCITATIONS, AbstractExcitation
 from experiments.excite.limit_use import FS, Inspector, LimitUse
+from experiments.excite.planning import plan_for
 from experiments.identification.parameters import Parameters
 from experiments.identification.subject import Subject
-from identify import CHAINS, Array, FirLowPass, MotionLog, NoiseLevels
+from identify import CHAINS, Array, MotionLog, NoiseLevels
+from identify.data.limits import Limits
 from identify.design.criteria import CRITERIA, AbstractCriterion, LogSigma
-from identify.design.information import Information
-from identify.design.limits import Limits
 from identify.design.plan import Plan
 from identify.design.predicted import predicted_information
-from identify.parameters.base_parameters import random_states
 from identify.plugins import did_you_mean
-from identify.rows.linearization import slopes
 from sim.planning.clearance import Clearance
-from sim.planning.motion_limits import Bounds, MotionLimits, surroundings
+from sim.planning.motion_limits import MotionLimits, home_of, limits_of, surroundings
 from sim.scenario.scenario import Scenario
 from sim.trajectories.approach import approach
 from sim.trajectories.reference import Reference
@@ -33,12 +30,6 @@ SIGMA, DETERMINANT = "sigma", "determinant"
 
 RANDOM, DRAWS = 60, 600
 """Random motions that a motion is compared with, and draws after which fewer will do."""
-
-STATES = 12.0
-"""States for each period of the highest frequency; at least 8 a second."""
-
-FINER = 4
-"""Instants at which limits are kept, for each state."""
 
 PREDICTED = 100.0
 """Frequency [Hz] at which sigmas are predicted, with the noise that a faster log has in this band."""
@@ -120,14 +111,19 @@ class Design:
         return EXCITATIONS.create(self.kind)
 
     @cached_property
-    def bounds(self) -> Bounds:
+    def limits(self) -> Limits:
         """Limits of the joints."""
-        return Bounds.of(self.subject.robot, self.asked)
+        return limits_of(self.subject.robot, self.asked)
+
+    @cached_property
+    def home(self) -> Array:
+        """Where the arm comes from [rad], shape (joint,)."""
+        return home_of(self.subject.robot, self.asked, self.limits)
 
     @cached_property
     def clearance(self) -> Clearance:
         """Distances of shapes, from each other and from what stands around."""
-        found = Clearance(surroundings(self.robot, self.asked), self.bounds.position, self.asked.clearance)
+        found = Clearance(surroundings(self.robot, self.asked), self.limits.position, self.asked.clearance)
         for pair in found.left_out:
             if box := next((box.name for box in self.asked.keep_out if box.name in pair), None):
                 (other,) = set(pair) - {box}
@@ -135,7 +131,7 @@ class Design:
                     f"keep_out {box}: {other} is inside it, or nearer than {1000 * self.asked.clearance:.0f} mm, whatever the "
                     "posture: make the box smaller, or move it"
                 )
-        home = self.bounds.home[None]
+        home = self.home[None]
         if touch := found.nearest(home, 0 * home, FS):
             raise ExperimentError(
                 f"home = {np.round(home[0], 3).tolist()}: {' and '.join(touch.shapes)} are {1000 * touch.distance:.0f} mm "
@@ -167,45 +163,7 @@ class Design:
     @cached_property
     def plan(self) -> Plan:
         """What the search minimises."""
-        robot, bounds = self.subject.robot, self.bounds
-        q, qd, qdd = random_states(self.subject.tree, 200)
-        inertia = slopes(self.subject.basis, self.X, q, qd, qdd, qd).inertia.mean(axis=-1)
-        rate = max(8.0, STATES * self.frequency)
-        count = ceil(rate * self.duration)
-        rate = count / self.duration
-        levels = self.levels if self.first_criterion.noise else NoiseLevels(np.ones(robot.n), np.zeros(robot.n))
-        information = Information(
-            self.subject.basis, levels, inertia, self.scenario.fs, rate, min(FirLowPass().cutoff, self.scenario.fs / 2)
-        )
-        limits = Limits(bounds.position, bounds.velocity, bounds.acceleration, bounds.jerk, bounds.torque, bounds.rms_torque)
-        middles = np.asarray((np.arange(count) + 0.5) / rate)
-        finer = np.asarray(np.arange(FINER * count) / (FINER * rate))
-        states = self.excitation.shapes(middles, self.duration, self.frequency)
-        instants = self.excitation.shapes(finer, self.duration, self.frequency)
-        self._require_enough(count * robot.n)
-        return Plan(
-            information,
-            self.first_criterion,
-            limits,
-            states,
-            instants,
-            self.X,
-            self.known if self.first_criterion.noise else np.zeros_like(self.known),
-            self.asked.prior_error,
-            self.asked.torque_share,
-            self.repeat,
-            bounds.home,
-            self.clearance.cost if self.clearance.checks else None,
-        )
-
-    def _require_enough(self, rows: int) -> None:
-        """Raise ExperimentError if a motion is too short for the parameters, whatever it is."""
-        p, least = len(self.X), 2 * FirLowPass().cutoff * self.duration * self.subject.robot.n
-        if min(rows, least) < p:
-            raise ExperimentError(
-                f"{self.duration:g} s make {least:.0f} rows behind a filter at {FirLowPass().cutoff:g} Hz, fewer than the {p} "
-                f"parameters: give a --duration of at least {ceil(4 * p / least * self.duration)} s"
-            )
+        return plan_for(self)
 
     @property
     def first_criterion(self) -> AbstractCriterion:
@@ -223,12 +181,12 @@ class Design:
     @cached_property
     def inspector(self) -> Inspector:
         """What looks at motions."""
-        return Inspector(self.subject.robot, self.bounds, self.asked, self.clearance, self.subject.basis, self.X)
+        return Inspector(self.subject.robot, self.limits, self.asked, self.clearance, self.subject.basis, self.X)
 
     def trajectory(self, c: Array, repeat: int | None = None) -> AbstractTrajectory:
         """Return the trajectory of coefficients."""
         scaled = self.plan.coefficients(c)
-        return self.excitation.trajectory(scaled, self.plan.limits.middle, self.duration, repeat or self.repeat)
+        return self.excitation.trajectory(scaled, self.limits.middle, self.duration, repeat or self.repeat)
 
     def information(self, each: list[Array]) -> Array:
         """Return the information of motions, as generalized least squares has it, and of earlier logs, shape (motion, p, p)."""
@@ -254,7 +212,7 @@ class Design:
     def way(self, c: Array, fs: float, pace: float) -> Reference:
         """Return the way from home to where a motion starts, sampled at `fs` [Hz]."""
         start = self.trajectory(c).plan(self.subject.robot).sample(fs).q[0]
-        return approach(self.subject.robot, self.bounds.home, start, fs, pace)
+        return approach(self.subject.robot, self.home, start, fs, pace)
 
     def pace(self, c: Array) -> float:
         """Return how fast the way may be: slower where its torques would be too large."""

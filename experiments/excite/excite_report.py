@@ -91,10 +91,9 @@ def _motion_figure(found: Excited) -> str:
     """Return positions, velocities and torques of all joints, as shares of their limits."""
     d, step = found.design, max(1, round(FS / PLOTTED))
     motion = d.trajectory(found.c, 1).plan(d.subject.robot).sample(FS)
-    low, high = d.bounds.position.T
     shown = {
-        "position": (motion.q - (low + high) / 2) / ((high - low) / 2),
-        "velocity": motion.qd / d.bounds.velocity,
+        "position": (motion.q - d.limits.middle) / d.limits.sizes[0],
+        "velocity": motion.qd / d.limits.velocity,
     }
     there = shown | {name: share for name, share in found.use.shares.items() if name == "torque"}
     figure = Figure(figsize=(11, 1.7 * len(there) + 0.4), layout="constrained")

@@ -169,7 +169,7 @@ class Excited:
             origin=origin,
             robot=absolute(d.robot),
             trajectory=d.trajectory(self.c),
-            start=tuple(float(x) for x in d.bounds.home),
+            start=tuple(float(x) for x in d.home),
         )
 
     def planned(self, fs: float) -> tuple[Array, Reference]:

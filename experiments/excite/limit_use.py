@@ -7,9 +7,10 @@ import numpy as np
 
 from identify.arrays import Array
 from identify.basis.basis import Basis
+from identify.data.limits import Limits
 from identify.parameters.base_parameters import columns_at
 from sim.planning.clearance import Clearance, Touch
-from sim.planning.motion_limits import Bounds, MotionLimits
+from sim.planning.motion_limits import MotionLimits
 from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from sim.robot.robot import Robot
 from sim.trajectories.reference import Reference
@@ -74,7 +75,7 @@ class Inspector:
     ----------
     robot : Robot
         The robot.
-    bounds : Bounds
+    limits : Limits
         Its limits.
     asked : MotionLimits
         How they are to be kept.
@@ -87,7 +88,7 @@ class Inspector:
     """
 
     robot: Robot
-    bounds: Bounds
+    limits: Limits
     asked: MotionLimits
     clearance: Clearance
     basis: Basis
@@ -95,15 +96,14 @@ class Inspector:
 
     def look(self, motion: Reference) -> LimitUse:
         """Return how far a motion, sampled at FS, uses its limits."""
-        low, high = self.bounds.position.T
         jerk = np.gradient(motion.qdd, 1 / FS, axis=0)
         rates = {"velocity": motion.qd, "acceleration": motion.qdd, "jerk": jerk}
-        shares = {"position": np.abs(motion.q - (low + high) / 2) / ((high - low) / 2)}
-        shares |= {name: np.abs(x) / getattr(self.bounds, name) for name, x in rates.items()}
+        shares = {"position": np.abs(motion.q - self.limits.middle) / self.limits.sizes[0]}
+        shares |= {name: np.abs(x) / getattr(self.limits, name) for name, x in rates.items()}
         tau = inverse_dynamics(self.robot, motion.q, motion.qd, motion.qdd) + coulomb_torque(self.robot, motion.qd)
-        shares["torque"] = np.abs(tau) / (self.asked.torque_share * self.bounds.torque)
-        shares["torque if off"] = (np.abs(tau) + self.asked.prior_error * self._spread(motion)) / self.bounds.torque
-        shares["rms torque"] = np.sqrt(np.mean(tau**2, axis=0, keepdims=True)) / self.bounds.rms_torque
+        shares["torque"] = np.abs(tau) / (self.asked.torque_share * self.limits.torque)
+        shares["torque if off"] = (np.abs(tau) + self.asked.prior_error * self._spread(motion)) / self.limits.torque
+        shares["rms torque"] = np.sqrt(np.mean(tau**2, axis=0, keepdims=True)) / self.limits.rms_torque
         limited = {name: share for name, share in shares.items() if share.any()}
         touch = self.clearance.nearest(motion.q, motion.qd, FS)
         return LimitUse(limited, touch, self.asked.clearance, self.robot.joints)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from identify.arrays import Array
+from identify.data.limits import Limits
 from identify.design.information import Information
-from identify.design.limits import Limits
 from identify.design.shapes import quintic
 
 POOL = 200

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from identify.arrays import Array
+from identify.data.limits import Limits
 from identify.design.criteria import AbstractCriterion
 from identify.design.information import Information
-from identify.design.limits import Limits
 from identify.design.shapes import Shapes
 
 POWER = 64.0

@@ -2,7 +2,6 @@
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, final
 
@@ -10,6 +9,7 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
+from identify.data.limits import Limits
 from identify.plugins import did_you_mean
 from sim.errors import ScenarioError
 from sim.robot.motors import Array
@@ -96,53 +96,46 @@ class MotionLimits:
         return found
 
 
-@dataclass(frozen=True, eq=False)
-class Bounds:
-    """Limits of every joint, infinite where there are none.
+def limits_of(robot: Robot, asked: MotionLimits) -> Limits:
+    """Return the limits of a robot's joints, from its file and from what is asked.
 
-    Parameters
-    ----------
-    position : Array, shape (joint, 2)
-        [rad].
-    velocity, acceleration, jerk : Array, shape (joint,)
-        [rad/s], [rad/s^2], [rad/s^3].
-    torque, rms_torque : Array, shape (joint,)
-        [N m].
-    home : Array, shape (joint,)
-        Where the arm comes from [rad].
+    Raises
+    ------
+    ScenarioError
+        If a joint has no range or no largest velocity, or one is not of the robot; the message says what to write.
     """
+    position = _positions(robot, asked.position)
+    velocity, acceleration, jerk = (_each(robot, name, getattr(asked, name), robot.most(name)) for name in RATES)
+    torque = _each(robot, "torque", asked.torque, robot.torque_limits)
+    rms = _each(robot, "rms_torque", asked.rms_torque, np.full(robot.n, np.inf))
+    if unlimited := _names(robot, ~np.isfinite(velocity)):
+        raise ScenarioError(
+            f"nothing says how fast {unlimited} may turn: write velocity = ... [rad/s] into a file and give --limits FILE"
+        )
+    if unlimited := _names(robot, ~np.isfinite(acceleration) & ~np.isfinite(torque)):
+        raise ScenarioError(
+            f"nothing limits the acceleration or the torque of {unlimited}: write acceleration = ... [rad/s^2] or "
+            "torque = ... [N m] into a file and give --limits FILE"
+        )
+    return Limits(position, velocity, acceleration, jerk, torque, rms)
 
-    position: Array
-    velocity: Array
-    acceleration: Array
-    jerk: Array
-    torque: Array
-    rms_torque: Array
-    home: Array
 
-    @classmethod
-    def of(cls, robot: Robot, asked: MotionLimits) -> "Bounds":
-        """Return the limits of a robot.
+def home_of(robot: Robot, asked: MotionLimits, limits: Limits) -> Array:
+    """Return where the arm comes from [rad], shape (joint,): as asked, the keyframe `home`, or where the file puts it.
 
-        Raises
-        ------
-        ScenarioError
-            If a joint has no range or no largest velocity, or one is not of the robot; the message says what to write.
-        """
-        position = _positions(robot, asked.position)
-        velocity, acceleration, jerk = (_rate(robot, name, getattr(asked, name)) for name in RATES)
-        torque = _each(robot, "torque", asked.torque, robot.torque_limits)
-        rms = _each(robot, "rms_torque", asked.rms_torque, np.full(robot.n, np.inf))
-        if unlimited := _names(robot, ~np.isfinite(velocity)):
-            raise ScenarioError(
-                f"nothing says how fast {unlimited} may turn: write velocity = ... [rad/s] into a file and give --limits FILE"
-            )
-        if unlimited := _names(robot, ~np.isfinite(acceleration) & ~np.isfinite(torque)):
-            raise ScenarioError(
-                f"nothing limits the acceleration or the torque of {unlimited}: write acceleration = ... [rad/s^2] or "
-                "torque = ... [N m] into a file and give --limits FILE"
-            )
-        return cls(position, velocity, acceleration, jerk, torque, rms, _home(robot, asked.home, position))
+    Raises
+    ------
+    ScenarioError
+        If what is asked for lies outside a range.
+    """
+    low, high = limits.position.T
+    if asked.home:
+        home = per_joint(asked.home, robot.n, "limits: home")
+        if outside := _names(robot, (home < low) | (home > high)):
+            raise ScenarioError(f"limits: home = {list(asked.home)} puts {outside} outside its range")
+        return home
+    keys = [k for k in range(robot.model.nkey) if robot.model.key(k).name == "home"]
+    return np.clip(robot.model.key_qpos[keys[0]] if keys else robot.model.qpos0, low, high)
 
 
 def surroundings(name: str, asked: MotionLimits) -> Robot:
@@ -192,25 +185,8 @@ def _positions(robot: Robot, asked: Mapping[str, tuple[float, float]]) -> Array:
     return ranges
 
 
-def _rate(robot: Robot, name: str, asked: tuple[float, ...] | None) -> Array:
-    """Return the largest velocity, acceleration or jerk of every joint."""
-    return _each(robot, name, asked, robot.most(name))
-
-
 def _each(robot: Robot, name: str, asked: tuple[float, ...] | None, known: Array) -> Array:
     return known if asked is None else per_joint(asked, robot.n, f"limits: {name}")
-
-
-def _home(robot: Robot, asked: tuple[float, ...], position: Array) -> Array:
-    """Return where the arm comes from: what is asked for, the keyframe `home`, or where the file puts it."""
-    low, high = position.T
-    if asked:
-        home = per_joint(asked, robot.n, "limits: home")
-        if outside := _names(robot, (home < low) | (home > high)):
-            raise ScenarioError(f"limits: home = {list(asked)} puts {outside} outside its range")
-        return home
-    keys = [k for k in range(robot.model.nkey) if robot.model.key(k).name == "home"]
-    return np.clip(robot.model.key_qpos[keys[0]] if keys else robot.model.qpos0, low, high)
 
 
 def _names(robot: Robot, chosen: Any) -> str:

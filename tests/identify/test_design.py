@@ -7,10 +7,10 @@ import pytest
 import scipy
 
 from identify import CHAINS, ExplicitModel, GeneralizedLeastSquares, MotionLog, NoiseLevels, TorqueChannel, identify, scara
+from identify.data.limits import Limits
 from identify.design.criteria import CRITERIA, LogSigma
 from identify.design.greedy import Greedy
 from identify.design.information import Information
-from identify.design.limits import Limits
 from identify.design.plan import Plan
 from identify.design.predicted import predicted_information
 from identify.design.search import Search

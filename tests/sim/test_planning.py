@@ -7,7 +7,7 @@ import pytest
 
 from sim.errors import RobotError, ScenarioError
 from sim.planning.clearance import Clearance
-from sim.planning.motion_limits import Bounds, KeepOut, MotionLimits, surroundings
+from sim.planning.motion_limits import KeepOut, MotionLimits, home_of, limits_of, surroundings
 from sim.robot.robot import Robot
 from sim.trajectories import Fourier
 
@@ -88,9 +88,10 @@ def test_the_floor_is_below_what_the_robot_stands_on():
 
 def test_shipped_arms_are_clear_at_home():
     for name in ("scara", "puma560", "panda"):
-        bounds = Bounds.of(Robot.load(name), MotionLimits())
-        clearance = Clearance(surroundings(name, MotionLimits()), bounds.position, 0.01)
-        assert clearance.distances(bounds.home[None], 0.05).min() > 0.01
+        robot, asked = Robot.load(name), MotionLimits()
+        limits = limits_of(robot, asked)
+        clearance = Clearance(surroundings(name, asked), limits.position, 0.01)
+        assert clearance.distances(home_of(robot, asked, limits)[None], 0.05).min() > 0.01
         assert not clearance.left_out
 
 
@@ -98,7 +99,7 @@ def test_a_urdf_says_velocities_and_efforts_but_has_no_shapes(tmp_path):
     path = tmp_path / "arm.urdf"
     path.write_text(URDF)
     robot = Robot.load(str(path))
-    bounds = Bounds.of(robot, MotionLimits())
+    bounds = limits_of(robot, MotionLimits())
     assert bounds.velocity.tolist() == [2.5]
     assert bounds.torque.tolist() == [33.0]
     assert not Clearance(surroundings(str(path), MotionLimits()), bounds.position, 0.01).checks
@@ -117,8 +118,9 @@ def test_a_urdf_says_velocities_and_efforts_but_has_no_shapes(tmp_path):
     ],
 )
 def test_limits_that_do_not_fit_say_what_to_write(balls, asked, message):
+    robot, given = Robot.load(balls), MotionLimits(**asked)
     with pytest.raises(ScenarioError) as error:
-        Bounds.of(Robot.load(balls), MotionLimits(**asked))
+        home_of(robot, given, limits_of(robot, given))
     assert message in str(error.value)
 
 
@@ -126,7 +128,7 @@ def test_a_joint_without_a_range_is_asked_for_one(tmp_path):
     path = tmp_path / "free.xml"
     path.write_text(BALLS.replace(' range="-3 3"', ""))
     with pytest.raises(ScenarioError, match=r"turn has no range: write \[position\] and turn = \[lowest, highest\]"):
-        Bounds.of(Robot.load(str(path)), MotionLimits(velocity=(1.0,)))
+        limits_of(Robot.load(str(path)), MotionLimits(velocity=(1.0,)))
 
 
 def test_numbers_of_a_file_must_be_as_many_as_its_joints(tmp_path):

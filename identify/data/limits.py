@@ -1,4 +1,4 @@
-"""What a motion must keep."""
+"""Limits of a robot's joints."""
 
 from dataclasses import dataclass
 
