@@ -223,7 +223,10 @@ def _motions(study: str, name: str, labels: dict[str, str]) -> Callable[[], Iter
 
 def _coarse() -> Iterator[str]:
     made = {"scara-sigma": "17 bits", "scara-12bits": "12 bits", "scara-slow": "17 bits, at most 2 rad/s"}
-    found = {(c["settings"]["encoder.lines"], str(c["settings"]["trajectory"])[8:]): c for c in cells("excitation-coarse")}
+    found = {
+        (c["settings"]["encoder.lines"], str(c["settings"]["trajectory"]).removeprefix("excited/")): c
+        for c in cells("excitation-coarse")
+    }
     lines = sorted({line for line, _ in found})
     rows = ([words, *(typical(found[line, motion]) for line in lines)] for motion, words in made.items())
     yield from _table(["designed for", *(f"{log2(4 * line):g} bits" for line in lines)], rows)

@@ -15,6 +15,7 @@ from experiments.recording.audience import Watching
 Files = Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE", help_behavior_hint="")]
 Weights = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=WEIGHT", help_behavior_hint="")]
 Each = Annotated[tuple[float, ...], tyro.conf.arg(metavar="FLOAT", help_behavior_hint="")]
+Real = Annotated[float | None, tyro.conf.arg(metavar="FLOAT", help_behavior_hint="")]
 Percent = Annotated[str | None, tyro.conf.arg(metavar="PERCENT", help_behavior_hint="")]
 
 
@@ -38,12 +39,12 @@ class Excite:
     """Earlier logs of the robot: what they tell need not be told again."""
     noise: Scenario = None
     """A scenario (name, or TOML file) whose encoders and torque noise are those of the log, and whose drive is simulated."""
-    encoder_bits: float = 17.0
-    """Resolution of the encoders, a turn [bits]; without --noise."""
-    torque_noise: Each = (0.05,)
-    """White noise of the torques, rms [N m], of all joints or of each; without --noise."""
-    fs: float = 100.0
-    """Sampling frequency of controller and log [Hz]; without --noise."""
+    encoder_bits: Real = None
+    """Resolution of the encoders, a turn [bits]; that of the scenario of --noise, or 17."""
+    torque_noise: Each = ()
+    """White noise of the torques, rms [N m], of all joints or of each; that of the scenario of --noise, or 0.05."""
+    fs: Real = None
+    """Sampling frequency of controller and log [Hz]; that of the scenario of --noise, or 100."""
     limits: File = None
     """What the motion must keep (TOML): ranges, velocities, torques, boxes around the robot; by default what its file says."""
     weigh: Weights = ()

@@ -1,9 +1,10 @@
 """The command that designs motions."""
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from math import isfinite
 from pathlib import Path
+from shlex import quote
 
 from experiments.cli.excite import Excite
 from experiments.cli.page import new_page, shown
@@ -15,10 +16,11 @@ from experiments.excite.excite_report import report
 from experiments.excite.excite_text import print_excited
 from experiments.excite.excited import Excited
 from experiments.excite.motion_file import write_motion
-from experiments.excite.sequence import Sequence, print_sequence
+from experiments.excite.sequence import MotionSequence, print_sequence
 from experiments.identification.identified import Identified
 from experiments.identification.results import Place, results_folder, tell_of, write_recording, write_summary
 from experiments.identification.subject import Subject, absolute
+from experiments.identification.warnings import FILE, warnings_of_robot
 from identify import MotionLog, TorqueChannel
 from identify.data.log_file import write_log
 from sim.encoders import IncrementalEncoder
@@ -27,8 +29,11 @@ from sim.scenario.measurement import TorqueMeasurement
 from sim.scenario.scenario import Scenario
 from sim.scenario.scenario_file import load, to_toml
 
-LONGEST = 1000.0
-"""Duration of a motion [s] above which it is taken for a slip."""
+LONGEST, FASTEST = 3600.0, 10000.0
+"""Time of a motion, repeated [s], and sampling frequency [Hz] above which they are taken for a slip."""
+
+BITS, TORQUE_NOISE, QUIET = 17.0, (0.05,), 1e-6
+"""Noise without a scenario: resolution of the encoders [bits], rms of the torques [N m]; and the least of that."""
 
 
 def excite(asked: Excite) -> None:
@@ -41,13 +46,15 @@ def excite(asked: Excite) -> None:
     share = _percent(asked.until)
     with asked.watching.audience() as audience, shown(page):
         with results_folder(place) as folder, progress_of(f"designing a motion of {stem}") as progress:
-            sequence = Sequence.of(design, share, progress) if share else None
+            sequence = MotionSequence.of(design, share, progress) if share else None
             found = sequence.last if sequence else Excited.of(design, progress)
             print_excited(page, found)
+            page.warn({FILE: warnings_of_robot(design.subject.robot)})
             if sequence:
                 print_sequence(page, sequence)
-                for number, log in enumerate(sequence.logs, 1):
-                    write_log(log, folder / f"log{number}.parquet")
+                for number, each in enumerate(sequence.rounds, 1):
+                    write_log(each.log, folder / f"log{number}.parquet")
+                    write_motion(each.excited, folder / f"motion{number}.csv")
             write_motion(found, folder / "motion.csv")
             (folder / "scenario.toml").write_text(to_toml(found.scenario))
             summary = found.summary() | (sequence.summary() if sequence else {})
@@ -58,27 +65,44 @@ def excite(asked: Excite) -> None:
                 from experiments.recording.excite_recording import record_excited
 
                 lost = write_recording(folder, record_excited(found, audience))
+        _forget(place.out, len(sequence.rounds) if sequence else 0)
         tell_of(lost, place.out)
         page.print(f"written to {place.out}{asked.watching.hint(place.out)}", soft_wrap=True)
         page.print(f"try it on the simulated robot: uv run idbench run {place.out / 'scenario.toml'}", soft_wrap=True)
 
 
+def _forget(folder: Path, rounds: int) -> None:
+    """Remove what an earlier and longer sequence left in the folder."""
+    for path in (*folder.glob("log[0-9]*.parquet"), *folder.glob("motion[0-9]*.csv")):
+        if int("".join(c for c in path.stem if c.isdigit())) > rounds:
+            path.unlink()
+
+
 def _designed(asked: Excite) -> Design:
     """Return what is asked, checked."""
-    for name, value, most in (("duration", asked.duration, LONGEST), ("frequency", asked.frequency, asked.fs / 4)):
-        if not (isfinite(value) and 0 < value <= most):
-            raise ExperimentError(f"--{name} {value:g} must be above 0 and at most {most:g}")
-    if asked.repeat < 1 or asked.seed < 0:
-        raise ExperimentError(f"--repeat {asked.repeat} must be at least 1, and --seed {asked.seed} at least 0")
+    if asked.fs is not None:
+        _require_between("fs", asked.fs, 10, FASTEST)
+    scenario = _scenario(asked)
+    _require_between("duration", asked.duration, 0, LONGEST)
+    _require_between("frequency", asked.frequency, 0, scenario.fs / 4)
+    _require_between("repeat", asked.repeat, 1, max(1.0, LONGEST // asked.duration))
+    if asked.seed < 0:
+        raise ExperimentError(f"--seed {asked.seed} must be at least 0")
+    if asked.until is not None and asked.log:
+        raise ExperimentError("--until simulates its own logs: leave --log out")
     subject = Subject(absolute(asked.robot), asked.parameters)
-    limits = MotionLimits.read(asked.limits)
+    if len(asked.torque_noise) not in (0, 1, subject.robot.n):
+        count = len(asked.torque_noise)
+        raise ExperimentError(
+            f"--torque-noise has {count} values for {subject.robot.n} joints: give one for all, or one a joint"
+        )
     return Design(
         robot=absolute(asked.robot),
-        scenario=_scenario(asked, subject),
+        scenario=scenario,
         kind=asked.kind,
         duration=asked.duration,
         frequency=asked.frequency,
-        asked=limits,
+        asked=MotionLimits.read(asked.limits),
         repeat=asked.repeat,
         seed=asked.seed,
         weights=_weights(asked.weigh),
@@ -88,30 +112,34 @@ def _designed(asked: Excite) -> Design:
     )
 
 
-def _scenario(asked: Excite, subject: Subject) -> Scenario:
-    """Return what says how noisy the log will be, and how the motion is simulated."""
-    if asked.noise is not None:
-        return load(asked.noise)
-    if not (isfinite(asked.encoder_bits) and 4 <= asked.encoder_bits <= 40):
-        raise ExperimentError(f"--encoder-bits {asked.encoder_bits:g} must be between 4 and 40")
-    if len(asked.torque_noise) not in (1, subject.robot.n):
-        raise ExperimentError(
-            f"--torque-noise has {len(asked.torque_noise)} values for {subject.robot.n} joints: give 1 or all"
-        )
-    lines = max(1, round(2**asked.encoder_bits / 4))
-    return replace(
-        load("ideal"),
-        fs=asked.fs,
-        encoder=IncrementalEncoder(lines=(lines,)),
-        torque=TorqueMeasurement(noise=asked.torque_noise),
-    )
+def _require_between(name: str, value: float, least: float, most: float) -> None:
+    if not (least <= value <= most and value > 0):
+        above = f"at least {least:g}" if least else "above 0"
+        raise ExperimentError(f"--{name} {value:g} must be {above} and at most {most:g}")
+
+
+def _scenario(asked: Excite) -> Scenario:
+    """Return what says how noisy the log will be, and how the motion is simulated: options before the scenario's own."""
+    scenario = load(asked.noise or "ideal")
+    bits = asked.encoder_bits if asked.encoder_bits is not None or asked.noise else BITS
+    noise = asked.torque_noise or (() if asked.noise else TORQUE_NOISE)
+    if bits is not None:
+        _require_between("encoder-bits", bits, 4, 40)
+        scenario = replace(scenario, encoder=IncrementalEncoder(lines=(max(1, round(2**bits / 4)),)))
+    if noise:
+        if not all(isfinite(x) and x >= QUIET for x in noise):
+            raise ExperimentError(f"--torque-noise {' '.join(f'{x:g}' for x in noise)} must be at least {QUIET:g} N m")
+        scenario = replace(scenario, torque=TorqueMeasurement(noise=noise))
+    return scenario if asked.fs is None else replace(scenario, fs=asked.fs)
 
 
 def _weights(given: tuple[str, ...]) -> Mapping[str, float]:
     """Return weights by the names of parameters; raise ExperimentError if one is no number above 0."""
-    found = {}
+    found = dict[str, float]()
     for text in given:
         name, _, value = text.partition("=")
+        if name in found:
+            raise ExperimentError(f"--weigh gives {name} twice")
         try:
             found[name] = float(value)
         except ValueError:
@@ -140,12 +168,17 @@ def _log(path: Path, subject: Subject) -> MotionLog:
 
 
 def _command(asked: Excite) -> str:
-    """Return what was asked, as a command."""
-    words = ["uv run idbench excite", asked.robot, f"--duration {asked.duration:g}", f"--kind {asked.kind}"]
-    words += [f"--frequency {asked.frequency:g}", f"--seed {asked.seed}", f"--criterion {asked.criterion}"]
-    for name, value in (("repeat", asked.repeat if asked.repeat > 1 else ""), ("noise", asked.noise), ("limits", asked.limits)):
-        words += [f"--{name} {value}"] if value else []
-    if asked.noise is None:
-        words += [f"--encoder-bits {asked.encoder_bits:g}", f"--torque-noise {' '.join(f'{x:g}' for x in asked.torque_noise)}"]
-    words += [f"--{name} {' '.join(map(str, x))}" for name, x in (("log", asked.log), ("weigh", asked.weigh)) if x]
+    """Return what was asked, as a command: all that differs from the defaults."""
+    words = ["uv run idbench excite", quote(asked.robot)]
+    for part in (asked, asked.parameters):
+        for field in fields(part):
+            value = getattr(part, field.name)
+            if field.name in LEFT_OUT or value == field.default:
+                continue
+            values = value if isinstance(value, tuple) else (value,)
+            words.append(" ".join([f"--{field.name.replace('_', '-')}", *(quote(str(x)) for x in values)]))
     return " ".join(words)
+
+
+LEFT_OUT = ("robot", "out", "force", "json", "watching", "parameters")
+"""Options that make no difference to a motion, or stand elsewhere in the command."""

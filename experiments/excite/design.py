@@ -19,7 +19,7 @@ from identify.design.plan import Plan
 from identify.design.predicted import predicted_information
 from identify.plugins import did_you_mean
 from sim.planning.clearance import Clearance
-from sim.planning.motion_limits import MotionLimits, home_of, limits_of, surroundings
+from sim.planning.motion_limits import BOX, FLOOR, MotionLimits, home_of, limits_of, surroundings
 from sim.scenario.scenario import Scenario
 from sim.trajectories.approach import approach
 from sim.trajectories.reference import Reference
@@ -37,8 +37,11 @@ PREDICTED = 100.0
 TOGETHER = 10
 """Motions whose sigmas are predicted together."""
 
-PACES = 1.0, 0.5, 0.25
-"""Of the way from home, over that of any approach."""
+WAY, MOST = 0.9, 1e3
+"""Share of the limits that the ways from home and back may use, and what stands for a limit that there is not."""
+
+PACES = 1.0, 0.3, 0.1
+"""Shares of that, the first for which torques keep their limits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +96,8 @@ class Design:
                 raise ExperimentError(
                     f"--weigh {name}: no such parameter{did_you_mean(name, names)}; known: {', '.join(names)}"
                 )
+        if self.weights and self.criterion != SIGMA:
+            raise ExperimentError(f"--weigh needs the criterion sigma, not {self.criterion}")
         if self.criterion not in (known := (SIGMA, *CRITERIA)):
             hint = did_you_mean(self.criterion, known)
             raise ExperimentError(f"--criterion {self.criterion}: no such criterion{hint}; known: {', '.join(known)}")
@@ -124,18 +129,21 @@ class Design:
     def clearance(self) -> Clearance:
         """Distances of shapes, from each other and from what stands around."""
         found = Clearance(surroundings(self.robot, self.asked), self.limits.position, self.asked.clearance)
+        wanted = [BOX.format(box.name) for box in self.asked.keep_out]
+        wanted += [FLOOR] if isinstance(self.asked.floor, float) else []
+        if wanted and not found.checks:
+            raise ExperimentError(f"{wanted[0]}: nothing is known of the shapes of {self.robot}: take it out of the limits")
         for pair in found.left_out:
-            if box := next((box.name for box in self.asked.keep_out if box.name in pair), None):
-                (other,) = set(pair) - {box}
+            if thing := next((name for name in wanted if name in pair), None):
+                (other,) = set(pair) - {thing}
                 raise ExperimentError(
-                    f"keep_out {box}: {other} is inside it, or nearer than {1000 * self.asked.clearance:.0f} mm, whatever the "
-                    "posture: make the box smaller, or move it"
+                    f"{thing}: {other} is inside it, or nearer than {1000 * self.asked.clearance:.0f} mm, whatever the "
+                    "posture: move it, or make it smaller"
                 )
-        home = self.home[None]
-        if touch := found.nearest(home, 0 * home, FS):
+        if touch := found.nearest(self.home[None], 0 * self.home[None], FS):
             raise ExperimentError(
-                f"home = {np.round(home[0], 3).tolist()}: {' and '.join(touch.shapes)} are {1000 * touch.distance:.0f} mm "
-                "apart; give another home, or a smaller clearance, in a file of --limits"
+                f"home = {np.round(self.home, 3).tolist()}: {touch}; give another home, or a smaller clearance, in a file of "
+                "--limits"
             )
         return found
 
@@ -209,15 +217,17 @@ class Design:
                 kept.append(c)
         return kept, drawn
 
-    def way(self, c: Array, fs: float, pace: float) -> Reference:
-        """Return the way from home to where a motion starts, sampled at `fs` [Hz]."""
-        start = self.trajectory(c).plan(self.subject.robot).sample(fs).q[0]
-        return approach(self.subject.robot, self.home, start, fs, pace)
+    def ways(self, c: Array, fs: float, pace: float) -> tuple[Reference, Reference]:
+        """Return the ways from home to where a motion starts, and back, sampled at `fs` [Hz], at a share of the limits."""
+        start = self.trajectory(c, 1).plan(self.subject.robot).at(np.zeros(1), fs).q[0]
+        most = np.stack([self.limits.velocity, self.limits.acceleration, self.limits.jerk])
+        there = approach(self.subject.robot, self.home, start, fs, WAY * pace * np.where(np.isfinite(most), most, MOST))
+        return there, Reference(fs, there.q[::-1], -there.qd[::-1], there.qdd[::-1])
 
     def pace(self, c: Array) -> float:
-        """Return how fast the way may be: slower where its torques would be too large."""
+        """Return how fast the ways may be: slower where their torques would be too large."""
         for pace in PACES:
-            if not any(self.inspector.look(self.way(c, FS, pace)).broken()):
+            if not any(broken for way in self.ways(c, FS, pace) for broken in self.inspector.look(way).broken()):
                 break
         return pace
 

@@ -33,6 +33,8 @@ def lines(found: Excited) -> list[str]:
     told.append(
         f"what holds the motion back: {held}" if held else "no limit holds the motion back: a higher --frequency may do"
     )
+    if found.floor is not None:
+        told.append(f"the floor counts as {found.floor:g} m high")
     if found.unchecked:
         told.append(f"note: {found.unchecked}")
     if found.interrupted:

@@ -15,12 +15,20 @@ from experiments.excite.stages import searched
 from experiments.identification.subject import absolute
 from identify import Array
 from sim.engine.simulation import Progress
+from sim.planning.motion_limits import floor_of
 from sim.scenario.scenario import Scenario
 from sim.scenario.scenario_file import to_dict
 from sim.trajectories.reference import Reference
 
 BINDING = 0.9
 """Share of a limit from which on it counts as what holds the motion back."""
+
+SINGULAR = 1e-13
+"""Share of the largest eigenvalue, of scaled information, below which a direction counts as not told."""
+
+HIDDEN = 1e-6
+"""Share of a parameter in such directions from which on it is unknown."""
+
 
 STRETCHES = 20
 """Parts of a motion whose share in each parameter is told."""
@@ -56,11 +64,19 @@ class Excited:
         random, drawn = design.random_motions()
         search = searched(design, random, progress)
         found = cls(design, search.best, random, drawn, search.interrupted)
-        if broken := [*found.use.broken(), *(f"on the way from home, {what}" for what in found.way_use.broken())]:
+        names = ("on the way from home", "on the way back")
+        ways = [f"{name}, {what}" for name, use in zip(names, found.way_uses, strict=True) for what in use.broken()]
+        if broken := [*found.use.broken(), *ways]:
             more = f", and {len(broken) - 1} more" if len(broken) > 1 else ""
             raise ExperimentError(
                 f"no motion was found that keeps all limits: {broken[0]}{more}; widen that limit, narrow the [position] of "
                 "joints, or try another --duration, --frequency, --seed or home"
+            )
+        if not np.isfinite(found.sigma).all():
+            lost = [name for name, s in zip(design.subject.basis.names, found.sigma, strict=True) if not np.isfinite(s)]
+            raise ExperimentError(
+                f"the motion tells nothing of {', '.join(lost)}: give a longer --duration, wider limits, or leave them out: "
+                f"--without {' '.join(lost)}"
             )
         return found
 
@@ -75,14 +91,15 @@ class Excited:
         return self.design.pace(self.c)
 
     @cached_property
-    def way(self) -> Reference:
-        """The way from home to its start, at 1 kHz."""
-        return self.design.way(self.c, FS, self.pace)
+    def ways(self) -> tuple[Reference, Reference]:
+        """The ways from home to its start, and back, at 1 kHz."""
+        return self.design.ways(self.c, FS, self.pace)
 
     @cached_property
-    def way_use(self) -> LimitUse:
-        """How far the way uses them."""
-        return self.design.inspector.look(self.way)
+    def way_uses(self) -> tuple[LimitUse, LimitUse]:
+        """How far the ways use the limits."""
+        there, back = (self.design.inspector.look(way) for way in self.ways)
+        return there, back
 
     @cached_property
     def information(self) -> Array:
@@ -130,8 +147,7 @@ class Excited:
     def condition(self) -> float:
         """Cond(W), of the rows of joints that move."""
         plan = self.design.plan
-        motion = plan.motion(self.c)
-        W = plan.information.columns(motion) * plan.information.weight(motion)[..., None]
+        W = plan.information.weighted(plan.motion(self.c))
         return float(np.linalg.cond(W.reshape(-1, W.shape[-1])))
 
     @cached_property
@@ -139,7 +155,7 @@ class Excited:
         """How much of what is told of each parameter each stretch of the motion tells, shape (stretch, p)."""
         plan = self.design.plan
         motion = plan.motion(self.c)
-        W = plan.information.columns(motion) * plan.information.weight(motion)[..., None]
+        W = plan.information.weighted(motion)
         V = np.linalg.inv(plan.matrix(motion))
         told = np.sum((plan.repeat * plan.information.whitened(W) @ V) * (W @ V), axis=1) / np.diag(V)
         return np.stack([part.sum(axis=0) for part in np.array_split(told, STRETCHES)])
@@ -169,18 +185,15 @@ class Excited:
             origin=origin,
             robot=absolute(d.robot),
             trajectory=d.trajectory(self.c),
-            start=tuple(float(x) for x in d.home),
+            start=(),
         )
 
     def planned(self, fs: float) -> tuple[Array, Reference]:
         """Return the part of each sample (0 there, 1 motion, 2 back), and the whole way of the arm, from home to home."""
         main = self.design.trajectory(self.c).plan(self.design.subject.robot).sample(fs)
-        way = self.design.way(self.c, fs, self.pace)
-        there = way.q, way.qd, way.qdd
-        signs = 1.0, -1.0, 1.0
-        back = [sign * x[::-1] for sign, x in zip(signs, there, strict=True)]
-        parts = [np.concatenate(x) for x in zip(there, (main.q, main.qd, main.qdd), back, strict=True)]
-        return np.repeat([0.0, 1.0, 2.0], [len(there[0]), len(main.q), len(back[0])]), Reference(fs, *parts)
+        there, back = self.design.ways(self.c, fs, self.pace)
+        whole = [np.concatenate([getattr(x, name) for x in (there, main, back)]) for name in ("q", "qd", "qdd")]
+        return np.repeat([0.0, 1.0, 2.0], [len(there.q), len(main.q), len(back.q)]), Reference(fs, *whole)
 
     def summary(self) -> dict[str, Any]:
         """Return summary.json."""
@@ -209,7 +222,8 @@ class Excited:
             "over_random_best": _finite(best),
             "random_motions": len(self.random),
             "random_drawn": self.drawn,
-            "condition_number": self.condition,
+            "condition_number": _finite(self.condition),
+            "floor": self.floor,
             "noise": {"torque": d.levels.torque.tolist(), "position": d.levels.position.tolist()},
             "limits_used": {name: share.tolist() for name, share in self.use.largest.items()},
             "binding": self.binding,
@@ -218,13 +232,23 @@ class Excited:
         }
 
     @property
+    def floor(self) -> float | None:
+        """Height of the floor [m], where one is kept clear of."""
+        d = self.design
+        return floor_of(d.subject.robot, d.asked) if d.clearance.checks else None
+
+    @property
     def unchecked(self) -> str:
         """What could not be checked, in words; empty if there is nothing."""
         clearance = self.design.clearance
         if not clearance.checks:
             return "nothing is known of the robot's shapes: whether it hits itself or the floor was not checked"
-        pairs = [" and ".join(pair) for pair in clearance.left_out]
-        return f"left out, since they touch whatever the posture: {'; '.join(pairs)}" if pairs else ""
+        pairs = "; ".join(" and ".join(pair) for pair in clearance.left_out)
+        found = [f"left out, since they are too near whatever the posture: {pairs}"] if pairs else []
+        found += [f"not checked, since they have no shape that MuJoCo can measure: {', '.join(clearance.bare)}"] * bool(
+            clearance.bare
+        )
+        return "; ".join(found)
 
 
 def sigmas_of(M: Array) -> Array:
@@ -235,13 +259,6 @@ def sigmas_of(M: Array) -> Array:
     variance = np.sum(np.where(told, 1 / np.where(told, values, 1.0), 0.0)[..., None, :] * vectors**2, axis=-1)
     hidden = np.sum(np.where(told, 0.0, 1.0)[..., None, :] * vectors**2, axis=-1) > HIDDEN
     return np.where(hidden, np.inf, np.sqrt(variance) / size)
-
-
-SINGULAR = 1e-13
-"""Share of the largest eigenvalue, of scaled information, below which a direction counts as not told."""
-
-HIDDEN = 1e-6
-"""Share of a parameter in such directions from which on it is unknown."""
 
 
 def _finite(x: float) -> float | None:

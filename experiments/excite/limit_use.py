@@ -24,8 +24,6 @@ BLOCK = 2000
 ROUNDING = 1e-6
 """Share by which a limit may be exceeded: coefficients are rounded where they are written."""
 
-UNITS = {"position": "rad", "velocity": "rad/s", "acceleration": "rad/s^2", "jerk": "rad/s^3"}
-
 
 @dataclass(frozen=True, eq=False)
 class LimitUse:
@@ -58,13 +56,11 @@ class LimitUse:
         """Yield which limits are broken, by whom and when."""
         for name, share in self.shares.items():
             k, j = np.unravel_index(int(share.argmax()), share.shape)
-            if share[k, j] > 1 + ROUNDING:
+            if not share[k, j] <= 1 + ROUNDING:  # nor is what is not a number
                 when = f" at {k / FS:.3f} s" if len(share) > 1 else ""
                 yield f"{name} of {self.joints[j]} is {share[k, j]:.1%} of its limit{when}"
         if self.touch:
-            one, two = self.touch.shapes
-            how = f"are {1000 * self.touch.distance:.0f} mm apart" if self.touch.distance > 0 else "touch"
-            yield f"{one} and {two} {how} at {self.touch.instant / FS:.3f} s ({1000 * self.least:.0f} mm are asked for)"
+            yield f"{self.touch} at {self.touch.instant / FS:.3f} s ({1000 * self.least:.0f} mm are asked for)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +99,9 @@ class Inspector:
         tau = inverse_dynamics(self.robot, motion.q, motion.qd, motion.qdd) + coulomb_torque(self.robot, motion.qd)
         shares["torque"] = np.abs(tau) / (self.asked.torque_share * self.limits.torque)
         shares["torque if off"] = (np.abs(tau) + self.asked.prior_error * self._spread(motion)) / self.limits.torque
-        shares["rms torque"] = np.sqrt(np.mean(tau**2, axis=0, keepdims=True)) / self.limits.rms_torque
+        moves = motion.qd.any(axis=1)  # rest before and after is no rest between two of many motions
+        squares = np.mean(tau[moves] ** 2, axis=0, keepdims=True) if moves.any() else 0 * tau[:1]
+        shares["rms torque"] = np.sqrt(squares) / self.limits.rms_torque
         limited = {name: share for name, share in shares.items() if share.any()}
         touch = self.clearance.nearest(motion.q, motion.qd, FS)
         return LimitUse(limited, touch, self.asked.clearance, self.robot.joints)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from experiments.errors import ExperimentError
-from identify import Array, FirLowPass, NoiseLevels
+from identify import Array, FirLowPass, NoiseLevels, ReversalMask
 from identify.design.information import Information
 from identify.design.plan import Plan
 from identify.parameters.base_parameters import random_states
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 STATES, LEAST = 12.0, 8.0
 """States for each period of the highest frequency, and least states a second."""
+
+MANY = 400
+"""Most periods of the highest frequency: slopes of more take hours."""
 
 FINER = 4
 """Instants at which limits are kept, for each state."""
@@ -31,7 +34,11 @@ PASS = FirLowPass().cutoff
 def plan_for(design: "Design") -> Plan:
     """Return what the search minimises; raise ExperimentError if the motion is too short for the parameters."""
     _require_enough(design)
-    count = ceil(max(LEAST, STATES * design.frequency) * design.duration)
+    _require_sliding(design)
+    moves = max(1, round(design.duration * design.frequency))
+    if moves > MANY:
+        raise ExperimentError(f"{moves} periods of {design.frequency:g} Hz are more than {MANY}: give a shorter --duration")
+    count = moves * ceil(max(LEAST, STATES * design.frequency) * design.duration / moves)  # where moves begin, jerk peaks
     rate = count / design.duration
     grids = (np.arange(count) + 0.5) / rate, np.arange(FINER * count) / (FINER * rate)
     states, instants = (design.excitation.shapes(np.asarray(t), design.duration, design.frequency) for t in grids)
@@ -63,6 +70,17 @@ def _inertia(design: "Design") -> Array:
     """Return M(q), on average over postures."""
     q, qd, qdd = random_states(design.subject.tree, POSTURES)
     return np.asarray(slopes(design.subject.basis, design.X, q, qd, qdd, qd).inertia.mean(axis=-1))
+
+
+def _require_sliding(design: "Design") -> None:
+    """Raise ExperimentError if a joint is so slow that masks leave out all of its rows."""
+    threshold, robot = 1.5 * ReversalMask().threshold, design.subject.robot
+    for joint, most in zip(robot.joints, design.limits.velocity, strict=True):
+        if most < threshold:
+            raise ExperimentError(
+                f"{joint} may move at {most:g} rad/s or m/s at most: below {threshold:g} it counts as standing, and nothing is "
+                "told of it; raise its velocity, or weld it"
+            )
 
 
 def _require_enough(design: "Design") -> None:

@@ -1,5 +1,6 @@
 """Motions one after the other, each designed for what the logs before it left open, on the simulated robot."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -7,7 +8,6 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
-from experiments.errors import ExperimentError
 from experiments.excite.design import Design
 from experiments.excite.excited import Excited
 from experiments.text import new_table, print_titled
@@ -18,7 +18,7 @@ ENOUGH = 0.1
 """Weight of a parameter that is known well enough."""
 
 ROUNDS = 12
-"""Motions after which a wish counts as out of reach."""
+"""Motions after which it ends, whatever is known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class Round:
 
 
 @dataclass(frozen=True, eq=False)
-class Sequence:
+class MotionSequence:
     """Motions until every parameter is known well enough.
 
     Parameters
@@ -69,41 +69,40 @@ class Sequence:
     wished: float
 
     @classmethod
-    def of(cls, design: Design, wished: float, progress: Progress | None = None) -> "Sequence":
+    def of(cls, design: Design, wished: float, progress: Progress | None = None) -> "MotionSequence":
         """Design, simulate and identify until one sigma of each parameter makes less than `wished` of a brisk torque.
 
-        Raises
-        ------
-        ExperimentError
-            If so many motions do not reach it.
+        After ROUNDS motions, or Ctrl-C, it ends with what there is.
         """
-        rounds, logs = list[Round](), design.logs
-        for number in range(ROUNDS):
-            weights = _weak(rounds[-1], wished) if rounds else design.weights
-            excited = Excited.of(replace(design, logs=logs, seed=design.seed + number, weights=weights), progress)
-            run = simulate(replace(excited.scenario, seed=design.scenario.seed + number))
-            logs = (*logs, run.alone())
-            rounds.append(_judged(excited, logs))
-            if rounds[-1].share < wished or excited.interrupted:
-                return cls(tuple(rounds), wished)
-        raise ExperimentError(
-            f"after {ROUNDS} motions one sigma of {rounds[-1].weakest} makes {rounds[-1].share:.2%} of a brisk torque, not "
-            f"less than {wished:.2%}: give a longer --duration, less noise, or a higher --until"
-        )
+        rounds, logs, weights = list[Round](), design.logs, design.weights
+        try:
+            for number in range(ROUNDS):
+                asked = replace(design, logs=logs, seed=design.seed + number, weights=weights)
+                excited = Excited.of(asked, progress)
+                run = simulate(replace(excited.scenario, seed=design.scenario.seed + number))
+                logs = (*logs, run.alone())
+                rounds.append(_judged(excited, logs))
+                if rounds[-1].share < wished or excited.interrupted:
+                    break
+                weights = _weak(rounds[-1], wished, design.weights)
+        except KeyboardInterrupt:
+            if not rounds:
+                raise
+        return cls(tuple(rounds), wished)
+
+    @property
+    def reached(self) -> bool:
+        """Whether every parameter is known well enough."""
+        return self.rounds[-1].share < self.wished
 
     @property
     def last(self) -> Excited:
         """The last motion."""
         return self.rounds[-1].excited
 
-    @property
-    def logs(self) -> list[MotionLog]:
-        """The logs, one a motion."""
-        return [each.log for each in self.rounds]
-
     def summary(self) -> dict[str, Any]:
         """Return what summary.json has of it."""
-        return {"until": self.wished, "rounds": [_summary(each) for each in self.rounds]}
+        return {"until": self.wished, "reached": self.reached, "rounds": [_summary(each) for each in self.rounds]}
 
 
 def _summary(found: Round) -> dict[str, Any]:
@@ -118,13 +117,14 @@ def _judged(excited: Excited, logs: tuple[MotionLog, ...]) -> Round:
     return Round(excited, logs[-1], estimate, shares)
 
 
-def _weak(last: Round, wished: float) -> dict[str, float]:
+def _weak(last: Round, wished: float, weights: Mapping[str, float]) -> dict[str, float]:
     """Return weights for the next motion: what is not known well enough counts as much more as it is off."""
     names = last.excited.design.subject.basis.names
-    return {name: float(max(ENOUGH, share / wished)) for name, share in zip(names, last.shares, strict=True)}
+    each = zip(names, last.shares, strict=True)
+    return {name: float(weights.get(name, 1.0) * max(ENOUGH, share / wished)) for name, share in each}
 
 
-def print_sequence(console: Console, sequence: Sequence) -> None:
+def print_sequence(console: Console, sequence: MotionSequence) -> None:
     """Print what each motion left open."""
     grid = new_table("", ["weakest\nparameter", "its sigma, of\nbrisk torque %", "typical\nsigma, of first"])
     first = np.log(sequence.rounds[0].estimate.best_sigma).mean()
@@ -132,4 +132,7 @@ def print_sequence(console: Console, sequence: Sequence) -> None:
         typical = np.exp(np.log(each.estimate.best_sigma).mean() - first)
         grid.add_row(f"motion {number}", each.weakest, f"{100 * each.share:.3g}", f"{typical:.2f}")
     print_titled(console, "motions one after the other, identified together", grid)
-    console.print(Text(f"every sigma makes less than {sequence.wished:.2%} of a brisk torque"))
+    last = sequence.rounds[-1]
+    reached = f"every sigma makes less than {100 * sequence.wished:.4g} % of a brisk torque"
+    short = f"not reached: {last.weakest} still makes {last.share:.2%}; give a longer --duration, or less noise"
+    console.print(Text(reached if sequence.reached else short), soft_wrap=True)

@@ -7,9 +7,14 @@ from typing import NamedTuple
 import numpy as np
 
 from experiments.excite.design import SIGMA, Design
+from experiments.excite.limit_use import LimitUse
 from identify import Array
+from identify.data.limits import Limits
 from identify.design.plan import POWER, Plan
 from identify.design.search import Search
+
+FARTHEST = 1.5
+"""Most by which limits become narrower at once: a motion that leads far beyond them says little of how near it may go."""
 
 STARTS, BASINS = 5, 12
 """Least starts of the search, and starts times joints: few joints take little time."""
@@ -32,16 +37,19 @@ STAGES = Stage(24.0, 0.1, None, 50), Stage(24.0, 0.3, 3, 80), Stage(POWER, 10.0,
 """The first asks for the determinant, the others for what is minimised."""
 
 HARDER = 100.0, 1000.0, 10000.0, 100000.0
-"""What exceeding limits costs while some are still broken; those of torques also become narrower, by as much as is exceeded:
-between the states that the search looks at torques may be larger, where a joint turns."""
+"""What exceeding limits costs while some are still broken; they also become narrower, by as much as is exceeded: between the
+states that the search looks at torques may be larger, where a joint turns."""
 
 CLOSER = 1.005
-"""Factor by which limits of torques become narrower than what they are exceeded by."""
+"""Factor by which limits become narrower than what they are exceeded by."""
 
 
 def searched(design: Design, random: Sequence[Array], progress: Callable[[float], None] | None = None) -> Search:
     """Return the search of the best motion, begun with the best of random ones and those of the kind's own."""
-    rng, starts = np.random.default_rng([design.seed, 2]), max(STARTS, BASINS // design.subject.robot.n)
+    rng, starts = np.random.default_rng([design.seed, 2]), max(FARTHEST = 1.5
+"""Most by which limits become narrower at once: a motion that leads far beyond them says little of how near it may go."""
+
+STARTS, BASINS // design.subject.robot.n)
     own = design.excitation.starts(rng, design.plan, design.duration, design.frequency, starts - bool(random))
     cheapest = sorted(random, key=lambda c: design.plan.value(c)[0])[:1]
     total = sum((stage.keep or starts) * stage.steps for stage in STAGES)
@@ -52,13 +60,19 @@ def searched(design: Design, random: Sequence[Array], progress: Callable[[float]
     for harder in HARDER:
         if not any((use := design.look(search.best)).broken()):
             return search
-        over = max(1.0, *(CLOSER * float(share.max()) for name, share in use.largest.items() if "torque" in name), 1.0)
-        limits = replace(plan.limits, torque=plan.limits.torque / over, rms_torque=plan.limits.rms_torque / over)
-        plan = replace(plan, limits=limits, hard=harder)
+        plan = replace(plan, limits=_closer(plan.limits, use), hard=harder)
         search.run(plan, 1, stage.steps)
     if search.interrupted and cheapest and any(design.look(search.best).broken()):
         search.found = cheapest
     return search
+
+
+def _closer(limits: Limits, use: LimitUse) -> Limits:
+    """Return limits that are narrower by as much as a motion exceeds them."""
+    over = {name: min(FARTHEST, CLOSER * float(share.max())) for name, share in use.largest.items() if share.max() > 1}
+    torque = max(over.get("torque", 1.0), over.get("torque if off", 1.0))
+    rates = {name: getattr(limits, name) / over.get(name, 1.0) for name in ("velocity", "acceleration", "jerk")}
+    return replace(limits, **rates, torque=limits.torque / torque, rms_torque=limits.rms_torque / over.get("rms torque", 1.0))
 
 
 def _last(design: Design) -> Plan:

@@ -51,7 +51,7 @@ def record_excited(found: Excited, audience: Audience | None = None) -> list[tup
 def _send_limits(stream: Stream, found: Excited) -> None:
     """Send which share of each limit the motion uses over time, from the end of the way on."""
     step, joints = round(FS / SHOWN), [part(joint) for joint in found.use.joints]
-    begin = len(found.way.q) / FS
+    begin = len(found.ways[0].q) / FS
     for number, (kind, share) in enumerate(found.use.shares.items()):
         if len(share) > 1 and share.max() > NOTABLE:
             path = f"limits/{number}_{part(kind)}"
@@ -80,7 +80,7 @@ def _send_sigmas(stream: Stream, found: Excited) -> None:
 def _send_told(stream: Stream, found: Excited) -> None:
     """Send which stretch of the motion tells how much of each parameter."""
     names, shares, duration = found.design.subject.basis.names, found.shares, found.design.duration
-    begin = len(found.way.q) / FS
+    begin = len(found.ways[0].q) / FS
     middles = begin + (np.arange(STRETCHES) + 0.5) * duration / STRETCHES
     for at, members in _parts(names):
         x = linear("time [s]", begin, begin + duration)

@@ -7,6 +7,9 @@ import numpy as np
 from identify.arrays import Array, frozen
 from identify.errors import SettingError
 
+LEAST = 1e-6
+"""Limits below this are a slip."""
+
 
 @dataclass(frozen=True, eq=False)
 class Limits:
@@ -34,8 +37,8 @@ class Limits:
         n = len(self.position)
         for name in ("velocity", "acceleration", "jerk", "torque", "rms_torque"):
             values = frozen(np.broadcast_to(getattr(self, name), n))
-            if not (values > 0).all():
-                raise SettingError(f"limits: {name} = {values.tolist()} must be above 0")
+            if not (values >= LEAST).all():
+                raise SettingError(f"limits: {name} = {values.tolist()} must be at least {LEAST:g}")
             object.__setattr__(self, name, values)
         if self.position.shape != (n, 2) or not (self.position[:, 0] < self.position[:, 1]).all():
             raise SettingError(f"limits: position = {self.position.tolist()} must be pairs, the lowest first")

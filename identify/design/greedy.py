@@ -1,6 +1,6 @@
 """Moves that are chosen one after the other, each the one that tells most beside those before it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -75,5 +75,5 @@ class Greedy:
         shape = quintic(u) / self.T ** np.arange(4)[:, None]
         motion = (pool - at)[:, None, None, :] * shape[:, :, None]
         motion[:, 0] += self.limits.middle + at
-        W = self.information.columns(motion) * self.information.weight(motion)[..., None]
-        return self.information.matrix(W)
+        information = replace(self.information, rate=INSTANTS / self.T)
+        return information.matrix(information.weighted(motion))

@@ -55,6 +55,10 @@ class Information:
             found[..., row, self._place[name]] = column
         return found
 
+    def weighted(self, motion: Array) -> Array:
+        """Return columns multiplied by how much their rows count, shape (..., time, joint, p)."""
+        return self.columns(motion) * self.weight(motion)[..., None]
+
     def weight(self, motion: Array) -> Array:
         """Return how much rows count, qd^2 / (qd^2 + SLOW^2 + (TURNING qdd)^2), shape (..., time, joint)."""
         squares = motion[..., 1, :, :] ** 2

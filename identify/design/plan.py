@@ -20,6 +20,9 @@ NEAR = 0.97
 HARD = 30.0
 """What exceeding a limit by all of it costs, squared; halving all sigmas gains 0.7."""
 
+NOTHING = 1e6
+"""What motions cost that leave a parameter unknown."""
+
 SLACK = 0.99
 """Share of the limits that motions use, since limits are kept at instants."""
 
@@ -64,7 +67,7 @@ class Plan:
     hard : float
         What exceeding a limit by all of it costs, squared.
     power : float
-        That of the smooth norm by which motions are scaled into their limits.
+        That of the smooth norm by which motions are scaled into their limits; even.
     """
 
     information: Information
@@ -94,13 +97,12 @@ class Plan:
 
     def matrix(self, motion: Array) -> Array:
         """Return the information of a motion, with what is known."""
-        W = self.information.columns(motion) * self.information.weight(motion)[..., None]
-        return self.known + self.repeat * self.information.matrix(W)
+        return self.known + self.repeat * self.information.matrix(self.information.weighted(motion))
 
     def excess(self, c: Array) -> float:
         """Return what coefficients, shape (m, joint), cost beyond what the criterion says: 0 where limits are kept."""
         whole = self._with_way(self.motion(c))
-        cost, _ = self._torque_cost(whole, self.information.columns(whole))
+        cost, _ = self._torque_cost(whole, self.information.columns(whole), self.states.values.shape[1])
         return cost + (self.hard * self.obstacles(whole[0])[0] if self.obstacles else 0.0)
 
     def value(self, c: Array) -> tuple[float, Array]:
@@ -122,16 +124,19 @@ class Plan:
         solved = self.information.whitened(W) * self.repeat
         flat = W.reshape(-1, W.shape[-1])
         M = self.known + flat.T @ solved.reshape(flat.shape)
+        value = float(self.criterion.value(M))
+        if not np.isfinite(value):
+            return NOTHING, np.zeros((3, *motion.shape[1:]))
         of_rows = np.zeros_like(D)
         of_rows[:count] = 2 * solved @ self.criterion.slope(M)
-        penalty, of_torques = self._torque_cost(whole, D)
+        penalty, of_torques = self._torque_cost(whole, D, count)
         slope = self.information.slope(whole, of_rows, of_torques)
         if self.obstacles:
             near, away = self.obstacles(whole[0])
             penalty += self.hard * near
             slope[0] += self.hard * away
         slope[0, 0] += np.sum(WAY[:, None] * slope[0, count:], axis=0) if self.home is not None else 0.0
-        return float(self.criterion.value(M)) + penalty, slope[:, :count]
+        return value + penalty, slope[:, :count]
 
     def _with_way(self, motion: Array) -> Array:
         """Return a motion, shape (4, time, joint), with postures on the way from home to its start at the end."""
@@ -141,17 +146,18 @@ class Plan:
         way[0] = self.home + WAY[:, None] * (motion[0, 0] - self.home)
         return np.concatenate([motion, way], axis=1)
 
-    def _torque_cost(self, motion: Array, D: Array) -> tuple[float, Array]:
-        """Return what torques beyond their limits cost, and the slope by columns times parameters."""
+    def _torque_cost(self, motion: Array, D: Array, count: int) -> tuple[float, Array]:
+        """Return what torques beyond their limits cost, and the slope by columns; the mean is that of `count` states."""
         parts = self.information.torques(motion, D, self.X)
         tau, spread = parts.sum(axis=-1), np.abs(parts).sum(axis=-1)
         most, worst = 1 / (self.torque_share * self.limits.torque), 1 / self.limits.torque
-        mean = np.sqrt(np.mean(tau**2, axis=0) + 1e-300)
+        mean, inside = np.sqrt(np.mean(tau[:count] ** 2, axis=0) + 1e-300), (np.arange(len(tau)) < count)[:, None]
         over = np.maximum(np.abs(tau) * most - NEAR, 0.0)
         above = np.maximum((np.abs(tau) + self.prior_error * spread) * worst - NEAR, 0.0)
         warm = np.maximum(mean / self.limits.rms_torque - NEAR, 0.0)
-        cost = self.hard * (np.sum(over**2) + np.sum(above**2) + len(tau) * np.sum(warm**2))
-        by_tau = 2 * self.hard * (np.sign(tau) * (over * most + above * worst) + warm / mean / self.limits.rms_torque * tau)
+        cost = self.hard * (np.sum(over**2) + np.sum(above**2) + count * np.sum(warm**2))
+        by_mean = inside * warm / mean / self.limits.rms_torque
+        by_tau = 2 * self.hard * (np.sign(tau) * (over * most + above * worst) + by_mean * tau)
         by_spread = 2 * self.hard * self.prior_error * above * worst
         return float(cost), (by_tau[..., None] + by_spread[..., None] * np.sign(parts)) * self.X
 
@@ -161,7 +167,7 @@ class Plan:
         use = self.instants.at(c) / sizes
         largest = np.abs(use).max(axis=(-3, -2), keepdims=True)
         relative = use / np.maximum(largest, 1e-300)
-        total = np.sum(relative**self.power, axis=(-3, -2))
+        total = np.maximum(np.sum(relative**self.power, axis=(-3, -2)), 1e-300)  # of no motion at all
         norm = largest[..., 0, 0, :] * total ** (1 / self.power)
         by_use = relative ** (self.power - 1) * total[..., None, None, :] ** (1 / self.power - 1)
         of_norm = np.einsum("dtm,...dtj->...mj", self.instants.values, by_use / sizes)

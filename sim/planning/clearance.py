@@ -42,6 +42,10 @@ class Touch:
     shapes: tuple[str, str]
     instant: int
 
+    def __str__(self) -> str:
+        how = f"are {1000 * self.distance:.0f} mm apart" if self.distance > 0 else "touch"
+        return f"{self.shapes[0]} and {self.shapes[1]} {how}"
+
 
 class Clearance:
     """Distances between the shapes of a robot that could meet, by MuJoCo.
@@ -66,18 +70,28 @@ class Clearance:
         random = np.random.default_rng(SEED).uniform(ranges[:, 0], ranges[:, 1], (ALWAYS, robot.n))
         most = self.distances(random, least + ROOM).max(axis=0, initial=-np.inf)
         always = most < least
-        self.left_out = [self._names(pair) for pair in self.pairs[always]]
+        self.left_out = [self.names(pair) for pair in self.pairs[always]]
         self.pairs = self.pairs[~always]
         self._margin = least + np.minimum(ROOM, (most[~always] - least) / 2)
 
     @cached_property
     def shapes(self) -> npt.NDArray[np.intp]:
-        """Numbers of the shapes that count."""
+        """Numbers of the shapes that count: of each link those marked for collisions, all where none is."""
         m = self._model
         marked = (m.geom_contype != 0) | (m.geom_conaffinity != 0)
-        fixed = m.body_weldid[m.geom_bodyid] == 0
-        chosen = marked | fixed if marked[~fixed].any() else np.ones(m.ngeom, dtype=bool)
-        return np.flatnonzero(chosen)
+        links = m.body_weldid[m.geom_bodyid]
+        of_marked = np.isin(links, links[marked]) & (links != 0)
+        return np.flatnonzero((marked | ~of_marked) & (m.geom_type != int(mujoco.mjtGeom.mjGEOM_HFIELD)))
+
+    @cached_property
+    def bare(self) -> tuple[str, ...]:
+        """Names of links that have no shape, and of height fields, whose distances MuJoCo does not tell."""
+        m = self._model
+        links = (
+            {int(m.body_weldid[b]) for b in range(1, m.nbody)} - {0} - set(m.body_weldid[m.geom_bodyid[self.shapes]].tolist())
+        )
+        fields = np.flatnonzero(m.geom_type == int(mujoco.mjtGeom.mjGEOM_HFIELD))
+        return (*(body_name(m, link) for link in sorted(links)), *(m.geom(int(g)).name or "a height field" for g in fields))
 
     @property
     def checks(self) -> bool:
@@ -95,24 +109,32 @@ class Clearance:
         return moved
 
     def _asked(self) -> npt.NDArray[np.intp]:
-        """Return the pairs of shapes between which a joint lies, and more than one."""
-        m, found = self._model, []
-        weld, parent = m.body_weldid, m.body_weldid[m.body_parentid]
-        for a, b in combinations(self.shapes, 2):
-            one, two = weld[m.geom_bodyid[a]], weld[m.geom_bodyid[b]]
-            arm = {self._owner(int(a)), self._owner(int(b))}
-            neighbours = parent[one] == two or parent[two] == one
-            if one != two and not (neighbours and self.WORLD not in arm):
-                found.append((a, b))
-        return np.array(found, dtype=np.intp).reshape(-1, 2)
+        """Return the pairs of shapes that joints move against each other, without those of neighbouring links."""
+        m = self._model
+        pairs = [pair for pair in combinations(self.shapes, 2) if not self._neighbours(*(int(m.geom_bodyid[g]) for g in pair))]
+        return np.array(pairs, dtype=np.intp).reshape(-1, 2)
 
-    WORLD = "world"
+    def _neighbours(self, one: int, two: int) -> bool:
+        """Return whether two bodies belong to one link, or to two with a joint between them; what stands around is nobody's."""
+        m = self._model
+        if m.body_weldid[one] == m.body_weldid[two]:
+            return True
+        for a, b in ((one, two), (two, one)):
+            link = int(m.body_weldid[b])
+            if link and m.body_weldid[m.body_parentid[link]] == m.body_weldid[a]:
+                return bool(m.body_weldid[a] or a in self._stand(link))
+        return False
 
-    def _owner(self, geom: int) -> str:
-        """Return whether a shape is of the robot, or of the world around it."""
-        return self.WORLD if self._model.geom_bodyid[geom] == 0 else "robot"
+    def _stand(self, link: int) -> set[int]:
+        """Return the bodies that carry the first link of a chain, but for the world itself."""
+        found, body = set[int](), int(self._model.body_parentid[link])
+        while body:
+            found.add(body)
+            body = int(self._model.body_parentid[body])
+        return found
 
-    def _names(self, pair: npt.NDArray[np.intp]) -> tuple[str, str]:
+    def names(self, pair: npt.NDArray[np.intp]) -> tuple[str, str]:
+        """Return what the shapes of a pair are called."""
         m = self._model
         one, two = (m.geom(int(g)).name or f"a shape of {body_name(m, int(m.geom_bodyid[g]))}" for g in pair)
         return one, two
@@ -194,7 +216,7 @@ class Clearance:
         if not found.size or found.min() >= self.least:
             return None
         k, i = np.unravel_index(int(found.argmin()), found.shape)
-        return Touch(float(found[k, i]), self._names(self.pairs[i]), int(fine[k]))
+        return Touch(float(found[k, i]), self.names(self.pairs[i]), int(fine[k]))
 
     def _reach(self, q: Array, speed: Array) -> Array:
         """Return how fast pairs can approach at positions and speeds, shape (instant, joint), as (instant, pair) [m/s]."""

@@ -21,7 +21,11 @@ Point = tuple[Number, Number, Number]
 RATES = ("velocity", "acceleration", "jerk")
 """Limits that MJCF has no word for: a robot's file gives them as `<custom><numeric name="max_velocity" data="..."/>`."""
 
-FLOOR = "floor"
+FLOOR = "the floor"
+"""What the floor is called beside the shapes of a file."""
+
+BOX = "keep_out {}"
+"""What a box is called beside them."""
 
 
 @final
@@ -29,7 +33,7 @@ FLOOR = "floor"
 class KeepOut:
     """A box that no part of the robot may enter, its edges along the axes of the world."""
 
-    name: str
+    name: Annotated[str, Field(min_length=1)]
     """What stands there."""
     lowest: Point
     """Corner with the least x, y and z [m]."""
@@ -63,7 +67,7 @@ class MotionLimits:
     torque_share: Annotated[Share, Field(gt=0)] = 0.8
     """Share of the largest torque that the motion takes; the controller needs the rest."""
     prior_error: Annotated[Number, Field(ge=0, le=1)] = 0.3
-    """Share by which every parameter of the robot's file may be off, with torques still below the largest."""
+    """Share by which every base parameter of the robot may be off, with torques still below the largest."""
     clearance: Positive = 0.01
     """Least distance between shapes of the robot, and from what stands around it [m]."""
     floor: Number | Literal["none"] | None = None
@@ -72,8 +76,11 @@ class MotionLimits:
     """Boxes that no part of the robot may enter."""
     home: tuple[Number, ...] = ()
     """Positions from which the arm comes, and to which it returns [rad]; the robot's own by default."""
-    way_velocity: Positive = 0.5
-    """Largest speed on the way to the start and back [rad/s]."""
+
+    def __post_init__(self) -> None:
+        names = [box.name for box in self.keep_out]
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise ScenarioError(f"two boxes of keep_out are called {', '.join(twice)}")
 
     @classmethod
     def read(cls, path: Path | None) -> "MotionLimits":
@@ -135,25 +142,34 @@ def home_of(robot: Robot, asked: MotionLimits, limits: Limits) -> Array:
             raise ScenarioError(f"limits: home = {list(asked.home)} puts {outside} outside its range")
         return home
     keys = [k for k in range(robot.model.nkey) if robot.model.key(k).name == "home"]
-    return np.clip(robot.model.key_qpos[keys[0]] if keys else robot.model.qpos0, low, high)
+    own = np.clip(robot.model.key_qpos[keys[0]] if keys else robot.model.qpos0, *robot.ranges.T)
+    if outside := _names(robot, (own < low) | (own > high)):
+        raise ScenarioError(f"limits: position puts the robot's own home outside, by {outside}: give a home = [...], too")
+    return own
 
 
 def surroundings(name: str, asked: MotionLimits) -> Robot:
     """Return a robot, by its name or file, with the floor and the boxes around it as shapes of the world."""
-    floor = _floor(Robot.load(name)) if asked.floor is None else asked.floor
+    floor = floor_of(Robot.load(name), asked)
 
     def edit(spec: mujoco.MjSpec) -> None:
-        if isinstance(floor, float):
+        if floor is not None:
             spec.worldbody.add_geom(name=FLOOR, type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], pos=[0, 0, floor])
         for box in asked.keep_out:
             low, high = np.array(box.lowest), np.array(box.highest)
-            spec.worldbody.add_geom(name=box.name, type=mujoco.mjtGeom.mjGEOM_BOX, size=(high - low) / 2, pos=(high + low) / 2)
+            place = {"size": (high - low) / 2, "pos": (high + low) / 2}
+            spec.worldbody.add_geom(name=BOX.format(box.name), type=mujoco.mjtGeom.mjGEOM_BOX, **place)
 
     return Robot.load(name, edit)
 
 
-def _floor(robot: Robot) -> float | None:
-    """Return the height of the lowest point of what is fixed to the world; None where that is a plane, or nothing."""
+def floor_of(robot: Robot, asked: MotionLimits) -> float | None:
+    """Return the height of the floor [m], as asked, or of the lowest point of what is fixed to the world; None without one.
+
+    Where a plane is fixed to the world, that is the floor.
+    """
+    if asked.floor is not None:
+        return asked.floor if isinstance(asked.floor, float) else None
     model, data = robot.model, mujoco.MjData(robot.model)
     mujoco.mj_kinematics(model, data)
     fixed = np.flatnonzero(model.body_weldid[model.geom_bodyid] == 0)

@@ -147,6 +147,10 @@ class Robot:
             raise RobotError(f"robot {self.name!r}: {name} has {len(custom[name])} values for {self.n} joints")
         for j, joint in enumerate(self.joints):
             found[j] = custom[name][j] if name in custom else custom.get(f"{name} {joint}", [np.inf])[0]
+            if not found[j] > 0:
+                raise RobotError(
+                    f"robot {self.name!r}: {name} of {joint} is {found[j]:g}, which must be above 0: correct the file"
+                )
         return found
 
     @property
@@ -161,17 +165,26 @@ class Robot:
         From the range of forces, and from that of controls where the control is a force, as in `motor`; of a URDF its efforts.
         """
         model = self.model
-        limits = np.where(model.jnt_actfrclimited.astype(bool), np.abs(model.jnt_actfrcrange).max(axis=1), np.inf)
+        of_joints = [_smaller_side(range_) for range_ in model.jnt_actfrcrange]
+        limits = np.where(model.jnt_actfrclimited.astype(bool), of_joints, np.inf)
         for a in range(model.nu):
             if model.actuator_trntype[a] != int(mujoco.mjtTrn.mjTRN_JOINT):
                 continue
             joint, gear = model.actuator_trnid[a, 0], abs(model.actuator_gear[a, 0])
             if model.actuator_forcelimited[a]:
-                limits[joint] = min(limits[joint], gear * model.actuator_forcerange[a].max())
+                limits[joint] = min(limits[joint], gear * _smaller_side(model.actuator_forcerange[a]))
             is_force = model.actuator_biastype[a] == int(mujoco.mjtBias.mjBIAS_NONE)
             if model.actuator_ctrllimited[a] and is_force:
-                limits[joint] = min(limits[joint], gear * model.actuator_gainprm[a, 0] * model.actuator_ctrlrange[a].max())
+                limits[joint] = min(
+                    limits[joint], gear * model.actuator_gainprm[a, 0] * _smaller_side(model.actuator_ctrlrange[a])
+                )
         return limits
+
+
+def _smaller_side(limits: Array) -> float:
+    """Return how far a range goes to both sides of 0; of one that lies to one side of it, how far it goes."""
+    low, high = (float(x) for x in limits)
+    return min(-low, high) if low < 0 < high else max(abs(low), abs(high))
 
 
 def _from_urdf(urdf: str) -> mujoco.MjSpec:

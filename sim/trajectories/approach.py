@@ -15,10 +15,10 @@ REST = 0.2
 """Time at rest before and after it [s]."""
 
 
-def approach(robot: Robot, start: Array, goal: Array, fs: float, pace: float = 1.0) -> Reference:
+def approach(robot: Robot, start: Array, goal: Array, fs: float, most: Array | None = None) -> Reference:
     """Return ruckig's move from `start` to `goal` [rad], shape (joint,), gentle, at rest at both ends.
 
-    No faster than the file of the robot allows; with another `pace`, so many times as fast.
+    No faster than the file of the robot allows, nor than `most` [rad/s, rad/s^2, rad/s^3], shape (3, joint).
 
     Raises
     ------
@@ -26,7 +26,8 @@ def approach(robot: Robot, start: Array, goal: Array, fs: float, pace: float = 1
         If `start` is not a position of the robot's joints.
     """
     require_in_range(robot, start[None])
-    most = np.stack([robot.most(rate) for rate in ("velocity", "acceleration", "jerk")])
-    limits = np.minimum(most, np.array([[VELOCITY], [ACCELERATION], [JERK]]))
-    limits *= pace ** np.arange(1.0, 4.0)[:, None]
+    known = np.stack([robot.most(rate) for rate in ("velocity", "acceleration", "jerk")])
+    limits = np.minimum(known, np.array([[VELOCITY], [ACCELERATION], [JERK]]))
+    if most is not None:
+        limits = np.minimum(limits, most)
     return JerkLimited.between(np.stack([start, goal]), limits, REST).sample(fs)

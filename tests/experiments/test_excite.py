@@ -72,7 +72,7 @@ def test_its_scenario_runs_and_its_errors_are_as_predicted(written, tmp_path):
 
 @pytest.mark.parametrize("kind", EXCITATIONS.builtin)
 def test_limits_hold_at_a_thousand_hertz_by_mujocos_own_torques(kind):
-    """Also with the parameters of the file off by 30 %, every one to its worst side or at random."""
+    """Also with the parameters of the file off by 30 %: all of them larger, or each at random."""
     noisy = replace(load("arm"), torque=TorqueMeasurement(noise=(0.05,)))
     found = Excited.of(Design("puma560", noisy, kind, 4.0, 1.0, MotionLimits(torque=TORQUES)))
     robot, motion = Robot.load("puma560"), found.design.trajectory(found.c).plan(Robot.load("puma560")).sample(1000.0)
@@ -83,11 +83,12 @@ def test_limits_hold_at_a_thousand_hertz_by_mujocos_own_torques(kind):
     tau = inverse_dynamics(robot, motion.q, motion.qd, motion.qdd) + coulomb_torque(robot, motion.qd)
     limit = np.array(TORQUES)
     assert (np.abs(tau) <= 0.8 * limit * (1 + 1e-6)).all()
+    assert found.use.largest["torque if off"].max() > 0.95
     rng, model = np.random.default_rng(0), robot.model
-    for _ in range(20):
+    for k in range(20):
         for field in ("body_mass", "body_inertia", "dof_armature", "dof_damping", "dof_frictionloss"):
             values = getattr(model, field)
-            values *= rng.uniform(0.7, 1.3, values.shape)
+            values *= 1.3 if k == 0 else rng.uniform(0.7, 1.3, values.shape)
         off = inverse_dynamics(robot, motion.q, motion.qd, motion.qdd) + coulomb_torque(robot, motion.qd)
         assert (np.abs(off) <= limit).all()
         robot = Robot.load("puma560")
@@ -103,13 +104,16 @@ def test_the_same_seed_gives_the_same_motion(tmp_path):
 
 
 def test_an_earlier_log_is_used(written, tmp_path, capsys):
-    """With ten times the same motion known, the next one tells other things, and sigmas are below those of the log."""
+    """What the log tells is added: sigmas are below those of the log, and below those of a motion without it."""
     assert main(["run", str(written / "scenario.toml"), "--out", str(tmp_path / "run"), "--no-rerun"]) == 0
     asked = ["--log", str(tmp_path / "run" / "log.parquet"), "--out", str(tmp_path / "next")]
     assert main(["excite", "scara", *SHORT, *asked]) == 0
     assert "earlier" in capsys.readouterr().out
     summary = json.loads((tmp_path / "next" / "summary.json").read_text())
     assert (np.array(summary["sigma"]) < summary["earlier"]).all()
+    assert main(["excite", "scara", *SHORT, "--out", str(tmp_path / "alone")]) == 0
+    alone = json.loads((tmp_path / "alone" / "summary.json").read_text())
+    assert (np.array(summary["sigma"]) < 0.9 * np.array(alone["sigma"])).all()
 
 
 def test_what_is_weighed_comes_out_better(tmp_path):
@@ -132,26 +136,49 @@ def test_a_keep_out_box_is_kept_out_of(tmp_path):
     _, rows = table(tmp_path / "out")
     robot = surroundings("scara", MotionLimits.read(limits))
     found = Clearance(robot, robot.ranges, 0.01)
-    assert any("post" in found._names(pair) for pair in found.pairs)
+    assert any("keep_out post" in found.names(pair) for pair in found.pairs)
     assert found.distances(rows[:, 2:4], 0.05).min() > 0.0095
 
 
 def test_motions_follow_until_all_is_known(tmp_path, capsys):
     out = tmp_path / "out"
-    assert main(["excite", "scara", *SHORT, "--until", "0.35%", "--out", str(out)]) == 0
+    assert main(["excite", "scara", *SHORT, "--until", "0.18%", "--out", str(out)]) == 0
     summary = json.loads((out / "summary.json").read_text())
     shares = [each["brisk_share"] for each in summary["rounds"]]
     assert shares == sorted(shares, reverse=True)
-    assert shares[-1] < 0.0035
-    assert len(shares) == 1 or shares[-2] >= 0.0035
+    assert shares[-1] < 0.0018 <= shares[-2]
     assert "motion 1" in capsys.readouterr().out
 
 
-def test_what_stays_unknown_is_told(tmp_path, monkeypatch, complaint):
+def test_what_stays_unknown_is_told_and_nothing_is_lost(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("experiments.excite.sequence.ROUNDS", 1)
-    line = complaint("excite", "scara", *SHORT, "--until", "0.0001%", "--out", str(tmp_path / "out"))
-    assert "after 1 motions one sigma of" in line
-    assert "give a longer --duration, less noise, or a higher --until" in line
+    out = tmp_path / "out"
+    assert main(["excite", "scara", *SHORT, "--until", "0.0001%", "--out", str(out)]) == 0
+    assert "not reached: Fs2 still makes" in capsys.readouterr().out
+    assert {"log1.parquet", "motion1.csv", "motion.csv"} < {path.name for path in out.iterdir()}
+
+
+def test_ways_keep_the_limits_that_were_given(tmp_path):
+    limits = tmp_path / "limits.toml"
+    limits.write_text("velocity = 0.3\nacceleration = 2.0\nhome = [1.5, 1.5]\n")
+    assert main(["excite", "scara", *SHORT, "--limits", str(limits), "--out", str(tmp_path / "out")]) == 0
+    _, rows = table(tmp_path / "out")
+    np.testing.assert_allclose(rows[[0, -1], 2:4], 1.5)
+    assert np.abs(rows[:, 4:6]).max() <= 0.3
+    assert np.abs(rows[:, 6:8]).max() <= 2.0
+
+
+def test_motors_stay_cool_however_often_a_motion_is_run():
+    """Root mean squares of the torques of ten runs, by MuJoCo, without the rest at both ends."""
+    noisy = replace(load("ideal"), torque=TorqueMeasurement(noise=(0.05,)))
+    asked = MotionLimits(rms_torque=(15.0, 1.2))
+    found = Excited.of(Design("scara", noisy, duration=4.0, asked=asked, repeat=10))
+    robot = Robot.load("scara")
+    motion = found.design.trajectory(found.c).plan(robot).sample(1000.0)
+    tau = inverse_dynamics(robot, motion.q, motion.qd, motion.qdd) + coulomb_torque(robot, motion.qd)
+    rms = np.sqrt(np.mean(tau[1000:-1000] ** 2, axis=0))
+    assert (rms <= (15.0, 1.2)).all()
+    assert (rms / (15.0, 1.2)).max() > 0.9
 
 
 def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
@@ -183,9 +210,14 @@ def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
         (["scara", "--weigh", "Fv3=2"], "--weigh Fv3: no such parameter (did you mean"),
         (["scara", "--weigh", "Fv2"], "--weigh Fv2: give a parameter and a weight above 0"),
         (["scara", "--criterion", "cond"], "--criterion cond: no such criterion"),
-        (["scara", "--torque-noise", "0"], "sigmas need a noise of the torques above 0"),
+        (["scara", "--torque-noise", "0"], "--torque-noise 0 must be at least 1e-06 N m"),
+        (["scara", "--fs", "nan"], "--fs nan must be at least 10 and at most 10000"),
+        (["scara", "--repeat", "100000"], "--repeat 100000 must be at least 1 and at most 360"),
+        (["scara", "--until", "2%", "--log", "x.csv"], "--until simulates its own logs"),
+        (["scara", "--weigh", "Fv2=2", "Fv2=3"], "--weigh gives Fv2 twice"),
+        (["scara", "--duration", "1000", "--frequency", "20"], "are more than 400: give a shorter --duration"),
         (["scara", "--torque-noise", "1", "2", "3"], "--torque-noise has 3 values for 2 joints"),
-        (["scara", "--encoder-bits", "99"], "--encoder-bits 99 must be between 4 and 40"),
+        (["scara", "--encoder-bits", "99"], "--encoder-bits 99 must be at least 4 and at most 40"),
         (["scara", "--until", "200%"], "--until 200%: give a share between 0 and 100 %"),
         (["scara", "--limits", "nowhere.toml"], "cannot read limits nowhere.toml"),
         (["scara", "--repeat", "0"], "--repeat 0 must be at least 1"),
@@ -205,10 +237,13 @@ def test_wrong_input_is_one_line(args, message, tmp_path, monkeypatch, complaint
     [
         ("torque = 0.1", "no motion was found that keeps all limits: "),
         ("torque = 1e-3\n[position]\njoint1 = [-0.1, 0.1]", "no motion was found that keeps all limits: torque"),
-        ('[[keep_out]]\nname = "cage"\nlowest = [-1, -1, 0]\nhighest = [1, 1, 1]', "keep_out cage: link1_hub is inside it"),
+        ('[[keep_out]]\nname = "cage"\nlowest = [-1, -1, 0]\nhighest = [1, 1, 1]', "keep_out cage: "),
+        ("[position]\njoint1 = [0.5, 1.5]", "puts the robot's own home outside, by joint1: give a home"),
+        ("velocity = 0.1", "joint1 may move at 0.1 rad/s or m/s at most"),
+        ("floor = 5.0", "the floor: "),
         ("home = [5, 0]", "limits: home = [5.0, 0.0] puts joint1 outside its range"),
     ],
-    ids=["torque", "range", "cage", "home"],
+    ids=["torque", "range", "cage", "own home", "slow", "floor", "home"],
 )
 def test_limits_that_nothing_keeps_are_told_by_name(text, message, tmp_path, complaint):
     limits = tmp_path / "limits.toml"

@@ -45,15 +45,15 @@ def test_distances_are_those_of_spheres(clear):
     ball = np.stack([(0.5 + q[:, 1]) * np.cos(q[:, 0]), (0.5 + q[:, 1]) * np.sin(q[:, 0])], axis=1)
     post = np.linalg.norm(ball - [1.0, 0.0], axis=1) - 0.2
     found = clear.distances(q, 10.0)
-    pair = [clear._names(p) for p in clear.pairs].index(("post", "ball"))
+    pair = [clear.names(p) for p in clear.pairs].index(("post", "ball"))
     np.testing.assert_allclose(found[:, pair], post, atol=1e-6)
 
 
 def test_neighbours_are_left_out_and_what_always_touches_is_told(balls, clear):
-    assert ("hub", "ball") not in [clear._names(p) for p in clear.pairs]
+    assert ("hub", "ball") not in [clear.names(p) for p in clear.pairs]
     asked = MotionLimits(keep_out=(KeepOut("cage", (-0.1, -0.1, 0.4), (0.1, 0.1, 0.6)),))
     robot = surroundings(balls, asked)
-    assert ("cage", "hub") in [tuple(sorted(p)) for p in Clearance(robot, robot.ranges, 0.05).left_out]
+    assert ("hub", "keep_out cage") in [tuple(sorted(p)) for p in Clearance(robot, robot.ranges, 0.05).left_out]
 
 
 def test_the_slope_of_nearness_is_its_derivative(clear):
@@ -80,7 +80,7 @@ def test_the_nearest_is_found_between_coarse_instants(clear):
 
 def test_the_floor_is_below_what_the_robot_stands_on():
     robot = surroundings("panda", MotionLimits())
-    floor = robot.model.geom("floor")
+    floor = robot.model.geom("the floor")
     assert floor.pos[2] == pytest.approx(0.0, abs=1e-9)
     none = surroundings("panda", MotionLimits(floor="none"))
     assert none.model.ngeom == robot.model.ngeom - 1
