@@ -1,0 +1,63 @@
+"""What it costs to design a motion: ten seconds for each arm that ships, from any seed.
+
+    uv run python tests/benchmarks/excite.py [SEEDS]
+
+For each arm: the time of a whole design (random motions, search, limits at 1 kHz, predictions); that of one value with its
+slope, over that of the columns at the same states; the typical sigma over that of the median and of the best random motion; how
+far the worst of the seeds is from the best.
+"""
+
+import statistics
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from experiments.excite.design import Design
+from experiments.excite.excited import Excited
+from sim.encoders import IncrementalEncoder
+from sim.scenario.measurement import TorqueMeasurement
+from sim.scenario.scenario_file import load
+
+TIMES = 20
+"""Repetitions of short work."""
+
+
+def timed(work: Callable[[], object]) -> float:
+    """Return how long something takes [s]."""
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+def designed(robot: str, seed: int) -> tuple[Excited, float]:
+    """Return a motion, and how long it took."""
+    noisy = replace(load("ideal"), encoder=IncrementalEncoder(lines=(32768,)), torque=TorqueMeasurement(noise=(0.05,)))
+    start = time.perf_counter()
+    found = Excited.of(Design(robot, noisy, seed=seed))
+    _ = found.sigmas
+    return found, time.perf_counter() - start
+
+
+def main(seeds: int) -> None:
+    """Time and judge designs."""
+    for robot in ("scara", "puma560", "panda"):
+        each = [designed(robot, seed) for seed in range(seeds)]
+        found, plan = each[0][0], each[0][0].design.plan
+        value = statistics.median(timed(partial(plan.value, found.c)) for _ in range(TIMES))
+        columns = statistics.median(timed(partial(plan.information.columns, plan.motion(found.c))) for _ in range(TIMES))
+        typical = [float(np.log(one.sigma).mean()) for one, _ in each]
+        median, best = (max(one.ratios[i] for one, _ in each) for i in (0, 1))
+        print(
+            f"{robot}: {statistics.median(t for _, t in each):.1f} s (at most {max(t for _, t in each):.1f}), a slope "
+            f"{1e3 * value:.1f} ms, {value / columns:.1f} columns; at most {median:.2f} of the median and {best:.2f} of the "
+            f"best random motion; the worst of {seeds} seeds {np.exp(max(typical) - min(typical)):.3f} of the best",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 3)
