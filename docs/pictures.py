@@ -68,7 +68,7 @@ PICTURES = {
     "table1": Picture(("table1 --out OUT",), "", 0.6),
     "table2": Picture(("table2 --out OUT",), "", 0.6),
     "recording-compare": Picture(("run quantization --out OUT/quantization", "run ripple --out OUT/ripple"), "compare"),
-    "recording-excited": Picture(("excite panda --out OUT",), "", 0.55),
+    "recording-excited": Picture(("excite panda --out OUT --force",), "", 0.55),
     "recording-study": Picture(("study encoder --out OUT",), "study"),
 }
 

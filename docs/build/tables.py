@@ -72,7 +72,7 @@ def _by_settings(study: str) -> Iterator[tuple[dict[str, Any], dict[Column, Cell
 
 def typical(cell: Cell) -> str:
     """Return the geometric mean of the rms errors, to two digits."""
-    errors = [float(x) for x in cell["rmse_percent"]]
+    errors = [float(x) for x in cell["rmse_percent"] if x is not None]  # of what is zero in truth there is none
     mean = exp(sum(map(log, errors)) / len(errors))
     return f"{mean:.0f}" if mean >= 10 else f"{mean:#.2g}"
 

@@ -54,7 +54,7 @@ class Excite:
     birdy, smallest."""
     until: Percent = None
     """On the simulated robot: design, run and identify motions one after the other, until one sigma of every parameter makes
-    less than so much of a brisk motion's torque, such as 2%%."""
+    less than so much of a brisk motion's torque, such as 0.1%."""
     seed: int = 0
     """Of random motions and of the search; the same seed gives the same motion."""
     out: Folder = None

@@ -24,7 +24,7 @@ from experiments.identification.warnings import FILE, warnings_of_robot
 from identify import MotionLog, TorqueChannel
 from identify.data.log_file import write_log
 from sim.encoders import IncrementalEncoder
-from sim.planning.motion_limits import MotionLimits
+from sim.planning.motion_limits import MotionLimits, looser
 from sim.scenario.measurement import TorqueMeasurement
 from sim.scenario.scenario import Scenario
 from sim.scenario.scenario_file import load, to_toml
@@ -40,7 +40,8 @@ def excite(asked: Excite) -> None:
     """Design a motion, or a sequence of them, and write it."""
     design = _designed(asked)
     stem = Path(asked.robot).stem
-    place = Place(asked.out or Path("runs") / f"excited-{stem}", "excite", stem, asked.force)
+    what = _command(asked).removeprefix("uv run idbench excite ")
+    place = Place(asked.out or Path("runs") / f"excited-{stem}", "excite", what, asked.force)
     place.check()
     page, lost = new_page(machine=asked.json), ""
     share = _percent(asked.until)
@@ -49,7 +50,7 @@ def excite(asked: Excite) -> None:
             sequence = MotionSequence.of(design, share, progress) if share else None
             found = sequence.last if sequence else Excited.of(design, progress)
             print_excited(page, found)
-            page.warn({FILE: warnings_of_robot(design.subject.robot)})
+            page.warn({FILE: warnings_of_robot(design.subject.robot), "limits": looser(design.subject.robot, design.asked)})
             if sequence:
                 print_sequence(page, sequence)
                 for number, each in enumerate(sequence.rounds, 1):
@@ -57,7 +58,7 @@ def excite(asked: Excite) -> None:
                     write_motion(each.excited, folder / f"motion{number}.csv")
             write_motion(found, folder / "motion.csv")
             (folder / "scenario.toml").write_text(to_toml(found.scenario))
-            summary = found.summary() | (sequence.summary() if sequence else {})
+            summary = found.summary() | {"path": what} | (sequence.summary() if sequence else {})
             (folder / "report.html").write_text(report(found, _command(asked)), encoding="utf-8")
             page.found |= summary | {"folder": str(place.out)}
             write_summary(folder / "summary.json", summary)
@@ -130,6 +131,8 @@ def _scenario(asked: Excite) -> Scenario:
         if not all(isfinite(x) and x >= QUIET for x in noise):
             raise ExperimentError(f"--torque-noise {' '.join(f'{x:g}' for x in noise)} must be at least {QUIET:g} N m")
         scenario = replace(scenario, torque=TorqueMeasurement(noise=noise))
+    elif not max(scenario.torque.noise):
+        raise ExperimentError(f"scenario {asked.noise} has no noise of its torques: add --torque-noise, such as 0.05")
     return scenario if asked.fs is None else replace(scenario, fs=asked.fs)
 
 

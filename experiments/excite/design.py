@@ -147,6 +147,15 @@ class Design:
             )
         return found
 
+    def require_home(self) -> None:
+        """Raise ExperimentError if limits are broken where the arm comes from, at rest."""
+        q = np.repeat(self.home[None], 2, axis=0)
+        if broken := next(self.inspector.look(Reference(FS, q, 0 * q, 0 * q)).broken(), None):
+            what = broken.partition(" at ")[0]
+            raise ExperimentError(
+                f"at home, at rest, {what}: give another home, or a larger torque_share, in a file of --limits"
+            )
+
     @cached_property
     def X(self) -> Array:
         """Parameters as the robot's file has them."""

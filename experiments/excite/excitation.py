@@ -15,6 +15,9 @@ from identify.plugins import PluginTable
 from sim.trajectories import Fourier, Quintic
 from sim.trajectories.trajectory import AbstractTrajectory
 
+FEWEST = 3
+"""Moves that lead back."""
+
 REST = 1.0
 """Time at rest before and after a motion [s]: as much as filters look to either side."""
 
@@ -66,6 +69,8 @@ class FourierExcitation(AbstractExcitation):
 
     def starts(self, rng: np.random.Generator, plan: Plan, duration: float, frequency: float, count: int) -> list[Array]:
         """Return the series nearest to moves that are chosen one after the other: of random ones fewer end well."""
+        if round(duration * frequency) < FEWEST:
+            return super().starts(rng, plan, duration, frequency, count)
         t = (np.arange(plan.states.values.shape[1]) + 0.5) * duration / plan.states.values.shape[1]
         moves = MovesExcitation()
         number = moves.count(duration, frequency)
@@ -118,7 +123,7 @@ class MovesExcitation(AbstractExcitation):
     def count(self, duration: float, frequency: float) -> int:
         """Return the number of moves; raise ExperimentError if there are too few to lead back."""
         count = round(duration * frequency)
-        if count < 3:
+        if count < FEWEST:
             raise ExperimentError(
                 f"{duration:g} s are no three moves, {frequency:g} a second: give a longer --duration or a higher --frequency"
             )

@@ -14,7 +14,7 @@ from identify import brisk_shares
 def print_excited(console: Console, found: Excited) -> None:
     """Print the predicted sigma of every parameter beside random motions, and how limits are used."""
     d = found.design
-    title = f"{d.robot}: {d.kind}, {d.duration:g} s" + (f" x {d.repeat}" if d.repeat > 1 else "")
+    title = f"{d.subject.robot.name}: {d.kind}, {d.duration:g} s" + (f" x {d.repeat}" if d.repeat > 1 else "")
     _print_sigmas(console, found, title)
     _print_limits(console, found)
     for line in lines(found):
@@ -49,7 +49,8 @@ def _print_sigmas(console: Console, found: Excited, title: str) -> None:
     brisk = 100 * brisk_shares(d.subject.tree, d.subject.basis, d.X, found.sigma)
     for i, name in enumerate(d.subject.basis.names):
         share = 100 * found.sigma[i] / abs(d.X[i]) if d.X[i] else np.inf
-        own = [number(d.X[i]), f"{found.sigma[i]:.2g}", percentage(share) or f">{WORTHLESS:g}", f"{brisk[i]:.2g}"]
+        percent = (percentage(share) or f">{WORTHLESS:g}") if d.X[i] else "-"
+        own = [number(d.X[i]), f"{found.sigma[i]:.2g}", percent, f"{brisk[i]:.2g}"]
         others = [_sigma(x[i]) for x in (found.median, found.best, found.earlier) if x is not None]
         grid.add_row(name, *own, *others)
     print_titled(console, f"{title}: predicted sigma", grid)
@@ -61,7 +62,8 @@ def _sigma(x: float) -> str:
 
 def _print_limits(console: Console, found: Excited) -> None:
     largest = found.use.largest
-    grid = new_table("", [name.replace(" ", "\n", 1) for name in largest])
+    of = {"torque": f"torque, of\n{found.design.asked.torque_share:.0%}"}
+    grid = new_table("", [of.get(name, name.replace(" ", "\n", 1)) for name in largest])
     for j, joint in enumerate(found.use.joints):
         cells = (f"{100 * share[j]:.0f} %{'!' if share[j] > BINDING else ' '}" for share in largest.values())
         grid.add_row(joint, *cells)

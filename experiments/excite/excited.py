@@ -1,5 +1,6 @@
 """A motion that was designed: what it tells, beside random motions and earlier logs."""
 
+import sys
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -61,8 +62,11 @@ class Excited:
     @classmethod
     def of(cls, design: Design, progress: Progress | None = None) -> "Excited":
         """Search a motion; raise ExperimentError if none is found that keeps all limits, with what it breaks."""
+        design.require_home()
         random, drawn = design.random_motions()
         search = searched(design, random, progress)
+        if search.interrupted:
+            sys.stderr.write("\nidbench: stopping: the best motion so far is judged and written; Ctrl-C again drops it\n")
         found = cls(design, search.best, random, drawn, search.interrupted)
         names = ("on the way from home", "on the way back")
         ways = [f"{name}, {what}" for name, use in zip(names, found.way_uses, strict=True) for what in use.broken()]
@@ -175,7 +179,7 @@ class Excited:
     def scenario(self) -> Scenario:
         """What simulates it."""
         d = self.design
-        name = f"excited-{Path(d.robot).stem}"
+        name = f"{Path(d.robot).stem}-excited"
         origin = (
             f"idbench excite {Path(d.robot).name}, {d.kind}, {d.duration:g} s, {d.frequency:g} Hz, {d.criterion}, seed {d.seed}"
         )
@@ -204,7 +208,6 @@ class Excited:
             table["earlier"] = self.earlier
         return {
             "experiment": "excite",
-            "path": Path(d.robot).stem,
             "robot": absolute(d.robot),
             "kind": d.kind,
             "criterion": d.criterion,

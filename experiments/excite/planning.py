@@ -88,5 +88,5 @@ def _require_enough(design: "Design") -> None:
     if rows < p:
         raise ExperimentError(
             f"{design.duration:g} s make {rows:.0f} rows behind a filter at {PASS:g} Hz, fewer than the {p} parameters: "
-            f"give a --duration of at least {ceil(4 * p / rows * design.duration)} s"
+            f"give a --duration of at least {ceil(max(4 * p / rows * design.duration, 3 / design.frequency))} s"
         )

@@ -63,10 +63,13 @@ class MotionSequence:
         One a motion.
     wished : float
         Share that was asked for.
+    interrupted : bool
+        Whether it was ended before its time.
     """
 
     rounds: tuple[Round, ...]
     wished: float
+    interrupted: bool = False
 
     @classmethod
     def of(cls, design: Design, wished: float, progress: Progress | None = None) -> "MotionSequence":
@@ -88,7 +91,8 @@ class MotionSequence:
         except KeyboardInterrupt:
             if not rounds:
                 raise
-        return cls(tuple(rounds), wished)
+            return cls(tuple(rounds), wished, interrupted=True)
+        return cls(tuple(rounds), wished, rounds[-1].excited.interrupted)
 
     @property
     def reached(self) -> bool:
@@ -134,5 +138,6 @@ def print_sequence(console: Console, sequence: MotionSequence) -> None:
     print_titled(console, "motions one after the other, identified together", grid)
     last = sequence.rounds[-1]
     reached = f"every sigma makes less than {100 * sequence.wished:.4g} % of a brisk torque"
-    short = f"not reached: {last.weakest} still makes {last.share:.2%}; give a longer --duration, or less noise"
+    why = "interrupted; go on with --log" if sequence.interrupted else "give a longer --duration, or less noise"
+    short = f"not reached after {len(sequence.rounds)} motions: {last.weakest} still makes {last.share:.2%}; {why}"
     console.print(Text(reached if sequence.reached else short), soft_wrap=True)

@@ -59,6 +59,7 @@ def searched(design: Design, random: Sequence[Array], progress: Callable[[float]
             return search
         plan = replace(plan, limits=_closer(plan.limits, use), hard=harder)
         search.run(plan, 1, stage.steps)
+        search.found = [plan.coefficients(c) for c in search.found]  # which the design's own limits hardly scale
     if search.interrupted and cheapest and any(design.look(search.best).broken()):
         search.found = cheapest
     return search

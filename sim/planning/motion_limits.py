@@ -99,6 +99,8 @@ class MotionLimits:
             raise ScenarioError(f"cannot read limits {path}: {error.strerror}") from error
         except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
             raise ScenarioError(f"cannot read limits {path}: {error}") from error
+        if isinstance(content.get("keep_out"), dict):
+            raise ScenarioError(f"limits {path}: write [[keep_out]], with double brackets, for each box")
         found: MotionLimits = make(cls, content, "")
         return found
 
@@ -137,7 +139,9 @@ def home_of(robot: Robot, asked: MotionLimits, limits: Limits) -> Array:
     """
     low, high = limits.position.T
     if asked.home:
-        home = per_joint(asked.home, robot.n, "limits: home")
+        home = np.array(asked.home)
+        if len(home) != robot.n:
+            raise ScenarioError(f"limits: home has {len(home)} values for {robot.n} joints")
         if outside := _names(robot, (home < low) | (home > high)):
             raise ScenarioError(f"limits: home = {list(asked.home)} puts {outside} outside its range")
         return home
@@ -146,6 +150,21 @@ def home_of(robot: Robot, asked: MotionLimits, limits: Limits) -> Array:
     if outside := _names(robot, (own < low) | (own > high)):
         raise ScenarioError(f"limits: position puts the robot's own home outside, by {outside}: give a home = [...], too")
     return own
+
+
+def looser(robot: Robot, asked: MotionLimits) -> list[str]:
+    """Return which limits that are asked for go beyond those of the robot's file, in words."""
+    known = {name: robot.most(name) for name in RATES} | {"torque": robot.torque_limits}
+    found = []
+    for name, own in known.items():
+        if (values := getattr(asked, name)) is not None:
+            given = per_joint(values, robot.n, f"limits: {name}")
+            found += [
+                f"{name} of {joint} may be {x:g}, its file says {most:g}"
+                for joint, x, most in zip(robot.joints, given, own, strict=True)
+                if x > most
+            ]
+    return found
 
 
 def surroundings(name: str, asked: MotionLimits) -> Robot:

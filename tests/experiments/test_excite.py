@@ -103,6 +103,27 @@ def test_the_same_seed_gives_the_same_motion(tmp_path):
     assert motions[0] == motions[1]
 
 
+def test_another_design_does_not_replace_the_first_unasked(written, complaint):
+    line = complaint("excite", "scara", "--duration", "5", "--out", str(written))
+    assert "holds excite scara --duration 6" in line
+    assert "--force" in line
+
+
+def test_what_the_page_says_to_do_next_works(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["excite", "scara", *SHORT]) == 0
+    assert main(["run", "runs/excited-scara/scenario.toml", "--no-rerun"]) == 0
+    assert {path.name for path in (tmp_path / "runs").iterdir()} == {"excited-scara", "scara-excited"}
+
+
+def test_a_slow_series_and_a_home_too_heavy(tmp_path, complaint):
+    out = ["--no-rerun", "--out", str(tmp_path / "out")]
+    assert main(["excite", "scara", "--duration", "20", "--frequency", "0.1", *out]) == 0
+    limits = tmp_path / "limits.toml"
+    limits.write_text("torque_share = 0.2")
+    assert "at home, at rest, torque of joint" in complaint("excite", "panda", "--limits", str(limits), *out, "--force")
+
+
 def test_an_earlier_log_is_used(written, tmp_path, capsys):
     """What the log tells is added: sigmas are below those of the log, and below those of a motion without it."""
     assert main(["run", str(written / "scenario.toml"), "--out", str(tmp_path / "run"), "--no-rerun"]) == 0
@@ -154,7 +175,7 @@ def test_what_stays_unknown_is_told_and_nothing_is_lost(tmp_path, monkeypatch, c
     monkeypatch.setattr("experiments.excite.sequence.ROUNDS", 1)
     out = tmp_path / "out"
     assert main(["excite", "scara", *SHORT, "--until", "0.0001%", "--out", str(out)]) == 0
-    assert "not reached: Fs2 still makes" in capsys.readouterr().out
+    assert "not reached after 1 motions: Fs2 still makes" in capsys.readouterr().out
     assert {"log1.parquet", "motion1.csv", "motion.csv"} < {path.name for path in out.iterdir()}
 
 
@@ -221,7 +242,7 @@ def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
         (["scara", "--until", "200%"], "--until 200%: give a share between 0 and 100 %"),
         (["scara", "--limits", "nowhere.toml"], "cannot read limits nowhere.toml"),
         (["scara", "--repeat", "0"], "--repeat 0 must be at least 1"),
-        (["scara", "--noise", "ideal"], "sigmas need a noise of the torques above 0"),
+        (["scara", "--noise", "ideal"], "scenario ideal has no noise of its torques: add --torque-noise"),
         (["scora"], "did you mean 'scara'?"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
@@ -241,9 +262,11 @@ def test_wrong_input_is_one_line(args, message, tmp_path, monkeypatch, complaint
         ("[position]\njoint1 = [0.5, 1.5]", "puts the robot's own home outside, by joint1: give a home"),
         ("velocity = 0.1", "joint1 may move at 0.1 rad/s or m/s at most"),
         ("floor = 5.0", "the floor: "),
+        ("home = [0.1]", "limits: home has 1 values for 2 joints"),
+        ("[keep_out]\nname = 'a'", "write [[keep_out]], with double brackets"),
         ("home = [5, 0]", "limits: home = [5.0, 0.0] puts joint1 outside its range"),
     ],
-    ids=["torque", "range", "cage", "own home", "slow", "floor", "home"],
+    ids=["torque", "range", "cage", "own home", "slow", "floor", "short home", "single brackets", "home"],
 )
 def test_limits_that_nothing_keeps_are_told_by_name(text, message, tmp_path, complaint):
     limits = tmp_path / "limits.toml"
