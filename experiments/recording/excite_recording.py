@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from experiments.excite.excitation import REST
 from experiments.excite.excite_text import lines
 from experiments.excite.excited import STRETCHES, Excited
 from experiments.excite.limit_use import FS
@@ -80,7 +81,7 @@ def _send_sigmas(stream: Stream, found: Excited) -> None:
 def _send_told(stream: Stream, found: Excited) -> None:
     """Send which stretch of the motion tells how much of each parameter."""
     names, shares, duration = found.design.subject.basis.names, found.shares, found.design.duration
-    begin = len(found.ways[0].q) / FS
+    begin = len(found.ways[0].q) / FS + REST
     middles = begin + (np.arange(STRETCHES) + 0.5) * duration / STRETCHES
     for at, members in _parts(names):
         x = linear("time [s]", begin, begin + duration)
