@@ -1,6 +1,6 @@
 """What it costs to design a motion: ten seconds for each arm that ships, from any seed.
 
-    uv run python tests/benchmarks/excite.py [SEEDS]
+    uv run python tests/benchmarks/excite.py [SEEDS [ROBOT ...]]
 
 For each arm: the time of a whole design (random motions, search, limits at 1 kHz, predictions); that of one value with its
 slope, over that of the columns at the same states; the typical sigma over that of the median and of the best random motion; how
@@ -42,9 +42,9 @@ def designed(robot: str, seed: int) -> tuple[Excited, float]:
     return found, time.perf_counter() - start
 
 
-def main(seeds: int) -> None:
+def main(seeds: int, robots: tuple[str, ...] = ("scara", "puma560", "panda")) -> None:
     """Time and judge designs."""
-    for robot in ("scara", "puma560", "panda"):
+    for robot in robots:
         each = [designed(robot, seed) for seed in range(seeds)]
         found, plan = each[0][0], each[0][0].design.plan
         value = statistics.median(timed(partial(plan.value, found.c)) for _ in range(TIMES))
@@ -60,4 +60,4 @@ def main(seeds: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 3)
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 3, *([tuple(sys.argv[2:])] if sys.argv[2:] else []))

@@ -10,13 +10,14 @@ from experiments.cli import main
 from experiments.excite.design import Design
 from experiments.excite.excitation import EXCITATIONS
 from experiments.excite.excited import Excited, sigmas_of
+from experiments.excite.stages import STAGES
 from sim.planning.motion_limits import MotionLimits
 from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from sim.robot.robot import Robot
 from sim.scenario.measurement import TorqueMeasurement
 from sim.scenario.scenario_file import load
 
-TORQUES = (75.0, 110.0, 50.0, 7.0, 6.0, 5.0)
+TORQUES = (68.0, 104.0, 46.0, 6.0, 5.2, 4.4)
 """Of the motors of the PUMA, smaller than they are [N m]: they hold motions back."""
 
 SHORT = ["--duration", "4", "--no-rerun"]
@@ -71,8 +72,10 @@ def test_its_scenario_runs_and_its_errors_are_as_predicted(written, tmp_path):
 
 
 @pytest.mark.parametrize("kind", EXCITATIONS.builtin)
-def test_limits_hold_at_a_thousand_hertz_by_mujocos_own_torques(kind):
+def test_limits_hold_at_a_thousand_hertz_by_mujocos_own_torques(kind, monkeypatch):
     """Also with the parameters of the file off by 30 %: all of them larger, or each at random."""
+    few = tuple(stage._replace(keep=1, steps=stage.steps // 2) for stage in STAGES)
+    monkeypatch.setattr("experiments.excite.stages.STAGES", few)  # limits hold, however far the search has come
     noisy = replace(load("arm"), torque=TorqueMeasurement(noise=(0.05,)))
     found = Excited.of(Design("puma560", noisy, kind, 4.0, 1.0, MotionLimits(torque=TORQUES)))
     robot, motion = Robot.load("puma560"), found.design.trajectory(found.c).plan(Robot.load("puma560")).sample(1000.0)
