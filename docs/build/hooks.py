@@ -76,7 +76,7 @@ def settings() -> Iterator[str]:
 
 
 def _limits() -> Iterator[str]:
-    from sim.planning.motion_limits import KeepOut, MotionLimits
+    from sim.limits.motion_limits import KeepOut, MotionLimits
 
     yield "\n## limits.toml\n\nWhat a motion of `idbench excite` must keep (`--limits`).\n"
     yield from _table(MotionLimits)
@@ -128,7 +128,7 @@ def simulator() -> Iterator[str]:
         f"::: {name}\n"
         for name in (
             "sim.engine.simulation.simulate",
-            "sim.planning.clearance.Clearance",
+            "sim.limits.clearance.Clearance",
             "sim.engine.run.Run",
             "sim.engine.watch.Watch",
             "sim.engine.ideal_log.ideal_log",

@@ -13,10 +13,10 @@ from experiments.cli.reading import Question, file_of, read
 from experiments.errors import ExperimentError
 from experiments.excite.design import Design
 from experiments.excite.excite_report import report
-from experiments.excite.excite_text import print_excited
+from experiments.excite.excite_text import print_excited, print_sequence
 from experiments.excite.excited import Excited
 from experiments.excite.motion_file import write_motion
-from experiments.excite.sequence import MotionSequence, print_sequence
+from experiments.excite.sequence import MotionSequence
 from experiments.identification.identified import Identified
 from experiments.identification.results import Place, results_folder, tell_of, write_recording, write_summary
 from experiments.identification.subject import Subject, absolute
@@ -24,7 +24,7 @@ from experiments.identification.warnings import FILE, warnings_of_robot
 from identify import MotionLog, TorqueChannel
 from identify.data.log_file import write_log
 from sim.encoders import IncrementalEncoder
-from sim.planning.motion_limits import MotionLimits, looser
+from sim.limits.motion_limits import MotionLimits, looser
 from sim.scenario.measurement import TorqueMeasurement
 from sim.scenario.scenario import Scenario
 from sim.scenario.scenario_file import load, to_toml
@@ -161,7 +161,7 @@ def _percent(text: str | None) -> float | None:
     except ValueError:
         share = -1.0
     if not 0 < share < 1:
-        raise ExperimentError(f"--until {text}: give a share between 0 and 100 %, such as 2%")
+        raise ExperimentError(f"--until {text}: give a share between 0 and 100 %, such as 0.1%")
     return share
 
 

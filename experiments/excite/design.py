@@ -18,8 +18,8 @@ from identify.design.criteria import CRITERIA, AbstractCriterion, LogSigma
 from identify.design.plan import Plan
 from identify.design.predicted import predicted_information
 from identify.plugins import did_you_mean
-from sim.planning.clearance import Clearance
-from sim.planning.motion_limits import BOX, FLOOR, MotionLimits, home_of, limits_of, surroundings
+from sim.limits.clearance import Clearance
+from sim.limits.motion_limits import BOX, FLOOR, MotionLimits, home_of, limits_of, surroundings
 from sim.scenario.scenario import Scenario
 from sim.trajectories.approach import approach
 from sim.trajectories.reference import Reference

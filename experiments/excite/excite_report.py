@@ -1,22 +1,16 @@
 """The report of a designed motion: one HTML file that needs no other."""
 
-from importlib.resources import files
-from io import StringIO
-
-import matplotlib as mpl
 import numpy as np
-from jinja2 import Environment
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from experiments.excite.excite_text import lines
 from experiments.excite.excited import BINDING, Excited
 from experiments.excite.limit_use import FS
+from experiments.html_report import rendered, svg
 from experiments.recording.style import JOINTS
 from experiments.text import number, percentage
 from sim.scenario.scenario_file import to_toml
-
-mpl.rcParams.update({"svg.hashsalt": "idbench", "svg.fonttype": "none", "font.size": 8, "axes.grid": True, "grid.alpha": 0.3})
 
 PLOTTED = 100.0
 """Frequency [Hz] of curves."""
@@ -24,11 +18,10 @@ PLOTTED = 100.0
 
 def report(found: Excited, command: str) -> str:
     """Return the page: what the motion tells, how it moves, what holds it back, and the command that made it."""
-    template = Environment(autoescape=True, trim_blocks=True).from_string(
-        files("experiments.excite").joinpath("excite.html.j2").read_text(encoding="utf-8")
-    )
     d = found.design
-    return template.render(
+    return rendered(
+        "experiments.excite",
+        "excite.html.j2",
         title=f"A motion for {d.subject.robot.name}",
         design=d,
         headline=lines(found)[0],
@@ -84,7 +77,7 @@ def _sigma_figure(found: Excited) -> str:
     panel.set_xticks(at, names, rotation=90)
     panel.set_ylabel("sigma over that of the median\nrandom motion")
     panel.legend(ncols=4, loc="upper center", bbox_to_anchor=(0.5, 1.16), frameon=False)
-    return _svg(figure)
+    return svg(figure)
 
 
 def _motion_figure(found: Excited) -> str:
@@ -107,7 +100,7 @@ def _motion_figure(found: Excited) -> str:
     panels[-1].set_xlabel("time [s]")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=8, frameon=False)
-    return _svg(figure)
+    return svg(figure)
 
 
 def _told_figure(found: Excited) -> str:
@@ -123,10 +116,4 @@ def _told_figure(found: Excited) -> str:
     panel.set_xlabel("time [s]")
     panel.grid(visible=False)
     figure.colorbar(image, label="% of what is told")
-    return _svg(figure)
-
-
-def _svg(figure: Figure) -> str:
-    text = StringIO()
-    figure.savefig(text, format="svg", metadata={"Date": None})
-    return text.getvalue()[text.getvalue().index("<svg") :]
+    return svg(figure)

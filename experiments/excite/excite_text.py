@@ -7,6 +7,7 @@ from rich.console import Console
 from rich.text import Text
 
 from experiments.excite.excited import BINDING, Excited
+from experiments.excite.sequence import MotionSequence
 from experiments.text import WORTHLESS, new_table, number, percentage, print_titled
 from identify import brisk_shares
 
@@ -68,3 +69,18 @@ def _print_limits(console: Console, found: Excited) -> None:
         cells = (f"{100 * share[j]:.0f} %{'!' if share[j] > BINDING else ' '}" for share in largest.values())
         grid.add_row(joint, *cells)
     print_titled(console, "shares of the limits that it uses, at 1 kHz; ! holds it back", grid)
+
+
+def print_sequence(console: Console, sequence: MotionSequence) -> None:
+    """Print what each motion left open."""
+    grid = new_table("", ["weakest\nparameter", "its sigma, of\nbrisk torque %", "typical\nsigma, of first"])
+    first = np.log(sequence.rounds[0].estimate.best_sigma).mean()
+    for k, each in enumerate(sequence.rounds, 1):
+        typical = np.exp(np.log(each.estimate.best_sigma).mean() - first)
+        grid.add_row(f"motion {k}", each.weakest, f"{100 * each.share:.3g}", f"{typical:.2f}")
+    print_titled(console, "motions one after the other, identified together", grid)
+    last = sequence.rounds[-1]
+    reached = f"every sigma makes less than {100 * sequence.wished:.4g} % of a brisk torque"
+    why = "interrupted; go on with --log" if sequence.interrupted else "give a longer --duration, or less noise"
+    short = f"not reached after {len(sequence.rounds)} motions: {last.weakest} still makes {last.share:.2%}; {why}"
+    console.print(Text(reached if sequence.reached else short), soft_wrap=True)

@@ -15,21 +15,15 @@ from experiments.excite.limit_use import FS, LimitUse
 from experiments.excite.stages import searched
 from experiments.identification.subject import absolute
 from identify import Array
+from identify.design.criteria import sigmas_of
 from sim.engine.simulation import Progress
-from sim.planning.motion_limits import floor_of
+from sim.limits.motion_limits import floor_of
 from sim.scenario.scenario import Scenario
 from sim.scenario.scenario_file import to_dict
 from sim.trajectories.reference import Reference
 
 BINDING = 0.9
 """Share of a limit from which on it counts as what holds the motion back."""
-
-SINGULAR = 1e-13
-"""Share of the largest eigenvalue, of scaled information, below which a direction counts as not told."""
-
-HIDDEN = 1e-6
-"""Share of a parameter in such directions from which on it is unknown."""
-
 
 STRETCHES = 20
 """Parts of a motion whose share in each parameter is told."""
@@ -252,16 +246,6 @@ class Excited:
             clearance.bare
         )
         return "; ".join(found)
-
-
-def sigmas_of(M: Array) -> Array:
-    """Return standard deviations, shape (..., p), of information, shape (..., p, p); infinite where it tells nothing."""
-    size = np.sqrt(np.maximum(np.diagonal(M, axis1=-2, axis2=-1), 1e-300))
-    values, vectors = np.linalg.eigh(M / size[..., :, None] / size[..., None, :])
-    told = values > SINGULAR * values[..., -1:]
-    variance = np.sum(np.where(told, 1 / np.where(told, values, 1.0), 0.0)[..., None, :] * vectors**2, axis=-1)
-    hidden = np.sum(np.where(told, 0.0, 1.0)[..., None, :] * vectors**2, axis=-1) > HIDDEN
-    return np.where(hidden, np.inf, np.sqrt(variance) / size)
 
 
 def _finite(x: float) -> float | None:

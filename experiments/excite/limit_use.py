@@ -9,8 +9,8 @@ from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.data.limits import Limits
 from identify.parameters.base_parameters import columns_at
-from sim.planning.clearance import Clearance, Touch
-from sim.planning.motion_limits import MotionLimits
+from sim.limits.clearance import Clearance, Touch
+from sim.limits.motion_limits import MotionLimits
 from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from sim.robot.robot import Robot
 from sim.trajectories.reference import Reference
@@ -99,7 +99,7 @@ class Inspector:
         tau = inverse_dynamics(self.robot, motion.q, motion.qd, motion.qdd) + coulomb_torque(self.robot, motion.qd)
         shares["torque"] = np.abs(tau) / (self.asked.torque_share * self.limits.torque)
         shares["torque if off"] = (np.abs(tau) + self.asked.prior_error * self._spread(motion)) / self.limits.torque
-        moves = motion.qd.any(axis=1)  # rest before and after is no rest between two of many motions
+        moves = motion.qd.any(axis=1)  # of a motion that is repeated, rest is at the ends alone
         squares = np.mean(tau[moves] ** 2, axis=0, keepdims=True) if moves.any() else 0 * tau[:1]
         shares["rms torque"] = np.sqrt(squares) / self.limits.rms_torque
         limited = {name: share for name, share in shares.items() if share.any()}

@@ -4,13 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-from rich.console import Console
-from rich.text import Text
-
 from experiments.excite.design import Design
 from experiments.excite.excited import Excited
-from experiments.text import new_table, print_titled
 from identify import Array, Estimate, ExplicitModel, MotionLog, brisk_shares, identify
 from sim.engine.simulation import Progress, simulate
 
@@ -126,18 +121,3 @@ def _weak(last: Round, wished: float, weights: Mapping[str, float]) -> dict[str,
     names = last.excited.design.subject.basis.names
     each = zip(names, last.shares, strict=True)
     return {name: float(weights.get(name, 1.0) * max(ENOUGH, share / wished)) for name, share in each}
-
-
-def print_sequence(console: Console, sequence: MotionSequence) -> None:
-    """Print what each motion left open."""
-    grid = new_table("", ["weakest\nparameter", "its sigma, of\nbrisk torque %", "typical\nsigma, of first"])
-    first = np.log(sequence.rounds[0].estimate.best_sigma).mean()
-    for number, each in enumerate(sequence.rounds, 1):
-        typical = np.exp(np.log(each.estimate.best_sigma).mean() - first)
-        grid.add_row(f"motion {number}", each.weakest, f"{100 * each.share:.3g}", f"{typical:.2f}")
-    print_titled(console, "motions one after the other, identified together", grid)
-    last = sequence.rounds[-1]
-    reached = f"every sigma makes less than {100 * sequence.wished:.4g} % of a brisk torque"
-    why = "interrupted; go on with --log" if sequence.interrupted else "give a longer --duration, or less noise"
-    short = f"not reached after {len(sequence.rounds)} motions: {last.weakest} still makes {last.share:.2%}; {why}"
-    console.print(Text(reached if sequence.reached else short), soft_wrap=True)

@@ -26,6 +26,9 @@ SHOWN = 50.0
 DARK, BRIGHT = np.array([32.0, 32.0, 36.0]), np.array([90.0, 200.0, 120.0])
 """Colours of cells: of a stretch that tells nothing, and of that which tells most."""
 
+LEVELS = 8
+"""Colours that are told apart: an entity each, where one for each cell would make a large recording."""
+
 MOST = 13
 """Parameters of a chart."""
 
@@ -86,12 +89,13 @@ def _send_told(stream: Stream, found: Excited) -> None:
     for at, members in _parts(names):
         x = linear("time [s]", begin, begin + duration)
         chart = Chart(stream, f"excited/told/{at}", x, listed("", [names[p] for p in members]))
-        for row, p in enumerate(members):
-            strength = np.clip(shares[:, p] / shares[:, p].max(), 0.0, 1.0)
-            for stretch in range(STRETCHES):
-                color: Color = [int(v) for v in DARK + (BRIGHT - DARK) * strength[stretch]]
-                ends = middles[stretch] + np.array([[-0.5, 0.5]]) * 0.92 * duration / STRETCHES
-                chart.segments(f"{row}-{stretch}", ends, np.full((1, 2), float(row)), color, 5.0)
+        strength = np.clip(shares[:, members] / shares[:, members].max(axis=0), 0.0, 1.0)
+        level, row = np.rint((LEVELS - 1) * strength.T).astype(int), np.arange(float(len(members)))
+        for k in range(LEVELS):
+            which, stretch = np.nonzero(level == k)
+            ends = middles[stretch, None] + np.array([-0.46, 0.46]) * duration / STRETCHES
+            color: Color = [int(v) for v in DARK + (BRIGHT - DARK) * k / (LEVELS - 1)]
+            chart.segments(f"level {k}", ends, np.stack([row[which]] * 2, axis=1), color, 5.0)
 
 
 def _parts(names: Sequence[str]) -> Iterator[tuple[str, npt.NDArray[np.intp]]]:

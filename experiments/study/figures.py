@@ -1,14 +1,13 @@
 """The figures of a study's report, as SVG."""
 
 from collections.abc import Mapping, Sequence
-from io import StringIO
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes as Panel
 from matplotlib.figure import Figure
 
+from experiments.html_report import svg
 from experiments.recording.style import FORMS
 from experiments.study.answer import value
 from experiments.study.axis import Axis
@@ -27,8 +26,6 @@ TICKS = 8
 
 WIDE = 8.0
 """Ratio of the largest to the smallest value above which an axis is logarithmic."""
-
-mpl.rcParams.update({"svg.hashsalt": "idbench", "svg.fonttype": "none", "font.size": 8, "axes.grid": True, "grid.alpha": 0.3})
 
 
 def typical_figure(families: Mapping[str, Sequence[Cell]], axis: Axis, edges: int) -> str:
@@ -52,7 +49,7 @@ def typical_figure(families: Mapping[str, Sequence[Cell]], axis: Axis, edges: in
     figure.legend(named.values(), named.keys(), loc="outside upper center", ncols=6, frameon=False)
     figure.supylabel("typical error [%]", fontsize=9)
     figure.supxlabel(axis.field, fontsize=9)
-    return _svg(figure)
+    return svg(figure)
 
 
 def _last(cells: Sequence[Cell]) -> str:
@@ -107,7 +104,7 @@ def cost_figure(seconds: dict[str, float], runs: int) -> str:
     panel.set_xlim(right=4 * max(values))
     panel.set_xlabel("time of a run on one thread [ms]")
     panel.invert_yaxis()
-    return _svg(figure)
+    return svg(figure)
 
 
 def _panels(parameters: Sequence[str]) -> tuple[Figure, dict[str, Panel]]:
@@ -165,10 +162,4 @@ def _finished(figure: Figure, panels: dict[str, Panel], axis: str, y: str) -> st
     figure.legend(handles, labels, loc="outside upper center", ncols=6, frameon=False)
     figure.supylabel(y, fontsize=9)
     figure.supxlabel(axis, fontsize=9)
-    return _svg(figure)
-
-
-def _svg(figure: Figure) -> str:
-    text = StringIO()
-    figure.savefig(text, format="svg", metadata={"Date": None})
-    return text.getvalue()[text.getvalue().index("<svg") :]
+    return svg(figure)

@@ -1,15 +1,14 @@
 """The report of a study: one HTML file that needs no other."""
 
 from collections.abc import Iterator, Sequence
-from importlib.resources import files
 from pathlib import Path
 from shlex import quote
 from typing import Any
 
 import numpy as np
 import tomli_w
-from jinja2 import Environment
 
+from experiments.html_report import rendered
 from experiments.study.answer import answer, grouped, headline, method, percent, short, value, where
 from experiments.study.axis import Axis
 from experiments.study.comparison import differences
@@ -25,11 +24,10 @@ WORST = 10
 
 def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folder: Path) -> str:
     """Return the page: question, answer, tables, figures, and how to make it again."""
-    template = Environment(autoescape=True, trim_blocks=True).from_string(
-        files("experiments.study").joinpath("report.html.j2").read_text(encoding="utf-8")
-    )
     solved = [cell for cell in cells if cell.runs]
-    return template.render(
+    return rendered(
+        "experiments.study",
+        "report.html.j2",
         study=study,
         methods=len(study.methods),
         headline=headline(solved, study.edges) if solved else "",

@@ -9,6 +9,12 @@ import numpy as np
 
 from identify.arrays import Array
 
+SINGULAR = 1e-13
+"""Share of the largest eigenvalue, of scaled information, below which a direction counts as not told."""
+
+HIDDEN = 1e-6
+"""Share of a parameter in such directions from which on it is unknown."""
+
 
 class AbstractCriterion(ABC):
     """A function of the information M = W' C^-1 W; less is better."""
@@ -54,9 +60,8 @@ class LogSigma(AbstractCriterion):
     weights: tuple[float, ...]
 
     def value(self, M: Array) -> Array:
-        """Return sum of weights ln(V_ii) / 2, V = M^-1."""
-        variance = np.diagonal(_inverse(M), axis1=-2, axis2=-1)
-        return np.where((variance > 0).all(axis=-1), np.sum(np.log(np.abs(variance)) * self.weights, axis=-1) / 2, np.inf)
+        """Return sum of weights ln(sigma)."""
+        return np.asarray(np.sum(np.log(sigmas_of(M)) * self.weights, axis=-1))
 
     def slope(self, M: Array) -> Array:
         """Return -V diag(weights / 2 V_ii) V."""
@@ -138,11 +143,11 @@ def _square(v: Array) -> Array:
     return np.outer(v, v)
 
 
-def _inverse(M: Array) -> Array:
-    """Return M^-1, of scaled M, so that units do not matter; of singular M something with negative variances."""
-    size = np.sqrt(np.abs(np.diagonal(M, axis1=-2, axis2=-1)))
-    scale = 1 / np.where(size > 0, size, 1.0)
-    values, vectors = np.linalg.eigh(M * scale[..., None] * scale[..., None, :])
-    sound = values[..., :1] > 1e-14 * values[..., -1:]
-    safe = np.where(sound, values, -1.0)
-    return np.matmul(vectors / safe[..., None, :], np.swapaxes(vectors, -1, -2)) * scale[..., None] * scale[..., None, :]
+def sigmas_of(M: Array) -> Array:
+    """Return standard deviations, shape (..., p), of information, shape (..., p, p); infinite where it tells nothing."""
+    size = np.sqrt(np.maximum(np.diagonal(M, axis1=-2, axis2=-1), 1e-300))  # units must not matter
+    values, vectors = np.linalg.eigh(M / size[..., :, None] / size[..., None, :])
+    told = values > SINGULAR * values[..., -1:]
+    variance = np.sum(np.where(told, 1 / np.where(told, values, 1.0), 0.0)[..., None, :] * vectors**2, axis=-1)
+    hidden = np.sum(np.where(told, 0.0, 1.0)[..., None, :] * vectors**2, axis=-1) > HIDDEN
+    return np.where(hidden, np.inf, np.sqrt(variance) / size)

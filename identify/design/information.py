@@ -8,6 +8,7 @@ import scipy
 
 from identify.arrays import Array
 from identify.basis.basis import Basis
+from identify.rows.linearization import observation
 from identify.rows.noise_propagation import NoiseLevels
 from identify.signals.state import State
 
@@ -49,11 +50,7 @@ class Information:
 
     def columns(self, motion: Array) -> Array:
         """Return the columns of D at a motion, shape (..., 4, time, joint), as (..., time, joint, p)."""
-        state = _state(motion)
-        found = np.zeros((*state.q.shape[:-2], state.q.shape[-1], self.basis.n, len(self.basis.names)))
-        for (row, name), column in self.basis.explicit(state).items():
-            found[..., row, self._place[name]] = column
-        return found
+        return observation(self.basis, *_states(motion))
 
     def weighted(self, motion: Array) -> Array:
         """Return columns multiplied by how much their rows count, shape (..., time, joint, p)."""
@@ -114,7 +111,8 @@ class Information:
             for j in range(n):
                 copies[1 + order * n + j, order, :, j] += steps[order]
         weight, sums, weighted = self.weight(motion), np.zeros((3 * n + 1, motion.shape[-2])), np.zeros(motion.shape[-2:])
-        for (row, name), column in self.basis.explicit(_state(copies)).items():
+        q, qd, qdd = _states(copies)
+        for (row, name), column in self.basis.explicit(State(q, qd, lambda _: qdd)).items():
             fading = of_rows[:, row, place[name]].copy()
             whole = of_torques[:, row, place[name]]
             if name in self._frictions:
@@ -138,6 +136,7 @@ class Information:
         return W * X * np.where(frictions, self.weight(motion)[..., None], 1.0)
 
 
-def _state(motion: Array) -> State:
+def _states(motion: Array) -> tuple[Array, Array, Array]:
+    """Return positions, velocities and accelerations of a motion, shape (..., joint, time) each."""
     q, qd, qdd = (np.ascontiguousarray(np.swapaxes(motion[..., i, :, :], -1, -2)) for i in range(3))
-    return State(q, qd, lambda _: qdd)
+    return q, qd, qdd

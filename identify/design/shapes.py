@@ -68,9 +68,10 @@ class Shapes:
 
     @classmethod
     def moves(cls, t: Array, period: float, count: int) -> Self:
-        """Return the fifth-order moves through `count` waypoints, the last of which leads back to the first (Eq. 13's motions).
+        """Return the fifth-order moves through `count` waypoints, the last of which leads back to the first.
 
-        Every shape is a waypoint: the moves to it and from it. All moves take as long.
+        Every shape is a waypoint: the moves to it and from it. All moves take as long. The paper's motions are of this kind,
+        in times of their own.
         """
         T = period / count
         u = np.mod(t / T, count)

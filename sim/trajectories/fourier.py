@@ -10,6 +10,7 @@ from sim.errors import ScenarioError
 from sim.robot.motors import Array
 from sim.robot.robot import Robot
 from sim.settings import NotNegative, Number, Positions, Positive, Whole, settings
+from sim.trajectories.point_to_point import at_rest
 from sim.trajectories.reference import AbstractMotion, Reference
 from sim.trajectories.trajectory import AbstractTrajectory
 
@@ -98,10 +99,10 @@ class Fourier(AbstractTrajectory):
 
 
 def _fading(t: Array, end: float, fade: float) -> tuple[Array, Array, Array]:
-    """Return a factor that grows from 0 to 1 and falls again, of fifth order, and its derivatives, shape (time, 1) each."""
+    """Return a factor that grows from 0 to 1 and falls again, by moves of fifth order, and its derivatives, shape (time, 1)."""
     if fade == 0:
         one = np.ones((len(t), 1))
         return one, 0 * one, 0 * one
-    left = np.minimum(t, end - t)[:, None] / fade
-    u, way = np.clip(left, 0.0, 1.0), np.where(t < end / 2, 1.0, -1.0)[:, None]
-    return u**3 * (10 - 15 * u + 6 * u**2), way * 30 * u**2 * (1 - u) ** 2 / fade, 60 * u * (1 - u) * (1 - 2 * u) / fade**2
+    there_and_back = at_rest(np.array([[0.0], [1.0], [1.0], [0.0]]), np.array([fade, end - 2 * fade, fade]), 0.0)
+    found = there_and_back.at(t, 1.0)
+    return found.q, found.qd, found.qdd

@@ -8,7 +8,7 @@ import scipy
 
 from identify import CHAINS, ExplicitModel, GeneralizedLeastSquares, MotionLog, NoiseLevels, TorqueChannel, identify, scara
 from identify.data.limits import Limits
-from identify.design.criteria import CRITERIA, LogSigma
+from identify.design.criteria import CRITERIA, LogSigma, sigmas_of
 from identify.design.greedy import Greedy
 from identify.design.information import Information
 from identify.design.plan import Plan
@@ -159,3 +159,8 @@ def test_the_quick_information_ranks_motions_as_the_exact_one():
         exact.append(float(criterion.value(predicted_information(log, scara(), X, LEVELS, CHAINS.create("idbench")))))
         quick.append(float(criterion.value(plan.matrix(plan.motion(c)))))
     assert scipy.stats.spearmanr(exact, quick).statistic > 0.95
+
+
+def test_sigmas_of_what_is_not_told_are_infinite():
+    M = np.diag([4.0, 0.0, 1e6])
+    np.testing.assert_allclose(sigmas_of(M), [0.5, np.inf, 1e-3])

@@ -13,7 +13,7 @@ from sim.robot.robot import Robot
 from sim.robot.scene import body_name
 
 ALWAYS = 100
-"""Random postures: pairs that touch in all of them are made so, and are left out."""
+"""Random postures: pairs that are too near in all of them are made so, and are left out."""
 
 SEED = 0
 
@@ -50,7 +50,7 @@ class Touch:
 class Clearance:
     """Distances between the shapes of a robot that could meet, by MuJoCo.
 
-    Where shapes of a file are marked for collisions, these count, otherwise all. Shapes of neighbouring links are left out, and
+    Of each link the shapes count that are marked for collisions, or all where none is. Neighbouring links are left out, and
     pairs that are nearer than they may be whatever the posture.
 
     Parameters

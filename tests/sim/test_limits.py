@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from sim.errors import RobotError, ScenarioError
-from sim.planning.clearance import Clearance
-from sim.planning.motion_limits import KeepOut, MotionLimits, home_of, limits_of, surroundings
+from sim.limits.clearance import Clearance
+from sim.limits.motion_limits import KeepOut, MotionLimits, home_of, limits_of, surroundings
 from sim.robot.robot import Robot
 from sim.trajectories import Fourier
 
