@@ -25,7 +25,9 @@ ALLOWED = {
 }
 
 ALLOWED_IN = {
-    "identify/data/log_file.py": {"pyarrow"},
+    "identify/files/arrow.py": {"pyarrow"},
+    "identify/files/log_file.py": {"pyarrow"},
+    "identify/files/ros_bag.py": {"rosbags"},
     "identify/parameters/consistent.py": {"clarabel"},
     "sim/scenario/scenario_file.py": {"tomli_w"},
     "experiments/recording/columns.py": {"pyarrow"},

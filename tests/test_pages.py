@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from identify.data.log_file import write_log
+from identify.files.log_file import write_log
 from sim.engine import simulate
 from sim.scenario.scenario_file import load
 

@@ -22,7 +22,7 @@ from experiments.identification.results import Place, results_folder, tell_of, w
 from experiments.identification.subject import Subject, absolute
 from experiments.identification.warnings import FILE, warnings_of_robot
 from identify import MotionLog, TorqueChannel
-from identify.data.log_file import write_log
+from identify.files.log_file import write_log
 from sim.encoders import IncrementalEncoder
 from sim.limits.motion_limits import MotionLimits, looser
 from sim.scenario.measurement import TorqueMeasurement
@@ -167,7 +167,7 @@ def _percent(text: str | None) -> float | None:
 
 def _log(path: Path, subject: Subject) -> MotionLog:
     """Return an earlier log: of its torques nothing counts, so that their meaning is not asked for."""
-    return read(file_of(path), Question(fallback=TorqueChannel("held")), Identified((), subject))[0]
+    return read(file_of(path), Question(fallback=TorqueChannel("held")), Identified((), subject)).longest
 
 
 def _command(asked: Excite) -> str:

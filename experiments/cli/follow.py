@@ -14,7 +14,7 @@ from experiments.errors import ExperimentError
 from experiments.identification.identified import Identified
 from experiments.recording.audience import Audience
 from identify import IdentificationError, MotionLog
-from identify.data.log_file import CSV
+from identify.files.log_file import CSV
 
 if TYPE_CHECKING:
     from experiments.recording.live_layer import LiveIdentification
@@ -124,7 +124,7 @@ class Follower:
             copy = Path(folder) / self.path.name
             copy.write_bytes(lines)
             try:
-                return read(copy, replace(self.question, delay=self._delay), self.named)[0]
+                return read(copy, replace(self.question, delay=self._delay), self.named).longest
             except (ExperimentError, IdentificationError) as error:
                 complaint = str(error).replace(str(copy), str(self.path))
                 if lines.count(b"\n") > FEW and complaint != self._complaint:

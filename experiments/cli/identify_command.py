@@ -2,24 +2,25 @@
 
 import re
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.text import Text
 
+from experiments.cli.identify_logs import FitLogs, fit_logs, judged_on, question_of, titles, with_chain
+from experiments.cli.identify_results import Results, require_targets, summary_of, warn
 from experiments.cli.logs import Identify
+from experiments.cli.mounting import mounting_of
 from experiments.cli.page import Page, new_page, shown
-from experiments.cli.reading import Question, file_of, read, stated_by
-from experiments.errors import ExperimentError, ResultsError
-from experiments.identification.consistent_robot import Written
+from experiments.cli.reading import Question, file_of, stated_by
+from experiments.errors import ExperimentError
 from experiments.identification.identification_text import print_identified, print_validated
 from experiments.identification.identified import Identified
 from experiments.identification.log_warnings import warnings_of_log
-from experiments.identification.results import Place, beside, results_folder, tell_of, write_recording, write_summary
+from experiments.identification.results import Place, beside, tell_of, write_recording
 from experiments.identification.subject import CLOSED_FORM, Subject, absolute
 from experiments.identification.validated import Validated
 from experiments.identification.verdict import Remedies, Verdict
@@ -35,54 +36,71 @@ from experiments.identification.warnings import (
 )
 from experiments.plugin_tables import plugin_conflicts
 from experiments.recording.audience import Audience, Watching
-from identify import MODELS, ExcitationError, IdentificationError, LogError, MotionLog
-from identify.data.log_file import write_log
+from identify import MODELS, ExcitationError, IdentificationError
 from identify.rows.long_logs import is_long
-from sim.errors import BenchError
-from sim.robot.robot import Robot
 
 MOST_STARTS = 1000
 """Instants of a log that are looked at for the beginning of another."""
 
 
 def identify(asked: Identify) -> None:
-    """Identify a log, judge the result, write it."""
+    """Identify logs, judge the result, write it."""
     page, models, out = new_page(machine=asked.json), tuple(MODELS) if asked.model == "all" else (asked.model,), asked.out
-    path, stated = file_of(asked.log), stated_by(asked.log)
+    _require_logs(asked)
+    first = asked.log[0]
+    path, stated = file_of(first), stated_by(first)
     _require_label(asked.label)
-    subject = Subject(stated.get("robot", CLOSED_FORM) if asked.robot is None else absolute(asked.robot), asked.parameters)
-    _require_target(asked.write_mjcf, subject)
-    place = None if out is None else Place(out, "identify", str(asked.log.absolute()), asked.force)
+    robot = stated.get("robot", CLOSED_FORM) if asked.robot is None else absolute(asked.robot)
+    subject = Subject(robot, asked.parameters, mounting_of(asked.mounting))
+    require_targets(asked, subject)
+    place = None if out is None else Place(out, "identify", str(first.absolute()), asked.force)
     if place:
         place.check()
     named = Identified(  # complains of names first
         (), subject, models=models, chain=asked.chain, estimator=asked.estimator, name=asked.label
     )
-    question = Question(asked.torque, asked.torque_delay, asked.unwrap)
+    named = with_chain(asked, named)
     with ExitStack() as stack:
-        audience, path = _followed(stack, asked, path, question, named)
-        known, about_delay = read(path, question, named)
-        found, hidden = _shown(replace(named, logs=(known,), truth=_truth(stated, named)))
-        validated = _validated(found, asked, known)
+        audience, path = _followed(stack, asked, path, question_of(asked), named)
+        fit = fit_logs(replace(asked, log=(path, *asked.log[1:])), named)
+        whole = replace(fit.named, logs=fit.logs, log_names=fit.names)
+        found, hidden = _shown(replace(whole, truth=_truth(stated, named)))
+        judged = judged_on(asked, found, fit)
         of_file = [*warnings_of_robot(found.subject.robot), *plugin_conflicts()]
-        warnings = {LOG: _warnings(validated), FILE: of_file, MOTION: hidden}
+        warnings = {LOG: _warnings(judged, fit), FILE: of_file, MOTION: hidden}
         audience = audience or stack.enter_context(asked.watching.audience())
         stack.enter_context(shown(page))
         with _explained([warning for group in warnings.values() for warning in group]):
-            print_identified(page, found, str(asked.log))
-            print_validated(page, validated)
-        _warn(page, warnings, warnings_of_result(found), _advice(validated, asked))
-        if about_delay:
-            page.print(about_delay)
-        page.found |= _summary(validated, asked.log.absolute())
+            print_identified(page, found, titles(asked.log))
+            for validated in judged:
+                print_validated(page, validated)
+        warned = warn(page, warnings, warnings_of_result(found), _advice(judged[0], asked))
+        notes = [*_notes(fit), *fit.notes]
+        for note in notes:
+            page.print(Text(note), soft_wrap=True)
+        page.found |= {**summary_of(judged, first.absolute()), "notes": notes}
+        results = Results(page, asked, found, judged, fit, warned, notes)
         if place is not None:
-            _write_results(page, place, validated, asked.watching, audience)
-        elif asked.log.is_dir() and asked.watching.rerun and not is_long([known]):
-            _add_layer(page, asked.log, found, asked.watching, audience)
-        elif audience and not is_long([known]):
+            results.write(place, audience)
+        elif first.is_dir() and asked.watching.rerun and not is_long(found.logs):
+            _add_layer(page, first, found, asked.watching, audience)
+        elif audience and not is_long(found.logs):
             _show(found, audience)
-        if asked.write_mjcf is not None:
-            _write_mjcf(page, found, asked.write_mjcf)
+        results.export()
+
+
+def _require_logs(asked: Identify) -> None:
+    if not asked.log:
+        raise ExperimentError("name a log, or several of one fit")
+    if asked.follow is not None and len(asked.log) > 1:
+        raise ExperimentError("--follow takes one log, not several")
+
+
+def _notes(fit: FitLogs) -> list[str]:
+    """Return what was done to the logs; by the name of the log, where there are several."""
+    several = len(fit.read) > 1
+    said = [(f"{read.path.name}: " if several else "") + note for read in fit.read for note in read.notes]
+    return list(dict.fromkeys(said))
 
 
 def _followed(
@@ -111,7 +129,7 @@ def _shown(found: Identified) -> tuple[Identified, list[str]]:
             f"this log does not show {', '.join(leading.hidden)}: left out, as if zero{f' ({moves})' if moves else ''}"
         )
         fewer = replace(found.subject.asked, without=(*found.subject.asked.without, *leading.hidden))
-        subject = Subject(found.subject.name, fewer)
+        subject = replace(found.subject, asked=fewer)
         truth = None if found.truth is None else {name: found.truth[name] for name in subject.basis.names}
         found = replace(found, subject=subject, truth=truth)
         leading = next(iter(found.outcomes.values()))
@@ -153,51 +171,18 @@ def _require_label(label: str) -> None:
         raise ExperimentError(f"--label {label!r} must be of letters, digits, dots, hyphens and underscores, and not 'inner'")
 
 
-def _require_target(target: Path | None, subject: Subject) -> None:
-    """Raise ExperimentError if the robot cannot be written there; before the work, not after it."""
-    if target is None:
-        return
-    if target.suffix != ".xml":
-        raise ExperimentError(f"--write-mjcf {target}: its name must end with .xml, or nothing would read it back")
-    if target.is_dir() or not target.absolute().parent.is_dir():
-        raise ExperimentError(f"--write-mjcf {target}: there is no folder {target.parent} for it, or it is a folder itself")
-    if target.exists() and target.samefile(Robot.path(subject.name)):
-        raise ExperimentError(f"--write-mjcf {target} is the robot's own file: choose another name")
-
-
-def _warnings(validated: Validated) -> list[str]:
+def _warnings(judged: Sequence[Validated], fit: FitLogs) -> list[str]:
     """Return what is suspicious about the logs."""
-    subject, second = validated.found.subject, validated.second
-    found = warnings_of_log(validated.found.logs[0], subject.tree)
-    return found + ([f"{validated.name}: {warning}" for warning in warnings_of_log(second, subject.tree)] if second else [])
+    tree, several = judged[0].found.subject.tree, len(fit.logs) > 1
+    every = [(f"{name}: " if several else "", log) for name, log in zip(fit.names, fit.logs, strict=True)]
+    every += [(f"{validated.name}: ", validated.second) for validated in judged if validated.second]
+    return [before + warning for before, log in every for warning in warnings_of_log(log, tree)]
 
 
 def _truth(stated: dict[str, Any], named: Identified) -> dict[str, float] | None:
     """Return the truth that the summary of a run states, if it is of the same parameters."""
     truth: dict[str, float] | None = stated.get("truth")
     return truth if truth and tuple(truth) == named.basis.names else None
-
-
-def _validated(found: Identified, asked: Identify, known: MotionLog) -> Validated:
-    """Return the identification, to be judged on a second log: its torque is that of the first if options say it."""
-    if asked.validate is None:
-        return Validated(found)
-    path = file_of(asked.validate)
-    stated = known.torque if asked.torque or asked.torque_delay else None
-    try:
-        second, _ = read(path, Question(unwrap=asked.unwrap, otherwise=stated, fallback=known.torque), found)
-    except (LogError, ExperimentError) as error:
-        raise ExperimentError(f"--validate {error}" if str(path) in str(error) else f"--validate {path}: {error}") from error
-    if _within(second, known):
-        raise ExperimentError(f"--validate {path} holds the motion that is identified: give one that it has not seen, or none")
-    return Validated(found, second, str(asked.validate))
-
-
-def _within(one: MotionLog, other: MotionLog) -> bool:
-    """Return whether a log is a part of another, or the other of it."""
-    short, long = sorted((one, other), key=lambda log: log.samples)
-    starts = np.flatnonzero((long.q[: long.samples - short.samples + 1] == short.q[0]).all(axis=1)) if short.n == long.n else ()
-    return any(np.array_equal(long.q[k : k + short.samples], short.q) for k in starts[:MOST_STARTS])
 
 
 @contextmanager
@@ -207,50 +192,3 @@ def _explained(warnings: Sequence[str]) -> Iterator[None]:
         yield
     except IdentificationError as error:
         raise ExperimentError("; ".join([str(error), *(f"warning: {warning}" for warning in warnings)])) from error
-
-
-def _warn(page: Page, *groups: Mapping[str, Sequence[str]]) -> None:
-    """Print warnings of several sources, the log first, as what comes first may be what makes the others."""
-    page.warn({about: [w for group in groups for w in group.get(about, ())] for about in (LOG, DELAY, FILE, MOTION, MODEL)})
-
-
-def _write_mjcf(page: Page, found: Identified, path: Path) -> None:
-    """Write the robot's file; raise ResultsError if that fails, which takes nothing else away."""
-    try:
-        written = Written(found, next(iter(found.estimates)))
-        written.write(path)
-    except (IdentificationError, BenchError) as error:
-        raise ResultsError(f"--write-mjcf {path}: {error}; everything else is as printed") from error
-    page.print(Text(f"written to {path}: the robot with the parameters of the {written.model} model"), soft_wrap=True)
-    page.warn({"the file that was written": written.warnings})
-
-
-def _write_results(page: Page, place: Place, validated: Validated, watching: Watching, audience: Audience | None) -> None:
-    lost, found = "", validated.found
-    with results_folder(place) as folder:
-        write_log(found.logs[0], folder / "log.parquet")
-        write_summary(folder / "summary.json", _summary(validated, Path(place.of)))
-        if is_long(found.logs):
-            page.print("not recorded: the rows of so long a log are not kept; identify a part of it to look inside")
-        elif watching.rerun:
-            from experiments.recording.identification_recording import record_log
-
-            lost = write_recording(folder, record_log(found, audience))
-    tell_of(lost, place.out)
-    page.print(f"written to {place.out}{watching.hint(place.out)}", soft_wrap=True)
-
-
-def _summary(validated: Validated, log: Path) -> dict[str, Any]:
-    """Return what a summary.json says of an identification."""
-    found = {"experiment": "identify", "log": log.name, "path": str(log)}
-    return {**found, **validated.found.summary(), "validation": _judged(validated)}
-
-
-def _judged(validated: Validated) -> dict[str, Any]:
-    """Return what a summary.json says of a validation, verdicts included; why, if there is none."""
-    try:
-        stated = validated.summary()
-    except IdentificationError as error:
-        return {"on": validated.title, "models": {}, "failure": str(error)}
-    verdicts = {model: Verdict(validated, model).summary() for model in stated["models"]}
-    return {**stated, "models": {model: {**verdicts[model], **numbers} for model, numbers in stated["models"].items()}}

@@ -3,22 +3,22 @@
 import shlex
 from pathlib import Path
 
-import numpy as np
+from rich.text import Text
 
 from experiments.cli.logs import Export, Resample
 from experiments.cli.page import new_page, show
-from experiments.cli.reading import channel_of, stated_by
+from experiments.cli.reading import channel_of, columns_of, stated_by
 from experiments.errors import ExperimentError, ResultsError
 from experiments.identification.results import beside
 from experiments.identification.subject import CLOSED_FORM
 from identify import MotionLog
-from identify.data.log_file import read_columns, read_log, write_log
-from identify.data.resample import resample as at
+from identify.data.resample import Repaired
+from identify.files.log_file import read_log, write_log
 
 
 def resample(asked: Resample) -> None:
-    """Write a log anew at a fixed sampling frequency."""
-    columns, page = read_columns(asked.log), new_page()
+    """Write a log anew at a fixed sampling frequency, its clock repaired."""
+    columns, page = columns_of(asked.log, asked.reading), new_page()
     if asked.out.exists() and asked.out.samefile(asked.log):
         raise ExperimentError(f"--out {asked.out} is the log that is read: choose another name")
     if asked.out.exists() and not asked.force:
@@ -27,11 +27,14 @@ def resample(asked: Resample) -> None:
     if meaning is None:
         raise ExperimentError(f"{asked.log} does not say what its torque means: add --torque held, instantaneous or averaged")
     channel = channel_of(columns.torque, meaning, asked.torque_delay)
-    made, widest = at(columns.t, columns.q, columns.tau, channel, asked.fs), float(np.diff(columns.t).max())
-    _write(made, asked.out, columns.joints)
-    page.print(f"written to {asked.out}: torque {made.torque.meaning}, delay {made.torque.delay:g} s", soft_wrap=True)
-    if widest > 2 / asked.fs:
-        page.print(f"warning: a gap of {widest:.3g} s was filled in, with positions and torques that nobody measured")
+    made = Repaired.of(columns, channel, asked.fs)
+    for words in made.words(columns.joints or tuple(f"joint {j + 1}" for j in range(columns.n))):
+        page.print(Text(words), soft_wrap=True)
+    for k, log in enumerate(made.logs):
+        out = asked.out if len(made.logs) == 1 else asked.out.with_stem(f"{asked.out.stem}{k + 1}")
+        _write(log, out, columns.joints)
+        torque = f"torque {log.torque.meaning}, delay {log.torque.delay:g} s"
+        page.print(Text(f"written to {out}: {log.samples} samples at {log.fs:.6g} Hz, {torque}"), soft_wrap=True)
     show(page)
 
 

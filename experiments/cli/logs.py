@@ -8,7 +8,22 @@ import tyro
 
 from experiments.cli.app import APP
 from experiments.cli.interruption import importing
-from experiments.cli.options import Asked, Delay, File, Folder, Json, Robot, Torque, Watched
+from experiments.cli.options import (
+    Asked,
+    ColumnOptions,
+    Delay,
+    File,
+    Files,
+    Folder,
+    Hertz,
+    Json,
+    Mounted,
+    MountingOptions,
+    Reading,
+    Robot,
+    Torque,
+    Watched,
+)
 from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.parameters import Parameters
 from experiments.recording.audience import Watching
@@ -18,12 +33,14 @@ from experiments.recording.audience import Watching
 @final
 @dataclass(frozen=True)
 class Identify:
-    """Identify a log: CSV or Parquet with the columns t, q1, q2, ..., tau1, tau2, ... in SI units."""
+    """Identify a log, or several in one fit: columns t, q1, q2, ..., tau1, tau2, ... in SI units, or what log.toml says."""
 
-    log: tyro.conf.Positional[Path]
-    """The file; its times uniform to 1 %. Or the folder of a run, whose recording gets a layer of this identification."""
+    log: tyro.conf.Positional[tuple[Path, ...]]
+    """The files; their times uniform to 1 %, or --resample. CSV and other text, Parquet, NumPy, Matlab, ROS bags. Or the
+    folder of a run, whose recording gets a layer of this identification."""
     robot: Robot = None
-    """Name of a robot that ships, or a file that describes it (MJCF or URDF); scara, or that of the run, by default."""
+    """Name of a robot that ships, or a file that describes it: MJCF, URDF, or a table of DH parameters (.toml); scara, or that
+    of the run, by default."""
     torque: Torque = None
     """What a torque sample means: held from its sample on for a period (a controller's command), the torque at an instant
     (a measurement), or the mean over a period. Asked for unless the file says it."""
@@ -31,8 +48,16 @@ class Identify:
     """From a sample to the instant it speaks for, in seconds, or `estimate` to find it from the log."""
     unwrap: bool = False
     """Take jumps of a hinge by about a turn for a change of the turn that is counted, and undo them."""
+    reading: Reading = ColumnOptions()  # noqa: RUF009  # frozen
+    """What its columns are."""
+    mounting: Mounted = MountingOptions()  # noqa: RUF009  # frozen
+    """How the robot is mounted."""
     chain: str = CHAIN
     """Signal processing."""
+    cutoff: Hertz = None
+    """Band of the fit [Hz]; by default 5, or what a short log needs."""
+    chain_file: File = None
+    """TOML file with settings of the chain: chain = "idbench", then tables such as [operator] with cutoff = 20.0."""
     model: str = "all"
     """all, explicit, implicit or power."""
     estimator: str = ESTIMATOR
@@ -40,8 +65,8 @@ class Identify:
     follow: Annotated[float | None, tyro.conf.arg(metavar="SECONDS", help_behavior_hint="")] = None
     """Identify a CSV log while it is being written, until it has not grown for so long; then as a whole. With --live or
     --serve estimates and residuals are seen to grow."""
-    validate: File = None
-    """A second log, on which the result is judged; without it the last quarter of the first, by a fit of the rest."""
+    validate: Files = ()
+    """Other logs, on each of which the result is judged; without them the last quarter of the log, by a fit of the rest."""
     write_mjcf: File = None
     """File to write: the robot's own with the inertias, armatures and frictions that were found, made physically consistent
     (extra `consistent`); those of the first model."""
@@ -72,11 +97,13 @@ class DescribeRobot:
     """Show what can be identified of a robot: its joints, its base parameters, what its torques are made of."""
 
     name: tyro.conf.Positional[str]
-    """Name of a robot that ships, or a file that describes it (MJCF or URDF)."""
+    """Name of a robot that ships, or a file that describes it: MJCF, URDF, or a table of DH parameters (.toml)."""
     json: Json = False
     """Print joints and parameters as JSON; what is for people goes to the error stream."""
     parameters: Asked = Parameters()  # noqa: RUF009  # frozen
     """Which parameters are asked for."""
+    mounting: Mounted = MountingOptions()  # noqa: RUF009  # frozen
+    """How the robot is mounted."""
 
     def __call__(self) -> None:
         """Run it."""
@@ -89,14 +116,16 @@ class DescribeRobot:
 @final
 @dataclass(frozen=True)
 class Resample:
-    """Write a log anew at a fixed sampling frequency."""
+    """Write a log anew at a fixed sampling frequency, its clock repaired: repeated rows, jitter, drops, gaps."""
 
     log: tyro.conf.Positional[Path]
-    """The file, CSV or Parquet, its times in any steps."""
-    fs: float
-    """Sampling frequency [Hz]."""
+    """The file, its times in any steps."""
     out: Path
-    """File to write, CSV or Parquet."""
+    """File to write, CSV or Parquet; a log with gaps becomes several, numbered."""
+    fs: Hertz = None
+    """Sampling frequency [Hz]; by default that of the log."""
+    reading: Reading = ColumnOptions()  # noqa: RUF009  # frozen
+    """What its columns are."""
     torque: Torque = None
     """What a torque sample means; asked for unless the file says it. A held torque comes out averaged."""
     torque_delay: Delay = None

@@ -2,17 +2,22 @@
 
 import json
 import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from experiments.cli.options import Meaning
+from experiments.cli.options import ColumnOptions, Meaning
 from experiments.errors import ExperimentError
 from experiments.identification.identified import Identified
-from identify import Array, LogError, MotionLog, TimeError, TorqueChannel
-from identify.data.log_file import read_columns
+from identify import Array, LogError, MotionLog, SettingError, TimeError, TorqueChannel
+from identify.data.log_columns import LogColumns
+from identify.data.resample import Repaired
+from identify.files.layout import LogLayout
+from identify.files.reading import LAYOUT_FILE, layout_of, read_columns
+from identify.judge.delay import DelayEstimate
 
 SLOWEST = 0.5
 """Sampling period [s] that no robot's log has: its times are in another unit."""
@@ -60,6 +65,8 @@ class Question:
         What its torque means, whatever the file says.
     fallback : TorqueChannel, optional
         What it means where the file says nothing.
+    columns : ColumnOptions
+        What the columns are, as options say.
     """
 
     torque: Meaning | None = None
@@ -67,15 +74,48 @@ class Question:
     unwrap: bool = False
     otherwise: TorqueChannel | None = None
     fallback: TorqueChannel | None = None
+    columns: ColumnOptions = ColumnOptions()  # noqa: RUF009  # frozen
 
 
-def read(path: Path, question: Question, named: Identified) -> tuple[MotionLog, str]:
-    """Return the log, its torque read as the options say, and notes on its delay."""
-    columns, delay = read_columns(path), question.delay
+@dataclass(frozen=True, eq=False)
+class ReadLog:
+    """A log as it was read.
+
+    Parameters
+    ----------
+    path : Path
+        Its file.
+    logs : tuple of MotionLog
+        The log; its pieces, if it has gaps.
+    columns : LogColumns
+        What the file holds.
+    repaired : Repaired or None
+        What was done to its clock, if that was asked for.
+    notes : tuple of str
+        What was done or assumed.
+    """
+
+    path: Path
+    logs: tuple[MotionLog, ...]
+    columns: LogColumns
+    repaired: Repaired | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def longest(self) -> MotionLog:
+        """The log, or the longest of its pieces."""
+        return max(self.logs, key=lambda log: log.samples)
+
+
+def read(path: Path, question: Question, named: Identified) -> ReadLog:
+    """Return the log, its torque read as the options say; its delay is that which is stated."""
+    columns, delay = columns_of(path, question.columns), question.delay
+    asked = named.subject.mounting.joints
+    columns = columns if columns.joints or len(asked) != columns.n else replace(columns, joints=asked)
     try:
         columns = columns.ordered(named.subject.robot.joints)
     except LogError as error:
-        raise ExperimentError(f"{path}: {error}; name the robot of the log with --robot") from error
+        raise ExperimentError(f"{path}: {error}; name the robot of the log with --robot{_joints_of(columns, named)}") from error
     stated = columns.torque or question.fallback
     meaning = question.torque or (stated.meaning if stated else None)
     if meaning is None:
@@ -87,25 +127,69 @@ def read(path: Path, question: Question, named: Identified) -> tuple[MotionLog, 
     _require_seconds(path, columns.t)
     if not np.any(columns.tau) and np.ptp(columns.q, axis=0).any():
         raise ExperimentError(f"{path}: all torques are 0: there is nothing to identify")
-    q = _turned(path, columns.q, named, question.unwrap)
+    columns = replace(columns, q=_turned(path, columns.q, named, question.unwrap))
+    assumed = delay is None and stated is None and question.otherwise is None
+    notes = ["no --torque-delay was given, 0 is assumed: `estimate` finds it"] if assumed else []
+    if question.columns.resample or columns.t_tau is not None:
+        repaired = Repaired.of(columns, channel)
+        words = [*repaired.words(named.subject.robot.joints), *notes]
+        return ReadLog(path, repaired.logs, columns, repaired, tuple(words))
     try:
-        log = MotionLog.at_times(columns.t, q, columns.tau, channel)
+        log = MotionLog.at_times(columns.t, columns.q, columns.tau, channel)
     except TimeError as error:
-        fs = 1 / float(np.median(np.diff(columns.t)))
         late = f" --torque-delay {channel.delay:g}" if channel.delay else ""
         raise ExperimentError(
-            f"{path}: {error}: uv run idbench resample {shlex.quote(str(path))} --fs {fs:.4g} --torque {meaning}{late} "
-            "--out uniform.parquet"
+            f"{path}: {error}: add --resample, or write it anew and look: uv run idbench resample {shlex.quote(str(path))} "
+            f"--torque {meaning}{late} --out uniform.parquet"
         ) from error
-    if delay != "estimate":
-        assumed = delay is None and stated is None
-        return log, "no --torque-delay was given, 0 is assumed: `estimate` finds it" if assumed else ""
+    return ReadLog(path, (log,), columns, None, tuple(notes))
+
+
+def with_delays(every: Sequence[ReadLog], named: Identified) -> list[ReadLog]:
+    """Return logs with the delay of their torques, estimated from all that have the same meaning together."""
     from identify.judge.delay import estimate_delay
 
-    found = estimate_delay(log, named.basis, named.processing)
-    log = MotionLog(log.fs, log.q, log.tau, replace(channel, delay=found.delay))
+    found = {}
+    for meaning in {log.logs[0].torque.meaning for log in every}:
+        alike = [log for read in every for log in read.logs if log.torque.meaning == meaning]
+        found[meaning] = estimate_delay(alike, named.basis, named.processing)
+    return [_delayed(log, found[log.logs[0].torque.meaning]) for log in every]
+
+
+def _delayed(read: ReadLog, found: DelayEstimate) -> ReadLog:
+    logs = tuple(MotionLog(log.fs, log.q, log.tau, replace(log.torque, delay=found.delay)) for log in read.logs)
     sure = f"{1e3 * found.delay:.4g} ms, sigma {1e3 * found.sigma:.2g} ms (not in the sigmas above)"
-    return log, f"torque delay estimated from the log: {sure}"
+    return replace(read, logs=logs, notes=(*read.notes, f"torque delay estimated from the log: {sure}"))
+
+
+def columns_of(path: Path, options: ColumnOptions) -> LogColumns:
+    """Return the columns of a log, as the file beside it and the options say."""
+    if not options.stated:
+        return read_columns(path)
+    layout = LogLayout.read(options.layout) if options.layout else None
+    beside = LogLayout.beside(path) if path.suffix != LAYOUT_FILE else (LogLayout.read(path), path)
+    layout = layout or (beside[0] if beside else None) or layout_of(path)
+    for quantity, texts in (("columns", options.columns), ("unit", options.units)):
+        for text in texts:
+            name, mark, value = text.partition("=")
+            if name not in ("t", "q", "qd", "tau") or not mark or not value:
+                raise ExperimentError(f"--{quantity} {text}: give t=..., q=..., qd=... or tau=..., such as q=position_*")
+            given = tuple(value.split(",")) if quantity == "columns" else value
+            layout = replace(layout, **{name: replace(getattr(layout, name), **{quantity: given})})
+    try:
+        _ = [getattr(layout, name).scale(name) for name in ("t", "q", "qd", "tau")]
+    except SettingError as error:
+        raise ExperimentError(f"--units: {error}") from error
+    return read_columns(path, replace(layout, gain=options.gain or layout.gain))
+
+
+def _joints_of(columns: LogColumns, named: Identified) -> str:
+    """Return how to say which joints a log has, where they are fewer than the robot's."""
+    known = named.subject.robot.joints
+    if columns.n >= len(known):
+        return ""
+    those = columns.joints if set(columns.joints) <= set(known) and columns.joints else known[: columns.n]
+    return f", or the joints that it has: --joints {' '.join(those)} (the others are held at 0, or where --lock says)"
 
 
 def _require_seconds(path: Path, t: Array) -> None:

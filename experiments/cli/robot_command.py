@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.text import Text
 
 from experiments.cli.logs import DescribeRobot
+from experiments.cli.mounting import mounting_of
 from experiments.cli.page import new_page, show
 from experiments.identification.budget import Budget
 from experiments.identification.subject import Subject, absolute
@@ -23,7 +24,7 @@ MANY = 30
 
 def describe(asked: DescribeRobot) -> None:
     """Show what can be identified of a robot."""
-    subject, page = Subject(absolute(asked.name), asked.parameters), new_page(machine=asked.json)
+    subject, page = Subject(absolute(asked.name), asked.parameters, mounting_of(asked.mounting)), new_page(machine=asked.json)
     if subject.robot.n > MANY:
         sys.stderr.write(f"idbench: grouping the parameters of {subject.robot.n} joints takes a while\n")
     truth = subject.truth(subject.robot)

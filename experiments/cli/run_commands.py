@@ -21,7 +21,7 @@ from experiments.paper.table2 import Table2
 from experiments.paper.table2_text import print_table2
 from experiments.plugin_tables import plugin_conflicts
 from experiments.recording.audience import Audience, Watching
-from identify.data.log_file import write_log
+from identify.files.log_file import write_log
 from identify.rows.long_logs import is_long
 from sim.drives import IdealDrive
 from sim.errors import RobotError

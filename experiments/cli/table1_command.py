@@ -15,7 +15,7 @@ from experiments.paper.motions_report import picture, print_motions
 from experiments.paper.search import Search
 from experiments.paper.table1 import CHAINS_COMPARED, SCENARIO, Table1
 from experiments.paper.table1_text import print_table1
-from identify.data.log_file import write_log
+from identify.files.log_file import write_log
 from sim.robot.robot import Robot
 from sim.scenario.scenario import Scenario
 from sim.scenario.scenario_file import load, to_toml

@@ -60,7 +60,8 @@ class Written:
     @cached_property
     def text(self) -> str:
         """The file."""
-        return rewritten(self.found.subject.name, self._values())
+        subject = self.found.subject
+        return rewritten(subject.name, self._values(), mounting=subject.mounting)
 
     @cached_property
     def robot(self) -> Robot:
@@ -68,12 +69,15 @@ class Written:
         return compiled(self.found.subject.name, self.text)
 
     def _values(self) -> dict[str, float]:
-        found = self.consistent
-        return dict(zip(found.names, map(float, found.standard), strict=True))
+        found, asked = self.consistent, self.found.subject.asked
+        none = ("Ia",) * (asked.armature == "none") + ("Fv", "Fs") * (asked.friction == "none")
+        without = {f"{letters}{j + 1}": 0.0 for letters in none for j in range(self.found.basis.n)}
+        return without | dict(zip(found.names, map(float, found.standard), strict=True))
 
     def write(self, path: Path) -> None:
         """Write the file, whole or not at all."""
-        write_whole(path, rewritten(self.found.subject.name, self._values(), path.absolute().parent))
+        subject = self.found.subject
+        write_whole(path, rewritten(subject.name, self._values(), path.absolute().parent, subject.mounting))
 
     @property
     def warnings(self) -> list[str]:

@@ -55,7 +55,18 @@ def print_identified(console: Console, found: Identified, title: str) -> None:
             words += f"; what follows judges them at {1e3 * channel.delay:.4g} ms: give --torque-delay {1e-3 * delay:.4g}"
         console.print(Text(words), soft_wrap=True)
     console.print(Text(_noise(found)), soft_wrap=True)
+    if len(found.logs) > 1 and found.torque_errors:
+        _print_logs(console, found)
     console.print()
+
+
+def _print_logs(console: Console, found: Identified) -> None:
+    """Print the torque error of the first estimate, log by log."""
+    model, errors = next(iter(found.torque_errors.items()))
+    grid = new_table("", found.subject.robot.joints)
+    for k, name in enumerate(found.log_names or [f"log {k + 1}" for k in range(len(found.logs))]):
+        grid.add_row(name, *(f"{x:.2g}" if isfinite(x) else "" for x in errors[k]))
+    print_titled(console, f"what the {model} model leaves of each log while joints move: rms torque error [N m, N]", grid)
 
 
 def _flagged(cells: Sequence[str], marks: Sequence[str]) -> Iterator[str]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import isfinite
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from identify import (
     attempt_each,
     encoder_steps,
 )
+from identify.rows.rows import Rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +52,10 @@ class Identified:
         Time at either end of a log that makes no rows [s]; by default what the chain needs.
     name : str
         What to call it beside others of the same log; by default chain and estimator.
+    log_names : tuple of str
+        What to call the logs, where there are several.
+    known : mapping of str to Estimate, optional
+        Estimates that were made from other logs, to be looked at on these.
     """
 
     logs: tuple[MotionLog, ...]
@@ -62,6 +67,8 @@ class Identified:
     method: tuple[Chain, AbstractEstimator] | None = None
     trim: float | None = None
     name: str = ""
+    log_names: tuple[str, ...] = ()
+    known: Mapping[str, Estimate | IdentificationError] | None = None
 
     def __post_init__(self) -> None:
         _ = self.basis, self.processing, ESTIMATORS.create(self.estimator), [MODELS.create(name) for name in self.models]
@@ -95,8 +102,30 @@ class Identified:
     @cached_property
     def outcomes(self) -> dict[str, Estimate | IdentificationError]:
         """The estimate of every model, or why it has none."""
+        if self.known is not None:
+            return dict(self.known)
         models = {name: MODELS.create(name) for name in self.models}
         return attempt_each(self.problem, models, self.solver)
+
+    def on(self, k: int) -> Self:
+        """Return the identification as it looks on one of its logs: parameters and sigma of all, rows of that one."""
+        if len(self.logs) == 1:
+            return self
+        alone = replace(self, logs=(self.logs[k],), log_names=self.log_names[k : k + 1], known={})
+        problem = alone.problem
+        known = {
+            name: replace(e, problem=problem.with_model(e.problem.model), honest=e.best_covariance, whiten=None, fits={})
+            for name, e in self.estimates.items()
+        }
+        return replace(alone, known=known)
+
+    @cached_property
+    def torque_errors(self) -> dict[str, Array]:
+        """Rms of measured - predicted torque of every estimate while joints move, shape (log, joint) [N m], or NaN."""
+        if self.problem.long:
+            return {}
+        parts = self.problem.parts
+        return {name: np.array([_rms_by_kind(part, e.X) for part in parts]) for name, e in self.estimates.items()}
 
     @cached_property
     def estimates(self) -> dict[str, Estimate]:
@@ -174,4 +203,29 @@ class Identified:
             "noise": self.noise,
             "models": models,
             "failures": self.failures,
+            "cutoff": getattr(self.processing.operator, "cutoff", None),
+            "logs": [self._of_log(k) for k in range(len(self.logs))],
         }
+
+    def _of_log(self, k: int) -> dict[str, Any]:
+        """Return what a summary.json says of one of the logs."""
+        log, channel = self.logs[k], self.logs[k].torque
+        errors = {name: [_finite(x) for x in errors[k]] for name, errors in self.torque_errors.items()}
+        return {
+            "name": self.log_names[k] if self.log_names else "",
+            "samples": log.samples,
+            "fs": log.fs,
+            "torque": {"meaning": channel.meaning, "delay": channel.delay, "gain": channel.gain},
+            "torque_error_rms": errors,
+        }
+
+
+def _rms_by_kind(rows: Rows, X: Array) -> Array:
+    """Return the rms of the valid residuals of each joint, shape (joint,)."""
+    left, valid = rows.by_kind((rows.Y - rows.predicted(X)) * rows.valid), rows.by_kind(rows.valid)
+    count = valid.sum(axis=-1)
+    return np.sqrt(np.divide(np.sum(left**2, axis=-1), count, out=np.full(len(count), np.nan), where=count > 0))
+
+
+def _finite(x: float) -> float | None:
+    return float(x) if isfinite(x) else None

@@ -13,9 +13,12 @@ Names = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME")]
 class Parameters:
     """Which parameters of a robot are asked for."""
 
-    armature: Literal["file", "all"] = "file"
-    """Which joints have the inertia of a rotor: those to which the robot's file gives one, or all."""
+    armature: Literal["file", "all", "none"] = "file"
+    """Which joints have the inertia of a rotor: those to which the robot's file gives one, all, or none, as where torques are
+    measured at the links."""
     add: Names = ()
     """Laws of friction beside viscous and Coulomb friction, such as offset, a constant torque of each joint."""
     without: Names = ()
     """Parameters to leave out, as if they were zero."""
+    friction: Literal["joints", "none"] = "joints"
+    """Viscous and Coulomb friction of every joint, or none, as where torques are measured at the links."""

@@ -10,6 +10,7 @@ import numpy as np
 from experiments.errors import ExperimentError
 from experiments.identification.parameters import Parameters
 from identify import BLOCKS, AbstractFriction, BaseParameters, Basis, KinematicTree, scara, tree_basis
+from sim.robot.mounting import PLAIN, Mounting
 from sim.robot.robot import FILES, Robot
 from sim.robot.scara import scara_truth
 from sim.robot.tree import kinematic_tree, standard_parameters
@@ -29,15 +30,18 @@ class Subject:
         Name of a robot that ships, or path of an MJCF or URDF file.
     asked : Parameters
         Which of its parameters are asked for.
+    mounting : Mounting
+        How it is mounted, and which of its joints move.
     """
 
     name: str = CLOSED_FORM
     asked: Parameters = Parameters()  # noqa: RUF009  # frozen
+    mounting: Mounting = PLAIN
 
     @cached_property
     def robot(self) -> Robot:
-        """The robot as its file describes it."""
-        return Robot.load(self.name)
+        """The robot as its file describes it, mounted as it is."""
+        return Robot.load(self.name) if self.mounting.plain else Robot.load(self.name, self.mounting.edit)
 
     @cached_property
     def tree(self) -> KinematicTree:
@@ -45,17 +49,20 @@ class Subject:
         tree = kinematic_tree(self.robot)
         if self.asked.armature == "file":
             return tree
-        return replace(tree, joints=tuple(replace(joint, armature=True) for joint in tree.joints))
+        rotors = self.asked.armature == "all"
+        return replace(tree, joints=tuple(replace(joint, armature=rotors) for joint in tree.joints))
 
     @cached_property
     def grouping(self) -> BaseParameters:
         """How its standard parameters are grouped."""
-        return BaseParameters.of(self.tree, self._with_laws(tree_basis(self.tree)))
+        basis = tree_basis(self.tree) if self.asked.friction == "joints" else tree_basis(self.tree, ())
+        return BaseParameters.of(self.tree, self._with_laws(basis))
 
     @cached_property
     def base(self) -> BaseParameters | None:
         """The grouping, where its base parameters are what is identified; None for the closed form."""
-        return None if self.name == CLOSED_FORM and self.asked.armature == "file" else self.grouping
+        as_shipped = self.name == CLOSED_FORM and self.mounting.plain
+        return None if as_shipped and self.asked.armature == "file" and self.asked.friction == "joints" else self.grouping
 
     @cached_property
     def whole(self) -> Basis:

@@ -44,17 +44,28 @@ class Validated:
     @cached_property
     def judged(self) -> Identified:
         """The identification that is judged."""
-        return self.found if self.second is not None else replace(self.found, logs=(split(self.found.logs[0])[0],))
+        if self.second is not None:
+            return self.found
+        k, logs = self._longest, self.found.logs
+        return replace(self.found, logs=(*logs[:k], split(logs[k])[0], *logs[k + 1 :]))
 
     @cached_property
     def unseen(self) -> MotionLog:
         """The motion on which it is judged; of a long one the beginning."""
-        return manageable([split(self.found.logs[0])[1] if self.second is None else self.second])[0]
+        return manageable([split(self.found.logs[self._longest])[1] if self.second is None else self.second])[0]
+
+    @property
+    def _longest(self) -> int:
+        """The number of the log of which the end is held out."""
+        return max(range(len(self.found.logs)), key=lambda k: self.found.logs[k].samples)
 
     @property
     def title(self) -> str:
         """What it is judged on."""
-        return f"unseen motion {self.name}" if self.name else "the last quarter of the log, by a fit of the rest"
+        if self.name:
+            return f"unseen motion {self.name}"
+        names = self.found.log_names
+        return f"the last quarter of {names[self._longest] if len(names) > 1 else 'the log'}, by a fit of the rest"
 
     @cached_property
     def torques(self) -> dict[str, Validation]:

@@ -9,7 +9,6 @@ import numpy as np
 
 from experiments.errors import ExperimentError
 from experiments.identification.identified import Identified
-from experiments.identification.subject import Subject
 from experiments.identification.validated import Validated
 from experiments.identification.warnings import wrong_sign
 from identify import Array, IdentificationError, RangeError, Validation, estimate, validate
@@ -152,7 +151,7 @@ class Remedies:
         before = self._worst(self.validated.judged)
         for option, asked in options.items():
             try:
-                after = self._worst(replace(self.validated.judged, subject=Subject(subject.name, asked), truth=None))
+                after = self._worst(replace(self.validated.judged, subject=replace(subject, asked=asked), truth=None))
             except (IdentificationError, ExperimentError):
                 continue
             if after < min(WORTH * before, TOLERABLE):

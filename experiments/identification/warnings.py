@@ -136,6 +136,8 @@ def _share(share: float) -> str:
 def wrong_unit(found: Identified) -> list[str]:
     """Return whether torques are far from what the robot's file says of the same motion, as those in other units are."""
     subject, R = found.subject, found.problem.factors.R
+    if subject.robot.weightless:
+        return []
     filed = R[..., :-1] @ np.array(list(subject.truth(subject.robot).values()))
     sizes = zip(np.linalg.norm(R[..., -1], axis=-1), np.linalg.norm(filed, axis=-1), strict=True)
     measured, expected = max(sizes, key=lambda pair: float(pair[1]))  # the joint of which the file expects most
@@ -148,6 +150,7 @@ def warnings_of_robot(robot: Robot) -> list[str]:
     """Return what of a robot's file no parameter describes."""
     found = unmodelled(robot)
     messages = [f"the file of robot {robot.name!r} has {', '.join(found)}, which no parameter describes"] if found else []
+    messages += [f"the file of robot {robot.name!r} has {note}" for note in robot.notes]
     return [*messages, *warnings_of_base(kinematic_tree(robot))]
 
 

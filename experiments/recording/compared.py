@@ -14,7 +14,7 @@ import scipy
 from experiments.errors import ExperimentError, ResultsError
 from experiments.recording.columns import part
 from identify import Array, LogError, MotionLog
-from identify.data.log_file import read_log
+from identify.files.log_file import read_log
 
 SAME_MOTION = 0.8
 """Correlation of velocities from which on two logs are of the same motion."""

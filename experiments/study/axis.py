@@ -1,24 +1,15 @@
 """What a study varies."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, final
 
 import numpy as np
 
-from experiments.errors import StudyError
-from identify import ALIGNMENTS, DIFFERENTIATORS, MASKS, OPERATORS, PREFILTERS, Chain, SettingError
-from identify.plugins import PluginTable, did_you_mean
+from experiments.errors import ExperimentError, StudyError
+from experiments.identification.chain_settings import replaced
+from identify import Chain
 from sim.settings import Number, Whole, settings
-
-STAGES: dict[str, PluginTable[Any]] = {
-    "prefilter": PREFILTERS,
-    "differentiator": DIFFERENTIATORS,
-    "alignment": ALIGNMENTS,
-    "mask": MASKS,
-    "operator": OPERATORS,
-}
-"""The stages of a chain that are plug-ins."""
 
 MOST_VALUES = 10000
 
@@ -123,7 +114,7 @@ class Setting:
         for field in self.axis.all_fields:
             root, *path = field.split(".")
             if root == "chain":
-                chain = _replaced(chain, path, self.value, field)
+                chain = _set(chain, path, self.value, field)
         return chain
 
     def estimator(self, estimator: Any) -> Any:
@@ -131,7 +122,7 @@ class Setting:
         for field in self.axis.all_fields:
             root, *path = field.split(".")
             if root == "estimator":
-                estimator = _replaced(estimator, path, self.value, field)
+                estimator = _set(estimator, path, self.value, field)
         return estimator
 
 
@@ -139,22 +130,13 @@ def _of_identification(field: str) -> bool:
     return field.split(".", maxsplit=1)[0] in ("chain", "estimator")
 
 
-def _replaced(part: Any, path: list[str], value: Any, field: str) -> Any:
-    """Return a frozen dataclass with the value of a field, or of a field of a field, replaced."""
-    known = [f.name for f in fields(part)]
-    if not path or path[0] not in known:
-        hint = did_you_mean(path[0] if path else "", known)
-        raise StudyError(f"axis {field}: {type(part).__name__} has no such setting{hint}; known: {', '.join(known) or 'none'}")
-    if len(path) > 1:
-        value = _replaced(getattr(part, path[0]), path[1:], value, field)
-    elif path[0] in STAGES and isinstance(part, Chain):
-        if not isinstance(value, str):
-            raise StudyError(f"axis {field} = {value!r:.60}: give names, among {', '.join(STAGES[path[0]])}")
-        value = STAGES[path[0]].create(value)
+def _set(part: Any, path: list[str], value: Any, field: str) -> Any:
+    """Return a part with a value of a field; raise StudyError that names the axis."""
     try:
-        return replace(part, **{path[0]: value})
-    except (SettingError, TypeError, ValueError) as error:
-        raise StudyError(f"axis {field} = {value!r:.60}: {error}") from error
+        return replaced(part, path, value)
+    except ExperimentError as error:
+        sets = "no such setting" in str(error)
+        raise StudyError(f"axis {field}{'' if sets else f' = {value!r:.60}'}: {error}") from error
 
 
 def _plain(value: Any) -> Any:

@@ -1,19 +1,87 @@
 """Logs whose times are not uniform, made uniform."""
 
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 import scipy
 
 from identify.arrays import Array
+from identify.data.clock import Clock
+from identify.data.log_columns import LogColumns
 from identify.data.motion_log import MotionLog, TorqueChannel
+from identify.data.velocities import Velocities
 from identify.errors import LogError, require_positive
 
 MOST_SAMPLES = 1e8
 """Samples above which a frequency is taken for a slip."""
 
+SHORTEST = 1.0
+"""Pieces between gaps that are shorter than this [s] are left out."""
 
-def resample(t: Array, q: Array, tau: Array, torque: TorqueChannel, fs: float) -> MotionLog:
+NICE = 2e-3
+"""Share by which a sampling frequency may be off a round one that is then taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class Repaired:
+    """A log made uniform: one, or several where it has gaps.
+
+    Parameters
+    ----------
+    logs : tuple of MotionLog
+        Its pieces.
+    clock : Clock
+        Which rows count, and when they were.
+    velocities : Velocities or None
+        What the logged velocities are worth; None without any.
+    short : int
+        How many pieces were too short to be kept.
+    """
+
+    logs: tuple[MotionLog, ...]
+    clock: Clock
+    velocities: Velocities | None = None
+    short: int = 0
+
+    @classmethod
+    def of(cls, columns: LogColumns, torque: TorqueChannel, fs: float | None = None) -> Self:
+        """Return a log made uniform at `fs` [Hz], by default at the frequency of its clock.
+
+        Samples of a steady clock stay as they are; what is between others is interpolated.
+
+        Raises
+        ------
+        LogError
+            If too few rows are left, or no piece between gaps is long enough.
+        """
+        clock = Clock.of(columns)
+        sound, fs = clock.columns(columns), fs or _round(1 / clock.period)
+        found, short, velocities = list[MotionLog](), 0, None
+        for piece in clock.pieces:
+            part = replace(sound, t=sound.t[piece], q=sound.q[piece], qd=None if sound.qd is None else sound.qd[piece])
+            if sound.t_tau is None:
+                part = replace(part, tau=sound.tau[piece])
+            if part.t[-1] - part.t[0] < SHORTEST and len(clock.pieces) > 1:
+                short += 1
+                continue
+            log, known = _uniform(part, torque, fs)
+            found, velocities = [*found, log], velocities or known
+        if not found:
+            raise LogError(f"no piece between the {len(clock.gaps)} gaps is longer than {SHORTEST:g} s")
+        return cls(tuple(found), clock, velocities, short)
+
+    def words(self, joints: tuple[str, ...]) -> Iterator[str]:
+        """Yield what was done, a sentence each."""
+        yield from self.clock.words()
+        if self.short:
+            yield f"{self.short} pieces shorter than {SHORTEST:g} s are left out"
+        if self.velocities is not None:
+            yield from self.velocities.words(joints)
+
+
+def resample(t: Array, q: Array, tau: Array, torque: TorqueChannel, fs: float, t_tau: Array | None = None) -> MotionLog:
     """Return a log at `fs` [Hz] of samples at any increasing times.
 
     Positions by a cubic spline; torques by straight lines, or, where they are held, by the mean of what is held over each new
@@ -29,6 +97,8 @@ def resample(t: Array, q: Array, tau: Array, torque: TorqueChannel, fs: float) -
         What the torque means.
     fs : float
         [Hz].
+    t_tau : Array, shape (time of torques,), optional
+        Times of the torques, by default those of the positions [s].
 
     Raises
     ------
@@ -36,21 +106,48 @@ def resample(t: Array, q: Array, tau: Array, torque: TorqueChannel, fs: float) -
         If there are fewer than 4 samples, a value is not finite, or times do not increase.
     """
     require_positive(fs=fs)
-    if len(t) < 4 or not all(np.isfinite(x).all() for x in (t, q, tau)):
+    own = t if t_tau is None else t_tau
+    for times, values in ((t, q), (own, tau)):
+        _require_sound(times, values)
+    start, end = max(t[0], own[0]), min(t[-1], own[-1])
+    count = int((end - start) * fs + 1e-9)
+    if not 1 <= count <= MOST_SAMPLES:
+        raise LogError(f"fs = {fs:g} Hz makes {count:.3g} samples of {end - start:.3g} s; 1 to {MOST_SAMPLES:.0e} are allowed")
+    at = start + np.arange(count + 1) / fs
+    positions: Array = np.asarray(scipy.interpolate.CubicSpline(t, q)(at[:-1]), dtype=np.float64)
+    if torque.meaning == "held":
+        impulse = np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(tau[:-1] * np.diff(own)[:, None], axis=0)])
+        grown: Array = np.asarray(
+            scipy.interpolate.interp1d(own, impulse, axis=0, fill_value="extrapolate")(at), dtype=np.float64
+        )
+        return MotionLog(fs, positions, np.diff(grown, axis=0) * fs, replace(torque, meaning="averaged"))
+    between = scipy.interpolate.interp1d(own, tau, axis=0)(at[:-1])
+    return MotionLog(fs, positions, np.asarray(between, dtype=np.float64), torque)
+
+
+def _uniform(part: LogColumns, torque: TorqueChannel, fs: float) -> tuple[MotionLog, Velocities | None]:
+    """Return a piece without gaps as a log, its positions improved by velocities that know better."""
+    steps = np.diff(part.t)
+    as_is = part.t_tau is None and np.abs(steps * fs - 1).max() < 1e-3
+    log = MotionLog(fs, part.q, part.tau, torque) if as_is else resample(part.t, part.q, part.tau, torque, fs, part.t_tau)
+    if part.qd is None or not np.isfinite(part.qd).all():
+        return log, None
+    start = 0.0 if as_is else max(part.t[0], part.t_tau[0]) if part.t_tau is not None else part.t[0]
+    qd = part.qd if as_is else scipy.interpolate.CubicSpline(part.t, part.qd)(start + log.t)
+    velocities = Velocities.of(log.q, qd, fs)
+    return MotionLog(fs, velocities.improved(log.q, qd), log.tau, log.torque), velocities
+
+
+def _round(fs: float) -> float:
+    """Return a frequency, or a round one that is next to it."""
+    digits = 10 ** np.floor(np.log10(fs) - 1)
+    near = float(np.round(fs / digits) * digits)
+    return near if abs(near - fs) <= NICE * fs else fs
+
+
+def _require_sound(t: Array, values: Array) -> None:
+    if len(t) < 4 or not all(np.isfinite(x).all() for x in (t, values)):
         raise LogError(f"{len(t)} samples: at least 4 are needed, without NaN or infinity")
     if (step := np.diff(t)).min() <= 0:
         k = int(np.argmin(step))
         raise LogError(f"time does not increase: t = {t[k]:.9g} s is followed by {t[k + 1]:.9g} s at sample {k + 1}")
-    count = int((t[-1] - t[0]) * fs + 1e-9)
-    if not 1 <= count <= MOST_SAMPLES:
-        raise LogError(f"fs = {fs:g} Hz makes {count:.3g} samples of {t[-1] - t[0]:.3g} s; 1 to {MOST_SAMPLES:.0e} are allowed")
-    at = t[0] + np.arange(count + 1) / fs
-    positions: Array = np.asarray(scipy.interpolate.CubicSpline(t, q)(at[:-1]), dtype=np.float64)
-    if torque.meaning == "held":
-        impulse = np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(tau[:-1] * np.diff(t)[:, None], axis=0)])
-        grown: Array = np.asarray(
-            scipy.interpolate.interp1d(t, impulse, axis=0, fill_value="extrapolate")(at), dtype=np.float64
-        )
-        return MotionLog(fs, positions, np.diff(grown, axis=0) * fs, replace(torque, meaning="averaged"))
-    between = scipy.interpolate.interp1d(t, tau, axis=0)(at[:-1])
-    return MotionLog(fs, positions, np.asarray(between, dtype=np.float64), torque)

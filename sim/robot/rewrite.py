@@ -12,7 +12,10 @@ import numpy.typing as npt
 
 from identify.data.kinematics import INERTIAL
 from sim.errors import RobotError
+from sim.robot.dh import TABLE
+from sim.robot.meshes import without_missing_meshes
 from sim.robot.motors import Array
+from sim.robot.mounting import PLAIN, Mounting
 from sim.robot.robot import Robot
 from sim.robot.tree import standard_parameters
 
@@ -22,7 +25,7 @@ ROUNDING = 1e-9
 Values = Mapping[str, float]
 
 
-def rewritten(name: str, standard: Values, folder: Path | None = None) -> str:
+def rewritten(name: str, standard: Values, folder: Path | None = None, mounting: Mounting = PLAIN) -> str:
     """Return the file of a robot as MJCF, with other standard parameters.
 
     The inertia of a link stands at the body that its joint moves; bodies that are welded to it become massless. Everything
@@ -36,16 +39,18 @@ def rewritten(name: str, standard: Values, folder: Path | None = None) -> str:
         Values by the names that `sim.robot.tree.standard_parameters` gives; those that it leaves out stay.
     folder : Path, optional
         Where it will be written, so that it finds its meshes; by default where the file of the robot is.
+    mounting : Mounting, optional
+        How it is mounted, and which of its joints move: the others are welded in what is written.
 
     Raises
     ------
     RobotError
         If a link with these parameters cannot exist, or the model does not compile to them.
     """
-    robot = Robot.load(name)
+    robot = Robot.load(name, mounting.edit)
     known = standard_parameters(robot)
     wanted = {**known, **{key: value for key, value in standard.items() if key in known}}
-    root = _document(name)
+    root = _document(name, mounting)
     _require_alike(robot, root)
     for compiler in root.iter("compiler"):
         compiler.attrib.pop("inertiafromgeom", None)  # bodies keep what they are given
@@ -58,7 +63,8 @@ def rewritten(name: str, standard: Values, folder: Path | None = None) -> str:
     home = Robot.path(name).absolute().parent
     if folder is not None:
         _relocate(root, home, folder)
-    text = _around(name, ElementTree.tostring(root, encoding="unicode"))
+    text = ElementTree.tostring(root, encoding="unicode")
+    text = text if _made(Robot.path(name)) else _around(name, text)
     _require_same(name, compiled(name, text, folder or home), wanted)
     return text
 
@@ -71,6 +77,7 @@ def compiled(name: str, text: str, folder: Path | None = None) -> Robot:
     try:
         spec = mujoco.MjSpec.from_string(text)
         spec.modelfiledir = str(folder or Robot.path(name).parent)
+        without_missing_meshes(spec, Path(spec.modelfiledir))
         return Robot(Path(name).stem, spec.compile())
     except ValueError as error:
         raise RobotError(f"MuJoCo cannot compile {name!r} with these parameters: {' '.join(str(error).split())}") from error
@@ -84,8 +91,6 @@ def _around(name: str, text: str) -> str:
     parser.EndElementHandler = lambda *_: ends.append(parser.CurrentByteIndex)
     parser.Parse(raw, True)
     before, after = raw[: starts[0]], raw[raw.index(b">", ends[-1]) + 1 :]
-    if b"<robot" in raw[starts[0] : starts[0] + 6]:  # a URDF became MJCF
-        before = after = b""
     return before.decode() + text + (after.decode() or "\n")
 
 
@@ -105,14 +110,15 @@ def _relocate(root: ElementTree.Element, old: Path, new: Path) -> None:
         first.set(attribute, os.path.relpath(old / settings.get(attribute, settings.get("assetdir", "")), new))
 
 
-def _document(name: str) -> ElementTree.Element:
+def _document(name: str, mounting: Mounting) -> ElementTree.Element:
     """Return a robot's file as MJCF, its inclusions in their places."""
     path = Robot.path(name)
-    root = _parsed(path)
-    if root.tag == "robot":
+    if _made(path) or not mounting.plain:
         spec = Robot.spec(name)
+        mounting.edit(spec)
         spec.compile()
         return ElementTree.fromstring(spec.to_xml())
+    root = _parsed(path)
     while any(child.tag == "include" for parent in root.iter() for child in parent):
         for parent in list(root.iter()):
             for child in [child for child in parent if child.tag == "include"]:
@@ -121,6 +127,11 @@ def _document(name: str) -> ElementTree.Element:
                 for k, included in enumerate(_parsed(path.parent / child.get("file", ""))):
                     parent.insert(place + k, included)
     return root
+
+
+def _made(path: Path) -> bool:
+    """Return whether a file is none of MJCF, which is made of it."""
+    return path.suffix == TABLE or "<robot" in path.read_text(encoding="utf-8")
 
 
 def _parsed(path: Path) -> ElementTree.Element:

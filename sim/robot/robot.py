@@ -15,13 +15,16 @@ import numpy.typing as npt
 import models
 from identify.plugins import did_you_mean
 from sim.errors import BenchError, RobotError
+from sim.robot.dh import TABLE, from_table
+from sim.robot.meshes import without_missing_meshes
 from sim.robot.motors import Array, Motors
+from sim.robot.urdf import SMALL, from_urdf
 
 _log = mujoco.MjLogConfig.get()
 _log.logto_console = _log.logto_file = False  # what it warns of is checked and reported by the bench
 _log.set()
 
-FILES = (".xml", ".urdf")
+FILES = (".xml", ".urdf", TABLE)
 """What names of files end with."""
 
 
@@ -35,10 +38,13 @@ class Robot:
         Name of the robot.
     model : mujoco.MjModel
         The compiled model.
+    notes : tuple of str
+        What was mended in its file to compile it.
     """
 
     name: str
     model: mujoco.MjModel
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         simple = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
@@ -57,13 +63,13 @@ class Robot:
         RobotError
             If there is no such robot or file, or MuJoCo cannot compile it.
         """
-        spec = cls.spec(name)
+        spec, notes = cls.described(name)
         try:
             for edit in edits:
                 edit(spec)
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # what it warns of ends a simulation, by name
-                robot = cls(Path(name).stem, spec.compile())
+                robot = cls(Path(name).stem, spec.compile(), notes)
             robot.require_resisting()
             return robot
         except BenchError:
@@ -82,7 +88,12 @@ class Robot:
 
     @staticmethod
     def spec(name: str) -> mujoco.MjSpec:
-        """Return the description of the robot that ships as `name`, or of an MJCF or URDF file, to be edited and compiled.
+        """Return the description of the robot that ships as `name`, or of a file, to be edited and compiled."""
+        return Robot.described(name)[0]
+
+    @staticmethod
+    def described(name: str) -> tuple[mujoco.MjSpec, tuple[str, ...]]:
+        """Return the description of a robot, to be edited and compiled, and what was mended in its file.
 
         Of a URDF only what moves is read, not the shapes: their meshes are mostly in formats that MuJoCo does not read.
 
@@ -93,11 +104,11 @@ class Robot:
         """
         path = Robot.path(name)
         try:
-            text = path.read_text(encoding="utf-8")
-            urdf = "<robot" in text
-            spec = _from_urdf(text) if urdf else mujoco.MjSpec.from_file(str(path))
+            spec, notes = _read(path)
             spec.compiler.fusestatic = False  # bodies stay those of the file
-            return spec
+            return spec, tuple(notes)
+        except RobotError as error:
+            raise RobotError(f"robot {name!r}: {error}") from None
         except OSError as error:
             raise RobotError(f"cannot read robot {name!r}: {error.strerror}") from error
         except (ValueError, ElementTree.ParseError) as error:
@@ -113,6 +124,11 @@ class Robot:
                     f"robot {self.name!r}: joint {self.joints[j]} has {field} = {values[j]:g}, which must be 0 or above: "
                     "correct the file"
                 )
+
+    @property
+    def weightless(self) -> bool:
+        """Whether its file says nothing of its masses."""
+        return float(self.model.body_mass.sum()) <= 1.01 * SMALL * self.n
 
     @property
     def n(self) -> int:
@@ -181,24 +197,21 @@ class Robot:
         return limits
 
 
+def _read(path: Path) -> tuple[mujoco.MjSpec, list[str]]:
+    """Return the description of a robot's file, and what was mended in it."""
+    if path.suffix == TABLE:
+        return from_table(path)
+    text = path.read_text(encoding="utf-8")
+    if "<robot" in text:
+        return from_urdf(text)
+    spec = mujoco.MjSpec.from_file(str(path))
+    return spec, without_missing_meshes(spec, path.parent)
+
+
 def _smaller_side(limits: Array) -> float:
     """Return how far a range goes to both sides of 0; of one that lies to one side of it, how far it goes."""
     low, high = (float(x) for x in limits)
     return min(-low, high) if low < 0 < high else max(abs(low), abs(high))
-
-
-def _from_urdf(urdf: str) -> mujoco.MjSpec:
-    """Return the description of a URDF without its shapes, with the velocities that it allows."""
-    root = ElementTree.fromstring(urdf)
-    for link in root.iter("link"):
-        for shape in [child for child in link if child.tag in ("visual", "collision")]:
-            link.remove(shape)
-    spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
-    for joint in root.iter("joint"):
-        limit = joint.find("limit")
-        if limit is not None and float(limit.get("velocity", 0)) > 0:
-            spec.add_numeric(name=f"max_velocity {joint.get('name')}", data=[float(limit.get("velocity", 0))], size=1)
-    return spec
 
 
 def _called(model: mujoco.MjModel, joint: int) -> str:
@@ -214,5 +227,5 @@ def _way_out(reason: str) -> str:
     if "eigenvalues" in reason or "A + B" in reason or "inertia must satisfy" in reason:
         return "; correct the inertia of that body: it must be that of a body that can exist"
     if "file" in reason.lower():
-        return "; put the file there, or take the mesh and its geoms out: identification needs the inertials alone"
+        return "; put the file there, or take what needs it out: identification needs the inertials alone"
     return ""

@@ -80,8 +80,8 @@ def _require_open(robot: Robot) -> None:
     ties += [f"tendon {model.tendon(i).name!r}" for i in range(model.ntendon) if _is_stiff(model, i)]
     if ties:
         raise RobotError(
-            f"robot {robot.name!r} is no open tree: {', '.join(ties)} closes a chain or couples joints; remove it from the "
-            "file, and weld or remove the joints that follow others"
+            f"robot {robot.name!r} is no open tree: {', '.join(ties)} closes a chain or couples joints; hold the "
+            "joints that follow others (--lock JOINT=VALUE, or --joints with those of the log), or remove it from the file"
         )
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from experiments.cli import main
 from identify import MotionLog
-from identify.data.log_file import read_log, write_log
+from identify.files.log_file import read_log, write_log
 from sim.engine.simulation import simulate
 from sim.scenario.scenario_file import load, to_toml
 

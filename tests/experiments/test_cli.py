@@ -4,7 +4,7 @@ import json
 
 from experiments.cli import main
 from experiments.paper.table1 import SCENARIO
-from identify.data.log_file import read_log
+from identify.files.log_file import read_log
 from sim.scenario.scenario_file import from_dict, load
 
 

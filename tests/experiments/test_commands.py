@@ -11,7 +11,7 @@ from experiments.cli import main
 from experiments.paper import table2
 from experiments.paper.attribution import imperfections
 from experiments.paper.table2 import PAPER, Table2
-from identify.data.log_file import read_log
+from identify.files.log_file import read_log
 from sim.drives import AveragedDrive
 from sim.scenario.scenario_file import from_dict, load, names, to_dict, to_toml
 from sim.trajectories import Quintic, RandomMoves
@@ -122,7 +122,7 @@ def rewritten(csv, change):
             "put a line of names before it, such as t,q1,q2,tau1,tau2",
         ),
         (lambda lines: [lines[0].replace("tau2", "tau3"), *lines[1:]], "missing, left over or twice: tau2, tau3"),
-        (lambda lines: [lines[0].replace("tau2", "tau1"), *lines[1:]], "missing, left over or twice: tau1, tau2"),
+        (lambda lines: [lines[0].replace("tau2", "tau1"), *lines[1:]], "missing, left over or twice: tau1"),
         (lambda lines: [*lines[:50], lines[50].rsplit(",", 1)[0] + ",nan", *lines[51:]], "tau is nan at sample 49 of joint 2"),
         (lambda lines: [*lines[:50], lines[50].rsplit(",", 1)[0] + ",x", *lines[51:]], "column tau2 holds string, not numbers"),
         (lambda lines: lines[:30], "the log has 29 samples"),

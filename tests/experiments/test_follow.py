@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from experiments.cli import main
-from identify.data.log_file import write_log
+from identify.files.log_file import write_log
 
 TORQUE = ["--torque", "instantaneous", "--torque-delay", "0"]
 

@@ -7,7 +7,7 @@ import pytest
 
 from experiments.cli import main
 from identify import MotionLog
-from identify.data.log_file import read_log, write_log
+from identify.files.log_file import read_log, write_log
 
 NEEDED = "--robot", "puma560", "--model", "explicit"
 
@@ -54,7 +54,7 @@ def test_torques_that_are_zero_throughout(idbench, as_csv):
 
 def test_a_log_is_not_judged_on_itself(idbench, logs, tmp_path):
     log = read_log(logs / "first.parquet")
-    from identify.data.log_file import write_log
+    from identify.files.log_file import write_log
 
     write_log(log.part(500, 3000), tmp_path / "part.parquet")
     for other in (logs / "first.parquet", tmp_path / "part.parquet"):
@@ -71,7 +71,7 @@ def test_names_in_another_case_are_guessed(idbench, logs):
 
 def test_one_models_failure_takes_nothing_from_the_others(idbench, logs, tmp_path):
     """A seventh of the log leaves the power model fewer rows than parameters; the explicit one has six times as many."""
-    from identify.data.log_file import write_log
+    from identify.files.log_file import write_log
 
     log = read_log(logs / "first.parquet")
     write_log(log.part(0, int(0.14 * log.samples)), tmp_path / "short.parquet")

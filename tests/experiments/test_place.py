@@ -8,7 +8,7 @@ import pytest
 from experiments.cli import main
 from experiments.errors import ResultsError
 from experiments.identification.results import HIDDEN, Place, results_folder, write_whole
-from identify.data.log_file import read_log, write_log
+from identify.files.log_file import read_log, write_log
 
 
 def filled(out, **summary):

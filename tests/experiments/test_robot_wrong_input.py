@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identify import MotionLog
-from identify.data.log_file import read_log, write_log
+from identify.files.log_file import read_log, write_log
 from sim.robot.robot import Robot
 
 

@@ -13,7 +13,7 @@ from experiments.identification.validated import Validated
 from experiments.identification.verdict import Remedies, Verdict
 from experiments.identification.warnings import warnings_of_result
 from identify import MotionLog
-from identify.data.log_file import read_log
+from identify.files.log_file import read_log
 
 PUMA = "puma560"
 

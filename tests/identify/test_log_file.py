@@ -6,7 +6,7 @@ import pytest
 from pyarrow import parquet
 
 from identify import IdentificationError, LogError, MotionLog, TorqueChannel
-from identify.data.log_file import read_log, write_log
+from identify.files.log_file import read_log, write_log
 
 
 @pytest.fixture
@@ -92,7 +92,10 @@ def test_columns_may_be_separated_as_programs_do(tmp_path, text):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (ROWS.encode(), r"has no header, .*: put a line of names before it, such as t,q1,tau1$"),
+        (
+            ROWS.encode(),
+            r"has no header, .*: put a line of names before it, such as t,q1,tau1, or say what its columns are in",
+        ),
         ("t,q1,tau1 [N·m]\n".encode("latin-1") + ROWS.encode(), "no UTF-8|invalid UTF8|must have a header"),
         ("t,q1,tau1\n0,0.1,Müll\n".encode("latin-1"), "column tau1 holds .*, not numbers|invalid UTF8"),
         (b"t,q1,tau1\n0,0.1,0.2\n0.01,0.1,off\n", r"column tau1 holds string, not numbers: 'off' in line 3"),

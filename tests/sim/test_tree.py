@@ -111,10 +111,6 @@ PAIR = '<geom size="0.1"/><body name="b" pos="1 0 0"><joint name="second"/><geom
             "tendon 'belt' closes a chain or couples joints",
         ),
         (one('<joint name="light"/>', inside=""), "give every body that a joint moves a mass and an inertia"),
-        (
-            one("<joint/>", '<asset><mesh name="m" file="gone.stl"/></asset>', '<geom type="mesh" mesh="m"/>'),
-            "gone.stl.*; put the file there, or take the mesh and its geoms out",
-        ),
         ("<mujoco><worldbody>", "MuJoCo cannot read"),
         ("<mujoco/>", "has no joints"),
     ],

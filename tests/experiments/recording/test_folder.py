@@ -18,7 +18,7 @@ from experiments.recording.views import Shelf
 def copied(recorded, tmp_path):
     """Return a results folder that may be changed."""
     folder = shutil.copytree(recorded.folder, tmp_path / "run")
-    from identify.data.log_file import write_log
+    from identify.files.log_file import write_log
 
     write_log(recorded.ran.run.alone(), folder / "log.parquet")
     from experiments.identification.results import write_summary

@@ -1,0 +1,125 @@
+"""What an identification leaves behind: a folder, a robot's files, a page."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.text import Text
+
+from experiments.cli.identify_logs import FitLogs
+from experiments.cli.logs import Identify
+from experiments.cli.page import Page
+from experiments.errors import ExperimentError, ResultsError
+from experiments.identification.consistent_robot import Written
+from experiments.identification.identified import Identified
+from experiments.identification.results import Place, results_folder, tell_of, write_recording, write_summary
+from experiments.identification.subject import Subject
+from experiments.identification.validated import Validated
+from experiments.identification.verdict import Verdict
+from experiments.identification.warnings import DELAY, FILE, LOG, MODEL, MOTION
+from experiments.recording.audience import Audience
+from identify import IdentificationError
+from identify.files.log_file import write_log
+from identify.rows.long_logs import is_long
+from sim.errors import BenchError
+from sim.robot.robot import Robot
+
+
+@dataclass(frozen=True, eq=False)
+class Results:
+    """What an identification leaves behind.
+
+    Parameters
+    ----------
+    page : Page
+        Where it is said.
+    asked : Identify
+        The options.
+    found : Identified
+        The identification.
+    judged : sequence of Validated
+        On each unseen motion.
+    fit : FitLogs
+        Its logs.
+    warned : mapping of str to sequence of str
+        Warnings by what they are about.
+    notes : sequence of str
+        What was done and chosen.
+    """
+
+    page: Page
+    asked: Identify
+    found: Identified
+    judged: Sequence[Validated]
+    fit: FitLogs
+    warned: Mapping[str, Sequence[str]]
+    notes: Sequence[str]
+
+    def write(self, place: Place, audience: Audience | None) -> None:
+        """Write the folder: summary, logs, recording, page."""
+        lost, found, watching = "", self.found, self.asked.watching
+        with results_folder(place) as folder:
+            for k, log in enumerate(found.logs):
+                write_log(log, folder / f"log{k + 1 if k else ''}.parquet")
+            write_summary(folder / "summary.json", {**summary_of(self.judged, Path(place.of)), "notes": list(self.notes)})
+            if is_long(found.logs):
+                self.page.print("not recorded: the rows of so long a log are not kept; identify a part of it to look inside")
+            elif watching.rerun:
+                from experiments.recording.identification_recording import record_log
+
+                lost = write_recording(folder, record_log(found.on(0), audience))
+        tell_of(lost, place.out)
+        if len(found.logs) > 1 and watching.rerun:
+            self.page.print(f"recorded: {found.log_names[0]}, by the estimate of all logs")
+        self.page.print(f"written to {place.out}{watching.hint(place.out)}", soft_wrap=True)
+
+    def export(self) -> None:
+        """Write the robot's file; raise ResultsError if that fails, which takes nothing else away."""
+        path = self.asked.write_mjcf
+        if path is None:
+            return
+        try:
+            written = Written(self.found, next(iter(self.found.estimates)))
+            written.write(path)
+        except (IdentificationError, BenchError) as error:
+            raise ResultsError(f"--write-mjcf {path}: {error}; everything else is as printed") from error
+        self.page.print(Text(f"written to {path}: the robot with the parameters of the {written.model} model"), soft_wrap=True)
+        self.page.warn({"the file that was written": written.warnings})
+
+
+def require_targets(asked: Identify, subject: Subject) -> None:
+    """Raise ExperimentError if the robot cannot be written where it is asked for; before the work, not after it."""
+    target = asked.write_mjcf
+    if target is None:
+        return
+    if target.suffix != ".xml":
+        raise ExperimentError(f"--write-mjcf {target}: its name must end with .xml, or nothing would read it back")
+    if target.is_dir() or not target.absolute().parent.is_dir():
+        raise ExperimentError(f"--write-mjcf {target}: there is no folder {target.parent} for it, or it is a folder itself")
+    if target.exists() and target.samefile(Robot.path(subject.name)):
+        raise ExperimentError(f"--write-mjcf {target} is the robot's own file: choose another name")
+
+
+def warn(page: Page, *groups: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
+    """Print warnings of several sources, the log first, as what comes first may be what makes the others; return them."""
+    found = {about: [w for group in groups for w in group.get(about, ())] for about in (LOG, DELAY, FILE, MOTION, MODEL)}
+    page.warn(found)
+    return found
+
+
+def summary_of(judged: Sequence[Validated], log: Path) -> dict[str, Any]:
+    """Return what a summary.json says of an identification."""
+    found = {"experiment": "identify", "log": log.name, "path": str(log)}
+    each = [_judged(validated) for validated in judged]
+    return {**found, **judged[0].found.summary(), "validation": each[0], "validations": each}
+
+
+def _judged(validated: Validated) -> dict[str, Any]:
+    """Return what a summary.json says of a validation, verdicts included; why, if there is none."""
+    try:
+        stated = validated.summary()
+    except IdentificationError as error:
+        return {"on": validated.title, "models": {}, "failure": str(error)}
+    verdicts = {model: Verdict(validated, model).summary() for model in stated["models"]}
+    return {**stated, "models": {model: {**verdicts[model], **numbers} for model, numbers in stated["models"].items()}}

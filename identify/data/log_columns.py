@@ -1,0 +1,63 @@
+"""Times, positions and torques of a log as they are, before anything is made of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+from identify.arrays import Array
+from identify.data.motion_log import TorqueChannel
+from identify.errors import LogError
+
+
+@dataclass(frozen=True, eq=False)
+class LogColumns:
+    """The columns of a log, as they are, in SI units.
+
+    Parameters
+    ----------
+    t : Array, shape (time,)
+        [s].
+    q, tau : Array, shape (time, joint)
+        [rad], [N m].
+    torque : TorqueChannel or None
+        What the file says of its torque.
+    joints : tuple of str
+        Names of the joints, where the columns have them.
+    qd : Array, shape (time, joint), optional
+        Logged velocities [rad/s].
+    t_tau : Array, shape (time of torques,), optional
+        Times of the torques, where they are others than those of the positions [s].
+    """
+
+    t: Array
+    q: Array
+    tau: Array
+    torque: TorqueChannel | None
+    joints: tuple[str, ...] = ()
+    qd: Array | None = None
+    t_tau: Array | None = None
+
+    @property
+    def n(self) -> int:
+        """Number of joints."""
+        return self.q.shape[1]
+
+    def ordered(self, joints: Sequence[str]) -> Self:
+        """Return the columns in the order of `joints`, where they have names.
+
+        Raises
+        ------
+        LogError
+            If there are others, or not as many.
+        """
+        if self.joints and set(self.joints) != set(joints):
+            missing, over = ", ".join(set(joints) - set(self.joints)), ", ".join(set(self.joints) - set(joints))
+            wrong = "; ".join(text for text in (missing and f"missing: {missing}", over and f"not the robot's: {over}") if text)
+            raise LogError(f"the log names the joints {', '.join(self.joints)}, the robot {', '.join(joints)}: {wrong}")
+        if self.q.shape[1] != len(joints):
+            raise LogError(f"the log has {self.q.shape[1]} joints, the robot {len(joints)}: {', '.join(joints)}")
+        if not self.joints:
+            return self
+        place = [self.joints.index(joint) for joint in joints]
+        qd = None if self.qd is None else self.qd[:, place]
+        return replace(self, q=self.q[:, place], tau=self.tau[:, place], qd=qd, joints=tuple(joints))

@@ -1,0 +1,198 @@
+"""Text and Parquet files, read by pyarrow, which only this file and the one that writes logs need."""
+
+import gzip
+import os
+import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import IO, TYPE_CHECKING, Any
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.errors import LogError
+from identify.files.table import LogTable
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+TORQUE = b"idbench.torque"
+"""Key of what a Parquet file says of its torque."""
+
+NUMBER = r"[-+.\deE,]*\d[-+.\deE,]*"
+
+
+def arrow() -> ModuleType:
+    """Return pyarrow; raise LogError if it is not installed."""
+    try:
+        import pyarrow
+    except ImportError as error:
+        raise LogError(
+            "files of logs are read and written with pyarrow: pip install pyarrow; or make a MotionLog of your own arrays"
+        ) from error
+    return pyarrow
+
+
+def read_text(path: Path, separator: str = "") -> LogTable:
+    """Return the columns of a text file: CSV, with semicolons, tabs or blanks, with a line of names or without, packed or not.
+
+    Without a line of names columns are called 1, 2, ...; lines that begin with # or % before the numbers are passed over,
+    the last of them may hold the names.
+    """
+    pa = arrow()
+    from pyarrow import csv
+
+    try:
+        skipped, names, mark = _head(path, separator)
+        if mark == b" ":
+            return _blanks(path, skipped, names)
+        read = csv.ReadOptions(skip_rows=skipped, column_names=names or None)
+        parse = csv.ParseOptions(delimiter=mark.decode())
+        convert = csv.ConvertOptions(decimal_point=_decimal(path, skipped, mark))
+        with _opened(path) as file:
+            table = csv.read_csv(file, read_options=read, parse_options=parse, convert_options=convert)
+    except UnicodeDecodeError as error:
+        raise LogError(f"cannot read the log {path}: byte {error.start} of its header is no UTF-8; save it as UTF-8") from error
+    except (pa.ArrowException, gzip.BadGzipFile, EOFError) as error:
+        raise LogError(f"cannot read the log {path} as CSV: {str(error).splitlines()[0]}") from error
+    first = 1 + skipped + (0 if names else 1)
+    cleaned = [name.strip(' "') for name in table.column_names]
+    _require_single(path, cleaned)
+    return _table(cleaned, (_numbers(column, first) for column in table.columns), named=not names or not names[0].isdigit())
+
+
+def read_parquet(path: Path) -> LogTable:
+    """Return the columns of a Parquet file that hold numbers, or lists of numbers of one length (LeRobot)."""
+    pa = arrow()
+    from pyarrow import parquet
+
+    try:
+        with path.open("rb") as file:
+            table = _numeric(path, parquet.ParquetFile(file))
+    except pa.ArrowException as error:
+        words = str(error).splitlines()[0]
+        raise LogError(f"cannot read the log {path} as Parquet (a CSV file's name must end with .csv): {words}") from error
+    cleaned = [name.strip(' "') for name in table.column_names]
+    _require_single(path, cleaned)
+    return _table(cleaned, map(_entries, table.columns), (table.schema.metadata or {}).get(TORQUE))
+
+
+def _opened(path: Path) -> IO[bytes]:
+    return gzip.open(path, "rb") if path.suffix.lower() == ".gz" else path.open("rb")  # type: ignore[return-value]
+
+
+def _head(path: Path, separator: str) -> tuple[int, list[str], bytes]:
+    """Return how many lines to pass over, names if the file has no line of them there, and what separates columns."""
+    with _opened(path) as file:
+        lines = [file.readline() for _ in range(200)]
+    skipped = next((i for i, line in enumerate(lines) if line.strip() and line[:1] not in b"#%"), 0)
+    first, comment = lines[skipped], lines[skipped - 1].lstrip(b"#% ") if skipped else b""
+    known = [separator.encode()] if separator else [b",", b";", b"\t", b" "]
+    mark = next((mark for mark in known if mark in first.strip()), b",")
+    if mark == b"," and b";" in first:
+        mark = b";"
+    cells = _cells(first, mark)
+    if not all(re.fullmatch(NUMBER, cell) for cell in cells if cell):
+        return skipped, [], mark
+    named = _cells(comment, mark)
+    return skipped, named if len(named) == len(cells) else [str(i + 1) for i in range(len(cells))], mark
+
+
+def _cells(line: bytes, mark: bytes) -> list[str]:
+    text = line.decode("utf-8").strip()
+    return text.split() if mark == b" " else [cell.strip(' "') for cell in text.split(mark.decode())]
+
+
+def _decimal(path: Path, skipped: int, mark: bytes) -> str:
+    """Return the decimal mark, as the first rows show."""
+    with _opened(path) as file:
+        rows = b"".join([file.readline() for _ in range(skipped + 20)][skipped + 1 :])
+    return "," if mark != b"," and b"," in rows and b"." not in rows else "."
+
+
+def _blanks(path: Path, skipped: int, names: list[str]) -> LogTable:
+    """Return the columns of a file that separates them by blanks."""
+    with _opened(path) as file:
+        lines = file.read().decode("utf-8").splitlines()[skipped:]
+    found, given = names or lines[0].split(), lines if names else lines[1:]
+    try:
+        values = np.array([[float(cell) for cell in line.split()] for line in given if line.strip()])
+    except ValueError as error:
+        raise LogError(f"cannot read the log {path}: {error}") from error
+    if values.ndim != 2 or values.shape[1] != len(found):
+        raise LogError(f"cannot read the log {path}: its rows are not of {len(found)} numbers each, {', '.join(found)}")
+    return LogTable(dict(zip(found, values.T, strict=True)), named=not names or not names[0].isdigit())
+
+
+def _require_single(path: Path, names: Sequence[str]) -> None:
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise LogError(f"{path}: columns missing, left over or twice: {', '.join(twice)}")
+
+
+def _numeric(path: Path, file: Any) -> "pa.Table":
+    """Return the columns of a Parquet file that may be numbers; raise LogError before anything is read that no memory holds.
+
+    A file of some kilobytes may hold a column of terabytes, all values being the same.
+    """
+    types, wanted, size = arrow().types, list[str](), 0
+    for field in file.schema_arrow:
+        kind = field.type
+        if types.is_list(kind) or types.is_fixed_size_list(kind) or types.is_large_list(kind):
+            kind, size = kind.value_type, size + 16
+        if types.is_floating(kind) or types.is_integer(kind) or types.is_null(kind):
+            wanted, size = [*wanted, field.name], size + 8
+        elif re.fullmatch(r"t|(q|tau)\d+", field.name.strip(' "')):
+            raise LogError(f"{path}: column {field.name} holds {kind}, not numbers")
+    rows = file.metadata.num_rows
+    if (needed := 1e-9 * rows * size) > (room := _memory()):
+        what = f"{rows:.3g} samples of {len(wanted)} columns, {needed:.3g} GB"
+        raise LogError(f"{path} says that it holds {what}; this machine has {room:.3g} GB: cut the log")
+    return file.read(columns=wanted)
+
+
+def _memory() -> float:
+    """Return the memory of this machine [GB]; infinity where it does not say."""
+    try:
+        return 1e-9 * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return float("inf")
+
+
+def _entries(column: "pa.ChunkedArray[Any]") -> Array | str:
+    """Return a column of numbers, shape (row,), or of lists of numbers, shape (row, entry); what it holds if neither."""
+    pa = arrow()
+    if not (pa.types.is_list(column.type) or pa.types.is_fixed_size_list(column.type) or pa.types.is_large_list(column.type)):
+        return _numbers(column, 1)
+    whole = column.combine_chunks()
+    lengths = set(pa.compute.list_value_length(whole).to_pylist())
+    if len(lengths) != 1 or None in lengths:
+        return "lists that differ in length"
+    values: Array = whole.flatten().cast(pa.float64()).to_numpy(zero_copy_only=False).reshape(len(whole), -1)
+    return values
+
+
+def _numbers(column: "pa.ChunkedArray[Any]", first: int) -> Array | str:
+    """Return a column as numbers, an empty cell as NaN, which no log may have; what it holds if these are none."""
+    pa = arrow()
+    if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type) or pa.types.is_null(column.type)):
+        return f"{column.type}, not numbers{_culprit(column, first)}"
+    values: Array = column.cast(pa.float64()).to_numpy()
+    return values
+
+
+def _culprit(column: "pa.ChunkedArray[Any]", first: int) -> str:
+    """Return the first cell of a column that is no number, and its line."""
+    for k, cell in enumerate(column.to_pylist()):
+        try:
+            float(cell if cell is not None else "nan")
+        except (TypeError, ValueError):
+            return f": {cell!r:.40} in line {k + first}"
+    return ""
+
+
+def _table(names: Sequence[str], values: Iterable[Array | str], torque: bytes | None = None, named: bool = True) -> LogTable:
+    """Return a table of the columns that are numbers, and of what the others are."""
+    found = dict(zip(names, values, strict=True))
+    words = {name: column for name, column in found.items() if isinstance(column, str)}
+    return LogTable({name: column for name, column in found.items() if not isinstance(column, str)}, torque, named, words=words)

@@ -1,0 +1,52 @@
+"""The kinds of files that logs are read from, and their table."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from identify.errors import LogError
+from identify.files.arrays import read_matlab, read_numpy
+from identify.files.arrow import read_parquet, read_text
+from identify.files.ros_bag import read_bag
+from identify.files.table import LogTable
+
+TEXT = (".csv", ".txt", ".tsv", ".dat")
+"""What names of text files end with."""
+
+FORMATS: dict[str, Callable[[Path], LogTable]] = {
+    **dict.fromkeys(TEXT, read_text),
+    ".parquet": read_parquet,
+    ".npz": read_numpy,
+    ".npy": read_numpy,
+    ".mat": read_matlab,
+    ".bag": read_bag,
+    ".db3": read_bag,
+    ".mcap": read_bag,
+}
+"""Readers by what a file's name ends with, `.gz` aside."""
+
+
+def kind_of(path: Path) -> str:
+    """Return what the name of a file ends with, without what says that it is packed."""
+    return Path(path.stem).suffix.lower() if path.suffix.lower() == ".gz" else path.suffix.lower()
+
+
+def read_table(path: Path) -> LogTable:
+    """Return what a file holds.
+
+    Raises
+    ------
+    LogError
+        If it cannot be read, is of no kind that is known, or is empty.
+    """
+    bag = path.is_dir() and (path / "metadata.yaml").is_file()
+    reader = read_bag if bag else FORMATS.get(kind_of(path), read_parquet)
+    try:
+        if not bag:
+            with path.open("rb"):  # whatever the reader is, a missing file is said in the same words
+                pass
+        table = reader(path)
+    except OSError as error:
+        raise LogError(f"cannot read the log {path}: {error.strerror or error}") from error
+    if not table.rows:
+        raise LogError(f"{path} holds no samples")
+    return table

@@ -1,0 +1,181 @@
+"""What the columns of a log are: a small file, log.toml, that stands beside it."""
+
+import json
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, Self
+
+from identify.data.motion_log import TorqueChannel
+from identify.errors import IdentificationError, LogError
+from identify.files.units import SI, factor
+
+LAYOUT = "log.toml"
+"""Name of the file that says what all logs of its folder hold."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a quantity of a log is.
+
+    Parameters
+    ----------
+    columns : tuple of str
+        Names of its columns, joint by joint; or one that stands for several: a column of several entries, or a name with a *
+        in the place of numbers or names.
+    unit : str
+        Theirs.
+    file : str
+        The file that holds them, from where the layout is; by default that of the log.
+    t : str
+        Column of that file with its own times, in the unit of t; by default those of the log.
+    fs : float, optional
+        Sampling frequency [Hz] where there are no times.
+    """
+
+    columns: tuple[str, ...] = ()
+    unit: str = ""
+    file: str = ""
+    t: str = ""
+    fs: float | None = None
+
+    def scale(self, quantity: str) -> float:
+        """Return what turns its values into SI."""
+        return factor(quantity, self.unit or SI[quantity])
+
+
+@dataclass(frozen=True)
+class LogLayout:
+    """Which columns of a log's files are times, positions, velocities and torques, and in which units.
+
+    Parameters
+    ----------
+    t, q, tau : Source
+        Times, positions, torques.
+    qd : Source
+        Velocities; without columns if there are none.
+    joints : tuple of str
+        Names of the joints, in the order of the columns.
+    torque : TorqueChannel, optional
+        What the torque means.
+    gain : tuple of float
+        Torque over what is logged, in the unit of tau, joint by joint, or one for all.
+    rows : mapping of str to float
+        Only rows in which these columns have these values: an episode.
+    """
+
+    t: Source = Source(("t",))  # frozen
+    q: Source = Source(("q*",))  # frozen
+    tau: Source = Source(("tau*",))  # frozen
+    qd: Source = Source()  # frozen
+    joints: tuple[str, ...] = ()
+    torque: TorqueChannel | None = None
+    gain: tuple[float, ...] = ()
+    rows: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def beside(cls, log: Path) -> tuple[Self, Path] | None:
+        """Return the layout that stands beside a log, under its name or as log.toml, and its path; None if there is none."""
+        stem = log.with_suffix("") if log.suffix.lower() == ".gz" else log
+        for path in (stem.with_suffix(".toml"), log.parent / LAYOUT):
+            if path.is_file():
+                return cls.read(path), path
+        return None
+
+    @classmethod
+    def read(cls, path: Path) -> Self:
+        """Return the layout of a file; raise LogError that names what is unknown or wrong in it."""
+        try:
+            stated = tomllib.loads(path.read_text(encoding="utf-8"))
+            return cls._of(stated)
+        except OSError as error:
+            raise LogError(f"cannot read {path}: {error.strerror or error}") from error
+        except (ValueError, TypeError, RecursionError) as error:  # ours are ValueErrors, too
+            raise LogError(f"{path}: {error}") from error
+
+    @classmethod
+    def _of(cls, stated: dict[str, Any]) -> Self:
+        _require_known("", stated, ("t", "q", "qd", "tau", "joints", "torque", "rows", "file"))
+        file = str(stated.get("file", ""))
+        sources = {name: _source(name, stated[name], file) for name in ("t", "q", "qd", "tau") if name in stated}
+        torque = dict(stated.get("torque", {}))
+        _require_known("torque", torque, ("meaning", "delay", "gain"))
+        gain = torque.pop("gain", [])
+        gains = tuple(map(float, gain if isinstance(gain, list) else [gain]))
+        channel = TorqueChannel(**torque) if "meaning" in torque else None
+        if torque and channel is None:
+            raise LogError("[torque] states a delay and no meaning: held, instantaneous or averaged")
+        rows = {str(k): float(v) for k, v in stated.get("rows", {}).items()}
+        return cls(**sources, joints=tuple(stated.get("joints", ())), torque=channel, gain=gains, rows=rows)
+
+    @property
+    def text(self) -> str:
+        """The layout as the text of a file."""
+        lines = [f"joints = {json.dumps(list(self.joints), ensure_ascii=False)}"] if self.joints else []
+        for name in ("t", "q", "qd", "tau"):
+            source: Source = getattr(self, name)
+            if source != Source():
+                lines += ["", f"[{name}]", *_lines(source, SI[name])]
+        lines += ["", "[torque]"]
+        if self.torque:
+            lines += [f'meaning = "{self.torque.meaning}"', f"delay = {self.torque.delay!r}"]
+        else:
+            lines += ['# meaning = "held"  # or "instantaneous", "averaged": see docs/real-logs.md', "# delay = 0.0  # [s]"]
+        if self.gain:
+            lines += [f"gain = {list(self.gain)}"]
+        if self.rows:
+            lines += ["", "[rows]", *(f"{json.dumps(name)} = {value:g}" for name, value in self.rows.items())]
+        return "\n".join(lines).strip() + "\n"
+
+
+def matching(pattern: str, names: Sequence[str]) -> list[tuple[str, str]]:
+    """Return the names that a pattern with a * stands for, and what is in its place: by number, or in the order of the file."""
+    found = []
+    for name in names:
+        inner = re.fullmatch(".+?".join(map(re.escape, pattern.split("*", 1))).replace(".+?", "(.+?)", 1), name)
+        if inner:
+            found.append((name, inner[1]))
+    numbered = [re.fullmatch(r"\D*(\d+)\D*", inner) for _, inner in found]
+    if found and all(numbered):
+        order = sorted(range(len(found)), key=lambda i: int(numbered[i][1]))  # type: ignore[index]  # all are matches
+        return [found[i] for i in order]
+    return found
+
+
+def _source(name: str, stated: Any, file: str) -> Source:
+    if isinstance(stated, (str, list)):
+        stated = {"columns": stated}
+    if not isinstance(stated, dict):
+        raise LogError(f"{name} = {stated!r} must name columns, or be a table [{name}]")
+    _require_known(name, stated, tuple(f.name for f in fields(Source)))
+    columns = stated.get("columns", [])
+    unit, fs = stated.get("unit", ""), stated.get("fs")
+    found = Source(
+        tuple(map(str, [columns] if isinstance(columns, (str, int)) else columns)),
+        str(unit),
+        str(stated.get("file", file)),
+        str(stated.get("t", "")),
+        None if fs is None else float(fs),
+    )
+    try:
+        found.scale(name)
+    except IdentificationError as error:
+        raise LogError(f"[{name}]: {error}") from error
+    return found
+
+
+def _require_known(where: str, stated: Mapping[str, Any], known: Sequence[str]) -> None:
+    if wrong := [key for key in stated if key not in known]:
+        place = f" in [{where}]" if where else ""
+        raise LogError(f"{', '.join(wrong)}{place} is unknown; known: {', '.join(known)}")
+
+
+def _lines(source: Source, si: str) -> list[str]:
+    """Return the lines of a table of a layout's text."""
+    columns = source.columns[0] if len(source.columns) == 1 else list(source.columns)
+    lines = [f"columns = {json.dumps(columns, ensure_ascii=False)}"] if source.columns else []
+    lines += [f'unit = "{source.unit or si}"']
+    lines += [f"{name} = {json.dumps(value)}" for name in ("file", "t", "fs") if (value := getattr(source, name))]
+    return lines

@@ -1,0 +1,203 @@
+"""Logs of any file, in SI units."""
+
+import json
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.data.log_columns import LogColumns
+from identify.data.motion_log import TorqueChannel
+from identify.errors import LogError
+from identify.files.formats import read_table
+from identify.files.layout import LogLayout, Source, matching
+from identify.files.table import LogTable
+from identify.files.units import needs_gain
+
+LAYOUT_FILE = ".toml"
+"""What the name of a layout ends with, which may be given in the place of a log."""
+
+
+def read_columns(path: Path, layout: LogLayout | None = None) -> LogColumns:
+    """Return times, positions, torques and velocities of a log, whatever its times.
+
+    Parameters
+    ----------
+    path : Path
+        The log: CSV or other text, Parquet, NumPy, Matlab, a ROS bag; or a layout that names its files.
+    layout : LogLayout, optional
+        What its columns are; by default what `log.toml` beside it says, or columns t, q1, q2, ..., tau1, tau2, ... in SI units
+        (q_elbow, tau_elbow where joints have names), and qd1, qd2, ... if there are.
+
+    Raises
+    ------
+    LogError
+        If it cannot be read, or lacks a column.
+    """
+    path = Path(path)
+    if path.suffix.lower() == LAYOUT_FILE:
+        layout = layout or LogLayout.read(path)
+        files = [source.file for source in (layout.q, layout.t, layout.tau) if source.file]
+        if not files:
+            raise LogError(f'{path} names no file of the log: add a line such as file = "run.csv" before the tables')
+        return _Files(path.parent / files[0], path.parent, layout).columns
+    found = None if layout else LogLayout.beside(path)
+    if found:
+        return _Files(path, found[1].parent, found[0]).columns
+    if layout:
+        return _Files(path, path.parent, layout).columns
+    table = read_table(path)
+    return _Files(path, path.parent, standard_layout(path, table), {path: table}).columns
+
+
+def layout_of(path: Path) -> LogLayout:
+    """Return the layout of a file whose columns are called as idbench calls them, or the plain one of t, q*, tau*."""
+    table = read_table(path)
+    try:
+        return standard_layout(path, table)
+    except LogError:
+        return LogLayout()
+
+
+def standard_layout(path: Path, table: LogTable) -> LogLayout:
+    """Return the layout of a file whose columns are called as idbench calls them; raise LogError if they are not."""
+    names = [*table.columns, *table.words]
+    _require_names(path, table)
+    n = sum(bool(re.fullmatch(r"q\d+", name)) for name in names)
+    joints = () if n else tuple(name.removeprefix("q_") for name in names if name.startswith("q_"))
+    ends = [f"_{joint}" for joint in joints] or [str(j + 1) for j in range(max(n, 1))]
+    needed = ["t", *(f"q{end}" for end in ends), *(f"tau{end}" for end in ends)]
+    present = [name for name in names if re.fullmatch(r"t|(q|tau)_.+" if joints else r"t|(q|tau)\d+", name)]
+    if wrong := set(needed) ^ set(present):
+        raise LogError(
+            f"{path} must have a header with the columns {', '.join(needed)}; missing, left over or twice: "
+            f"{', '.join(sorted(wrong))}; or say what its columns are in a file log.toml beside it: uv run idbench log {path} "
+            "--write makes one to start from"
+        )
+    qd = tuple(f"qd{end}" for end in ends)
+    velocities = Source(qd) if set(qd) <= set(table.columns) else Source()
+    return LogLayout(
+        Source(("t",)), *(Source(tuple(f"{x}{end}" for end in ends)) for x in ("q", "tau")), qd=velocities, joints=joints
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Files:
+    """The files of a log, read once each."""
+
+    log: Path
+    folder: Path
+    layout: LogLayout
+    tables: dict[Path, LogTable] = None  # type: ignore[assignment]  # made below
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tables", dict(self.tables or {}))
+
+    @property
+    def columns(self) -> LogColumns:
+        """What they hold."""
+        layout = self.layout
+        q, joints = self._of("q", layout.q)
+        tau, joints_of_tau = self._of("tau", layout.tau)
+        if q.shape[1] != tau.shape[1]:
+            raise LogError(f"{self.log}: {q.shape[1]} columns of positions and {tau.shape[1]} of torques: one of each a joint")
+        names = layout.joints or joints or joints_of_tau
+        if names and len(names) != q.shape[1]:
+            raise LogError(f"{self.log}: {len(names)} names of joints, {q.shape[1]} columns of positions")
+        if names and joints and joints_of_tau and set(joints) == set(joints_of_tau):
+            tau = tau[:, [joints_of_tau.index(joint) for joint in joints]]
+        qd = self._of("qd", layout.qd)[0] if layout.qd.columns else None
+        t, t_tau = self._times(layout.q, len(q)), self._times(layout.tau, len(tau))
+        other = t_tau.shape != t.shape or not np.array_equal(t, t_tau)
+        start = min(t[0], t_tau[0]) if other and len(t) and len(t_tau) else 0.0
+        channel = layout.torque or self._stated()
+        tau = tau * self._gain(tau.shape[1])
+        return LogColumns(t - start, q, tau, channel, names, qd, t_tau - start if other else None)
+
+    def _gain(self, n: int) -> Array:
+        gain = self.layout.gain
+        if needs_gain(self.layout.tau.unit) and not gain:
+            raise LogError(
+                f"{self.log}: efforts in {self.layout.tau.unit} are no torques: state gain = [...] in [torque] of its "
+                "log.toml, or --gain, N m a unit of each joint"
+            )
+        if gain and len(gain) not in (1, n):
+            raise LogError(f"{self.log}: {len(gain)} gains for {n} joints: give one, or one a joint")
+        return np.array(gain or (1.0,))
+
+    def _stated(self) -> TorqueChannel | None:
+        """Return what the file with the torques says of them itself."""
+        path = self._path(self.layout.tau)
+        stated = self._table(path).torque
+        if stated is None:
+            return None
+        try:
+            known = json.loads(stated)
+            return TorqueChannel(known["meaning"], known["delay"], known["gain"])
+        except (ValueError, KeyError, TypeError) as error:
+            words = stated.decode(errors="replace")
+            raise LogError(f"{path} states {words!r} of its torque, which makes no torque channel") from error
+
+    def _path(self, source: Source) -> Path:
+        return self.folder / source.file if source.file else self.log
+
+    def _table(self, path: Path) -> LogTable:
+        if path not in self.tables:
+            self.tables[path] = read_table(path)
+        return self.tables[path]
+
+    def _rows(self, path: Path) -> slice | Array:
+        """Return which rows of a file belong to the log."""
+        kept = None
+        for name, value in self.layout.rows.items():
+            column = self._table(path).require(name, path)
+            kept = (column == value) if kept is None else kept & (column == value)
+            if not kept.any():
+                raise LogError(f"{path}: {name} is {value:g} in no row; it goes from {column.min():g} to {column.max():g}")
+        return slice(None) if kept is None else kept
+
+    def _of(self, quantity: str, source: Source) -> tuple[Array, tuple[str, ...]]:
+        """Return the columns of a quantity in SI, shape (time, joint), and the names of joints that they have."""
+        path = self._path(source)
+        table, columns, joints = self._table(path), list[Array](), list[str]()
+        for pattern in source.columns:
+            if pattern in table.columns or "*" not in pattern:
+                column = table.require(pattern, path)
+                columns += [column] if column.ndim == 1 else list(column.T)
+                joints += table.entries.get(pattern, ())
+                continue
+            inside = matching(pattern, list(table.columns))
+            if not inside:
+                raise LogError(f"{path} has no columns {pattern}; its columns: {', '.join(list(table.columns)[:40])}")
+            columns += [table.columns[name] for name, _ in inside]
+            joints += [place for _, place in inside if not re.fullmatch(r"\d+", place)]
+        if len({len(column) for column in columns}) != 1:
+            raise LogError(f"{path}: columns {', '.join(source.columns)} of {quantity} differ in length")
+        values = np.stack(columns, axis=-1)[self._rows(path)] * source.scale(quantity)
+        return values, tuple(joints) if len(joints) == len(columns) else ()
+
+    def _times(self, source: Source, count: int) -> Array:
+        """Return the times of a quantity [s]."""
+        clock = self.layout.t
+        path = self._path(source) if source.t else self._path(clock)
+        if not source.t and clock.fs:
+            return np.arange(count) / clock.fs
+        name = source.t or (clock.columns[0] if clock.columns else "t")
+        t = self._table(path).require(name, path)[self._rows(path)] * clock.scale("t")
+        if len(t) != count:
+            raise LogError(f"{path}: {len(t)} times for {count} samples")
+        return t - t[0] if len(t) and abs(t[0]) > 1e6 else t  # since 1970
+
+
+def _require_names(path: Path, table: LogTable) -> None:
+    """Raise LogError if the columns of a file have no names."""
+    if table.named:
+        return
+    joints = max(1, (len(table.columns) - 1) // 2)
+    line = ",".join(["t", *(f"{x}{j + 1}" for x in ("q", "tau") for j in range(joints))])
+    raise LogError(
+        f"{path} has no header, its first line is numbers: put a line of names before it, such as {line}, or say what its "
+        f"columns are in a file log.toml beside it: uv run idbench log {path} --write makes one to start from"
+    )

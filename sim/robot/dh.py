@@ -1,0 +1,152 @@
+"""Robots given by a table of Denavit-Hartenberg parameters, as papers and makers' sheets have them."""
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from sim.errors import RobotError
+from sim.robot.motors import Array
+from sim.robot.urdf import SIZE, SMALL
+
+TABLE = ".toml"
+"""What the name of such a file ends with."""
+
+KHALIL, CLASSIC = "khalil-kleinfinger", "classic"
+
+KNOWN = ("name", "convention", "angles", "gravity", "joints")
+OF_JOINTS = ("name", "parent", "sigma", "gamma", "b", "alpha", "d", "theta", "r", "a", "range", "armature")
+"""Keys of a file, and of each of its joints."""
+
+
+def from_table(path: Path) -> tuple[mujoco.MjSpec, list[str]]:
+    """Return the description of a robot of a table of Denavit-Hartenberg parameters, and what was made up for it.
+
+    Khalil and Kleinfinger (1986), also called modified: frame j stands in that of its antecedent by Rot(z, gamma)
+    Trans(z, b) Rot(x, alpha) Trans(x, d) Rot(z, theta) Trans(z, r), and joint j turns about, or slides along, its own z.
+    Classic: Rot(z, theta) Trans(z, d) Trans(x, a) Rot(x, alpha), and joint j moves about z of the frame before; the frame of
+    link j is then that of its joint, parallel to the frame before. theta (r or d of a slide) is the joint's position at 0.
+
+    Raises
+    ------
+    RobotError
+        If the file cannot be read, or a key of it is missing or unknown.
+    """
+    try:
+        stated = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise RobotError(f"{path}: {error}") from error
+    _require_known(path, "", stated, KNOWN)
+    convention = stated.get("convention", KHALIL)
+    if convention not in (KHALIL, CLASSIC):
+        raise RobotError(f"{path}: convention = {convention!r} is none of {KHALIL}, {CLASSIC}")
+    scale = {"rad": 1.0, "deg": np.pi / 180}.get(stated.get("angles", ""))
+    if scale is None:
+        raise RobotError(f'{path}: say angles = "rad" or angles = "deg"')
+    spec, bodies = mujoco.MjSpec(), dict[str, mujoco.MjsBody]()
+    spec.option.gravity = stated.get("gravity", [0.0, 0.0, -9.81])
+    last, distal = spec.worldbody, (np.zeros(3), np.eye(3))
+    for number, joint in enumerate(stated.get("joints", [])):
+        name = str(joint.get("name", f"joint{number + 1}"))
+        _require_known(path, f"joint {name}", joint, OF_JOINTS)
+        values = _Values(path, name, joint, scale)
+        if convention == KHALIL:
+            parent = _parent(path, joint, bodies, last)
+            place, distal = values.khalil(), (np.zeros(3), np.eye(3))
+        else:
+            parent, place = last, distal
+            distal = values.classic()
+        bodies[name] = last = _body(parent, name, place, values)
+    if not bodies:
+        raise RobotError(f"{path} has no [[joints]]")
+    return spec, ["no inertias, as a table has none: 1 g a link is taken, which matters for simulation alone"]
+
+
+class _Values:
+    """The parameters of one joint."""
+
+    def __init__(self, path: Path, name: str, joint: Mapping[str, Any], scale: float) -> None:
+        self._path, self._name, self._joint, self._scale = path, name, joint, scale
+
+    def length(self, key: str) -> float:
+        try:
+            value = float(self._joint.get(key, 0.0))
+        except (TypeError, ValueError):
+            value = np.nan
+        if not np.isfinite(value):
+            raise RobotError(f"{self._path}: joint {self._name}: {key} = {self._joint[key]!r} must be a number")
+        return value
+
+    def angle(self, key: str) -> float:
+        # Multiples of a right angle are meant exactly, however they are rounded.
+        value = self.length(key) * self._scale
+        quarter = np.round(value / (np.pi / 2)) * np.pi / 2
+        return quarter if abs(value - quarter) < 1e-4 else value
+
+    @property
+    def slides(self) -> bool:
+        if self._joint.get("sigma", 0) not in (0, 1):
+            raise RobotError(
+                f"{self._path}: joint {self._name}: sigma = {self._joint['sigma']!r} must be 0 (turns) or 1 (slides)"
+            )
+        return bool(self._joint.get("sigma", 0))
+
+    @property
+    def range(self) -> list[float]:
+        low, high = self._joint.get("range", (0.0, 0.0))
+        scale = 1.0 if self.slides else self._scale
+        return [scale * float(low), scale * float(high)]
+
+    @property
+    def armature(self) -> float:
+        return self.length("armature")
+
+    def khalil(self) -> tuple[Array, Array]:
+        """Return where the frame of the joint stands in that of its antecedent."""
+        first = _turn("z", self.angle("gamma")) @ _turn("x", self.angle("alpha"))
+        rotation = first @ _turn("z", self.angle("theta"))
+        position = np.array([0, 0, self.length("b")]) + first @ [self.length("d"), 0, self.length("r")]
+        return position, rotation
+
+    def classic(self) -> tuple[Array, Array]:
+        """Return where the next frame stands in that of this joint."""
+        turned = _turn("z", self.angle("theta"))
+        return np.array([0, 0, self.length("d")]) + turned @ [self.length("a"), 0, 0], turned @ _turn("x", self.angle("alpha"))
+
+
+def _parent(path: Path, joint: Mapping[str, Any], bodies: Mapping[str, mujoco.MjsBody], last: mujoco.MjsBody) -> mujoco.MjsBody:
+    name = joint.get("parent")
+    if name is None:
+        return last
+    if name not in bodies:
+        raise RobotError(f"{path}: parent {name!r} is no joint before it; known: {', '.join(bodies) or 'none'}")
+    return bodies[name]
+
+
+def _body(parent: mujoco.MjsBody, name: str, place: tuple[Array, Array], values: _Values) -> mujoco.MjsBody:
+    quaternion = np.zeros(4)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(place[1]).ravel())
+    body = parent.add_body(name=f"link of {name}", pos=place[0], quat=quaternion)
+    body.mass, body.inertia, body.explicitinertial = SMALL, [SMALL * SIZE**2] * 3, True
+    kind = mujoco.mjtJoint.mjJNT_SLIDE if values.slides else mujoco.mjtJoint.mjJNT_HINGE
+    joint = body.add_joint(name=name, type=kind, axis=[0, 0, 1], armature=values.armature)
+    low, high = values.range
+    if low < high:
+        joint.range, joint.limited = [low, high], mujoco.mjtLimited.mjLIMITED_TRUE
+    return body
+
+
+def _turn(axis: str, angle: float) -> Array:
+    c, s = np.cos(angle), np.sin(angle)
+    c, s = (np.round(x) if abs(x - np.round(x)) < 1e-15 else x for x in (c, s))
+    if axis == "x":
+        return np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+
+
+def _require_known(path: Path, where: str, stated: Mapping[str, Any], known: tuple[str, ...]) -> None:
+    if wrong := [key for key in stated if key not in known]:
+        raise RobotError(f"{path}: {where + ': ' if where else ''}{', '.join(wrong)} is unknown; known: {', '.join(known)}")

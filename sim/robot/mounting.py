@@ -1,0 +1,144 @@
+"""How a robot is mounted and which of its joints a log has: a file describes more than a log shows."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import final
+
+import mujoco
+import numpy as np
+
+from identify.plugins import did_you_mean
+from sim.errors import RobotError
+from sim.robot.motors import Array
+
+
+@final
+@dataclass(frozen=True)
+class Mounting:
+    """How a robot is mounted, and which of its joints move.
+
+    Parameters
+    ----------
+    joints : tuple of str
+        Joints of the log, in the order of the robot's file or in another; empty for all. The others are held at 0, or where
+        `lock` says.
+    lock : tuple of (str, float)
+        Joints that do not move, and where they are held [rad, m].
+    gravity : tuple of float, optional
+        [m/s^2] in the frame of the robot's base; by default what the file says, -9.81 along z in a URDF.
+    """
+
+    joints: tuple[str, ...] = ()
+    lock: tuple[tuple[str, float], ...] = ()
+    gravity: tuple[float, float, float] | None = None
+
+    @property
+    def plain(self) -> bool:
+        """Whether the robot stays as its file describes it."""
+        return self == Mounting()
+
+    def edit(self, spec: mujoco.MjSpec) -> None:
+        """Hold the joints that do not move, and turn gravity.
+
+        Raises
+        ------
+        RobotError
+            If a joint is unknown, of several degrees of freedom, or nothing is left that moves.
+        """
+        if self.gravity is not None:
+            if not np.isfinite(self.gravity).all():
+                raise RobotError(f"--gravity {self.gravity} must be three finite numbers [m/s^2]")
+            spec.option.gravity = self.gravity
+        names = [joint.name for joint in spec.joints]
+        for name in (*self.joints, *(name for name, _ in self.lock)):
+            if name not in names:
+                raise RobotError(f"there is no joint {name!r}{did_you_mean(name, names)}; the robot's: {', '.join(names)}")
+        held = dict.fromkeys((name for name in names if self.joints and name not in self.joints), 0.0) | dict(self.lock)
+        if both := [name for name in self.joints if name in dict(self.lock)]:
+            raise RobotError(f"{', '.join(both)}: both among --joints and locked")
+        if held and len(held) == len(names):
+            raise RobotError("all joints are locked: nothing is left to identify")
+        for joint in [joint for joint in spec.joints if joint.name in held]:
+            _hold(spec, joint, held[joint.name])
+        if held:
+            _forget(spec, set(held))
+
+
+PLAIN = Mounting()
+"""As the file describes it."""
+
+
+def _hold(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, value: float) -> None:
+    """Weld a body to its parent, where its joint has a value."""
+    if joint.type in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL):
+        spec.delete(joint)
+        return
+    body, axis = joint.parent, np.array(joint.axis) / np.linalg.norm(joint.axis)
+    turned, way = _orientation(body), value - float(joint.ref)
+    if joint.type == mujoco.mjtJoint.mjJNT_SLIDE:
+        body.pos = np.array(body.pos) + _rotated(turned, axis * way)
+    else:
+        about, rotation = np.array(joint.pos), np.zeros(4)
+        mujoco.mju_axisAngle2Quat(rotation, axis, way)
+        final = np.zeros(4)
+        mujoco.mju_mulQuat(final, turned, rotation)
+        body.pos = np.array(body.pos) + _rotated(turned, about) - _rotated(final, about)
+        body.quat = final
+        body.alt = mujoco.MjSpec().worldbody.add_body().alt  # the quaternion holds
+    spec.delete(joint)
+
+
+def _orientation(body: mujoco.MjsBody) -> Array:
+    """Return the orientation of a body as a quaternion, however its file states it."""
+    model = body.alt
+    if model.type == mujoco.mjtOrientation.mjORIENTATION_QUAT:
+        return np.array(body.quat, dtype=np.float64) / np.linalg.norm(body.quat)
+    alone = mujoco.MjSpec()
+    copy = alone.worldbody.add_body(name="copy")
+    copy.alt = model
+    copy.add_geom(size=[1.0, 0.0, 0.0])
+    return np.array(alone.compile().body("copy").quat)
+
+
+def _rotated(quaternion: Array, vector: Array) -> Array:
+    found = np.zeros(3)
+    mujoco.mju_rotVecQuat(found, vector, quaternion)
+    return found
+
+
+def _forget(spec: mujoco.MjSpec, held: set[str]) -> None:
+    """Take out what refers to joints that are no more: ties, actuators, sensors, keyframes."""
+    for equality in [e for e in spec.equalities if e.type == mujoco.mjtEq.mjEQ_JOINT and {e.name1, e.name2} & held]:
+        spec.delete(equality)
+    gone = {tendon.name for tendon in spec.tendons if _wraps(tendon, held)}
+    for tendon in [tendon for tendon in spec.tendons if tendon.name in gone]:
+        spec.delete(tendon)
+    actuators = {a.name for a in spec.actuators if a.target in held | gone}
+    for actuator in [a for a in spec.actuators if a.target in held | gone]:
+        spec.delete(actuator)
+    for sensor in [s for s in spec.sensors if s.objname in held | gone | actuators]:
+        spec.delete(sensor)
+    for key in list(spec.keys):
+        spec.delete(key)
+
+
+def _wraps(tendon: mujoco.MjsTendon, held: set[str]) -> bool:
+    return any(getattr(wrap.target, "name", "") in held for wrap in _wraps_of(tendon))
+
+
+def _wraps_of(tendon: mujoco.MjsTendon) -> Iterator[mujoco.MjsWrap]:
+    path = tendon.path
+    return (path[i] for i in range(len(path)))
+
+
+def locked(texts: Sequence[str]) -> tuple[tuple[str, float], ...]:
+    """Return joints and values of texts such as finger=0.02; raise RobotError if one is none."""
+    found = []
+    for text in texts:
+        name, mark, value = text.partition("=")
+        try:
+            found.append((name, float(value)))
+        except ValueError:
+            raise RobotError(f"--lock {text}: give a joint and where it is held [rad, m], such as finger=0.02") from None
+        del mark
+    return tuple(found)

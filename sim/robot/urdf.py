@@ -1,0 +1,128 @@
+"""URDFs as they are in the wild: without meshes, with links that have no inertia, with what MuJoCo does not read."""
+
+from collections.abc import Iterator, Mapping
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+
+from sim.errors import RobotError
+from sim.robot.motors import Array
+
+SMALL = 1e-3
+"""Mass [kg] of a moving link to which its file gives none: identification needs its place alone."""
+
+SIZE = 0.05
+"""Radius of gyration [m] of links whose inertia is made up."""
+
+TINY = 1e-12
+"""Second moment [kg m^2] below which MuJoCo takes it for none."""
+
+ROUND, LEAST = 1e-9, 1e-3
+"""Share of the largest second moment above which the least is one that a body has; and to which others are raised."""
+
+
+def from_urdf(text: str) -> tuple[mujoco.MjSpec, list[str]]:
+    """Return the description of a URDF without its shapes, with the velocities that it allows, and what was mended in it.
+
+    Raises
+    ------
+    RobotError
+        If it is a xacro.
+    """
+    root = ElementTree.fromstring(text)
+    for link in root.iter("link"):
+        for shape in [child for child in link if child.tag in ("visual", "collision")]:
+            link.remove(shape)
+    for other in [child for child in root if child.tag in ("gazebo", "transmission", "ros2_control", "mujoco")]:
+        root.remove(other)
+    _require_plain(root)
+    mended = list(_mend(root))
+    spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
+    for joint in root.iter("joint"):
+        limit = joint.find("limit")
+        if limit is not None and float(limit.get("velocity", 0)) > 0:
+            spec.add_numeric(name=f"max_velocity {joint.get('name')}", data=[float(limit.get("velocity", 0))], size=1)
+    return spec, mended
+
+
+def _require_plain(root: ElementTree.Element) -> None:
+    """Raise RobotError if something is left to be computed: in a xacro."""
+    computed = any(mark in value for element in root.iter() for value in element.attrib.values() for mark in ("${", "$("))
+    if computed or any(str(element.tag).startswith(("xacro:", "{http://www.ros.org/wiki/xacro}")) for element in root.iter()):
+        raise RobotError("this is a xacro, from which a URDF is made first: xacro arm.urdf.xacro > arm.urdf")
+
+
+def _mend(root: ElementTree.Element) -> Iterator[str]:
+    """Give links inertias that can exist; yield what was done."""
+    links = {link.get("name", ""): link for link in root.iter("link")}
+    moving = {_name(joint, "child") for joint in root.iter("joint") if joint.get("type") != "fixed"}
+    missing, impossible = list[str](), list[str]()
+    for name, link in links.items():
+        inertial = link.find("inertial")
+        if inertial is not None and _mass(inertial) <= 0:
+            link.remove(inertial)
+            inertial = None
+        if inertial is None:
+            if name in moving and not _carries(name, links, root):
+                _give(link, SMALL, {}, np.eye(3) * SMALL * SIZE**2)
+                missing.append(name)
+            continue
+        given = _inertia(inertial)
+        if (possible := _possible(given, _mass(inertial))) is not given:
+            origin = inertial.find("origin")
+            link.remove(inertial)
+            _give(link, _mass(inertial), {} if origin is None else origin.attrib, possible)
+            impossible.append(name)
+    if missing:
+        yield f"no inertia of {', '.join(missing)}: 1 g is taken, which matters for simulation alone"
+    if impossible:
+        yield f"an inertia of {', '.join(impossible)} that no body has: one that can exist is taken"
+
+
+def _carries(name: str, links: dict[str, ElementTree.Element], root: ElementTree.Element) -> bool:
+    """Return whether something with mass is welded to a link."""
+    welded = [_name(j, "child") for j in root.iter("joint") if j.get("type") == "fixed" and _name(j, "parent") == name]
+    for child in welded:
+        inertial = links[child].find("inertial") if child in links else None
+        if (inertial is not None and _mass(inertial) > 0) or _carries(child, links, root):
+            return True
+    return False
+
+
+def _name(joint: ElementTree.Element, end: str) -> str:
+    found = joint.find(end)
+    return "" if found is None else found.get("link", "")
+
+
+def _mass(inertial: ElementTree.Element) -> float:
+    mass = inertial.find("mass")
+    return 0.0 if mass is None else float(mass.get("value", 0))
+
+
+def _inertia(inertial: ElementTree.Element) -> Array:
+    """Return the matrix of inertia, in the axes of its origin."""
+    found = inertial.find("inertia")
+    values = {} if found is None else found.attrib
+    xx, xy, xz, yy, yz, zz = (float(values.get(f"i{x}", 0)) for x in ("xx", "xy", "xz", "yy", "yz", "zz"))
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def _possible(inertia: Array, mass: float) -> Array:
+    """Return an inertia if a body can have it, else one that a body can have: second moments below zero are raised."""
+    moments = np.trace(inertia) / 2 * np.eye(3) - inertia
+    values, vectors = np.linalg.eigh(moments)
+    if values[0] > max(ROUND * values[2], TINY):
+        return inertia
+    raised = np.maximum(values, LEAST * values[2] if values[2] > TINY else mass * SIZE**2 / 2)
+    made = (vectors * raised) @ vectors.T
+    return np.asarray(np.trace(made) * np.eye(3) - made)
+
+
+def _give(link: ElementTree.Element, mass: float, origin: Mapping[str, str], inertia: Array) -> None:
+    inertial = ElementTree.SubElement(link, "inertial")
+    ElementTree.SubElement(inertial, "origin", {"xyz": "0 0 0", "rpy": "0 0 0", **origin})
+    ElementTree.SubElement(inertial, "mass", {"value": repr(float(mass))})
+    names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    values = zip(names, inertia[np.triu_indices(3)], strict=True)
+    ElementTree.SubElement(inertial, "inertia", {name: repr(float(value)) for name, value in values})
