@@ -11,7 +11,7 @@ from experiments.cli.identify_logs import FitLogs
 from experiments.cli.logs import Identify
 from experiments.cli.page import Page
 from experiments.errors import ExperimentError, ResultsError
-from experiments.identification.consistent_robot import Written
+from experiments.exports.exports import EXPORTS
 from experiments.identification.identified import Identified
 from experiments.identification.results import Place, results_folder, tell_of, write_recording, write_summary
 from experiments.identification.subject import Subject
@@ -75,30 +75,38 @@ class Results:
         self.page.print(f"written to {place.out}{watching.hint(place.out)}", soft_wrap=True)
 
     def export(self) -> None:
-        """Write the robot's file; raise ResultsError if that fails, which takes nothing else away."""
-        path = self.asked.write_mjcf
-        if path is None:
-            return
-        try:
-            written = Written(self.found, next(iter(self.found.estimates)))
-            written.write(path)
-        except (IdentificationError, BenchError) as error:
-            raise ResultsError(f"--write-mjcf {path}: {error}; everything else is as printed") from error
-        self.page.print(Text(f"written to {path}: the robot with the parameters of the {written.model} model"), soft_wrap=True)
-        self.page.warn({"the file that was written": written.warnings})
+        """Write the files that are asked for; raise ResultsError if one fails, which takes nothing else away."""
+        failed, leading = list[str](), next(iter(self.found.estimates))
+        for path in targets_of(self.asked):
+            what, write = EXPORTS[path.suffix]
+            try:
+                warnings = write(self.found, leading, path)
+            except (IdentificationError, BenchError, ExperimentError) as error:
+                failed.append(f"{path}: {error}" if str(path) not in str(error) else str(error))
+                continue
+            self.page.print(Text(f"written to {path}: {what} with the parameters of the {leading} model"), soft_wrap=True)
+            self.page.warn({"the file that was written": warnings})
+        if failed:
+            raise ResultsError(f"not written: {'; '.join(failed)}; everything else is as printed")
+
+
+def targets_of(asked: Identify) -> list[Path]:
+    """Return the files that are asked for."""
+    return [*([asked.write_mjcf] if asked.write_mjcf else []), *asked.write]
 
 
 def require_targets(asked: Identify, subject: Subject) -> None:
-    """Raise ExperimentError if the robot cannot be written where it is asked for; before the work, not after it."""
-    target = asked.write_mjcf
-    if target is None:
-        return
-    if target.suffix != ".xml":
-        raise ExperimentError(f"--write-mjcf {target}: its name must end with .xml, or nothing would read it back")
-    if target.is_dir() or not target.absolute().parent.is_dir():
-        raise ExperimentError(f"--write-mjcf {target}: there is no folder {target.parent} for it, or it is a folder itself")
-    if target.exists() and target.samefile(Robot.path(subject.name)):
-        raise ExperimentError(f"--write-mjcf {target} is the robot's own file: choose another name")
+    """Raise ExperimentError if what is asked for cannot be written there; before the work, not after it."""
+    if asked.write_mjcf is not None and asked.write_mjcf.suffix != ".xml":
+        raise ExperimentError(f"--write-mjcf {asked.write_mjcf}: its name must end with .xml, or nothing would read it back")
+    for target in targets_of(asked):
+        if target.suffix not in EXPORTS:
+            raise ExperimentError(f"--write {target}: its name must end with {', '.join(EXPORTS)}")
+        option = "--write-mjcf" if target == asked.write_mjcf else "--write"
+        if target.is_dir() or not target.absolute().parent.is_dir():
+            raise ExperimentError(f"{option} {target}: there is no folder {target.parent} for it, or it is a folder itself")
+        if target.exists() and target.samefile(Robot.path(subject.name)):
+            raise ExperimentError(f"{option} {target} is the robot's own file: choose another name")
 
 
 def warn(page: Page, *groups: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:

@@ -70,8 +70,11 @@ class Identify:
     write_mjcf: File = None
     """File to write: the robot's own with the inertias, armatures and frictions that were found, made physically consistent
     (extra `consistent`); those of the first model."""
+    write: Files = ()
+    """Files to write: .urdf or .xml, the robot with what was found; .json, base parameters with their covariance and regressor;
+    .py, a function of the inverse dynamics that needs NumPy alone."""
     out: Folder = None
-    """Folder for summary.json, recording.rrd and log.parquet."""
+    """Folder for summary.json, report.html, recording.rrd and log.parquet."""
     force: bool = False
     """Replace results of another experiment in the folder."""
     label: str = ""
@@ -110,6 +113,32 @@ class DescribeRobot:
         with importing():
             from experiments.cli.robot_command import describe
         describe(self)
+
+
+@APP.command(name="log")
+@final
+@dataclass(frozen=True)
+class ShowLog:
+    """Show what is understood of a log: its columns and units, rate and clock, ranges, noise, encoders. Needs no robot."""
+
+    log: tyro.conf.Positional[Path]
+    """The file: CSV and other text, Parquet, NumPy, Matlab, a ROS bag; or its log.toml."""
+    reading: Reading = ColumnOptions()  # noqa: RUF009  # frozen
+    """What its columns are; guessed from their names and values if nothing says it."""
+    write: bool = False
+    """Write what was understood as a file beside the log, NAME.toml, to be corrected: what is read later is what it says."""
+    picture: File = None
+    """Picture to write, PNG or SVG: motion, torques, spectra, time steps."""
+    force: bool = False
+    """Guess anew although there is such a file, and replace it."""
+    json: Json = False
+    """Print the same as JSON; what is for people goes to the error stream."""
+
+    def __call__(self) -> None:
+        """Run it."""
+        with importing():
+            from experiments.cli.show_log import show_log
+        show_log(self)
 
 
 @APP.command(name="resample")

@@ -47,6 +47,8 @@ class ColumnOptions:
     commas)."""
     units: Texts = ()
     """Units: t=ms q=deg tau=mNm, or tau=A with --gain."""
+    rows: Texts = ()
+    """Only rows in which columns have these values: episode_index=3."""
     gain: Annotated[tuple[float, ...], tyro.conf.arg(metavar="FLOAT")] = ()
     """Torque over what is logged, in the unit of tau (N m/A): one for all joints, or one each."""
     resample: bool = False
@@ -56,7 +58,7 @@ class ColumnOptions:
     @property
     def stated(self) -> bool:
         """Whether they say anything of columns."""
-        return bool(self.layout or self.columns or self.units or self.gain)
+        return bool(self.layout or self.columns or self.units or self.gain or self.rows)
 
 
 Reading = Annotated[ColumnOptions, tyro.conf.OmitArgPrefixes]

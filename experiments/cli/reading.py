@@ -180,7 +180,11 @@ def columns_of(path: Path, options: ColumnOptions) -> LogColumns:
         _ = [getattr(layout, name).scale(name) for name in ("t", "q", "qd", "tau")]
     except SettingError as error:
         raise ExperimentError(f"--units: {error}") from error
-    return read_columns(path, replace(layout, gain=options.gain or layout.gain))
+    try:
+        rows = {name: float(value) for name, _, value in (text.partition("=") for text in options.rows)}
+    except ValueError:
+        raise ExperimentError(f"--rows {' '.join(options.rows)}: give columns and numbers, such as episode_index=3") from None
+    return read_columns(path, replace(layout, gain=options.gain or layout.gain, rows={**layout.rows, **rows}))
 
 
 def _joints_of(columns: LogColumns, named: Identified) -> str:

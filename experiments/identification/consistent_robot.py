@@ -61,14 +61,16 @@ class Written:
     def text(self) -> str:
         """The file."""
         subject = self.found.subject
-        return rewritten(subject.name, self._values(), mounting=subject.mounting)
+        return rewritten(subject.name, self.values, mounting=subject.mounting)
 
     @cached_property
     def robot(self) -> Robot:
         """The robot of the file."""
         return compiled(self.found.subject.name, self.text)
 
-    def _values(self) -> dict[str, float]:
+    @cached_property
+    def values(self) -> dict[str, float]:
+        """The standard parameters by name; those that were not asked for are zero."""
         found, asked = self.consistent, self.found.subject.asked
         none = ("Ia",) * (asked.armature == "none") + ("Fv", "Fs") * (asked.friction == "none")
         without = {f"{letters}{j + 1}": 0.0 for letters in none for j in range(self.found.basis.n)}
@@ -77,7 +79,7 @@ class Written:
     def write(self, path: Path) -> None:
         """Write the file, whole or not at all."""
         subject = self.found.subject
-        write_whole(path, rewritten(subject.name, self._values(), path.absolute().parent, subject.mounting))
+        write_whole(path, rewritten(subject.name, self.values, path.absolute().parent, subject.mounting))
 
     @property
     def warnings(self) -> list[str]:
@@ -98,4 +100,4 @@ class Written:
     def lost(self) -> dict[str, float]:
         """Standard parameters that have no place in the file, and their values."""
         known = standard_parameters(self.found.subject.robot)
-        return {name: value for name, value in self._values().items() if name not in known}
+        return {name: value for name, value in self.values.items() if name not in known}

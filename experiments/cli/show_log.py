@@ -1,0 +1,123 @@
+"""The command that shows what is understood of a log."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import log2, log10, pi
+
+from rich.text import Text
+
+from experiments.cli.logs import ShowLog
+from experiments.cli.page import Page, new_page, show
+from experiments.cli.reading import columns_of
+from experiments.errors import ExperimentError
+from experiments.identification.log_facts import LogFacts
+from experiments.identification.results import write_whole
+from experiments.text import new_table, print_titled
+from identify import LogError
+from identify.data.log_columns import LogColumns
+from identify.files.guess import Guess, guess
+from identify.files.layout import LogLayout, Source
+from identify.files.reading import LAYOUT_FILE, layout_of, read_columns
+
+ROUNDED = 1e-4
+"""Departure of a step's logarithm from a whole number up to which it is a file's decimal places, no encoder's."""
+
+
+def show_log(asked: ShowLog) -> None:
+    """Show what is understood of a log: columns, units, rate, ranges, noise; write a layout to start from."""
+    page = new_page(machine=asked.json)
+    found, columns = _understood(asked)
+    layout = found.layout
+    facts = LogFacts(columns)
+    _print_layout(page, layout, found.doubts)
+    _print_facts(page, facts)
+    for note in facts.notes():
+        page.print(Text(note), soft_wrap=True)
+    page.found |= {**facts.summary(), "layout": layout.text, "doubts": list(found.doubts)}
+    if asked.write:
+        _write(page, asked, layout)
+    if asked.picture is not None:
+        from experiments.identification.log_picture import write_picture
+
+        try:
+            write_picture(facts, asked.picture)
+        except (OSError, ValueError) as error:
+            raise ExperimentError(f"--picture {asked.picture}: {error}") from error
+        page.print(Text(f"picture written to {asked.picture}"), soft_wrap=True)
+    show(page)
+
+
+def _understood(asked: ShowLog) -> tuple[Guess, LogColumns]:
+    """Return what the columns are, stated or guessed, and the columns."""
+    path = asked.log
+    if path.suffix.lower() == LAYOUT_FILE:
+        return Guess(LogLayout.read(path)), read_columns(path)
+    beside = LogLayout.beside(path)
+    if beside and not asked.force:
+        return Guess(beside[0]), columns_of(path, asked.reading)
+    if asked.reading.stated:
+        return Guess(layout_of(path)), columns_of(path, asked.reading)
+    try:
+        found = guess(path)
+    except LogError as error:
+        raise ExperimentError(str(error)) from error
+    layout = found.layout
+    if not layout.t.columns and not layout.t.fs:
+        raise ExperimentError(
+            f"{path} has no column of times that idbench recognises: say which with --columns t=NAME, or state fs in a log.toml"
+        )
+    # Currents without a gain are looked at as if they were torques.
+    return found, read_columns(path, replace(layout, gain=(1.0,)) if _needs_gain(layout) else layout)
+
+
+def _needs_gain(layout: LogLayout) -> bool:
+    return layout.tau.unit in ("A", "mA") and not layout.gain
+
+
+def _print_layout(page: Page, layout: LogLayout, doubts: Sequence[str]) -> None:
+    grid = new_table("", ["unit", "columns"])
+    for name in ("t", "q", "qd", "tau"):
+        source: Source = getattr(layout, name)
+        if source.columns or source.fs:
+            columns = ", ".join(source.columns) if source.columns else f"{source.fs:g} Hz"
+            grid.add_row(name, source.unit or "", columns)
+    print_titled(page, "what its columns are", grid)
+    for doubt in doubts:
+        page.print(Text(f"look: {doubt}"), soft_wrap=True)
+
+
+def _print_facts(page: Page, facts: LogFacts) -> None:
+    heads = ["from [rad]", "to", "qd max", "stands %", "noise of q", "step", "bits", "torque from", "to", "noise [N m]"]
+    grid = new_table("", heads)
+    for row in facts.rows:
+        step = row["encoder_step"]
+        bits = "" if step is None else "file" if _decimal(step) else f"{log2(2 * pi / step):.1f}"
+        grid.add_row(
+            row["joint"],
+            *(f"{x:.4g}" for x in row["q"]),
+            f"{row['qd_max']:.3g}",
+            f"{100 * row['standing']:.0f}",
+            f"{row['position_noise']:.2g}",
+            "" if step is None else f"{step:.3g}",
+            bits,
+            *(f"{x:.3g}" for x in row["tau"]),
+            f"{row['torque_noise']:.2g}",
+        )
+    t = facts.columns.t
+    print_titled(page, f"{len(t)} rows, {t[-1] - t[0]:.4g} s, {facts.log.fs:.5g} Hz", grid)
+
+
+def _decimal(step: float) -> bool:
+    """Return whether a step is that to which a file rounds."""
+    return abs(log10(step) - round(log10(step))) < ROUNDED
+
+
+def _write(page: Page, asked: ShowLog, layout: LogLayout) -> None:
+    stem = asked.log.with_suffix("") if asked.log.suffix.lower() == ".gz" else asked.log
+    target = stem.with_suffix(LAYOUT_FILE)
+    if target.exists() and not asked.force:
+        raise ExperimentError(f"{target} exists: replace it with --force")
+    write_whole(target, layout.text)
+    page.print(
+        Text(f"written to {target}: correct it where it is wrong; what is read from now on is what it says"), soft_wrap=True
+    )

@@ -1,0 +1,1 @@
+"""What was identified, for other software: robot files, base parameters, a function for a controller."""

@@ -1,0 +1,41 @@
+"""Standard parameters that make exactly the torques of an estimate."""
+
+import numpy as np
+
+from experiments.errors import ExperimentError
+from experiments.identification.identified import Identified
+from identify import Array, transfer
+
+KNOWN = ("Ia", "Fv", "Fs", "off")
+"""Beginnings of the names of the laws that a controller's function has, beside the links."""
+
+
+def standard_of(found: Identified, model: str) -> dict[str, float]:
+    """Return standard parameters with the torques of a model's estimate, by name.
+
+    Base parameters stand for themselves, what is grouped with them is zero: no body need have them, but the torques are those
+    of the estimate to the last digit.
+    """
+    subject, estimate = found.subject, found.estimates[model]
+    grouping = subject.grouping
+    X = np.zeros(len(subject.whole.names))
+    X[[subject.whole.names.index(name) for name in estimate.names]] = estimate.X
+    base = X if subject.base else transfer(subject.tree, subject.whole, grouping.basis) @ X
+    values: Array = np.zeros(len(grouping.standard.names))
+    values[list(grouping.kept)] = base
+    return dict(zip(grouping.standard.names, map(float, values), strict=True))
+
+
+def require_known(found: Identified, target: object) -> None:
+    """Raise ExperimentError if the estimate has a law of friction that a controller's function does not."""
+    kinds = {p.name for p in found.subject.grouping.standard.parameters if p.joint is not None and p.kind not in LINKS}
+    strange = sorted(name for name in kinds if name.rstrip("0123456789") not in KNOWN)
+    if strange:
+        raise ExperimentError(
+            f"{target}: the function of a controller has links, rotors, viscous and Coulomb friction and offsets, not "
+            f"{', '.join(strange[:6])}: leave out what --add adds"
+        )
+
+
+LINKS = ("inertia", "first moment", "mass")
+"""Kinds of the parameters of links."""

@@ -1,0 +1,58 @@
+"""A log as a picture: its motion, torques, spectra and clock."""
+
+from pathlib import Path
+
+import numpy as np
+import scipy
+from matplotlib.figure import Figure
+
+from experiments.identification.log_facts import LogFacts
+from experiments.recording.style import JOINTS
+from identify import Array
+
+POINTS = 4000
+"""Points of a curve at the most: more are not seen."""
+
+
+def figure_of(facts: LogFacts) -> Figure:
+    """Return positions, velocities and torques over time, spectra of the torques, and the steps of the clock."""
+    figure = Figure(figsize=(11, 9), layout="constrained")
+    grid = figure.add_gridspec(4, 2, height_ratios=(1, 1, 1, 1))
+    log, step = facts.log, max(1, facts.log.samples // POINTS)
+    above = None
+    for row, (name, values) in enumerate((("q [rad]", log.q), ("qd [rad/s]", facts.velocities), ("torque [N m]", log.tau))):
+        panel = above = figure.add_subplot(grid[row, :], sharex=above)
+        for j, joint in enumerate(facts.joints):
+            panel.plot(log.t[::step], values[::step, j], color=_color(j), lw=0.8, label=joint)
+        panel.set_ylabel(name)
+    above.set_xlabel("time [s]")
+    handles, labels = above.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=8, frameon=False)
+    spectra, clock = figure.add_subplot(grid[3, 0]), figure.add_subplot(grid[3, 1])
+    f, power = scipy.signal.welch(log.tau, log.fs, nperseg=min(log.samples, round(4 * log.fs)), axis=0)
+    for j in range(log.n):
+        spectra.loglog(f[1:], np.sqrt(power[1:, j]), color=_color(j), lw=0.8)
+    spectra.set_xlabel("frequency [Hz]")
+    spectra.set_ylabel("torque [N m/$\\sqrt{Hz}$]")
+    _clock(clock, facts)
+    return figure
+
+
+def write_picture(facts: LogFacts, path: Path) -> None:
+    """Write the picture, as its name says: PNG, SVG or PDF."""
+    figure_of(facts).savefig(path, dpi=110)
+
+
+def _clock(panel, facts: LogFacts) -> None:  # type: ignore[no-untyped-def]  # an Axes
+    """Draw the time steps of the file, and of the clock that was found."""
+    t, clock = facts.columns.t, facts.repaired.clock
+    panel.plot(t[1:], 1e3 * np.diff(t), ".", ms=2, color="0.6", label="steps of the file")
+    panel.plot(clock.t[1:], 1e3 * np.diff(clock.t), ".", ms=2, color="tab:blue", label="steps that count")
+    panel.set_xlabel("time [s]")
+    panel.set_ylabel("time step [ms]")
+    panel.set_ylim(bottom=0)
+    panel.legend(frameon=False, markerscale=4)
+
+
+def _color(j: int) -> Array:
+    return np.array(JOINTS[j % len(JOINTS)]) / 255

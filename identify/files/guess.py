@@ -1,0 +1,255 @@
+"""What the columns of a file probably are, from their names and values: a layout to start from, not one to rely on."""
+
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.errors import LogError
+from identify.files.formats import read_table
+from identify.files.layout import LogLayout, Source
+from identify.files.table import LogTable
+from identify.files.units import SI, factor, named_unit
+
+WORDS = {
+    "t": "t time timestamp timestamps stamp stamps clock zeit sec secs seconds elapsed",
+    "qd": "qd dq qp qdot vel velocity velocities velo speed speeds omega joint_velocity",
+    "tau": "tau torque torques effort efforts eff trq current currents cur moment moments load amps tauj",
+    "q": "q pos position positions angle angles theta state jpos encoder enc qj",
+}
+"""Words in the names of columns, by what they stand for; the first that is there holds."""
+
+OTHERS = (
+    "cmd",
+    "command",
+    "commanded",
+    "des",
+    "desired",
+    "ref",
+    "reference",
+    "target",
+    "set",
+    "setpoint",
+    "goal",
+    "error",
+    "ext",
+)
+"""Words of columns that are not what was measured."""
+
+EPISODES = ("episode_index", "episode", "run", "trial")
+"""Columns that tell the runs of a file apart."""
+
+CURRENTS = ("current", "currents", "cur", "amps")
+
+FARTHEST = 4 * np.pi
+"""Positions [rad] beyond which degrees are suspected."""
+
+STRONGEST = 3e3
+"""Torques [N m] beyond which mN m are suspected."""
+
+ALIKE = 0.2
+"""Departure of a column from the derivative of another, as a share, up to which it is its velocity."""
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A layout that was guessed.
+
+    Parameters
+    ----------
+    layout : LogLayout
+        What the columns probably are.
+    doubts : tuple of str
+        What should be looked at.
+    """
+
+    layout: LogLayout
+    doubts: tuple[str, ...] = ()
+
+
+def guess(path: Path) -> Guess:
+    """Return what the columns of a file probably are.
+
+    Raises
+    ------
+    LogError
+        If it cannot be read, or nothing in it looks like times, positions and torques.
+    """
+    table = read_table(path)
+    found = _by_names(table) if table.named else _by_values(path, table)
+    if not found.q.columns and not found.tau.columns and all(column.ndim == 1 for column in table.columns.values()):
+        found = _by_values(path, table)
+    missing = [name for name in ("q", "tau") if not getattr(found, name).columns]
+    if missing:
+        what = " and ".join({"q": "positions", "tau": "torques or currents"}[name] for name in missing)
+        raise LogError(
+            f"nothing in {path} looks like {what}; its columns: {', '.join(list(table.columns)[:40])}; say what they are in a "
+            "log.toml"
+        )
+    episodes, doubts = _episodes(table)
+    made = _with_units(replace(found, rows=episodes), table)
+    return replace(made, doubts=(*doubts, *made.doubts))
+
+
+def _episodes(table: LogTable) -> tuple[dict[str, float], list[str]]:
+    """Return which rows are one run, where a file has several: the first episode."""
+    for name, column in table.columns.items():
+        if name.lower() in EPISODES and column.ndim == 1 and len(values := np.unique(column)) > 1:
+            first = float(values[0])
+            return {name: first}, [f"{len(values)} runs by {name}: rows in which it is {first:g} are taken ([rows])"]
+    return {}, []
+
+
+def _by_names(table: LogTable) -> LogLayout:
+    """Return a layout by what columns are called."""
+    groups: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    for name, column in table.columns.items():
+        kind, stem, place = _parsed(name)
+        if kind and not (column.ndim == 2 and kind == "t"):
+            groups.setdefault((kind, stem), []).append((name, place))
+    found, n = LogLayout(q=Source(), tau=Source()), 0
+    for kind in ("t", "q", "tau", "qd"):
+        choices = {stem: names for (k, stem), names in groups.items() if k == kind}
+        if kind == "t":
+            found = replace(found, t=Source((next(iter(choices.values()))[0][0],)) if choices else Source())
+            continue
+        counts = {stem: sum(_entries(table, name) for name, _ in names) for stem, names in choices.items()}
+        best = next((stem for stem, count in counts.items() if count == n), None) if n else None
+        if best is None and kind != "qd" and counts:
+            best = max(counts, key=lambda stem: counts[stem])
+        if best is None:
+            continue
+        names = _sorted(choices[best])
+        n = n or counts[best]
+        found = replace(found, **{kind: Source(tuple(name for name, _ in names))})
+        if kind == "q":
+            places = [place for _, place in names]
+            named = len(names) == n and not any(re.fullmatch(r"\d*", place) for place in places)
+            joints = table.entries.get(names[0][0], ()) if len(names) == 1 else tuple(places) if named else ()
+            found = replace(found, joints=joints)
+    return found
+
+
+def _parsed(name: str) -> tuple[str, str, str]:
+    """Return what a column's name stands for, what it has in common with those of other joints, and its number or joint."""
+    bare = re.sub(r"\s*[\[(][^\])]*[\])]\s*$", "", name)
+    tokens = re.findall(r"[a-z]+|\d+", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", bare).lower())
+    if set(tokens) & set(OTHERS):
+        return "", "", ""
+    for kind, words in WORDS.items():
+        hits = [token for token in tokens if token in words.split()]
+        if hits:
+            number = next((token for token in reversed(tokens) if token.isdigit()), "")
+            rest = [token for token in tokens if token not in hits and not token.isdigit()]
+            if number:
+                return kind, " ".join([hits[0], *rest]), number
+            place = re.sub(rf"(?i)^[\W_]*{hits[0]}[\W_]+|[\W_]+{hits[0]}[\W_]*$", "", bare)
+            return kind, hits[0], place if place != bare else ""
+    return "", "", ""
+
+
+def _entries(table: LogTable, name: str) -> int:
+    return 1 if table.columns[name].ndim == 1 else int(table.columns[name].shape[1])
+
+
+def _sorted(names: list[tuple[str, str]]) -> list[tuple[str, str]]:
+    numbered = all(place.isdigit() for _, place in names)
+    return sorted(names, key=lambda pair: int(pair[1])) if numbered else names
+
+
+def _by_values(path: Path, table: LogTable) -> LogLayout:
+    """Return a layout of columns that have no names: time first if it increases, then as many of each quantity."""
+    names = list(table.columns)
+    first = table.columns[names[0]]
+    timed = bool(np.mean(np.diff(first) > 0) > 0.9)  # stamps may repeat
+    rest = names[1:] if timed else names
+    t = Source((names[0],)) if timed else Source(fs=0.0)
+    for blocks in (3, 2, 4):
+        if len(rest) % blocks:
+            continue
+        n = len(rest) // blocks
+        block = [tuple(rest[i * n : (i + 1) * n]) for i in range(blocks)]
+        speeds = _is_derivative(table, block[0], block[1])
+        if blocks > 2 and speeds:
+            return LogLayout(t, Source(block[0]), Source(block[-1]), Source(block[1]))
+        if blocks == 2 and not speeds:
+            return LogLayout(t, Source(block[0]), Source(block[1]))
+    raise LogError(f"{path}: {len(names)} columns without names are no time, positions and torques of some joints: name them")
+
+
+def _is_derivative(table: LogTable, q: tuple[str, ...], qd: tuple[str, ...]) -> bool:
+    """Return whether most columns are the derivatives of others, up to a factor that they share."""
+    slopes, fits = list[float](), list[bool]()
+    for a, b in zip(q, qd, strict=True):
+        width = max(1, min(len(table.columns[a]) // 50, 25))
+        v, given = (_smooth(x, width) for x in (np.gradient(table.columns[a]), table.columns[b]))
+        if not np.any(v) or not np.any(given):
+            continue
+        slope = float(v @ given / (v @ v))
+        slopes.append(slope)
+        fits.append(float(np.linalg.norm(given - slope * v)) < 2 * ALIKE * float(np.linalg.norm(given)))
+    return bool(fits) and np.mean(fits) > 0.5 and min(slopes) > 0
+
+
+def _smooth(x: Array, width: int) -> Array:
+    return np.convolve(np.nan_to_num(x), np.ones(width) / width, mode="valid")
+
+
+def _with_units(layout: LogLayout, table: LogTable) -> Guess:
+    """Return a layout with units by the names of columns, or else by the size of what is in them."""
+    doubts = list[str]()
+    suspected = {
+        "t": lambda: _time_unit(table, layout.t),
+        "q": lambda: "deg" if _largest(table, layout.q) > FARTHEST else "",
+        "tau": lambda: _torque_unit(table, layout.tau),
+        "qd": lambda: _velocity_unit(table, layout),
+    }
+    for name, suspicion in suspected.items():
+        source: Source = getattr(layout, name)
+        if not source.columns:
+            continue
+        stated = named_unit(name, source.columns[0])
+        unit = stated or suspicion()
+        if unit and not stated and unit != SI[name]:
+            doubts.append(f"{name} in {unit}? Its values, or names, look like it")
+        layout = replace(layout, **{name: replace(source, unit=unit)})
+    if not layout.t.columns:
+        doubts.append("no column of times: state fs = ... [Hz] in [t]")
+    if layout.tau.unit in ("A", "mA"):
+        doubts.append("efforts in A: state gain = [...] in [torque], N m/A of each joint, gears included")
+    return Guess(layout, tuple(doubts))
+
+
+def _values(table: LogTable, source: Source) -> Array:
+    return np.concatenate([table.columns[name].reshape(table.columns[name].shape[0], -1) for name in source.columns], axis=1)
+
+
+def _largest(table: LogTable, source: Source) -> float:
+    return float(np.nanmax(np.abs(_values(table, source)), initial=0.0))
+
+
+def _time_unit(table: LogTable, source: Source) -> str:
+    step = float(np.nanmedian(np.diff(table.columns[source.columns[0]])))
+    return next((unit for unit, largest in (("", 0.5), ("ms", 200.0), ("us", 2e5)) if step < largest), "ns")
+
+
+def _torque_unit(table: LogTable, source: Source) -> str:
+    if any(word in re.findall("[a-z]+", name.lower()) for name in source.columns for word in CURRENTS):
+        return "mA" if _largest(table, source) > STRONGEST / 10 else "A"
+    return "mN m" if _largest(table, source) > STRONGEST else ""
+
+
+def _velocity_unit(table: LogTable, layout: LogLayout) -> str:
+    """Return the unit of velocities in which they are the derivatives of the positions."""
+    if not layout.t.columns:
+        return ""
+    t = table.columns[layout.t.columns[0]] * factor("t", layout.t.unit or "s")
+    q = _values(table, layout.q) * factor("q", layout.q.unit or "rad")
+    v, given = np.gradient(q, axis=0) / max(float(np.median(np.diff(t))), 1e-12), _values(table, layout.qd)
+    if v.shape != given.shape or not np.any(v):
+        return ""
+    ratio = float(np.sum(v * given) / np.sum(v * v))
+    sizes = {unit: abs(np.log(abs(ratio) * factor("qd", unit))) for unit in ("rad/s", "deg/s", "mrad/s", "rpm") if ratio}
+    return min(sizes, key=lambda unit: sizes[unit]) if sizes else ""
