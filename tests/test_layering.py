@@ -43,6 +43,7 @@ ALLOWED_IN = {
     "experiments/study/cluster.py": {"threadpoolctl", "dask", "distributed"},
     "experiments/study/statistics.py": {"scipy"},
     "experiments/study/comparison.py": {"scipy"},
+    "experiments/identification/identify_figures.py": {"matplotlib"},
     "experiments/identification/log_picture.py": {"matplotlib", "scipy"},
     "experiments/study/figures.py": {"matplotlib"},
     "experiments/paper/motions_report.py": {"matplotlib"},

@@ -1,11 +1,11 @@
 """The command that designs motions."""
 
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from math import isfinite
 from pathlib import Path
-from shlex import quote
 
+from experiments.cli.command_text import command_of
 from experiments.cli.excite import Excite
 from experiments.cli.page import new_page, shown
 from experiments.cli.progress import progress_of
@@ -171,17 +171,9 @@ def _log(path: Path, subject: Subject) -> MotionLog:
 
 
 def _command(asked: Excite) -> str:
-    """Return what was asked, as a command: all that differs from the defaults."""
-    words = ["uv run idbench excite", quote(asked.robot)]
-    for part in (asked, asked.parameters):
-        for field in fields(part):
-            value = getattr(part, field.name)
-            if field.name in LEFT_OUT or value == field.default:
-                continue
-            values = value if isinstance(value, tuple) else (value,)
-            words.append(" ".join([f"--{field.name.replace('_', '-')}", *(quote(str(x)) for x in values)]))
-    return " ".join(words)
+    """Return what was asked, as a command."""
+    return command_of("excite", asked, "robot", LEFT_OUT)
 
 
-LEFT_OUT = ("robot", "out", "force", "json", "watching", "parameters")
+LEFT_OUT = ("out", "force", "json", "watching")
 """Options that make no difference to a motion, or stand elsewhere in the command."""

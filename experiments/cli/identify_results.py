@@ -7,6 +7,7 @@ from typing import Any
 
 from rich.text import Text
 
+from experiments.cli.command_text import command_of
 from experiments.cli.identify_logs import FitLogs
 from experiments.cli.logs import Identify
 from experiments.cli.page import Page
@@ -24,6 +25,9 @@ from identify.files.log_file import write_log
 from identify.rows.long_logs import is_long
 from sim.errors import BenchError
 from sim.robot.robot import Robot
+
+LEFT_OUT = ("out", "force", "json", "watching", "write", "write_mjcf", "follow")
+"""Options that make no difference to an identification."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +67,8 @@ class Results:
             for k, log in enumerate(found.logs):
                 write_log(log, folder / f"log{k + 1 if k else ''}.parquet")
             write_summary(folder / "summary.json", {**summary_of(self.judged, Path(place.of)), "notes": list(self.notes)})
+            if not is_long(found.logs):
+                (folder / "report.html").write_text(self._report(), encoding="utf-8")
             if is_long(found.logs):
                 self.page.print("not recorded: the rows of so long a log are not kept; identify a part of it to look inside")
             elif watching.rerun:
@@ -73,6 +79,13 @@ class Results:
         if len(found.logs) > 1 and watching.rerun:
             self.page.print(f"recorded: {found.log_names[0]}, by the estimate of all logs")
         self.page.print(f"written to {place.out}{watching.hint(place.out)}", soft_wrap=True)
+
+    def _report(self) -> str:
+        """Return the page of the identification."""
+        from experiments.identification.identify_report import report
+
+        command = command_of("identify", self.asked, "log", LEFT_OUT)
+        return report(self.found, self.judged, self.warned, self.notes, command)
 
     def export(self) -> None:
         """Write the files that are asked for; raise ResultsError if one fails, which takes nothing else away."""

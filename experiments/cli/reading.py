@@ -175,7 +175,7 @@ def columns_of(path: Path, options: ColumnOptions) -> LogColumns:
             if name not in ("t", "q", "qd", "tau") or not mark or not value:
                 raise ExperimentError(f"--{quantity} {text}: give t=..., q=..., qd=... or tau=..., such as q=position_*")
             given = tuple(value.split(",")) if quantity == "columns" else value
-            layout = replace(layout, **{name: replace(getattr(layout, name), **{quantity: given})})
+            layout = layout.where(name, replace(getattr(layout, name), **{quantity: given}))
     try:
         _ = [getattr(layout, name).scale(name) for name in ("t", "q", "qd", "tau")]
     except SettingError as error:

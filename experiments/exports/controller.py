@@ -7,7 +7,7 @@ from pprint import pformat
 
 from experiments.exports.standard import require_known, standard_of
 from experiments.identification.identified import Identified
-from identify.data.kinematics import INERTIAL
+from identify.data.kinematics import INERTIAL, Joint
 
 
 def python_text(found: Identified, model: str, target: Path) -> str:
@@ -41,6 +41,7 @@ def python_text(found: Identified, model: str, target: Path) -> str:
     return text
 
 
-def _joint(joint):  # type: ignore[no-untyped-def]  # of a tree
+def _joint(joint: Joint) -> tuple[object, ...]:
+    """Return a joint as the function has it."""
     lists = (joint.position, joint.rotation, joint.axis, joint.anchor)
     return (joint.parent, joint.kind == "slide", *(x.tolist() for x in lists), float(joint.zero))

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import scipy
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.identification.log_facts import LogFacts
@@ -19,14 +20,14 @@ def figure_of(facts: LogFacts) -> Figure:
     figure = Figure(figsize=(11, 9), layout="constrained")
     grid = figure.add_gridspec(4, 2, height_ratios=(1, 1, 1, 1))
     log, step = facts.log, max(1, facts.log.samples // POINTS)
-    above = None
-    for row, (name, values) in enumerate((("q [rad]", log.q), ("qd [rad/s]", facts.velocities), ("torque [N m]", log.tau))):
-        panel = above = figure.add_subplot(grid[row, :], sharex=above)
+    panels = [figure.add_subplot(grid[row, :]) for row in range(3)]
+    shown = (("q [rad]", log.q), ("qd [rad/s]", facts.velocities), ("torque [N m]", log.tau))
+    for panel, (name, values) in zip(panels, shown, strict=True):
         for j, joint in enumerate(facts.joints):
             panel.plot(log.t[::step], values[::step, j], color=_color(j), lw=0.8, label=joint)
         panel.set_ylabel(name)
-    above.set_xlabel("time [s]")
-    handles, labels = above.get_legend_handles_labels()
+    panels[-1].set_xlabel("time [s]")
+    handles, labels = panels[-1].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=8, frameon=False)
     spectra, clock = figure.add_subplot(grid[3, 0]), figure.add_subplot(grid[3, 1])
     f, power = scipy.signal.welch(log.tau, log.fs, nperseg=min(log.samples, round(4 * log.fs)), axis=0)
@@ -43,7 +44,7 @@ def write_picture(facts: LogFacts, path: Path) -> None:
     figure_of(facts).savefig(path, dpi=110)
 
 
-def _clock(panel, facts: LogFacts) -> None:  # type: ignore[no-untyped-def]  # an Axes
+def _clock(panel: Axes, facts: LogFacts) -> None:
     """Draw the time steps of the file, and of the clock that was found."""
     t, clock = facts.columns.t, facts.repaired.clock
     panel.plot(t[1:], 1e3 * np.diff(t), ".", ms=2, color="0.6", label="steps of the file")

@@ -213,5 +213,6 @@ def _move(hidden: Path, out: Path) -> None:
     for path in paths:
         path.replace(out / path.name)
     if any(path.name == "summary.json" for path in paths):  # recordings of earlier results are none of these
-        for old in {*out.glob("recording.rrd"), *out.glob("recording.*.rrd")} - {out / path.name for path in paths}:
+        patterns = ("recording.rrd", "recording.*.rrd", "log[0-9]*.parquet", "report.html")
+        for old in {old for pattern in patterns for old in out.glob(pattern)} - {out / path.name for path in paths}:
             old.unlink()

@@ -34,6 +34,9 @@ FAR = 4.0
 WEAK = 0.5
 """Share of its value that the sigma of a parameter may have before it is marked as weak."""
 
+LINK_SIDE = 3.0
+"""A rotor's inertia this many sigma below zero is none: torques do not see it."""
+
 OPEN = 0.02
 """Share of a joint's torque on a brisk motion that one sigma of a parameter may make before it counts as left open."""
 
@@ -46,7 +49,9 @@ def warnings_of_result(found: Identified) -> dict[str, list[str]]:
     """Return what no healthy identification shows, and what the log leaves open, by what it is about."""
     log, motion, model = [*wrong_sign(found), *wrong_unit(found)], list[str](), list[str]()
     negative = {name: _negative(found, name) for name in found.estimates}
-    if any(negative.values()) and not log:
+    linked = list(_link_side(found)) if not log else []
+    model += linked
+    if any(negative.values()) and not log and not linked:
         models: dict[tuple[str, ...], list[str]] = {}
         for name, names in negative.items():
             models.setdefault(tuple(names), []).append(name)
@@ -59,6 +64,21 @@ def warnings_of_result(found: Identified) -> dict[str, list[str]]:
     if not (log or motion or model):
         motion = _left_open(found)
     return {LOG: log, MOTION: motion, MODEL: model}
+
+
+def _link_side(found: Identified) -> Iterator[str]:
+    """Yield whether torques look like those of the links, behind gears and rotors: these take rotors out, as it were."""
+    estimate = next(iter(found.estimates.values()))
+    rotors = [
+        name
+        for p, name, x, sigma in zip(found.basis.parameters, estimate.names, estimate.X, estimate.best_sigma, strict=True)
+        if p.kind == "rotor inertia" and x < -LINK_SIDE * sigma
+    ]
+    if rotors:
+        yield (
+            f"{', '.join(rotors)} more than {LINK_SIDE:g} sigma below zero: are these torques measured at the links, behind "
+            "the gears? Then add --armature none --friction none; if not, their meaning or delay is wrong"
+        )
 
 
 FLAGS = {

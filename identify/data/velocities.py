@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from math import comb
 
 import numpy as np
+import numpy.typing as npt
 import scipy
 
 from identify.arrays import Array
@@ -64,15 +65,15 @@ class Velocities:
         return cls(scale, delay, _noise(qd) / np.maximum(2 * np.pi * _noise(q), 1e-300), fs)
 
     @property
-    def consistent(self) -> Array:
+    def consistent(self) -> npt.NDArray[np.bool_]:
         """Whether each joint's velocities are those of its positions, in unit and time."""
         same = np.abs(self.scale - 1) <= ALIKE
-        return np.asarray(same & (np.abs(self.delay) <= LATE / self.fs))
+        return np.logical_and(same, np.abs(self.delay) <= LATE / self.fs)
 
     @property
-    def used(self) -> Array:
+    def used(self) -> npt.NDArray[np.bool_]:
         """Whether the velocities of each joint know better than differences do."""
-        return np.asarray(self.consistent & (self.crossover < min(HIGHEST, self.fs / 10)))
+        return np.logical_and(self.consistent, self.crossover < min(HIGHEST, self.fs / 10))
 
     def words(self, joints: tuple[str, ...]) -> list[str]:
         """Return what was found, a sentence each."""

@@ -168,7 +168,8 @@ def _entries(column: "pa.ChunkedArray[Any]") -> Array | str:
     lengths = set(pa.compute.list_value_length(whole).to_pylist())
     if len(lengths) != 1 or None in lengths:
         return "lists that differ in length"
-    values: Array = whole.flatten().cast(pa.float64()).to_numpy(zero_copy_only=False).reshape(len(whole), -1)
+    flat = whole.flatten()  # type: ignore[attr-defined]  # of lists
+    values: Array = flat.cast(pa.float64()).to_numpy(zero_copy_only=False).reshape(len(whole), -1)
     return values
 
 

@@ -123,7 +123,7 @@ def _by_names(table: LogTable) -> LogLayout:
             continue
         names = _sorted(choices[best])
         n = n or counts[best]
-        found = replace(found, **{kind: Source(tuple(name for name, _ in names))})
+        found = found.where(kind, Source(tuple(name for name, _ in names)))
         if kind == "q":
             places = [place for _, place in names]
             named = len(names) == n and not any(re.fullmatch(r"\d*", place) for place in places)
@@ -190,7 +190,7 @@ def _is_derivative(table: LogTable, q: tuple[str, ...], qd: tuple[str, ...]) -> 
         slope = float(v @ given / (v @ v))
         slopes.append(slope)
         fits.append(float(np.linalg.norm(given - slope * v)) < 2 * ALIKE * float(np.linalg.norm(given)))
-    return bool(fits) and np.mean(fits) > 0.5 and min(slopes) > 0
+    return bool(fits) and 2 * sum(fits) > len(fits) and min(slopes) > 0
 
 
 def _smooth(x: Array, width: int) -> Array:
@@ -200,26 +200,29 @@ def _smooth(x: Array, width: int) -> Array:
 def _with_units(layout: LogLayout, table: LogTable) -> Guess:
     """Return a layout with units by the names of columns, or else by the size of what is in them."""
     doubts = list[str]()
-    suspected = {
-        "t": lambda: _time_unit(table, layout.t),
-        "q": lambda: "deg" if _largest(table, layout.q) > FARTHEST else "",
-        "tau": lambda: _torque_unit(table, layout.tau),
-        "qd": lambda: _velocity_unit(table, layout),
-    }
-    for name, suspicion in suspected.items():
+    for name in ("t", "q", "tau", "qd"):  # velocities last: their unit follows from those before
         source: Source = getattr(layout, name)
         if not source.columns:
             continue
         stated = named_unit(name, source.columns[0])
-        unit = stated or suspicion()
+        unit = stated or _suspected(name, layout, table)
         if unit and not stated and unit != SI[name]:
             doubts.append(f"{name} in {unit}? Its values, or names, look like it")
-        layout = replace(layout, **{name: replace(source, unit=unit)})
+        layout = layout.where(name, replace(source, unit=unit))
     if not layout.t.columns:
         doubts.append("no column of times: state fs = ... [Hz] in [t]")
     if layout.tau.unit in ("A", "mA"):
         doubts.append("efforts in A: state gain = [...] in [torque], N m/A of each joint, gears included")
     return Guess(layout, tuple(doubts))
+
+
+def _suspected(quantity: str, layout: LogLayout, table: LogTable) -> str:
+    """Return the unit that values look like; empty for SI."""
+    if quantity == "t":
+        return _time_unit(table, layout.t)
+    if quantity == "q":
+        return "deg" if _largest(table, layout.q) > FARTHEST else ""
+    return _torque_unit(table, layout.tau) if quantity == "tau" else _velocity_unit(table, layout)
 
 
 def _values(table: LogTable, source: Source) -> Array:

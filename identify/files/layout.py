@@ -4,7 +4,7 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -109,6 +109,11 @@ class LogLayout:
             raise LogError("[torque] states a delay and no meaning: held, instantaneous or averaged")
         rows = {str(k): float(v) for k, v in stated.get("rows", {}).items()}
         return cls(**sources, joints=tuple(stated.get("joints", ())), torque=channel, gain=gains, rows=rows)
+
+    def where(self, quantity: str, source: Source) -> Self:
+        """Return the layout with another source of a quantity: t, q, qd or tau."""
+        changed: Any = {quantity: source}
+        return replace(self, **changed)
 
     @property
     def text(self) -> str:

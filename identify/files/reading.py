@@ -78,9 +78,8 @@ def standard_layout(path: Path, table: LogTable) -> LogLayout:
         )
     qd = tuple(f"qd{end}" for end in ends)
     velocities = Source(qd) if set(qd) <= set(table.columns) else Source()
-    return LogLayout(
-        Source(("t",)), *(Source(tuple(f"{x}{end}" for end in ends)) for x in ("q", "tau")), qd=velocities, joints=joints
-    )
+    q, tau = (Source(tuple(f"{x}{end}" for end in ends)) for x in ("q", "tau"))
+    return LogLayout(Source(("t",)), q, tau, velocities, joints)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,172 @@
+"""Figures of an identification's report."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from experiments.html_report import svg
+from experiments.identification.identified import Identified
+from experiments.identification.validated import Validated
+from experiments.recording.style import model_color
+from experiments.text import percentage
+from identify import Array, Chain, ExplicitModel
+from identify.judge.diagnosis import cutoffs, filtered, instants, spectrum
+from identify.judge.noise_spectra import noise_spectra
+from identify.rows.grid import Kernel
+from identify.rows.rows import Rows
+from identify.signals.signals import Signals
+
+FRICTIONS = ("viscous friction", "Coulomb friction", "friction", "offset")
+RESOLUTION = 0.25
+"""Distance of the frequencies of spectra [Hz]."""
+
+SIGMAS = 2.0
+"""Half the width of intervals, in sigma: 95 %."""
+
+WHOLE = 0.99
+"""Share of a row's weights from which on the mask takes nothing of it."""
+
+FEW = 2
+"""Joints from which on panels stand in two columns."""
+
+
+def torques_figure(validated: Validated) -> str:
+    """Return measured and predicted torques on the unseen motion, joint by joint."""
+    rows = validated.problem.parts[0]
+    figure, panels = _panels(rows.kinds, 1.5)
+    models = list(validated.torques)
+    for j, panel in enumerate(panels):
+        own = rows.group == j
+        shown = np.where(rows.valid[own], rows.Y[own], np.nan)
+        panel.plot(rows.time[own], shown, color="0.55", lw=2.4, label="measured")
+        for model in reversed(models):
+            X = validated.judged.estimates[model].X
+            predicted = np.where(rows.valid[own], rows.predicted(X)[own], np.nan)
+            panel.plot(rows.time[own], predicted, color=_color(model), lw=1.0, label=model)
+        validation = validated.torques[models[0]]
+        joint = validated.found.subject.robot.joints[j]
+        panel.set_title(f"{joint}: {validation.rms[j]:.2g} N m off, {percentage(validation.percent[j])} %", loc="left")
+    _last(panels, "time [s]", "torque [N m]")
+    _legend(figure, panels[0])
+    return svg(figure)
+
+
+def parameters_figure(found: Identified) -> str:
+    """Return estimates with intervals, over the size of each: those of the first model, and how others differ."""
+    names = found.basis.names
+    models = list(found.estimates)
+    leading = found.estimates[models[0]].X
+    size = np.maximum(np.abs(leading), 1e-300)
+    figure = Figure(figsize=(11, 3.4), layout="constrained")
+    panel, at = figure.subplots(), np.arange(len(names))
+    for i, model in enumerate(models):
+        estimate = found.estimates[model]
+        off, half = 100 * (estimate.X - leading) / size, 100 * SIGMAS * estimate.best_sigma / size
+        x = at + 0.22 * (i - (len(models) - 1) / 2)
+        panel.errorbar(x, off, half, fmt="o", ms=2.5, lw=1.2, color=_color(model), label=model)
+    if found.truth is not None:
+        true = np.array(list(found.truth.values()))
+        panel.plot(at, 100 * (true - leading) / size, "_", ms=9, color="black", label="true")
+    panel.set_yscale("symlog", linthresh=1.0, linscale=0.6)
+    panel.set_ylim(-300, 300)
+    panel.set_yticks([-100, -10, -1, 0, 1, 10, 100], ["-100", "-10", "-1", "0", "1", "10", "100"])
+    panel.set_xticks(at, names, rotation=90, fontsize=6)
+    panel.set_xlim(-1, len(names))
+    panel.set_ylabel(f"difference from {models[0]}, with\n95 % interval [% of its value]")
+    _legend(figure, panel)
+    return svg(figure)
+
+
+def friction_figure(found: Identified) -> str:
+    """Return friction over velocity: what the rigid body leaves of the torque, and the law that was found."""
+    estimate = found.estimates[next(iter(found.estimates))]
+    parts = found.problem.parts
+    seen = [_seen(signals, found.processing) for signals in found.problem.signals]
+    if not any(p.kind in FRICTIONS for p in found.basis.parameters):
+        return ""
+    figure, panels = _panels(found.basis.n, 1.6)
+    for j, panel in enumerate(panels):
+        mine = np.array([p.kind in FRICTIONS and p.joint == j for p in found.basis.parameters])
+        v, torque, law = (np.concatenate(x) for x in zip(*(_friction(p, q, estimate.X, mine, j) for p, q in zip(
+            parts, seen, strict=True)), strict=True))  # fmt: skip
+        panel.plot(v, torque, ".", ms=2, color="0.6", label="torque less the rigid body's")
+        order = np.argsort(v)
+        slow = np.flatnonzero(np.diff(np.sign(v[order])) != 0)
+        line = np.insert(law[order], slow + 1, np.nan)
+        panel.plot(np.insert(v[order], slow + 1, 0.0), line, color=_color("explicit"), lw=1.6, label="law that was found")
+        panel.set_title(found.subject.robot.joints[j], loc="left")
+    _last(panels, "velocity [rad/s]", "friction [N m]")
+    _legend(figure, panels[0])
+    return svg(figure)
+
+
+def spectra_figure(found: Identified) -> str:
+    """Return spectra of what the first model leaves, and of the noise that was found, joint by joint; of the first log."""
+    alone = found.on(0)
+    model, estimate = next(iter(alone.estimates.items()))
+    left = instants(alone.problem.signals[0], alone.basis, ExplicitModel(), alone.processing, estimate.X)
+    fs, f = alone.logs[0].fs, np.empty(0)
+    figure, panels = _panels(alone.basis.n, 1.6)
+    lines = []
+    for j in range(alone.basis.n):
+        weight = left.weight[j]
+        f, density = spectrum(left.residual[j] * weight, fs, RESOLUTION)
+        lines.append(density / np.sqrt(max(np.mean(weight**2), 1e-12)))
+    noise = noise_spectra(alone.problem, estimate.noise_levels, f)
+    for j, panel in enumerate(panels):
+        panel.loglog(f[1:], lines[j][1:], color=_color(model), lw=1.0, label="residual")
+        panel.loglog(f[1:], noise[0][j, 1:], color="0.5", lw=1.0, ls="--", label="noise of the torque")
+        panel.loglog(f[1:], noise[1][j, 1:], color="tab:brown", lw=1.0, ls=":", label="noise of the positions")
+        for cutoff in cutoffs(alone.processing, fs).values():
+            panel.axvline(cutoff, color="0.8", lw=1.0)
+        top = max(lines[j][1:].max(), 1e-12)
+        panel.set_ylim(top * 1e-5, top * 3)
+        panel.set_title(alone.subject.robot.joints[j], loc="left")
+    _last(panels, "frequency [Hz]", "[N m/√Hz]")
+    _legend(figure, panels[0])
+    return svg(figure)
+
+
+def _seen(signals: Signals, chain: Chain) -> tuple[Array, Array]:
+    """Return velocities and weights as the rows see them, shape (joint, row) each."""
+    response = chain.operator.response(signals.fs)
+    mean = Kernel(response / response.sum(), (len(response) - 1) // 2, chain.grid(signals.log))
+    return filtered(signals, chain)["qd"], mean.apply(signals.weight)
+
+
+def _friction(rows: Rows, seen: tuple[Array, Array], X: Array, mine: Array, j: int) -> tuple[Array, Array, Array]:
+    """Return velocity, friction as measured, and by the law, at the rows of a joint of which the mask takes nothing."""
+    own = np.flatnonzero(rows.group == j)
+    qd, weight = (x[j] for x in seen)
+    kept = weight > WHOLE
+    law = rows.W[own[kept]] @ np.where(mine, X, 0.0)
+    return qd[kept], (rows.Y - rows.predicted(X))[own[kept]] + law, law
+
+
+def _panels(count: int, height: float) -> tuple[Figure, list[Axes]]:
+    """Return a figure with a panel each, in two columns if there are many."""
+    columns = 2 if count > FEW else 1
+    lines = -(-count // columns)
+    figure = Figure(figsize=(11, height * lines + 0.5), layout="constrained")
+    panels = list(np.atleast_1d(figure.subplots(lines, columns)).ravel())
+    for panel in panels[count:]:
+        panel.set_visible(False)
+    return figure, panels[:count]
+
+
+def _last(panels: Sequence[Axes], x: str, y: str) -> None:
+    for panel in panels[-2:]:
+        panel.set_xlabel(x)
+    for panel in panels[:: 2 if len(panels) > FEW else 1]:
+        panel.set_ylabel(y)
+
+
+def _legend(figure: Figure, panel: Axes) -> None:
+    handles, labels = panel.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper right", ncols=8, frameon=False)
+
+
+def _color(model: str) -> Array:
+    return np.array(model_color(model))[:3] / 255
