@@ -14,6 +14,7 @@ from experiments.identification.identified import Identified
 from experiments.identification.validated import Validated
 from identify import ESTIMATORS, LogError, MotionLog
 from identify.judge.band import Band
+from identify.signals.masks import NoMask
 
 MOST_STARTS = 1000
 """Instants of a log that are looked at for the beginning of another."""
@@ -64,6 +65,9 @@ def with_chain(asked: Identify, named: Identified) -> Identified:
     if asked.chain_file is not None:
         name, chain = chain_of(asked.chain_file)
         return replace(named, chain=name, method=(chain, ESTIMATORS.create(named.estimator)))
+    if named.subject.asked.armature == "none" and asked.chain == CHAIN:
+        # Behind the gears next to no friction is left that turns with the velocity: nothing to mask.
+        named = replace(named, method=(replace(named.processing, mask=NoMask()), named.solver))
     return named if asked.cutoff is None else _with_cutoff(named, asked.cutoff)
 
 

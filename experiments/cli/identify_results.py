@@ -95,12 +95,13 @@ class Results:
             try:
                 warnings = write(self.found, leading, path)
             except (IdentificationError, BenchError, ExperimentError) as error:
-                failed.append(f"{path}: {error}" if str(path) not in str(error) else str(error))
+                option = "--write-mjcf" if path == self.asked.write_mjcf else "--write"
+                failed.append(f"{option} {path}: {error}" if str(path) not in str(error) else str(error))
                 continue
             self.page.print(Text(f"written to {path}: {what} with the parameters of the {leading} model"), soft_wrap=True)
             self.page.warn({"the file that was written": warnings})
         if failed:
-            raise ResultsError(f"not written: {'; '.join(failed)}; everything else is as printed")
+            raise ResultsError(f"{'; '.join(failed)}; everything else is as printed")
 
 
 def targets_of(asked: Identify) -> list[Path]:

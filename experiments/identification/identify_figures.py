@@ -116,14 +116,18 @@ def spectra_figure(found: Identified) -> str:
         lines.append(density / np.sqrt(max(np.mean(weight**2), 1e-12)))
     noise = noise_spectra(alone.problem, estimate.noise_levels, f)
     for j, panel in enumerate(panels):
-        panel.loglog(f[1:], lines[j][1:], color=_color(model), lw=1.0, label="residual")
-        panel.loglog(f[1:], noise[0][j, 1:], color="0.5", lw=1.0, ls="--", label="noise of the torque")
-        panel.loglog(f[1:], noise[1][j, 1:], color="tab:brown", lw=1.0, ls=":", label="noise of the positions")
+        panel.set_title(alone.subject.robot.joints[j], loc="left")
+        panel.plot(f[1:], lines[j][1:], color=_color(model), lw=1.0, label="residual")
+        panel.plot(f[1:], noise[0][j, 1:], color="0.5", lw=1.0, ls="--", label="noise of the torque")
+        panel.plot(f[1:], noise[1][j, 1:], color="tab:brown", lw=1.0, ls=":", label="noise of the positions")
         for cutoff in cutoffs(alone.processing, fs).values():
             panel.axvline(cutoff, color="0.8", lw=1.0)
-        top = max(lines[j][1:].max(), 1e-12)
+        if not lines[j][1:].any():  # a joint that never moves
+            continue
+        top = lines[j][1:].max()
+        panel.set_xscale("log")
+        panel.set_yscale("log")
         panel.set_ylim(top * 1e-5, top * 3)
-        panel.set_title(alone.subject.robot.joints[j], loc="left")
     _last(panels, "frequency [Hz]", "[N m/√Hz]")
     _legend(figure, panels[0])
     return svg(figure)

@@ -15,7 +15,7 @@ class Parameters:
 
     armature: Literal["file", "all", "none"] = "file"
     """Which joints have the inertia of a rotor: those to which the robot's file gives one, all, or none, as where torques are
-    measured at the links."""
+    measured at the links: reversals are not masked then."""
     add: Names = ()
     """Laws of friction beside viscous and Coulomb friction, such as offset, a constant torque of each joint."""
     without: Names = ()

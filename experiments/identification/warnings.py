@@ -77,7 +77,7 @@ def _link_side(found: Identified) -> Iterator[str]:
     if rotors:
         yield (
             f"{', '.join(rotors)} more than {LINK_SIDE:g} sigma below zero: are these torques measured at the links, behind "
-            "the gears? Then add --armature none --friction none; if not, their meaning or delay is wrong"
+            "the gears? Then add --armature none; if not, their meaning or delay is wrong"
         )
 
 

@@ -7,6 +7,7 @@ from typing import Self
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
 from identify.arrays import Array
 from identify.data.log_columns import LogColumns
@@ -197,7 +198,9 @@ def _numbered(t: Array, fs: float) -> Array:
         width, count = 1 / max(float(some[-1]), 1e-9), min(3 * count, len(t))
     phase = np.angle(np.exp(2j * np.pi * fs * since).sum()) / (2 * np.pi)
     order = np.arange(len(t))
-    return np.asarray(order + np.maximum.accumulate(np.round(fs * since - phase) - order), dtype=np.float64)
+    # A sample later at least from row to row: what was lost before a row only grows.
+    lost = scipy.optimize.isotonic_regression(fs * since - phase - order).x
+    return np.asarray(order + np.round(lost), dtype=np.float64)
 
 
 def _about_steady(t: Array) -> Array:

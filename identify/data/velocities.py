@@ -1,5 +1,6 @@
 """Logged velocities: compared with differences of the positions, and used where they know better."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import comb
 
@@ -85,13 +86,14 @@ class Velocities:
             found.append(f"logged velocities know better than differences of the positions, and are used: {', '.join(each)}")
         elif self.consistent.all():
             found.append("logged velocities agree with differences of the positions, which are as good and are used")
-        for joint, a, d, same in zip(joints, self.scale, self.delay, self.consistent, strict=True):
-            if not same and abs(a - 1) > ALIKE:
-                found.append(
-                    f"logged velocities of {joint} are {a:.3g} times the differences of its positions: not used; units?"
-                )
-            elif not same:
-                found.append(f"logged velocities of {joint} are {1e3 * d:.2g} ms late: not used")
+        known = list(zip(joints, self.scale, self.delay, self.consistent, strict=True))
+        scaled = {joint: a for joint, a, _, same in known if not same and abs(a - 1) > ALIKE}
+        late = {joint: 1e3 * d for joint, _, d, same in known if not same and joint not in scaled}
+        if scaled:
+            what = f"{_between(scaled.values())} times the differences of the positions: not used; units?"
+            found.append(f"logged velocities of {', '.join(scaled)} are {what}")
+        if late:
+            found.append(f"logged velocities of {', '.join(late)} are {_between(late.values())} ms late: not used")
         return found
 
     def improved(self, q: Array, qd: Array) -> Array:
@@ -102,6 +104,12 @@ class Velocities:
             slow = scipy.signal.butter(2, max(self.crossover[j], 4 * self.fs / len(q)), fs=self.fs, output="sos")
             found[:, j] = way + scipy.signal.sosfiltfilt(slow, q[:, j] - way, padlen=min(len(q) - 1, round(self.fs)))
         return found
+
+
+def _between(values: Iterable[float]) -> str:
+    """Return a number, or two between which all are."""
+    low, high = f"{min(values := list(values)):.3g}", f"{max(values):.3g}"
+    return low if low == high else f"{low} to {high}"
 
 
 def _noise(x: Array) -> Array:
