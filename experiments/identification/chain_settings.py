@@ -86,6 +86,8 @@ def with_cutoff(chain: Chain, cutoff: float) -> Chain:
     """
     if not hasattr(chain.operator, "cutoff"):
         raise ExperimentError(f"--cutoff {cutoff:g}: the operator of this chain, {type(chain.operator).__name__}, has none")
+    if not cutoff > 0:
+        raise ExperimentError(f"--cutoff {cutoff:g} must be above 0 [Hz]")
     ratio = cutoff / chain.operator.cutoff
     for stage, setting, scale in (
         ("operator", "transition", ratio),

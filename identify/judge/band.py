@@ -38,7 +38,7 @@ class Band:
     wanted : float
         Cut-off [Hz] at which there are enough rows for every parameter.
     content : float
-        Frequency [Hz] at which the torques' noise begins.
+        Frequency [Hz] from which on the torques are noise.
     """
 
     cutoff: float
@@ -51,13 +51,13 @@ class Band:
         """Return the band for logs of so many parameters: `least` [Hz], or more where that leaves too few rows.
 
         Rows come at twice the cut-off: T seconds make 2 T f instants, and a power model has one row an instant. A short, fast
-        log starves at 5 Hz. What lies above the frequency at which the torques are noise would not help it.
+        log starves at 5 Hz. Above twice the frequency at which the torques are noise there is nothing: power is a product.
         """
         T = sum(log.samples / log.fs for log in logs)
         content = max(content_end(log) for log in logs)
         wanted = ENOUGH * parameters / (2 * T)
         most = min(OF_NYQUIST * log.fs / 2 for log in logs)
-        cutoff = max(min(max(wanted, least), max(content, least)), least)
+        cutoff = max(min(max(wanted, least), max(2 * content, least)), least)
         cutoff = float(f"{min(cutoff, max(most, least)):.2g}")
         return cls(cutoff, 2 * T * cutoff, wanted, content)
 
@@ -67,7 +67,7 @@ class Band:
             return ""
         few = self.rows * least / self.cutoff
         enough = f"{self.rows:.0f} instants for {parameters} parameters, where {least:g} Hz leave {few:.0f}"
-        noise = "" if self.cutoff >= 0.99 * self.wanted else f"; above {self.cutoff:.2g} Hz the torques are noise"
+        noise = "" if self.cutoff >= 0.99 * self.wanted else f"; above {self.content:.2g} Hz the torques are noise"
         return f"band up to {self.cutoff:.2g} Hz, chosen by the log: {enough}{noise} (--cutoff says another)"
 
 

@@ -1,0 +1,278 @@
+"""What a laboratory meets on its first day, by simulated stand-ins: each fails without what it is about."""
+
+import json
+import runpy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identify import MotionLog, TorqueChannel
+from identify.files.log_file import read_log, write_log
+from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
+from sim.robot.robot import Robot
+
+PUMA = ("--robot", "puma560")
+
+
+def as_csv(log, path, *, names=None, t=None, rows=slice(None), scale=(1.0, 1.0), qd=None):
+    n = log.n
+    heads = names or ["t", *(f"q{j + 1}" for j in range(n)), *(f"tau{j + 1}" for j in range(n))]
+    heads += [f"qd{j + 1}" for j in range(n)] if qd is not None else []
+    columns = [(log.t if t is None else t)[:, None], (log.q * scale[0])[rows], (log.tau * scale[1])[rows]]
+    columns += [qd[rows]] if qd is not None else []
+    lines = [",".join(heads), *(",".join(f"{x:.9g}" for x in row) for row in np.hstack(columns))]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def found(folder="out"):
+    return json.loads((folder / "summary.json").read_text())
+
+
+def unseen(summary, k=0, model="explicit"):
+    return np.array(summary["validations"][k]["models"][model]["torque_error_rms"])
+
+
+@pytest.fixture
+def first(logs):
+    return read_log(logs / "first.parquet")
+
+
+def test_several_logs_of_other_rates_meanings_and_kinds_in_one_fit(idbench, logs, first, tmp_path):
+    """Two halves, one of them at a third of the rate, measured instead of averaged, in degrees and mN m."""
+    half = first.samples // 2
+    slow = first.part(half, first.samples)
+    as_csv(
+        MotionLog(slow.fs, slow.q, slow.tau, slow.torque), tmp_path / "b.csv", scale=(180 / np.pi, 1e3),
+        names=["time", *(f"pos{j} [deg]" for j in range(6)), *(f"eff{j} [mNm]" for j in range(6))],
+    )  # fmt: skip
+    write_log(first.part(0, half), tmp_path / "a.parquet")
+    assert idbench("log", "b.csv", "--write")[0] == 0
+    layout = (tmp_path / "b.toml").read_text().partition("[torque]")[0]
+    (tmp_path / "b.toml").write_text(f'{layout}[torque]\nmeaning = "averaged"\ndelay = {first.torque.delay}\n')
+    code, out, _ = idbench(
+        "identify", "a.parquet", "b.csv", *PUMA, "--validate", logs / "second.parquet", "--out", "out",
+        "--no-rerun", "--model", "explicit",
+    )  # fmt: skip
+    assert code == 0
+    summary = found(tmp_path / "out")
+    assert [log["name"] for log in summary["logs"]] == ["a.parquet", "b.csv"]
+    errors = np.array([log["torque_error_rms"]["explicit"] for log in summary["logs"]])
+    assert errors.shape == (2, 6)
+    assert "what the explicit model leaves of each log" in out
+    assert idbench("identify", "a.parquet", *PUMA, "--validate", logs / "second.parquet", "--out", "one", "--no-rerun")[0] == 0
+    # Each half shows half of the motion: together they know more.
+    sigmas = [np.array(x["models"]["explicit"]["corrected_sigma"]) for x in (summary, found(tmp_path / "one"))]
+    assert np.mean(sigmas[0] < sigmas[1]) > 0.9
+    assert (unseen(summary) < 1.1 * unseen(found(tmp_path / "one"))).all()
+
+
+def test_each_log_is_judged_by_itself(idbench, logs, first, tmp_path):
+    write_log(MotionLog(first.fs, first.q, 1.1 * first.tau, first.torque), tmp_path / "wrong.parquet")
+    code, out, _ = idbench(
+        "identify", logs / "second.parquet", *PUMA, "--validate", logs / "first.parquet", "wrong.parquet", "--out", "out",
+        "--no-rerun", "--model", "explicit",
+    )  # fmt: skip
+    assert code == 0
+    summary = found(tmp_path / "out")
+    assert (unseen(summary, 1) > 2 * unseen(summary, 0)).any()
+    assert out.count("unseen motion") == 2
+    assert summary["validation"] == summary["validations"][0]
+
+
+def test_repeated_rows_are_left_out(idbench, logs, first, tmp_path, rng):
+    """One row in sixteen is the one before, written again."""
+    seen = np.maximum.accumulate(np.where(rng.uniform(size=first.samples) > 0.06, np.arange(first.samples), 0))
+    as_csv(first, tmp_path / "log.csv", t=first.t, rows=seen)
+    words = ("identify", "log.csv", *PUMA, "--torque", "averaged", "--validate", logs / "second.parquet", "--no-rerun",
+             "--model", "explicit")  # fmt: skip
+    assert idbench(*words, "--out", "as-is")[0] == 0
+    code, out, _ = idbench(*words, "--out", "repaired", "--resample")
+    assert code == 0
+    assert "repeat the row before while the robot moves: left out" in out
+    before, after = (unseen(found(tmp_path / name)) for name in ("as-is", "repaired"))
+    assert (after < 0.9 * before).all()
+    assert np.mean(after / before) < 0.75
+
+
+def test_times_that_jitter_are_refused_with_the_way_out_which_works(idbench, first, tmp_path, rng):
+    as_csv(first, tmp_path / "log.csv", t=first.t + 0.1 / first.fs * rng.normal(size=first.samples))
+    _, _, told = idbench("identify", "log.csv", *PUMA, "--torque", "averaged")
+    assert "add --resample, or write it anew and look: uv run idbench resample log.csv --torque averaged" in told
+    code, out, _ = idbench("resample", "log.csv", "--torque", "averaged", "--out", "even.parquet")
+    assert code == 0
+    assert "stamps jitter by 0.4 ms about a steady clock of 250 Hz" in out
+    made = read_log(tmp_path / "even.parquet")
+    np.testing.assert_allclose(made.q, first.q[: made.samples], atol=1e-6)  # rounded in the file, else as they were
+
+
+def test_a_log_with_a_gap_becomes_two(idbench, first, tmp_path):
+    kept = (first.t < 3) | (first.t > 3.4)
+    as_csv(first, tmp_path / "log.csv", t=first.t[kept], rows=kept)
+    assert idbench("resample", "log.csv", "--torque", "averaged", "--out", "even.parquet")[0] == 0
+    assert read_log(tmp_path / "even1.parquet").samples == 750
+    code, out, _ = idbench("identify", "log.csv", *PUMA, "--torque", "averaged", "--resample", "--no-rerun", "--out", "out")
+    assert code == 0
+    assert [log["name"] for log in found(tmp_path / "out")["logs"]] == ["log.csv, piece 1", "log.csv, piece 2"]
+    assert "the log is cut there" in out
+
+
+def test_a_short_fast_log_gets_the_band_that_it_needs(idbench, logs, first, tmp_path):
+    """Seven seconds: 70 instants at 5 Hz for 52 parameters, from which the power model cannot be identified at all."""
+    write_log(first.part(0, round(7 * first.fs)), tmp_path / "short.parquet")
+    words = ("identify", "short.parquet", *PUMA, "--no-rerun", "--validate", logs / "second.parquet")
+    code, out, _ = idbench(*words, "--out", "chosen")
+    assert code == 0
+    assert "chosen by the log" in out
+    assert "instants for 52 parameters, where 5 Hz leave 70" in out
+    assert idbench(*words, "--out", "narrow", "--cutoff", "5")[0] == 0
+    chosen, narrow = found(tmp_path / "chosen"), found(tmp_path / "narrow")
+    assert narrow["cutoff"] == 5.0
+    assert "power" in narrow["failures"]
+    assert chosen["models"]["power"]["rows"] > 150
+    (tmp_path / "chain.toml").write_text('chain = "idbench"\n[operator]\ncutoff = 12.0\n[mask]\nkind = "none"\n')
+    assert idbench(*words, "--out", "file", "--chain-file", "chain.toml", "--model", "explicit")[0] == 0
+    assert found(tmp_path / "file")["cutoff"] == 12.0
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--cutoff", "5", "--chain-file", "x.toml"), "--cutoff and --chain-file both say the band"),
+        (("--chain-file", "x.toml"), "--chain-file x.toml: No such file"),
+        (("--chain-file", "wrong.toml"), "operator.cutof = 3: FirLowPass has no such setting"),
+        (("--cutoff", "-3"), "cutoff"),
+        (("--lock", "joint9=1"), "there is no joint 'joint9'"),
+        (("--lock", "joint1"), "--lock joint1: give a joint and where it is held"),
+        (("--joints", "joint1"), "the log has 6 joints, the robot 1"),
+        (("--write", "arm.step"), "--write arm.step: its name must end with .xml, .urdf, .json, .py"),
+        (("--columns", "q"), "--columns q: give t="),
+        (("--units", "q=inch"), "--units: unit 'inch' of q is unknown"),
+        (("--rows", "t=x"), "--rows t=x: give columns and numbers"),
+    ],
+)
+def test_options_that_make_no_sense_are_told(complaint, logs, tmp_path, monkeypatch, options, message):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "wrong.toml").write_text("[operator]\ncutof = 3\n")
+    assert message in complaint("identify", str(logs / "second.parquet"), *PUMA, *options)
+
+
+def test_a_robot_with_more_joints_than_the_log(idbench, first, tmp_path):
+    """The wrist was held: its columns are not in the log. What follows from them belongs to the forearm."""
+    robot = Robot.load("puma560")
+    held = np.concatenate([first.q[:, :3], np.zeros((first.samples, 3))], axis=1)
+    qd, qdd = (np.gradient(held, 1 / first.fs, axis=0) for _ in range(2))
+    qdd = np.gradient(qd, 1 / first.fs, axis=0)
+    tau = inverse_dynamics(robot, held, qd, qdd) + coulomb_torque(robot, qd)
+    arm = MotionLog(first.fs, held[:, :3], tau[:, :3], TorqueChannel("instantaneous"))
+    write_log(arm, tmp_path / "arm.parquet")
+    _, _, told = idbench("identify", "arm.parquet", *PUMA)
+    names = robot.joints[:3]
+    assert f"--joints {' '.join(names)} (the others are held at 0" in told
+    code, out, _ = idbench(
+        "identify", "arm.parquet", *PUMA, "--joints", *names, "--no-rerun", "--model", "explicit", "--write-mjcf", "arm.xml",
+    )  # fmt: skip
+    assert code == 0
+    assert "explicit: good" in out
+    assert Robot.load(str(tmp_path / "arm.xml")).joints == names
+
+
+def test_torques_that_do_not_see_rotors_are_told_apart(idbench, logs, first, tmp_path):
+    """Sensors behind the gears: what the robot's file says of rotors is missing in the torques."""
+    qdd = np.gradient(np.gradient(first.q, 1 / first.fs, axis=0), 1 / first.fs, axis=0)
+    rotors = Robot.load("puma560").model.dof_armature
+    smooth = np.apply_along_axis(lambda x: np.convolve(x, np.ones(5) / 5, mode="same"), 0, qdd)
+    write_log(MotionLog(first.fs, first.q, first.tau - 1.2 * rotors * smooth, first.torque), tmp_path / "links.parquet")
+    words = ("identify", "links.parquet", *PUMA, "--no-rerun", "--model", "explicit")
+    _, out, _ = idbench(*words)
+    assert "are these torques measured at the links, behind the gears? Then add --armature none" in " ".join(out.split())
+    _, out, _ = idbench("identify", logs / "first.parquet", *PUMA, "--no-rerun", "--model", "explicit")
+    assert "measured at the links" not in out
+    code, out, _ = idbench(*words, "--armature", "none", "--friction", "none", "--out", "out")
+    assert code == 0
+    assert not [name for name in found(tmp_path / "out")["parameters"] if name.startswith(("Ia", "Fv", "Fs"))]
+
+
+def test_what_is_written_makes_the_torques_that_were_identified(idbench, logs, tmp_path):
+    """The function for a controller, against MuJoCo's inverse dynamics of the robot that is written beside it."""
+    code, _, _ = idbench(
+        "identify", logs / "first.parquet", *PUMA, "--no-rerun", "--model", "explicit", "--write-mjcf", "arm.xml", "--write",
+        "arm.py", "arm.json", "arm.urdf",
+    )  # fmt: skip
+    assert code == 0
+    written, function = Robot.load(str(tmp_path / "arm.xml")), runpy.run_path(str(tmp_path / "arm.py"))
+    rng = np.random.default_rng(0)
+    q, qd, qdd = (rng.uniform(-1, 1, (20, 6)) for _ in range(3))
+    tau = inverse_dynamics(written, q, qd, qdd) + coulomb_torque(written, qd)
+    # The bodies that can exist are some sigma from the estimate, which the function has as it is.
+    assert np.abs(function["inverse_dynamics"](q, qd, qdd) - tau).max() < 0.01 * np.abs(tau).max()
+    assert function["JOINTS"] == written.joints
+    np.testing.assert_allclose(function["inverse_dynamics"](q[0], qd[0], qdd[0]), function["inverse_dynamics"](q, qd, qdd)[0])
+    urdf = Robot.load(str(tmp_path / "arm.urdf"))
+    links = inverse_dynamics(urdf, q, qd, qdd) + coulomb_torque(urdf, qd) + written.model.dof_armature * qdd
+    np.testing.assert_allclose(links, tau, atol=1e-5 * np.abs(tau).max())  # angles of a URDF become quaternions
+    base = json.loads((tmp_path / "arm.json").read_text())
+    assert len(base["covariance"]) == len(base["parameters"]) == 52
+    assert base["parameters"][0]["made_of"]
+
+
+@pytest.mark.parametrize("robot", ["scara", "puma560", "panda"])
+def test_the_function_of_true_parameters_is_mujocos_inverse_dynamics(robot, tmp_path):
+    from experiments.exports.controller import python_text
+    from experiments.identification.identified import Identified
+    from experiments.identification.subject import Subject
+    from identify import ExplicitModel, Problem
+    from identify.estimators.estimate import Estimate
+
+    subject = Subject(robot)
+    arm, rng = subject.robot, np.random.default_rng(1)
+    log = MotionLog(100.0, rng.normal(size=(400, arm.n)), rng.normal(size=(400, arm.n)), TorqueChannel("held"))
+    known = Identified((log,), subject, models=("explicit",))
+    X = np.array(list(subject.truth(arm).values()))
+    estimate = Estimate(Problem((log,), subject.basis, ExplicitModel(), known.processing), X, np.eye(len(X)))
+    text = python_text(replace(known, known={"explicit": estimate}), "explicit", tmp_path)
+    (tmp_path / "arm.py").write_text(text)
+    function = runpy.run_path(str(tmp_path / "arm.py"))
+    q, qd, qdd = (rng.normal(size=(30, arm.n)) for _ in range(3))
+    tau = inverse_dynamics(arm, q, qd, qdd) + coulomb_torque(arm, qd)
+    np.testing.assert_allclose(function["inverse_dynamics"](q, qd, qdd), tau, atol=1e-12 * np.abs(tau).max())
+    still = np.zeros_like(q)
+    np.testing.assert_allclose(function["gravity_torque"](q), inverse_dynamics(arm, q, still, still), atol=1e-10)
+    M = function["mass_matrix"](q[0])
+    np.testing.assert_allclose(M, M.T, atol=1e-12)
+    np.testing.assert_allclose(
+        M @ qdd[0], (inverse_dynamics(arm, q, still, qdd) - inverse_dynamics(arm, q, still, still))[0], atol=1e-10
+    )
+
+
+def test_the_report_says_in_a_minute_whether_to_trust_it(idbench, logs, tmp_path):
+    code, _, _ = idbench(
+        "identify", logs / "first.parquet", *PUMA, "--validate", logs / "second.parquet", "--out", "out", "--no-rerun",
+        "--torque-delay", "0.001",
+    )  # fmt: skip
+    assert code == 0
+    page = (tmp_path / "out" / "report.html").read_text()
+    for words in ("explicit model: ", "What to see to", "unseen motion", "--torque-delay", "XX", "Friction", "What is left"):
+        assert words in page, words
+    assert page.count("<svg") == 4
+    assert 'src="http' not in page
+    assert "<link" not in page
+    assert f"--validate {logs / 'second.parquet'}" in page
+
+
+def test_a_log_is_shown_and_drawn(idbench, first, tmp_path):
+    as_csv(first, tmp_path / "log.csv", qd=np.gradient(first.q, 1 / first.fs, axis=0))
+    code, out, _ = idbench("log", "log.csv", "--picture", "log.png", "--json")
+    assert code == 0
+    told = json.loads(out)
+    assert told["fs"] == pytest.approx(250.0)
+    assert [row["joint"] for row in told["joints"]] == [f"joint {j + 1}" for j in range(6)]
+    assert "logged velocities agree" in " ".join(told["notes"])
+    assert (tmp_path / "log.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_a_log_is_not_is_told(complaint, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "words.csv").write_text("a,b,c\n" + "1,2,3\n" * 30)
+    assert "no time, positions and torques of some joints" in complaint("log", "words.csv")

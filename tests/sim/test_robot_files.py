@@ -1,0 +1,240 @@
+"""Robots' files as they are in the wild: mended, held, turned, made of a table; or refused for a reason that holds."""
+
+from importlib.metadata import files
+
+import mujoco
+import numpy as np
+import pytest
+
+from sim.errors import RobotError
+from sim.robot.inverse_dynamics import inverse_dynamics
+from sim.robot.mounting import Mounting, locked
+from sim.robot.rewrite import rewritten
+from sim.robot.robot import Robot
+from sim.robot.tree import kinematic_tree
+
+SOLID = '<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
+
+
+def urdf(*links, joints="", head=""):
+    inside = "".join(f'<link name="l{i}">{link}</link>' for i, link in enumerate(links))
+    made = "".join(
+        f'<joint name="j{i}" type="revolute"><parent link="l{i - 1}"/><child link="l{i}"/><origin xyz="0 0 0.3" rpy="0.3 0 0"/>'
+        f'<axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="10" velocity="3"/></joint>'
+        for i in range(1, len(links))
+    )
+    return f'<robot name="r" {head}>{inside}{joints or made}</robot>'
+
+
+@pytest.fixture
+def load(tmp_path):
+    def read(text, *edits, name="arm.urdf"):
+        (tmp_path / name).write_text(text)
+        return Robot.load(str(tmp_path / name), *edits)
+
+    return read
+
+
+@pytest.mark.parametrize(
+    ("inertial", "note"),
+    [
+        ("", "no inertia of l2: 1 g is taken"),
+        (SOLID.replace('"1"', '"0"'), "no inertia of l2"),
+        (SOLID.replace('ixx="0.1"', 'ixx="0.9"'), "an inertia of l2 that no body has"),
+        (SOLID.replace("0.1", "0"), "an inertia of l2 that no body has"),
+        (SOLID.replace('ixx="0.1"', 'ixx="-0.1"'), "an inertia of l2 that no body has"),
+    ],
+    ids=["none", "no mass", "too long", "zero", "negative"],
+)
+def test_links_without_an_inertia_that_a_body_has_are_mended(load, inertial, note):
+    """The published TX40, TIAGo's antenna, a dozen of the URDFs of laboratories: identification needs places alone."""
+    robot = load(urdf("", SOLID, inertial))
+    assert robot.joints == ("j1", "j2")
+    assert any(note in words for words in robot.notes)
+    assert load(urdf("", SOLID, SOLID)).notes == ()
+
+
+def test_a_link_whose_mass_is_welded_to_it_is_left_alone(load):
+    weld = '<joint name="w" type="fixed"><parent link="l1"/><child link="l2"/></joint>'
+    turn = '<joint name="j" type="continuous"><parent link="l0"/><child link="l1"/><axis xyz="0 0 1"/></joint>'
+    robot = load(urdf("", "", SOLID, joints=turn + weld))
+    assert robot.notes == ()
+    assert robot.model.body_mass.sum() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        urdf("", SOLID, head='xmlns:xacro="http://www.ros.org/wiki/xacro"').replace("<link", "<xacro:arm/><link", 1),
+        urdf("", SOLID).replace('"0 0 0.3"', '"0 0 ${height}"'),
+    ],
+)
+def test_a_xacro_is_said_to_be_one(load, text):
+    with pytest.raises(RobotError, match=r"this is a xacro, from which a URDF is made first: xacro arm.urdf.xacro > arm.urdf"):
+        load(text)
+
+
+def test_joints_that_follow_others_are_held(load):
+    """A gripper whose second finger mimics the first: refused with the way out, and read when it is held."""
+    mimic = urdf("", SOLID, SOLID, SOLID).replace('"j3" type="revolute">', '"j3" type="revolute"><mimic joint="j2"/>')
+    with pytest.raises(RobotError, match=r"couples joints; hold the joints that follow others \(--lock JOINT=VALUE"):
+        kinematic_tree(load(mimic))
+    robot = load(mimic, Mounting(joints=("j1",)).edit)
+    assert robot.joints == ("j1",)
+    assert kinematic_tree(robot).n == 1
+
+
+@pytest.mark.parametrize("name", ["puma560", "panda"])
+def test_a_held_joint_is_where_it_is_held(name):
+    """Places and torques of the others are those of the whole robot with that joint at rest there."""
+    whole = Robot.load(name)
+    held = {whole.joints[2]: 0.7, whole.joints[4]: -1.1}
+    part = Robot.load(name, Mounting(lock=tuple(held.items())).edit)
+    rng = np.random.default_rng(0)
+    q, qd, qdd = (rng.uniform(-1, 1, (5, whole.n)) for _ in range(3))
+    for j in (2, 4):
+        q[:, j], qd[:, j], qdd[:, j] = held[whole.joints[j]], 0.0, 0.0
+    rest = [j for j in range(whole.n) if whole.joints[j] not in held]
+    expected = inverse_dynamics(whole, q, qd, qdd)[:, rest]
+    np.testing.assert_allclose(inverse_dynamics(part, q[:, rest], qd[:, rest], qdd[:, rest]), expected, atol=1e-10)
+
+
+def test_a_slide_and_a_ball_are_held(load):
+    text = """<mujoco><worldbody><body><joint name="rail" type="slide" axis="0 1 0" ref="0.1"/><geom size="0.1"/>
+      <body><joint name="b" type="ball"/><geom size="0.1"/><body name="tip" pos="0 0 1"><joint name="t" axis="0 1 0"/>
+      <geom size="0.1"/></body></body></body></worldbody>
+      <actuator><motor joint="rail"/><motor name="m" joint="t"/></actuator><sensor><jointpos joint="rail"/></sensor>
+      <keyframe><key qpos="0.1 1 0 0 0 0"/></keyframe></mujoco>"""
+    robot = load(text, Mounting(("t",), (("rail", 0.4),)).edit, name="arm.xml")
+    assert (robot.joints, robot.model.nu, robot.model.nsensor, robot.model.nkey) == (("t",), 1, 0, 0)
+    data = mujoco.MjData(robot.model)
+    mujoco.mj_forward(robot.model, data)
+    np.testing.assert_allclose(data.body("tip").xpos, [0, 0.3, 1], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("mounting", "message"),
+    [
+        (Mounting(("elbo",)), r"there is no joint 'elbo'"),
+        (Mounting(lock=(("nothing", 0.0),)), "there is no joint 'nothing'"),
+        (Mounting(("j1",), (("j1", 0.0),)), "j1: both among --joints and locked"),
+        (Mounting(lock=(("j1", 0.0), ("j2", 0.0))), "all joints are locked"),
+        (Mounting(gravity=(0.0, 0.0, np.nan)), "three finite numbers"),
+    ],
+)
+def test_a_mounting_that_makes_no_sense_is_told(load, mounting, message):
+    with pytest.raises(RobotError, match=message):
+        load(urdf("", SOLID, SOLID), mounting.edit)
+
+
+def test_a_lock_that_is_none_is_told():
+    assert locked(["a=1", "b=-2e-3"]) == (("a", 1.0), ("b", -2e-3))
+    with pytest.raises(RobotError, match=r"--lock a: give a joint and where it is held"):
+        locked(["a"])
+
+
+def test_a_robot_on_a_wall_has_its_gravity_aside(load):
+    wall = load(urdf("", SOLID, SOLID), Mounting(gravity=(9.81, 0.0, 0.0)).edit)
+    np.testing.assert_array_equal(kinematic_tree(wall).gravity, [9.81, 0, 0])
+
+
+def test_meshes_that_are_not_there_cost_a_robot_its_looks_alone(load):
+    text = """<mujoco><asset><mesh name="m" file="gone.stl"/></asset><worldbody><body name="a"><joint axis="0 0 1"/>
+      <inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/><geom type="mesh" mesh="m"/>
+      <body name="b"><joint axis="0 1 0"/><geom type="mesh" mesh="m"/></body></body></worldbody></mujoco>"""
+    robot = load(text, name="arm.xml")
+    assert robot.model.body("a").mass[0] == 2
+    assert "meshes that are not there (m)" in robot.notes[0]
+    assert "no inertia of b but that of its mesh" in robot.notes[1]
+
+
+KHALIL = """
+angles = "deg"
+[[joints]]
+name = "base"
+[[joints]]
+alpha = 90.0
+theta = 20.0
+[[joints]]
+d = 0.45
+r = 0.1
+range = [-120.0, 120.0]
+[[joints]]
+sigma = 1
+alpha = -90.0
+r = 0.38
+"""
+
+
+def test_a_table_of_khalil_and_kleinfinger(load):
+    """Places by the product of the table's own matrices, multiplied out here."""
+    robot, q = load(KHALIL, name="arm.toml"), np.array([0.3, -0.4, 0.8, 0.15])
+    table = ((0, 0, 0, 0), (np.pi / 2, 0, np.radians(20), 0), (0, 0.45, 0, 0.1), (-np.pi / 2, 0, 0, 0.38))
+    place = np.eye(4)
+    for j, (alpha, d, theta, r) in enumerate(table):
+        turn, way = (theta + q[j], r) if j < 3 else (theta, r + q[j])
+        ca, sa, ct, st = np.cos(alpha), np.sin(alpha), np.cos(turn), np.sin(turn)
+        place = place @ [[ct, -st, 0, d], [ca * st, ca * ct, -sa, -way * sa], [sa * st, sa * ct, ca, way * ca], [0, 0, 0, 1]]
+    data = mujoco.MjData(robot.model)
+    data.qpos[:] = q
+    mujoco.mj_forward(robot.model, data)
+    np.testing.assert_allclose(data.xpos[-1], place[:3, 3], atol=1e-12)
+    np.testing.assert_allclose(data.xmat[-1].reshape(3, 3), place[:3, :3], atol=1e-12)
+    assert robot.weightless
+
+
+def test_a_classic_table_moves_as_the_puma_of_corke(load):
+    """The PUMA's table (P. Corke, Robotics Toolbox) against the arm that ships, whose frames are others: how the last link
+    moves, seen from where it was."""
+    rows = ((90, 0, 0), (0, 0.4318, 0), (-90, 0.0203, 0.15005), (90, 0, 0.4318), (-90, 0, 0), (0, 0, 0))
+    text = 'convention = "classic"\nangles = "deg"\n'
+    text += "".join(f"[[joints]]\nalpha = {alpha}\na = {a}\nd = {d}\n" for alpha, a, d in rows)
+    robot, q = load(text, name="arm.toml"), np.array([0.3, -0.4, 0.8, 0.15, 0.5, -0.6])
+    place = np.eye(4)
+    for (alpha, a, d), theta in zip(rows, q, strict=True):
+        ca, sa, ct, st = np.cos(np.radians(alpha)), np.sin(np.radians(alpha)), np.cos(theta), np.sin(theta)
+        place = place @ [[ct, -st * ca, st * sa, a * ct], [st, ct * ca, -ct * sa, a * st], [0, sa, ca, d], [0, 0, 0, 1]]
+    data = mujoco.MjData(robot.model)
+    data.qpos[:] = q
+    mujoco.mj_forward(robot.model, data)
+    np.testing.assert_allclose(data.xpos[-1], place[:3, 3], atol=1e-12)  # the wrist's axes meet: a and d of the last are 0
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("angles", "angels"), "angels is unknown; known: name, convention, angles"),
+        (('"deg"', '"grad"'), 'say angles = "rad" or angles = "deg"'),
+        (("sigma = 1", "sigma = 2"), "joint joint4: sigma = 2"),
+        (("d = 0.45", 'd = "x"'), "joint joint3: d = 'x' must be a number"),
+        (("d = 0.45", 'parent = "nobody"'), "parent 'nobody' is no joint before it"),
+        (("[[joints]]", "[["), "arm.toml"),
+    ],
+)
+def test_a_table_that_makes_no_sense_is_told(load, change, message):
+    with pytest.raises(RobotError, match=message):
+        load(KHALIL.replace(*change), name="arm.toml")
+
+
+def test_a_table_and_a_held_robot_are_written_as_mjcf(tmp_path):
+    (tmp_path / "arm.toml").write_text(KHALIL)
+    (tmp_path / "out.xml").write_text(rewritten(str(tmp_path / "arm.toml"), {"M4": 2.0, "XX4": 0.5, "YY4": 0.5, "ZZ4": 0.5}))
+    assert Robot.load(str(tmp_path / "out.xml")).model.body_mass[-1] == pytest.approx(2.0)
+    mounting = Mounting(lock=((Robot.load("panda").joints[6], 0.5),))
+    (tmp_path / "held.xml").write_text(rewritten("panda", {}, tmp_path, mounting))
+    assert Robot.load(str(tmp_path / "held.xml")).n == 6
+
+
+def test_every_robot_of_a_public_collection_reads_or_is_refused_for_a_reason():
+    """example-robot-data: 68 URDFs of arms, legs, hands; refused are closed chains, drones, and a file without joints."""
+    paths = [f.locate() for f in files("example-robot-data") or () if str(f).endswith(".urdf")]
+    refused = {}
+    for path in paths:
+        try:
+            kinematic_tree(Robot.load(str(path)))
+        except RobotError as error:
+            refused[path.stem] = str(error)
+    assert len(paths) > 60
+    for name, why in refused.items():
+        assert "closes a chain or couples joints" in why or "has no joints" in why, (name, why)
+    assert len(refused) < 14
