@@ -41,6 +41,9 @@ OTHERS = (
 EPISODES = ("episode_index", "episode", "run", "trial")
 """Columns that tell the runs of a file apart."""
 
+MOST_BLOCKS = (3, 4, 5, 6, 7, 8)
+"""Quantities of each joint that a file without names may have: positions, velocities, accelerations, torques, set points."""
+
 CURRENTS = ("current", "currents", "cur", "amps")
 
 FARTHEST = 4 * np.pi
@@ -166,16 +169,15 @@ def _by_values(path: Path, table: LogTable) -> LogLayout:
     timed = bool(np.mean(np.diff(first) > 0) > 0.9)  # stamps may repeat
     rest = names[1:] if timed else names
     t = Source((names[0],)) if timed else Source(fs=0.0)
-    for blocks in (3, 2, 4):
-        if len(rest) % blocks:
-            continue
-        n = len(rest) // blocks
-        block = [tuple(rest[i * n : (i + 1) * n]) for i in range(blocks)]
-        speeds = _is_derivative(table, block[0], block[1])
-        if blocks > 2 and speeds:
-            return LogLayout(t, Source(block[0]), Source(block[-1]), Source(block[1]))
-        if blocks == 2 and not speeds:
-            return LogLayout(t, Source(block[0]), Source(block[1]))
+    for count in (count for count in MOST_BLOCKS if len(rest) % count == 0):
+        n = len(rest) // count
+        block = [tuple(rest[i * n : (i + 1) * n]) for i in range(count)]
+        if count > 2 and _is_derivative(table, block[0], block[1]):
+            efforts = 3 if count > 3 and _is_derivative(table, block[1], block[2]) else 2
+            return LogLayout(t, Source(block[0]), Source(block[efforts]), Source(block[1]))
+    if len(rest) % 2 == 0:
+        n = len(rest) // 2
+        return LogLayout(t, Source(tuple(rest[:n])), Source(tuple(rest[n:])))
     raise LogError(f"{path}: {len(names)} columns without names are no time, positions and torques of some joints: name them")
 
 
