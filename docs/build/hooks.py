@@ -14,7 +14,7 @@ from mkdocs.structure.files import File, Files
 ROOT = Path(__file__).parent.parent.parent
 
 COMMANDS = (
-    *("table1", "table2", "run", "view", "identify", "robot", "excite", "study", "scenario", "new", "check", "list"),
+    *("table1", "table2", "run", "view", "identify", "log", "robot", "excite", "study", "scenario", "new", "check", "list"),
     *("resample", "export", "search"),
 )
 """In the order in which people meet them."""
