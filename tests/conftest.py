@@ -10,13 +10,14 @@ import sys
 import sysconfig
 from pathlib import Path
 
-NEEDED = ("pinocchio", "distributed", "dask_jobqueue", "clarabel")
+NEEDED = ("pinocchio", "distributed", "dask_jobqueue", "clarabel", "rosbags")
 """Modules of the dependency group `test`, which `uv run idbench` does not install: 200 MB, robots of other people above all."""
 
 if any(importlib.util.find_spec(name) is None for name in NEEDED):
     if not (uv := os.environ.get("UV") or shutil.which("uv")):
         sys.exit("the tests need the dependency group test: uv sync --group test, or pip install --group test")
     subprocess.run([uv, "sync", "--inexact", "--group", "test"], cwd=Path(__file__).parent.parent, check=True)
+    sys.modules.pop("cmeel_pth", None)  # a process of xdist has run it, and then got the search path of before
     site.addsitedir(sysconfig.get_path("purelib"))  # what has come adds itself to the search path as at the start of Python
 
 os.environ.setdefault("RUST_LOG", "off")  # as on the command line: read when rerun is loaded, which tests do first
