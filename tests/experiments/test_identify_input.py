@@ -75,7 +75,7 @@ def test_one_models_failure_takes_nothing_from_the_others(idbench, logs, tmp_pat
 
     log = read_log(logs / "first.parquet")
     write_log(log.part(0, int(0.14 * log.samples)), tmp_path / "short.parquet")
-    code, out, err = idbench("identify", "short.parquet", *NEEDED, "--out", "found", "--no-rerun", "--cutoff", "5")
+    code, out, err = idbench("identify", "short.parquet", "--robot", "puma560", "--out", "found", "--no-rerun", "--cutoff", "5")
     assert code == 0, err
     assert "power: no estimate: " in out
     assert "rows are left" in out
