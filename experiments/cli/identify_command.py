@@ -39,9 +39,6 @@ from experiments.recording.audience import Audience, Watching
 from identify import MODELS, ExcitationError, IdentificationError
 from identify.rows.long_logs import is_long
 
-MOST_STARTS = 1000
-"""Instants of a log that are looked at for the beginning of another."""
-
 
 def identify(asked: Identify) -> None:
     """Identify logs, judge the result, write it."""
@@ -65,7 +62,7 @@ def identify(asked: Identify) -> None:
         fit = fit_logs(replace(asked, log=(path, *asked.log[1:])), named)
         whole = replace(fit.named, logs=fit.logs, log_names=fit.names)
         found, hidden = _shown(replace(whole, truth=_truth(stated, named)))
-        judged = judged_on(asked, found, fit)
+        judged, said = judged_on(asked, found, fit)
         of_file = [*warnings_of_robot(found.subject.robot), *plugin_conflicts()]
         warnings = {LOG: _warnings(judged, fit), FILE: of_file, MOTION: hidden}
         audience = audience or stack.enter_context(asked.watching.audience())
@@ -75,7 +72,7 @@ def identify(asked: Identify) -> None:
             for validated in judged:
                 print_validated(page, validated)
         warned = warn(page, warnings, warnings_of_result(found), _advice(judged[0], asked))
-        notes = [*_notes(fit), *fit.notes]
+        notes = [*_notes(fit), *fit.notes, *said]
         for note in notes:
             page.print(Text(note), soft_wrap=True)
         page.found |= {**summary_of(judged, first.absolute()), "notes": notes}

@@ -85,30 +85,34 @@ def fit_logs(asked: Identify, named: Identified) -> FitLogs:
     return FitLogs(tuple(every), named, tuple(notes))
 
 
-def judged_on(asked: Identify, found: Identified, fit: FitLogs) -> list[Validated]:
-    """Return the identification, to be judged on each of the other logs; on the end of its own without any.
+def judged_on(asked: Identify, found: Identified, fit: FitLogs) -> tuple[list[Validated], list[str]]:
+    """Return the identification, to be judged on each of the other logs, and what was done to these; on its end without any.
 
-    Their torque is that of the first log if options say it.
+    Where nothing says what their torque means, it is that of the first log.
     """
     if not asked.validate:
-        return [Validated(found)]
-    known = fit.logs[0]
-    stated = known.torque if asked.torque or asked.torque_delay else None
-    judged = []
+        return [Validated(found)], []
+    known = fit.read[0].channel  # as it was logged; its gain is of its own file
+    delay = str(known.delay) if asked.torque_delay else None
+    judged, notes = list[Validated](), list[str]()
     for given in asked.validate:
         path = file_of(given)
-        question = Question(unwrap=asked.unwrap, otherwise=stated, fallback=known.torque, columns=asked.reading)
+        fallback = replace(known, gain=1.0)
+        question = Question(asked.torque, delay, asked.unwrap, fallback, asked.reading)
         try:
-            second = read(path, question, found).longest
+            one = read(path, question, found)
         except (LogError, ExperimentError) as error:
             words = f"--validate {error}" if str(path) in str(error) else f"--validate {path}: {error}"
             raise ExperimentError(words) from error
+        second = one.longest
+        pieces = [f"of its {len(one.logs)} pieces the longest is judged"] if len(one.logs) > 1 else []
+        notes += [f"{path.name}: {note}" for note in (*one.notes, *pieces)]
         if any(_within(second, log) for log in fit.logs):
             raise ExperimentError(
                 f"--validate {path} holds the motion that is identified: give one that it has not seen, or none"
             )
         judged.append(Validated(found, second, str(given)))
-    return judged
+    return judged, notes
 
 
 def _with_cutoff(named: Identified, cutoff: float) -> Identified:

@@ -121,6 +121,8 @@ def require_targets(asked: Identify, subject: Subject) -> None:
             raise ExperimentError(f"{option} {target}: there is no folder {target.parent} for it, or it is a folder itself")
         if target.exists() and target.samefile(Robot.path(subject.name)):
             raise ExperimentError(f"{option} {target} is the robot's own file: choose another name")
+        if target.exists() and target != asked.write_mjcf and not asked.force:
+            raise ExperimentError(f"{option} {target} exists: choose another name, or replace it with --force")
 
 
 def warn(page: Page, *groups: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:

@@ -13,7 +13,8 @@ from experiments.identification.results import beside
 from experiments.identification.subject import CLOSED_FORM
 from identify import MotionLog
 from identify.data.resample import Repaired
-from identify.files.log_file import read_log, write_log
+from identify.files.layout import LAYOUT
+from identify.files.log_file import CSV, read_log, write_log
 
 
 def resample(asked: Resample) -> None:
@@ -23,6 +24,10 @@ def resample(asked: Resample) -> None:
         raise ExperimentError(f"--out {asked.out} is the log that is read: choose another name")
     if asked.out.exists() and not asked.force:
         raise ExperimentError(f"{asked.out} exists: choose another --out, or replace it with --force")
+    if asked.out.suffix.lower() == CSV and (asked.out.parent / LAYOUT).is_file():
+        raise ExperimentError(
+            f"--out {asked.out}: {LAYOUT} there would be taken for its columns: choose another folder, or .parquet"
+        )
     meaning = asked.torque or (columns.torque.meaning if columns.torque else None)
     if meaning is None:
         raise ExperimentError(f"{asked.log} does not say what its torque means: add --torque held, instantaneous or averaged")

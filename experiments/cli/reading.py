@@ -30,7 +30,7 @@ NEARLY = 0.2
 
 def file_of(log: Path) -> Path:
     """Return the log of a results folder, or the log itself."""
-    if not log.is_dir():
+    if not log.is_dir() or (log / "metadata.yaml").is_file():  # of a ROS bag
         return log
     if not (log / "log.parquet").is_file():
         raise ExperimentError(f"there is no log.parquet in {log}: name a log, or the folder of a run")
@@ -61,8 +61,6 @@ class Question:
         What its torque means, and its delay, as options say.
     unwrap : bool
         Whether jumps of a hinge by a turn are undone.
-    otherwise : TorqueChannel, optional
-        What its torque means, whatever the file says.
     fallback : TorqueChannel, optional
         What it means where the file says nothing.
     columns : ColumnOptions
@@ -72,7 +70,6 @@ class Question:
     torque: Meaning | None = None
     delay: str | None = None
     unwrap: bool = False
-    otherwise: TorqueChannel | None = None
     fallback: TorqueChannel | None = None
     columns: ColumnOptions = ColumnOptions()  # noqa: RUF009  # frozen
 
@@ -89,6 +86,8 @@ class ReadLog:
         The log; its pieces, if it has gaps.
     columns : LogColumns
         What the file holds.
+    channel : TorqueChannel
+        What its torque means, as it was logged.
     repaired : Repaired or None
         What was done to its clock, if that was asked for.
     notes : tuple of str
@@ -98,6 +97,7 @@ class ReadLog:
     path: Path
     logs: tuple[MotionLog, ...]
     columns: LogColumns
+    channel: TorqueChannel
     repaired: Repaired | None = None
     notes: tuple[str, ...] = ()
 
@@ -123,17 +123,17 @@ def read(path: Path, question: Question, named: Identified) -> ReadLog:
             f"{path} does not say what its torque means: add --torque held (a controller's command), instantaneous (a "
             "measurement) or averaged, and --torque-delay SECONDS or estimate"
         )
-    channel = question.otherwise or channel_of(stated, meaning, delay)
+    channel = channel_of(stated, meaning, delay)
     _require_seconds(path, columns.t)
     if not np.any(columns.tau) and np.ptp(columns.q, axis=0).any():
         raise ExperimentError(f"{path}: all torques are 0: there is nothing to identify")
     columns = replace(columns, q=_turned(path, columns.q, named, question.unwrap))
-    assumed = delay is None and stated is None and question.otherwise is None
+    assumed = delay is None and stated is None
     notes = ["no --torque-delay was given, 0 is assumed: `estimate` finds it"] if assumed else []
     if question.columns.resample or columns.t_tau is not None:
         repaired = Repaired.of(columns, channel)
         words = [*repaired.words(named.subject.robot.joints), *notes]
-        return ReadLog(path, repaired.logs, columns, repaired, tuple(words))
+        return ReadLog(path, repaired.logs, columns, channel, repaired, tuple(words))
     try:
         log = MotionLog.at_times(columns.t, columns.q, columns.tau, channel)
     except TimeError as error:
@@ -142,7 +142,7 @@ def read(path: Path, question: Question, named: Identified) -> ReadLog:
             f"{path}: {error}: add --resample, or write it anew and look: uv run idbench resample {shlex.quote(str(path))} "
             f"--torque {meaning}{late} --out uniform.parquet"
         ) from error
-    return ReadLog(path, (log,), columns, None, tuple(notes))
+    return ReadLog(path, (log,), columns, channel, None, tuple(notes))
 
 
 def with_delays(every: Sequence[ReadLog], named: Identified) -> list[ReadLog]:
@@ -159,7 +159,8 @@ def with_delays(every: Sequence[ReadLog], named: Identified) -> list[ReadLog]:
 def _delayed(read: ReadLog, found: DelayEstimate) -> ReadLog:
     logs = tuple(MotionLog(log.fs, log.q, log.tau, replace(log.torque, delay=found.delay)) for log in read.logs)
     sure = f"{1e3 * found.delay:.4g} ms, sigma {1e3 * found.sigma:.2g} ms (not in the sigmas above)"
-    return replace(read, logs=logs, notes=(*read.notes, f"torque delay estimated from the log: {sure}"))
+    channel = replace(read.channel, delay=found.delay)
+    return replace(read, logs=logs, channel=channel, notes=(*read.notes, f"torque delay estimated from the log: {sure}"))
 
 
 def columns_of(path: Path, options: ColumnOptions) -> LogColumns:
@@ -167,8 +168,9 @@ def columns_of(path: Path, options: ColumnOptions) -> LogColumns:
     if not options.stated:
         return read_columns(path)
     layout = LogLayout.read(options.layout) if options.layout else None
-    beside = LogLayout.beside(path) if path.suffix != LAYOUT_FILE else (LogLayout.read(path), path)
-    layout = layout or (beside[0] if beside else None) or layout_of(path)
+    if layout is None:
+        beside = LogLayout.beside(path) if path.suffix.lower() != LAYOUT_FILE else (LogLayout.read(path), path)
+        layout = beside[0] if beside else layout_of(path)
     for quantity, texts in (("columns", options.columns), ("unit", options.units)):
         for text in texts:
             name, mark, value = text.partition("=")
@@ -219,7 +221,8 @@ def _turned(path: Path, q: Array, named: Identified, unwrap: bool) -> Array:
                 f"{path}: {joint.name} jumps from {q[k, j]:.4g} to {q[k + 1, j]:.4g} rad at sample {k + 1}: an angle that "
                 "starts anew at every turn? Add --unwrap to count the turns"
             )
-        q[:, j] = np.unwrap(q[:, j])
+        known = np.isfinite(q[:, j])
+        q[known, j] = np.unwrap(q[known, j])
     return q
 
 

@@ -16,8 +16,9 @@ from experiments.text import new_table, print_titled
 from identify import LogError
 from identify.data.log_columns import LogColumns
 from identify.files.guess import Guess, guess
-from identify.files.layout import LogLayout, Source
+from identify.files.layout import LAYOUT, LogLayout, Source
 from identify.files.reading import LAYOUT_FILE, layout_of, read_columns
+from identify.files.units import needs_gain
 
 ROUNDED = 1e-4
 """Departure of a step's logarithm from a whole number up to which it is a file's decimal places, no encoder's."""
@@ -52,11 +53,11 @@ def _understood(asked: ShowLog) -> tuple[Guess, LogColumns]:
     path = asked.log
     if path.suffix.lower() == LAYOUT_FILE:
         return Guess(LogLayout.read(path)), read_columns(path)
-    beside = LogLayout.beside(path)
-    if beside and not asked.force:
-        return Guess(beside[0]), columns_of(path, asked.reading)
     if asked.reading.stated:
         return Guess(layout_of(path)), columns_of(path, asked.reading)
+    beside = None if asked.force else LogLayout.beside(path)
+    if beside:
+        return Guess(beside[0]), read_columns(path, _looked_at(beside[0]))
     try:
         found = guess(path)
     except LogError as error:
@@ -66,12 +67,12 @@ def _understood(asked: ShowLog) -> tuple[Guess, LogColumns]:
         raise ExperimentError(
             f"{path} has no column of times that idbench recognises: say which with --columns t=NAME, or state fs in a log.toml"
         )
-    # Currents without a gain are looked at as if they were torques.
-    return found, read_columns(path, replace(layout, gain=(1.0,)) if _needs_gain(layout) else layout)
+    return found, read_columns(path, _looked_at(layout))
 
 
-def _needs_gain(layout: LogLayout) -> bool:
-    return layout.tau.unit in ("A", "mA") and not layout.gain
+def _looked_at(layout: LogLayout) -> LogLayout:
+    """Return a layout whose currents count as torques where their gain is not known yet."""
+    return replace(layout, gain=(1.0,)) if needs_gain(layout.tau.unit) and not layout.gain else layout
 
 
 def _print_layout(page: Page, layout: LogLayout, doubts: Sequence[str]) -> None:
@@ -118,6 +119,5 @@ def _write(page: Page, asked: ShowLog, layout: LogLayout) -> None:
     if target.exists() and not asked.force:
         raise ExperimentError(f"{target} exists: replace it with --force")
     write_whole(target, layout.text)
-    page.print(
-        Text(f"written to {target}: correct it where it is wrong; what is read from now on is what it says"), soft_wrap=True
-    )
+    every = ", and every other log of the folder" if target.name == LAYOUT else ""
+    page.print(Text(f"written to {target}: correct it; this log is read by it from now on{every}"), soft_wrap=True)

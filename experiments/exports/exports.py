@@ -11,6 +11,9 @@ from experiments.identification.results import write_whole
 
 Warnings = list[str]
 
+EARTH = [0.0, 0.0, -9.81]
+"""Gravity as readers of a URDF have it."""
+
 
 def write_mjcf(found: Identified, model: str, path: Path) -> Warnings:
     """Write the robot's file with the parameters; what of them bodies cannot have is said."""
@@ -24,10 +27,12 @@ def write_urdf(found: Identified, model: str, path: Path) -> Warnings:
     from sim.robot.write_urdf import urdf_text
 
     written, subject = Written(found, model), found.subject
-    write_whole(path, urdf_text(subject.name, subject.tree, written.values, subject.mounting))
+    write_whole(path, urdf_text(subject.name, subject.robot, subject.tree, written.values, subject.mounting))
     rotors = [name for name, value in written.values.items() if name.startswith("Ia") and value]
     lost = [f"{', '.join(rotors)} have no place in a URDF: rotors are left out of {path}"] if rotors else []
-    return [*written.warnings, *lost]
+    turned = [float(x) for x in subject.tree.gravity] != EARTH
+    aside = [f"gravity {subject.tree.gravity.tolist()} has no place in a URDF"] if turned else []
+    return [*written.warnings, *lost, *aside]
 
 
 def write_json(found: Identified, model: str, path: Path) -> Warnings:

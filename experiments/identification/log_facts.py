@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from math import comb
 from typing import Any, final
 
 import numpy as np
@@ -11,13 +10,11 @@ import numpy as np
 from identify import Array, MotionLog, TorqueChannel, encoder_steps
 from identify.data.log_columns import LogColumns
 from identify.data.resample import Repaired
+from identify.data.velocities import white_noise
 from identify.judge.band import content_end
 
 STILL = 1e-3
 """A joint stands while its velocity is below this share of its largest."""
-
-ORDER = 6
-"""Differences after which next to nothing of a motion is left, and of white noise much."""
 
 
 @final
@@ -57,7 +54,7 @@ class LogFacts:
     def rows(self) -> list[dict[str, Any]]:
         """What each joint's columns are like."""
         log, steps = self.log, encoder_steps(self.columns.q)
-        noises = [_noise(x) for x in (log.q, log.tau)]
+        noises = [white_noise(x) for x in (log.q, log.tau)]
         speed = np.abs(self.velocities)
         return [
             {
@@ -97,8 +94,3 @@ class LogFacts:
             "joints": self.rows,
             "notes": list(self.notes()),
         }
-
-
-def _noise(x: Array) -> Array:
-    differences = np.diff(x, ORDER, axis=0)
-    return np.asarray(np.sqrt(np.mean(differences**2, axis=0) / comb(2 * ORDER, ORDER)))

@@ -74,12 +74,10 @@ class Clock:
         if len(rows) >= LEAST and np.mean(~forward) > 0.5:
             raise LogError("time hardly ever increases: is its column the right one?")
         backward, rows = int(np.count_nonzero(~forward)), rows[forward]
+        _require_enough(rows, finite)
         fresh = _fresh(columns, rows)
         repeated, rows = int(np.count_nonzero(~fresh)), rows[fresh]
-        if len(rows) < LEAST:
-            raise LogError(
-                f"{len(rows)} rows are left of {len(finite)}, without those that repeat others or have no value: too few"
-            )
+        _require_enough(rows, finite)
         clocks = dict(_clocks(t[rows]))
         rough = {word: _roughness(times, columns.q[rows]) for word, times in clocks.items()}
         word = next(word for word, left in rough.items() if ROUGHER * left <= min(rough.values()))
@@ -154,8 +152,34 @@ class Clock:
             yield f"nothing was logged for {length:.3g} s after t = {start:.4g} s: the log is cut there"
 
 
+def _require_enough(rows: npt.NDArray[np.intp], every: npt.NDArray[np.bool_]) -> None:
+    if len(rows) < LEAST:
+        raise LogError(f"{len(rows)} rows are left of {len(every)}, without those that repeat others or have no value: too few")
+
+
+def torque_stretches(columns: LogColumns) -> tuple[LogColumns, list[tuple[float, float]]]:
+    """Return columns whose torques, with times of their own, have values and increasing times, and where they have no gap."""
+    t, tau = columns.t_tau, columns.tau
+    if t is None:
+        return columns, []
+    sound = np.isfinite(t) & np.isfinite(tau).all(axis=1)
+    t, tau = t[sound], tau[sound]
+    forward = t > np.maximum.accumulate(np.concatenate([[-np.inf], t[:-1]]))
+    t, tau = t[forward], tau[forward]
+    if len(t) < LEAST:
+        raise LogError(f"{len(t)} torques have values and times that increase: too few")
+    steps = np.diff(t)
+    ends = [0, *(np.flatnonzero(steps > max(LONGEST, 3.5 * float(np.median(steps)))) + 1), len(t)]
+    return replace(columns, t_tau=t, tau=tau), [(float(t[a]), float(t[b - 1])) for a, b in pairwise(ends)]
+
+
 def _fresh(columns: LogColumns, rows: npt.NDArray[np.intp]) -> npt.NDArray[np.bool_]:
-    """Return which rows do not repeat the one before; where the robot stands, repeats are no fault."""
+    """Return which rows do not repeat the one before; where the robot stands, repeats are no fault.
+
+    Positions alone repeat wherever their encoder is coarse: they say nothing.
+    """
+    if columns.t_tau is not None and columns.qd is None:
+        return np.ones(len(rows), dtype=bool)
     parts = [columns.q, *([] if columns.t_tau is not None else [columns.tau]), *([] if columns.qd is None else [columns.qd])]
     whole = np.concatenate(parts, axis=1)[rows]
     same = np.concatenate([[False], (np.diff(whole, axis=0) == 0).all(axis=1)])

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from identify.arrays import Array
-from identify.data.clock import Clock
+from identify.data.clock import Clock, torque_stretches
 from identify.data.log_columns import LogColumns
 from identify.data.motion_log import MotionLog, TorqueChannel
 from identify.data.velocities import Velocities
@@ -16,6 +16,12 @@ from identify.errors import LogError, require_positive
 
 MOST_SAMPLES = 1e8
 """Samples above which a frequency is taken for a slip."""
+
+LEAST_VELOCITIES = 50
+"""Samples from which on logged velocities are compared with differences."""
+
+FEW = 4
+"""Rows that an interpolation takes."""
 
 SHORTEST = 1.0
 """Pieces between gaps that are shorter than this [s] are left out."""
@@ -38,12 +44,15 @@ class Repaired:
         What the logged velocities are worth; None without any.
     short : int
         How many pieces were too short to be kept.
+    torque_gaps : int
+        How many gaps torques with times of their own have.
     """
 
     logs: tuple[MotionLog, ...]
     clock: Clock
     velocities: Velocities | None = None
     short: int = 0
+    torque_gaps: int = 0
 
     @classmethod
     def of(cls, columns: LogColumns, torque: TorqueChannel, fs: float | None = None) -> Self:
@@ -56,25 +65,29 @@ class Repaired:
         LogError
             If too few rows are left, or no piece between gaps is long enough.
         """
+        columns, stretches = torque_stretches(columns)
         clock = Clock.of(columns)
         sound, fs = clock.columns(columns), fs or _round(1 / clock.period)
-        found, short, velocities = list[MotionLog](), 0, None
-        for piece in clock.pieces:
-            part = replace(sound, t=sound.t[piece], q=sound.q[piece], qd=None if sound.qd is None else sound.qd[piece])
-            if sound.t_tau is None:
-                part = replace(part, tau=sound.tau[piece])
-            if part.t[-1] - part.t[0] < SHORTEST and len(clock.pieces) > 1:
+        found, short, velocities, parts = list[MotionLog](), 0, None, _parts(sound, clock, stretches)
+        for part in parts:
+            if part.t[-1] - part.t[0] < SHORTEST and len(parts) > 1:
                 short += 1
                 continue
             log, known = _uniform(part, torque, fs)
             found, velocities = [*found, log], velocities or known
         if not found:
-            raise LogError(f"no piece between the {len(clock.gaps)} gaps is longer than {SHORTEST:g} s")
-        return cls(tuple(found), clock, velocities, short)
+            raise LogError(
+                f"no piece of {len(parts)} between gaps is longer than {SHORTEST:g} s"
+                if parts
+                else "times of torques and positions do not overlap: are they of one clock, and in one unit?"
+            )
+        return cls(tuple(found), clock, velocities, short, max(len(stretches) - 1, 0))
 
     def words(self, joints: tuple[str, ...]) -> Iterator[str]:
         """Yield what was done, a sentence each."""
         yield from self.clock.words()
+        if self.torque_gaps:
+            yield f"torques have {self.torque_gaps} gaps of their own: the log is cut there"
         if self.short:
             yield f"{self.short} pieces shorter than {SHORTEST:g} s are left out"
         if self.velocities is not None:
@@ -125,12 +138,29 @@ def resample(t: Array, q: Array, tau: Array, torque: TorqueChannel, fs: float, t
     return MotionLog(fs, positions, np.asarray(between, dtype=np.float64), torque)
 
 
+def _parts(sound: LogColumns, clock: Clock, stretches: list[tuple[float, float]]) -> list[LogColumns]:
+    """Return the pieces between gaps of positions, and of torques that have times of their own."""
+    found = []
+    for piece in clock.pieces:
+        part = replace(sound, t=sound.t[piece], q=sound.q[piece], qd=None if sound.qd is None else sound.qd[piece])
+        if part.t_tau is None:
+            found.append(replace(part, tau=sound.tau[piece]))
+            continue
+        for start, end in stretches:
+            rows, own = (np.flatnonzero((t >= start) & (t <= end)) for t in (part.t, part.t_tau))
+            if len(rows) >= FEW and len(own) >= FEW:
+                rows = np.arange(max(rows[0] - 1, 0), min(rows[-1] + 2, len(part.t)))
+                qd = None if part.qd is None else part.qd[rows]
+                found.append(replace(part, t=part.t[rows], q=part.q[rows], qd=qd, tau=part.tau[own], t_tau=part.t_tau[own]))
+    return found
+
+
 def _uniform(part: LogColumns, torque: TorqueChannel, fs: float) -> tuple[MotionLog, Velocities | None]:
     """Return a piece without gaps as a log, its positions improved by velocities that know better."""
     steps = np.diff(part.t)
     as_is = part.t_tau is None and np.abs(steps * fs - 1).max() < 1e-3
     log = MotionLog(fs, part.q, part.tau, torque) if as_is else resample(part.t, part.q, part.tau, torque, fs, part.t_tau)
-    if part.qd is None or not np.isfinite(part.qd).all():
+    if part.qd is None or not np.isfinite(part.qd).all() or log.samples < LEAST_VELOCITIES:
         return log, None
     start = 0.0 if as_is else max(part.t[0], part.t_tau[0]) if part.t_tau is not None else part.t[0]
     qd = part.qd if as_is else scipy.interpolate.CubicSpline(part.t, part.qd)(start + log.t)

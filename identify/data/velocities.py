@@ -63,7 +63,7 @@ class Velocities:
             if np.any(v[:, j]):
                 a, b = np.linalg.lstsq(np.stack([v[:, j], -dv[:, j]], axis=1), logged[:, j])[0]
                 scale[j], delay[j] = a, b / a if a else np.nan
-        return cls(scale, delay, _noise(qd) / np.maximum(2 * np.pi * _noise(q), 1e-300), fs)
+        return cls(scale, delay, white_noise(qd) / np.maximum(2 * np.pi * white_noise(q), 1e-300), fs)
 
     @property
     def consistent(self) -> npt.NDArray[np.bool_]:
@@ -112,7 +112,7 @@ def _between(values: Iterable[float]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _noise(x: Array) -> Array:
+def white_noise(x: Array) -> Array:
     """Return the standard deviation of white noise, from differences of higher order, shape (joint,)."""
     differences = np.diff(x, ORDER, axis=0)
     return np.asarray(np.sqrt(np.median(differences**2, axis=0) / 0.4549 / comb(2 * ORDER, ORDER)))

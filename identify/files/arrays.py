@@ -13,7 +13,7 @@ from identify.arrays import Array
 from identify.errors import LogError
 from identify.files.table import LogTable
 
-BROKEN = (ValueError, EOFError, KeyError, TypeError, zipfile.BadZipFile, zlib.error, OSError)
+BROKEN = (MemoryError, ValueError, EOFError, KeyError, TypeError, zipfile.BadZipFile, zlib.error, OSError)
 """What readers raise of files that are none of theirs."""
 
 
@@ -23,13 +23,13 @@ def read_numpy(path: Path) -> LogTable:
         with path.open("rb") as file:
             found = np.load(file, allow_pickle=False)
             if isinstance(found, np.lib.npyio.NpzFile):
-                return _table({name: found[name] for name in found.files})
+                return _table({name: _array(found, name) for name in found.files})
     except BROKEN as error:
         raise LogError(f"cannot read the log {path} as NumPy's: {str(error).splitlines()[0]}") from error
     if found.dtype.names:
         return _table({name: found[name] for name in found.dtype.names})
-    if found.ndim != 2:
-        raise LogError(f"{path} holds an array of shape {found.shape}, not (rows, columns)")
+    if found.ndim != 2 or found.dtype.kind not in "iufb":
+        raise LogError(f"{path} holds an array of {found.dtype} of shape {found.shape}, not numbers (rows, columns)")
     upright = found if found.shape[0] >= found.shape[1] else found.T
     return LogTable({str(i + 1): column for i, column in enumerate(upright.T.astype(np.float64))}, named=False)
 
@@ -43,6 +43,14 @@ def read_matlab(path: Path) -> LogTable:
     except BROKEN as error:
         raise LogError(f"cannot read the log {path} as a MAT file: {str(error).splitlines()[0]}") from error
     return _table({name: x for key, value in found.items() if not key.startswith("__") for name, x in _inside(key, value)})
+
+
+def _array(file: Any, name: str) -> Any:
+    """Return an array of a file; of objects, which only a pickle holds, their name."""
+    try:
+        return file[name]
+    except ValueError:
+        return np.array("objects")
 
 
 def _inside(name: str, value: Any) -> Iterator[tuple[str, Any]]:

@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 TORQUE = b"idbench.torque"
 """Key of what a Parquet file says of its torque."""
 
-NUMBER = r"[-+.\deE,]*\d[-+.\deE,]*"
+BOM = b"\xef\xbb\xbf"
+"""How some programs begin a file of UTF-8."""
+
+NUMBER = r"[-+.\deE,]*\d[-+.\deE,]*|[-+]?(nan|inf|infinity)"
 
 
 def arrow() -> ModuleType:
@@ -34,7 +37,7 @@ def arrow() -> ModuleType:
     return pyarrow
 
 
-def read_text(path: Path, separator: str = "") -> LogTable:
+def read_text(path: Path) -> LogTable:
     """Return the columns of a text file: CSV, with semicolons, tabs or blanks, with a line of names or without, packed or not.
 
     Without a line of names columns are called 1, 2, ...; lines that begin with # or % before the numbers are passed over,
@@ -44,7 +47,7 @@ def read_text(path: Path, separator: str = "") -> LogTable:
     from pyarrow import csv
 
     try:
-        skipped, names, mark = _head(path, separator)
+        skipped, names, mark = _head(path)
         if mark == b" ":
             return _blanks(path, skipped, names)
         read = csv.ReadOptions(skip_rows=skipped, column_names=names or None)
@@ -82,18 +85,17 @@ def _opened(path: Path) -> IO[bytes]:
     return gzip.open(path, "rb") if path.suffix.lower() == ".gz" else path.open("rb")  # type: ignore[return-value]
 
 
-def _head(path: Path, separator: str) -> tuple[int, list[str], bytes]:
+def _head(path: Path) -> tuple[int, list[str], bytes]:
     """Return how many lines to pass over, names if the file has no line of them there, and what separates columns."""
     with _opened(path) as file:
         lines = [file.readline() for _ in range(200)]
     skipped = next((i for i, line in enumerate(lines) if line.strip() and line[:1] not in b"#%"), 0)
-    first, comment = lines[skipped], lines[skipped - 1].lstrip(b"#% ") if skipped else b""
-    known = [separator.encode()] if separator else [b",", b";", b"\t", b" "]
-    mark = next((mark for mark in known if mark in first.strip()), b",")
-    if mark == b"," and b";" in first:
-        mark = b";"
+    first, comment = lines[skipped].removeprefix(BOM), lines[skipped - 1].lstrip(b"#% ") if skipped else b""
+    mark = next((mark for mark in (b"\t", b";", b",", b" ") if mark in first.strip()), b",")
+    if mark == b"," and len(blanks := first.split()) > 1 and all(re.fullmatch(rb"[-+]?\d+(,\d+)?", x) for x in blanks):
+        mark = b" "  # decimal commas
     cells = _cells(first, mark)
-    if not all(re.fullmatch(NUMBER, cell) for cell in cells if cell):
+    if not all(re.fullmatch(NUMBER, cell, re.IGNORECASE) for cell in cells if cell):
         return skipped, [], mark
     named = _cells(comment, mark)
     return skipped, named if len(named) == len(cells) else [str(i + 1) for i in range(len(cells))], mark
@@ -115,9 +117,12 @@ def _blanks(path: Path, skipped: int, names: list[str]) -> LogTable:
     """Return the columns of a file that separates them by blanks."""
     with _opened(path) as file:
         lines = file.read().decode("utf-8").splitlines()[skipped:]
-    found, given = names or lines[0].split(), lines if names else lines[1:]
+    found, given = names or lines[0].lstrip("\ufeff").split(), lines if names else lines[1:]
+    _require_single(path, found)
+    decimal = any("," in line for line in given) and not any("." in line for line in given)
     try:
-        values = np.array([[float(cell) for cell in line.split()] for line in given if line.strip()])
+        rows = (line.replace(",", ".") if decimal else line for line in given if line.strip())
+        values = np.array([[float(cell) for cell in line.lstrip("\ufeff").split()] for line in rows])
     except ValueError as error:
         raise LogError(f"cannot read the log {path}: {error}") from error
     if values.ndim != 2 or values.shape[1] != len(found):

@@ -49,6 +49,9 @@ CURRENTS = ("current", "currents", "cur", "amps")
 FARTHEST = 4 * np.pi
 """Positions [rad] beyond which degrees are suspected."""
 
+FEWEST = 10
+"""Rows that a guess takes."""
+
 STRONGEST = 3e3
 """Torques [N m] beyond which mN m are suspected."""
 
@@ -81,6 +84,8 @@ def guess(path: Path) -> Guess:
         If it cannot be read, or nothing in it looks like times, positions and torques.
     """
     table = read_table(path)
+    if table.rows < FEWEST:
+        raise LogError(f"{path} has {table.rows} rows: too few to say what its columns are")
     found = _by_names(table) if table.named else _by_values(path, table)
     if not found.q.columns and not found.tau.columns and all(column.ndim == 1 for column in table.columns.values()):
         found = _by_values(path, table)
@@ -228,7 +233,9 @@ def _suspected(quantity: str, layout: LogLayout, table: LogTable) -> str:
 
 
 def _values(table: LogTable, source: Source) -> Array:
-    return np.concatenate([table.columns[name].reshape(table.columns[name].shape[0], -1) for name in source.columns], axis=1)
+    """Return the columns of a source, shape (row, column), to the end of the shortest."""
+    rows = min(len(table.columns[name]) for name in source.columns)
+    return np.concatenate([table.columns[name][:rows].reshape(rows, -1) for name in source.columns], axis=1)
 
 
 def _largest(table: LogTable, source: Source) -> float:
@@ -252,7 +259,8 @@ def _velocity_unit(table: LogTable, layout: LogLayout) -> str:
         return ""
     t = table.columns[layout.t.columns[0]] * factor("t", layout.t.unit or "s")
     q = _values(table, layout.q) * factor("q", layout.q.unit or "rad")
-    v, given = np.gradient(q, axis=0) / max(float(np.median(np.diff(t))), 1e-12), _values(table, layout.qd)
+    v, given = np.gradient(np.nan_to_num(q), axis=0) / max(float(np.nanmedian(np.diff(t))), 1e-12), _values(table, layout.qd)
+    given = np.nan_to_num(given)
     if v.shape != given.shape or not np.any(v):
         return ""
     ratio = float(np.sum(v * given) / np.sum(v * v))

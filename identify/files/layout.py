@@ -80,7 +80,7 @@ class LogLayout:
         """Return the layout that stands beside a log, under its name or as log.toml, and its path; None if there is none."""
         stem = log.with_suffix("") if log.suffix.lower() == ".gz" else log
         for path in (stem.with_suffix(".toml"), log.parent / LAYOUT):
-            if path.is_file():
+            if path.is_file() and path != log and (path.name == LAYOUT or _is_layout(path)):
                 return cls.read(path), path
         return None
 
@@ -107,7 +107,10 @@ class LogLayout:
         channel = TorqueChannel(**torque) if "meaning" in torque else None
         if torque and channel is None:
             raise LogError("[torque] states a delay and no meaning: held, instantaneous or averaged")
-        rows = {str(k): float(v) for k, v in stated.get("rows", {}).items()}
+        rows = stated.get("rows", {})
+        if not isinstance(rows, dict):
+            raise LogError(f"rows = {rows!r} must be a table: [rows], then lines such as episode_index = 3")
+        rows = {str(k): float(v) for k, v in rows.items()}
         return cls(**sources, joints=tuple(stated.get("joints", ())), torque=channel, gain=gains, rows=rows)
 
     def where(self, quantity: str, source: Source) -> Self:
@@ -131,22 +134,30 @@ class LogLayout:
         if self.gain:
             lines += [f"gain = {list(self.gain)}"]
         if self.rows:
-            lines += ["", "[rows]", *(f"{json.dumps(name)} = {value:g}" for name, value in self.rows.items())]
+            lines += ["", "[rows]", *(f"{json.dumps(name)} = {value!r}" for name, value in self.rows.items())]
         return "\n".join(lines).strip() + "\n"
 
 
 def matching(pattern: str, names: Sequence[str]) -> list[tuple[str, str]]:
     """Return the names that a pattern with a * stands for, and what is in its place: by number, or in the order of the file."""
-    found = []
-    for name in names:
-        inner = re.fullmatch(".+?".join(map(re.escape, pattern.split("*", 1))).replace(".+?", "(.+?)", 1), name)
-        if inner:
-            found.append((name, inner[1]))
+    before, _, after = pattern.partition("*")
+    # q* is q1 and q_elbow, not qd1.
+    star = r"(\d+|[\W_].*)" if before[-1:].isalnum() else "(.+?)"
+    matches = [re.fullmatch(re.escape(before) + star + re.escape(after), name) for name in names]
+    found = [(match.string, match[1].strip(" _-./[]()")) for match in matches if match]
     numbered = [re.fullmatch(r"\D*(\d+)\D*", inner) for _, inner in found]
     if found and all(numbered):
         order = sorted(range(len(found)), key=lambda i: int(numbered[i][1]))  # type: ignore[index]  # all are matches
         return [found[i] for i in order]
     return found
+
+
+def _is_layout(path: Path) -> bool:
+    """Return whether a file beside a log says what its columns are: a robot or a scenario may have the same name."""
+    try:
+        return bool({"t", "q", "qd", "tau", "torque", "rows"} & set(tomllib.loads(path.read_text(encoding="utf-8"))))
+    except (OSError, ValueError, RecursionError):
+        return True  # it is complained of
 
 
 def _source(name: str, stated: Any, file: str) -> Source:

@@ -68,6 +68,8 @@ def read_log(path: Path, torque: TorqueChannel | None = None, joints: Sequence[s
     if found.joints and not joints:
         raise LogError(f"{path} names its joints, {', '.join(found.joints)}: say their order with joints=(...)")
     found = found.ordered(joints) if joints else found
+    if found.t_tau is not None:
+        raise LogError(f"{path} has torques at times of their own: identify.data.resample.Repaired.of puts them on one clock")
     channel = torque or found.torque
     if channel is None:
         raise LogError(

@@ -12,9 +12,12 @@ from identify.data.log_columns import LogColumns
 from identify.data.motion_log import TorqueChannel
 from identify.errors import LogError
 from identify.files.formats import read_table
-from identify.files.layout import LogLayout, Source, matching
+from identify.files.layout import LAYOUT, LogLayout, Source, matching
 from identify.files.table import LogTable
 from identify.files.units import needs_gain
+
+CLOCKS = 1e6
+"""Times [s] beyond this are those of a calendar: logs count from their beginning."""
 
 LAYOUT_FILE = ".toml"
 """What the name of a layout ends with, which may be given in the place of a log."""
@@ -43,12 +46,15 @@ def read_columns(path: Path, layout: LogLayout | None = None) -> LogColumns:
         if not files:
             raise LogError(f'{path} names no file of the log: add a line such as file = "run.csv" before the tables')
         return _Files(path.parent / files[0], path.parent, layout).columns
-    found = None if layout else LogLayout.beside(path)
-    if found:
-        return _Files(path, found[1].parent, found[0]).columns
     if layout:
         return _Files(path, path.parent, layout).columns
-    table = read_table(path)
+    found, table = LogLayout.beside(path), None
+    if found and found[1].name == LAYOUT:
+        table = read_table(path)
+        found = None if table.torque is not None else found  # what idbench wrote is no log of that folder's recorder
+    if found:
+        return _Files(path, found[1].parent, found[0]).columns
+    table = table or read_table(path)
     return _Files(path, path.parent, standard_layout(path, table), {path: table}).columns
 
 
@@ -98,22 +104,29 @@ class _Files:
     def columns(self) -> LogColumns:
         """What they hold."""
         layout = self.layout
-        q, joints = self._of("q", layout.q)
-        tau, joints_of_tau = self._of("tau", layout.tau)
+        found = {name: self._of(name, getattr(layout, name)) for name in ("q", "tau", *(["qd"] if layout.qd.columns else []))}
+        names = layout.joints or next((joints for _, joints in found.values() if joints), ())
+        q, tau, *more = (self._ordered(name, *of, names) for name, of in found.items())
         if q.shape[1] != tau.shape[1]:
             raise LogError(f"{self.log}: {q.shape[1]} columns of positions and {tau.shape[1]} of torques: one of each a joint")
-        names = layout.joints or joints or joints_of_tau
         if names and len(names) != q.shape[1]:
             raise LogError(f"{self.log}: {len(names)} names of joints, {q.shape[1]} columns of positions")
-        if names and joints and joints_of_tau and set(joints) == set(joints_of_tau):
-            tau = tau[:, [joints_of_tau.index(joint) for joint in joints]]
-        qd = self._of("qd", layout.qd)[0] if layout.qd.columns else None
+        qd = more[0] if more else None
         t, t_tau = self._times(layout.q, len(q)), self._times(layout.tau, len(tau))
         other = t_tau.shape != t.shape or not np.array_equal(t, t_tau)
-        start = min(t[0], t_tau[0]) if other and len(t) and len(t_tau) else 0.0
+        since = min((times[0] for times in (t, t_tau) if len(times)), default=0.0)
+        start = since if other or abs(since) > CLOCKS else 0.0  # since 1970
         channel = layout.torque or self._stated()
         tau = tau * self._gain(tau.shape[1])
         return LogColumns(t - start, q, tau, channel, names, qd, t_tau - start if other else None)
+
+    def _ordered(self, quantity: str, values: Array, joints: tuple[str, ...], names: tuple[str, ...]) -> Array:
+        """Return columns in the order of the joints' names, where they have names themselves."""
+        if not joints or joints == names:
+            return values
+        if set(joints) != set(names):
+            raise LogError(f"{self.log}: columns of {quantity} are of {', '.join(joints)}, where joints are {', '.join(names)}")
+        return values[:, [joints.index(name) for name in names]]
 
     def _gain(self, n: int) -> Array:
         gain = self.layout.gain
@@ -151,10 +164,12 @@ class _Files:
         """Return which rows of a file belong to the log."""
         kept = None
         for name, value in self.layout.rows.items():
+            if path != self.log and name not in self._table(path).columns:
+                continue  # a second file may be of one run alone
             column = self._table(path).require(name, path)
             kept = (column == value) if kept is None else kept & (column == value)
             if not kept.any():
-                raise LogError(f"{path}: {name} is {value:g} in no row; it goes from {column.min():g} to {column.max():g}")
+                raise LogError(f"{path}: {name} is {value!r} in no row; it goes from {column.min()!s} to {column.max()!s}")
         return slice(None) if kept is None else kept
 
     def _of(self, quantity: str, source: Source) -> tuple[Array, tuple[str, ...]]:
@@ -164,13 +179,13 @@ class _Files:
         for pattern in source.columns:
             if pattern in table.columns or "*" not in pattern:
                 column = table.require(pattern, path)
-                columns += [column] if column.ndim == 1 else list(column.T)
+                columns += _singly(column)
                 joints += table.entries.get(pattern, ())
                 continue
             inside = matching(pattern, list(table.columns))
             if not inside:
                 raise LogError(f"{path} has no columns {pattern}; its columns: {', '.join(list(table.columns)[:40])}")
-            columns += [table.columns[name] for name, _ in inside]
+            columns += [column for name, _ in inside for column in _singly(table.columns[name])]
             joints += [place for _, place in inside if not re.fullmatch(r"\d+", place)]
         if len({len(column) for column in columns}) != 1:
             raise LogError(f"{path}: columns {', '.join(source.columns)} of {quantity} differ in length")
@@ -187,7 +202,12 @@ class _Files:
         t = self._table(path).require(name, path)[self._rows(path)] * clock.scale("t")
         if len(t) != count:
             raise LogError(f"{path}: {len(t)} times for {count} samples")
-        return t - t[0] if len(t) and abs(t[0]) > 1e6 else t  # since 1970
+        return t
+
+
+def _singly(column: Array) -> list[Array]:
+    """Return the entries of a column as columns."""
+    return [column] if column.ndim == 1 else list(column.T)
 
 
 def _require_names(path: Path, table: LogTable) -> None:

@@ -18,8 +18,14 @@ TABLE = ".toml"
 KHALIL, CLASSIC = "khalil-kleinfinger", "classic"
 
 KNOWN = ("name", "convention", "angles", "gravity", "joints")
-OF_JOINTS = ("name", "parent", "sigma", "gamma", "b", "alpha", "d", "theta", "r", "a", "range", "armature")
+OF_JOINTS = ("name", "sigma", "alpha", "d", "theta", "range", "armature")
 """Keys of a file, and of each of its joints."""
+
+OF_CONVENTION = {KHALIL: ("parent", "gamma", "b", "r"), CLASSIC: ("a",)}
+"""And those that a convention has beside them."""
+
+RIGHT = 1e-5
+"""Angles [rad] this near to a multiple of a right angle are meant to be it: 1.5708."""
 
 
 def from_table(path: Path) -> tuple[mujoco.MjSpec, list[str]]:
@@ -39,19 +45,29 @@ def from_table(path: Path) -> tuple[mujoco.MjSpec, list[str]]:
         stated = tomllib.loads(path.read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
         raise RobotError(f"{path}: {error}") from error
+    try:
+        return _described(path, stated)
+    except (AttributeError, TypeError) as error:
+        raise RobotError(
+            f"{path}: a value is of the wrong kind ({error}): [[joints]] are tables, range and gravity lists"
+        ) from error
+
+
+def _described(path: Path, stated: Mapping[str, Any]) -> tuple[mujoco.MjSpec, list[str]]:
     _require_known(path, "", stated, KNOWN)
     convention = stated.get("convention", KHALIL)
     if convention not in (KHALIL, CLASSIC):
         raise RobotError(f"{path}: convention = {convention!r} is none of {KHALIL}, {CLASSIC}")
-    scale = {"rad": 1.0, "deg": np.pi / 180}.get(stated.get("angles", ""))
+    scale = {"rad": 1.0, "deg": np.pi / 180}.get(str(stated.get("angles", "")))
     if scale is None:
         raise RobotError(f'{path}: say angles = "rad" or angles = "deg"')
     spec, bodies = mujoco.MjSpec(), dict[str, mujoco.MjsBody]()
+    spec.compiler.degree = False
     spec.option.gravity = stated.get("gravity", [0.0, 0.0, -9.81])
     last, distal = spec.worldbody, (np.zeros(3), np.eye(3))
     for number, joint in enumerate(stated.get("joints", [])):
         name = str(joint.get("name", f"joint{number + 1}"))
-        _require_known(path, f"joint {name}", joint, OF_JOINTS)
+        _require_known(path, f"joint {name}", joint, OF_JOINTS + OF_CONVENTION[convention])
         values = _Values(path, name, joint, scale)
         if convention == KHALIL:
             parent = _parent(path, joint, bodies, last)
@@ -84,7 +100,7 @@ class _Values:
         # Multiples of a right angle are meant exactly, however they are rounded.
         value = self.length(key) * self._scale
         quarter = np.round(value / (np.pi / 2)) * np.pi / 2
-        return quarter if abs(value - quarter) < 1e-4 else value
+        return quarter if abs(value - quarter) < RIGHT else value
 
     @property
     def slides(self) -> bool:

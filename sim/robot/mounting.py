@@ -61,7 +61,7 @@ class Mounting:
         for joint in [joint for joint in spec.joints if joint.name in held]:
             _hold(spec, joint, held[joint.name])
         if held:
-            _forget(spec, set(held))
+            _forget(spec, set(held), names)
 
 
 PLAIN = Mounting()
@@ -74,7 +74,13 @@ def _hold(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, value: float) -> None:
         spec.delete(joint)
         return
     body, axis = joint.parent, np.array(joint.axis) / np.linalg.norm(joint.axis)
-    turned, way = _orientation(body), value - float(joint.ref)
+    if len(list(body.joints)) > 1:
+        raise RobotError(
+            f"{joint.name} is one of several joints of body {body.name!r}, which cannot be held one by one: give each "
+            "a body of its own in the file"
+        )
+    in_degrees = spec.compiler.degree and joint.type == mujoco.mjtJoint.mjJNT_HINGE
+    turned, way = _orientation(spec, body), value - float(joint.ref) * (np.pi / 180 if in_degrees else 1.0)
     if joint.type == mujoco.mjtJoint.mjJNT_SLIDE:
         body.pos = np.array(body.pos) + _rotated(turned, axis * way)
     else:
@@ -88,12 +94,13 @@ def _hold(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, value: float) -> None:
     spec.delete(joint)
 
 
-def _orientation(body: mujoco.MjsBody) -> Array:
+def _orientation(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> Array:
     """Return the orientation of a body as a quaternion, however its file states it."""
     model = body.alt
     if model.type == mujoco.mjtOrientation.mjORIENTATION_QUAT:
         return np.array(body.quat, dtype=np.float64) / np.linalg.norm(body.quat)
     alone = mujoco.MjSpec()
+    alone.compiler.degree, alone.compiler.eulerseq = spec.compiler.degree, spec.compiler.eulerseq
     copy = alone.worldbody.add_body(name="copy")
     copy.alt = model
     copy.add_geom(size=[1.0, 0.0, 0.0])
@@ -106,8 +113,11 @@ def _rotated(quaternion: Array, vector: Array) -> Array:
     return found
 
 
-def _forget(spec: mujoco.MjSpec, held: set[str]) -> None:
-    """Take out what refers to joints that are no more: ties, actuators, sensors, keyframes."""
+def _forget(spec: mujoco.MjSpec, held: set[str], names: Sequence[str]) -> None:
+    """Take out what refers to joints that are no more: ties, actuators, sensors, keyframes, entries of limits."""
+    left = [j for j, name in enumerate(names) if name not in held]
+    for numeric in [x for x in spec.numerics if x.name.startswith("max_") and len(x.data) == len(names) > 1]:
+        numeric.data, numeric.size = np.array(numeric.data)[left], len(left)
     for equality in [e for e in spec.equalities if e.type == mujoco.mjtEq.mjEQ_JOINT and {e.name1, e.name2} & held]:
         spec.delete(equality)
     gone = {tendon.name for tendon in spec.tendons if _wraps(tendon, held)}
@@ -138,6 +148,8 @@ def locked(texts: Sequence[str]) -> tuple[tuple[str, float], ...]:
         name, mark, value = text.partition("=")
         try:
             found.append((name, float(value)))
+            if not np.isfinite(found[-1][1]):
+                raise ValueError
         except ValueError:
             raise RobotError(f"--lock {text}: give a joint and where it is held [rad, m], such as finger=0.02") from None
         del mark

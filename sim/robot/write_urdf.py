@@ -10,8 +10,11 @@ from sim.robot.motors import Array
 from sim.robot.mounting import Mounting
 from sim.robot.robot import Robot
 
+UNLIMITED = 1e6
+"""What stands for no limit, where a URDF must have one."""
 
-def urdf_text(name: str, tree: KinematicTree, standard: Mapping[str, float], mounting: Mounting) -> str:
+
+def urdf_text(name: str, robot: Robot, tree: KinematicTree, standard: Mapping[str, float], mounting: Mounting) -> str:
     """Return a robot as URDF with the standard parameters `standard`, by their names.
 
     A URDF stays as it is, but for inertias, damping and friction: the inertia of a link stands at the link that its joint
@@ -23,7 +26,7 @@ def urdf_text(name: str, tree: KinematicTree, standard: Mapping[str, float], mou
         root = ElementTree.fromstring(text, ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True)))
         _rewrite(root, tree, standard)
     else:
-        root = _made(tree, standard)
+        root = _made(robot, tree, standard)
     ElementTree.indent(root)
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
@@ -47,7 +50,7 @@ def _rewrite(root: ElementTree.Element, tree: KinematicTree, standard: Mapping[s
         _resist(joints[of.name], standard, j)
 
 
-def _made(tree: KinematicTree, standard: Mapping[str, float]) -> ElementTree.Element:
+def _made(robot: Robot, tree: KinematicTree, standard: Mapping[str, float]) -> ElementTree.Element:
     """Return the robot as links and joints without shapes; a link's frame is at its joint's axis, as URDF has it."""
     root = ElementTree.Element("robot", {"name": tree.name})
     ElementTree.SubElement(root, "link", {"name": "base"})
@@ -69,9 +72,10 @@ def _made(tree: KinematicTree, standard: Mapping[str, float]) -> ElementTree.Ele
         ElementTree.SubElement(joint, "child", {"link": f"link_{of.name}"})
         ElementTree.SubElement(joint, "axis", {"xyz": _numbers(of.axis)})
         if kind != "continuous":
-            low, high = of.range if bounded else (-1e3, 1e3)
-            limits = {"lower": repr(float(low)), "upper": repr(float(high)), "effort": "0", "velocity": "0"}
-            ElementTree.SubElement(joint, "limit", limits)
+            low, high = of.range if bounded else (-UNLIMITED, UNLIMITED)
+            limits = {"lower": low, "upper": high, "effort": robot.torque_limits[j], "velocity": robot.most("velocity")[j]}
+            stated = {key: repr(float(x) if np.isfinite(x) else UNLIMITED) for key, x in limits.items()}
+            ElementTree.SubElement(joint, "limit", stated)
         _resist(joint, standard, j)
     return root
 

@@ -127,6 +127,25 @@ def test_torques_with_times_of_their_own(columns):
     np.testing.assert_allclose(log.q, motion(late[0] + log.t), atol=1e-5)
 
 
+def test_gaps_and_missing_values_of_torques_with_times_of_their_own(columns):
+    late = T[::4] + 0.0013
+    kept = (late < 3) | (late > 5)
+    tau = motion(late[kept])
+    tau[7] = np.nan
+    found = repair(LogColumns(T, columns.q, tau, None, t_tau=late[kept]))
+    assert [log.samples for log in found.logs] == pytest.approx([2999, 2996], abs=8)
+    assert "torques have 1 gaps of their own" in " ".join(found.words(("a", "b")))
+    with pytest.raises(LogError, match="do not overlap"):
+        repair(LogColumns(T, columns.q, motion(late), None, t_tau=late + 100))
+
+
+def test_coarse_positions_alone_are_no_repeats():
+    """Torques have times of their own: positions of a 12-bit encoder stand for many samples while the robot moves."""
+    step, late = 2 * np.pi / 4096, T + 1e-4
+    found = repair(LogColumns(T, np.round(0.1 * motion(T) / step) * step, motion(late), None, t_tau=late))
+    assert found.clock.repeated == 0
+
+
 def test_velocities_that_know_better_are_used(rng):
     """A 12-bit encoder beside a tachometer: errors fall below a fifth; both noises alone are an order larger."""
     step = 2 * np.pi / 4096

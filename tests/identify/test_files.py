@@ -10,9 +10,11 @@ import pytest
 import scipy
 from pyarrow import parquet
 
-from identify import LogError
+from identify import LogError, MotionLog, TorqueChannel
+from identify.files.formats import read_table
 from identify.files.guess import guess
 from identify.files.layout import LogLayout, Source, matching
+from identify.files.log_file import read_log, write_log
 from identify.files.reading import read_columns
 from identify.files.units import factor, named_unit
 
@@ -141,6 +143,88 @@ def test_positions_and_efforts_may_be_in_two_files_with_times_of_their_own(tmp_p
     assert columns.torque.meaning == "instantaneous"
 
 
+def test_two_files_since_1970_keep_what_lies_between_them(tmp_path):
+    """Torques that begin half a second later, with as many rows: both count from one instant."""
+    text(tmp_path / "q.csv", numbered("q"), [T + 1.7e9, Q])
+    text(tmp_path / "e.csv", ["stamp", "e1", "e2", "e3"], [T + 1.7e9 + 0.5, TAU])
+    (tmp_path / "run.toml").write_text(
+        '[t]\nfile = "q.csv"\n[q]\ncolumns = "q*"\nfile = "q.csv"\n[tau]\ncolumns = "e*"\nfile = "e.csv"\nt = "stamp"\n'
+    )
+    columns = read_columns(tmp_path / "run.toml")
+    np.testing.assert_allclose(columns.t_tau - columns.t, 0.5, atol=1e-6)
+    with pytest.raises(LogError, match="times of their own"):
+        read_log(tmp_path / "run.toml", TorqueChannel("held"))
+
+
+def test_joints_are_in_the_order_that_is_stated(tmp_path):
+    text(tmp_path / "log.csv", ["t", "q_b", "q_a", "tau_a", "tau_b"], [T, Q[:, :2], TAU[:, :2]])
+    (tmp_path / "log.toml").write_text('joints = ["a", "b"]\n')
+    columns = read_columns(tmp_path / "log.csv")
+    np.testing.assert_array_equal(columns.q, Q[:, [1, 0]])
+    np.testing.assert_array_equal(columns.tau, TAU[:, :2])
+    (tmp_path / "log.toml").write_text('joints = ["a", "c"]\n')
+    with pytest.raises(LogError, match="columns of q are of b, a, where joints are a, c"):
+        read_columns(tmp_path / "log.csv")
+
+
+def test_a_layout_of_a_folder_is_not_for_what_idbench_wrote_there(tmp_path):
+    log = MotionLog(100.0, Q, TAU, TorqueChannel("held"))
+    write_log(log, tmp_path / "made.parquet")
+    (tmp_path / "log.toml").write_text('[q]\ncolumns = "q*"\nunit = "deg"\n')
+    np.testing.assert_array_equal(read_columns(tmp_path / "made.parquet").q, Q)
+    # Nor is the description of a robot, or a scenario, that has the name of a log.
+    text(tmp_path / "arm.csv", numbered("q", "tau"), [T, Q, TAU])
+    (tmp_path / "log.toml").unlink()
+    (tmp_path / "arm.toml").write_text('angles = "deg"\n[[joints]]\nd = 1.0\n')
+    np.testing.assert_array_equal(read_columns(tmp_path / "arm.csv").q, Q)
+
+
+@pytest.mark.parametrize(
+    ("content", "names"),
+    [
+        (b"\xef\xbb\xbft,q1,tau1\n0,1,2\n1,2,3\n", ["t", "q1", "tau1"]),
+        (b"\xef\xbb\xbf0,1,2\n1,2,3\n", ["1", "2", "3"]),
+        (b"0,nan,2\n1,2,3\n", ["1", "2", "3"]),
+        (b"0,0\t1,5\t2,5\n1,0\t2,5\t3,5\n", ["1", "2", "3"]),
+        (b"0,0 1,5 2,5\n1,0 2,5 3,5\n", ["1", "2", "3"]),
+        (b"% made by a recorder\nt q1 tau1\n0 1 2\n1 2 3\n", ["t", "q1", "tau1"]),
+    ],
+    ids=["mark", "mark, no names", "nan", "tabs, commas", "blanks, commas", "comment"],
+)
+def test_dialects_of_text(tmp_path, content, names):
+    (tmp_path / "x.txt").write_bytes(content)
+    table = read_table(tmp_path / "x.txt")
+    assert list(table.columns) == names
+    assert table.rows == 2
+    assert all((len(column) == 2 and column[1] > column[0]) or np.isnan(column[0]) for column in table.columns.values())
+
+
+def test_q_is_not_qd_and_arrays_of_some_columns_are_taken(tmp_path):
+    text(tmp_path / "log.csv", ["time", *numbered("q", "qd", "tau")[1:]], [T, Q, QD, TAU])
+    layout = LogLayout(t=Source(("time",)))
+    np.testing.assert_array_equal(read_columns(tmp_path / "log.csv", layout).q, Q)
+    np.savez(tmp_path / "log.npz", t=T, q_left=Q[:, :2], q_right=Q[:, 2:], tau_all=TAU, note=np.array({"a": 1}, dtype=object))
+    found = read_columns(tmp_path / "log.npz", LogLayout(q=Source(("q_*",)), tau=Source(("tau_*",))))
+    np.testing.assert_array_equal(found.q, Q)
+
+
+@pytest.mark.parametrize(
+    "write",
+    [
+        lambda p: p.with_suffix(".csv").write_text("t,q1,qd1,tau1\n0,1,2,3\n"),
+        lambda p: p.with_suffix(".csv").write_text("0,1,2,3\n"),
+        lambda p: np.savez(p.with_suffix(".npz"), t=T, q1=T, q2=T[:9], tau=TAU),
+        lambda p: np.save(p.with_suffix(".npy"), np.array([["a", "b"]] * 20)),
+    ],
+    ids=["one row", "one row, no names", "ragged", "words"],
+)
+def test_what_cannot_be_guessed_is_told_in_one_line(tmp_path, write):
+    write(tmp_path / "x")
+    (path,) = tmp_path.iterdir()
+    with pytest.raises(LogError):
+        read_columns(path, guess(path).layout)
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
@@ -151,7 +235,8 @@ def test_positions_and_efforts_may_be_in_two_files_with_times_of_their_own(tmp_p
         ('[q]\ncolumns = "nothing*"', r"has no columns nothing\*; its columns: t, q1"),
         ('[tau]\ncolumns = "gone"', "has no column 'gone'; its columns"),
         ('[tau]\ncolumns = ["tau1", "tau2"]', "3 columns of positions and 2 of torques"),
-        ("[rows]\nt = 100.0", "t is 100 in no row; it goes from 0 to"),
+        ("rows = 3", "rows = 3 must be a table"),
+        ("[rows]\nt = 100.0", "t is 100.0 in no row; it goes from 0.0 to"),
     ],
 )
 def test_a_layout_that_makes_no_sense_is_told_in_one_line(tmp_path, content, message):

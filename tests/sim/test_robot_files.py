@@ -99,6 +99,45 @@ def test_a_held_joint_is_where_it_is_held(name):
     np.testing.assert_allclose(inverse_dynamics(part, q[:, rest], qd[:, rest], qdd[:, rest]), expected, atol=1e-10)
 
 
+@pytest.mark.parametrize(
+    ("compiler", "turned"),
+    [
+        ('angle="radian"', 'euler="0.3 0.2 0.9"'),
+        ('angle="radian"', 'axisangle="1 2 3 0.7"'),
+        ('angle="degree" eulerseq="ZYX"', 'euler="10 20 30"'),
+        ('angle="degree"', 'quat="1 0.2 0.3 0.4"'),
+    ],
+)
+def test_a_held_body_stands_where_it_stood_however_its_file_says_it(load, compiler, turned):
+    ref, range_ = ("0.7", "-2 2") if "radian" in compiler else ("40", "-120 120")
+    text = f"""<mujoco><compiler {compiler}/><worldbody><body><joint name="first"/><geom size="0.1"/>
+      <body pos="0.1 0.2 0.3" {turned}><joint name="held" axis="1 1 0" pos="0.1 0 0.2" ref="{ref}" range="{range_}"/>
+      <geom size="0.1"/><body name="tip" pos="0.3 0.2 0.1"><joint name="last" axis="0 0 1"/><geom size="0.1"/>
+      </body></body></body></worldbody></mujoco>"""
+    whole, held = load(text, name="arm.xml"), load(text, Mounting(lock=(("held", 0.5),)).edit, name="arm.xml")
+    places = []
+    for robot, q in ((whole, [0.2, 0.5, -0.3]), (held, [0.2, -0.3])):
+        data = mujoco.MjData(robot.model)
+        data.qpos[:] = q
+        mujoco.mj_forward(robot.model, data)
+        places.append(np.concatenate([data.body("tip").xpos, data.body("tip").xmat]))
+    np.testing.assert_allclose(places[1], places[0], atol=1e-12)
+
+
+def test_one_of_several_joints_of_a_body_is_not_held(load):
+    text = """<mujoco><worldbody><body name="b"><joint name="x" axis="1 0 0"/><joint name="y" axis="0 1 0"/><geom size="0.1"/>
+      </body></worldbody></mujoco>"""
+    with pytest.raises(RobotError, match="y is one of several joints of body 'b'"):
+        load(text, Mounting(lock=(("y", 0.5),)).edit, name="arm.xml")
+
+
+def test_limits_go_with_the_joints_that_are_held():
+    whole, part = Robot.load("panda"), Robot.load("panda", Mounting(lock=((Robot.load("panda").joints[2], 0.5),)).edit)
+    rest = [j for j in range(7) if j != 2]
+    np.testing.assert_array_equal(part.most("velocity"), whole.most("velocity")[rest])
+    np.testing.assert_array_equal(part.torque_limits, whole.torque_limits[rest])
+
+
 def test_a_slide_and_a_ball_are_held(load):
     text = """<mujoco><worldbody><body><joint name="rail" type="slide" axis="0 1 0" ref="0.1"/><geom size="0.1"/>
       <body><joint name="b" type="ball"/><geom size="0.1"/><body name="tip" pos="0 0 1"><joint name="t" axis="0 1 0"/>
@@ -181,6 +220,7 @@ def test_a_table_of_khalil_and_kleinfinger(load):
     np.testing.assert_allclose(data.xpos[-1], place[:3, 3], atol=1e-12)
     np.testing.assert_allclose(data.xmat[-1].reshape(3, 3), place[:3, :3], atol=1e-12)
     assert robot.weightless
+    np.testing.assert_allclose(robot.ranges[2], np.radians([-120, 120]))
 
 
 def test_a_classic_table_moves_as_the_puma_of_corke(load):
@@ -209,6 +249,8 @@ def test_a_classic_table_moves_as_the_puma_of_corke(load):
         (("d = 0.45", 'd = "x"'), "joint joint3: d = 'x' must be a number"),
         (("d = 0.45", 'parent = "nobody"'), "parent 'nobody' is no joint before it"),
         (("[[joints]]", "[["), "arm.toml"),
+        (("r = 0.1", "a = 0.1"), "joint joint3: a is unknown"),
+        (("range = [-120.0, 120.0]", "range = 3"), "a value is of the wrong kind"),
     ],
 )
 def test_a_table_that_makes_no_sense_is_told(load, change, message):
