@@ -46,7 +46,7 @@ def read_matlab(path: Path) -> LogTable:
 
 
 def _array(file: Any, name: str) -> Any:
-    """Return an array of a file; of objects, which only a pickle holds, their name."""
+    """Return an array of a file; of objects, which are no numbers, their name."""
     try:
         return file[name]
     except ValueError:
