@@ -58,10 +58,10 @@ class Mounting:
             raise RobotError(f"{', '.join(both)}: both among --joints and locked")
         if held and len(held) == len(names):
             raise RobotError("all joints are locked: nothing is left to identify")
-        for joint in [joint for joint in spec.joints if joint.name in held]:
-            _hold(spec, joint, held[joint.name])
         if held:
             _forget(spec, set(held), names)
+        for joint in [joint for joint in spec.joints if joint.name in held]:
+            _hold(spec, joint, held[joint.name])
 
 
 PLAIN = Mounting()
@@ -114,7 +114,7 @@ def _rotated(quaternion: Array, vector: Array) -> Array:
 
 
 def _forget(spec: mujoco.MjSpec, held: set[str], names: Sequence[str]) -> None:
-    """Take out what refers to joints that are no more: ties, actuators, sensors, keyframes, entries of limits."""
+    """Take out what refers to joints that will be no more: ties, actuators, sensors, keyframes, entries of limits."""
     left = [j for j, name in enumerate(names) if name not in held]
     for numeric in [x for x in spec.numerics if x.name.startswith("max_") and len(x.data) == len(names) > 1]:
         numeric.data, numeric.size = np.array(numeric.data)[left], len(left)

@@ -280,3 +280,36 @@ def test_every_robot_of_a_public_collection_reads_or_is_refused_for_a_reason():
     for name, why in refused.items():
         assert "closes a chain or couples joints" in why or "has no joints" in why, (name, why)
     assert len(refused) < 14
+
+
+def test_an_arm_with_classes_a_gripper_by_tendon_and_keyframes_reads(load, tmp_path):
+    """As the models of MuJoCo's menagerie are written: the fingers are tied, driven through a tendon, and not in the log."""
+    text = """<mujoco model="arm"><compiler angle="radian" meshdir="assets"/>
+      <default><default class="arm"><joint armature="0.1" damping="1" axis="0 0 1" range="-2.8 2.8"/>
+        <general biastype="affine" ctrlrange="-2.8 2.8"/>
+        <default class="finger"><joint type="slide" axis="0 1 0" range="0 0.04" armature="0.2"/></default></default></default>
+      <asset><mesh name="link" file="link.stl"/></asset>
+      <worldbody><light pos="0 0 1"/><body name="link1" childclass="arm" pos="0 0 0.3"><inertial pos="0 0 0.1" mass="3"
+        diaginertia="0.1 0.1 0.1"/><joint name="joint1"/><geom type="mesh" mesh="link"/>
+        <body name="link2" quat="1 -1 0 0"><joint name="joint2"/><inertial pos="0.1 0 0" mass="2" diaginertia="0.1 0.1 0.1"/>
+          <body name="left"><joint name="finger1" class="finger"/><geom size="0.01"/></body>
+          <body name="right" quat="0 0 0 1"><joint name="finger2" class="finger"/><geom size="0.01"/></body></body></body>
+      </worldbody>
+      <tendon><fixed name="split"><joint joint="finger1" coef="0.5"/><joint joint="finger2" coef="0.5"/></fixed></tendon>
+      <equality><joint joint1="finger1" joint2="finger2"/></equality>
+      <actuator><general class="arm" name="a1" joint="joint1" gainprm="4500" biasprm="0 -4500 -450"/>
+        <general class="arm" name="a2" joint="joint2" gainprm="4500" biasprm="0 -4500 -450"/>
+        <general class="arm" name="grip" tendon="split" ctrlrange="0 255"/></actuator>
+      <contact><exclude body1="link1" body2="link2"/></contact>
+      <sensor><tendonpos tendon="split"/><jointpos joint="joint1"/><actuatorpos actuator="grip"/></sensor>
+      <keyframe><key name="home" qpos="0 0.5 0.04 0.04" ctrl="0 0.5 255"/></keyframe></mujoco>"""
+    with pytest.raises(RobotError, match="closes a chain or couples joints"):
+        kinematic_tree(load(text, name="arm.xml"))
+    mounting = Mounting(joints=("joint1", "joint2"))
+    robot = load(text, mounting.edit, name="arm.xml")
+    model = robot.model
+    assert robot.joints == ("joint1", "joint2")
+    assert (model.nu, model.ntendon, model.neq, model.nkey, model.nsensor, model.nexclude) == (2, 0, 0, 0, 1, 1)
+    assert kinematic_tree(robot).joints[1].armature
+    (tmp_path / "out.xml").write_text(rewritten(str(tmp_path / "arm.xml"), {"M2": 2.5}, tmp_path, mounting))
+    assert Robot.load(str(tmp_path / "out.xml")).joints == ("joint1", "joint2")
