@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from tyro.extras import SubcommandApp
 
-from experiments.cli.interruption import INTERRUPTED, importing, terminating
+from experiments.cli.interruption import INTERRUPTED, Notice, importing, noticing, terminating
 from experiments.errors import ExperimentError
 
 DESCRIPTION = "A MuJoCo testbench for the dynamic identification of robots."
@@ -42,8 +42,9 @@ for name, value in ENVIRONMENT.items():
 def run(args: Sequence[str] | None = None) -> int:
     """Run a command; return its exit code: 0, 2 for wrong input, 130 when interrupted."""
     words = sys.argv[1:] if args is None else list(args)
+    notice = Notice()
     try:
-        with terminating():
+        with terminating(), noticing() as notice:
             if words == ["--version"]:
                 _print(f"idbench {_version()}")
             elif not words:
@@ -57,6 +58,8 @@ def run(args: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output has gone, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except Exception as error:
+        if notice.pressed and not _on_purpose(error):
+            return _complain("interrupted", INTERRUPTED)
         if not _on_purpose(error):
             raise
         return _complain(str(error), 2)

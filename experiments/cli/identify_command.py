@@ -89,6 +89,9 @@ def identify(asked: Identify) -> None:
 def _require_logs(asked: Identify) -> None:
     if not asked.log:
         raise ExperimentError("name a log, or several of one fit")
+    twice = [str(path) for k, path in enumerate(asked.log) if path.absolute() in [p.absolute() for p in asked.log[:k]]]
+    if twice:
+        raise ExperimentError(f"{', '.join(twice)} is given twice: it would count twice")
     if asked.follow is not None and len(asked.log) > 1:
         raise ExperimentError("--follow takes one log, not several")
 

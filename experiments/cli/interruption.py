@@ -32,6 +32,28 @@ def terminating() -> Iterator[None]:
             signal.signal(number, handler)
 
 
+class Notice:
+    """Whether Ctrl-C was pressed."""
+
+    pressed: bool = False
+
+
+@contextmanager
+def noticing() -> Iterator[Notice]:
+    """Yield whether Ctrl-C was pressed: what is loaded late turns an interruption into errors of its own."""
+    notice = Notice()
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        notice.pressed = True
+        signal.default_int_handler(number, frame)
+
+    before = signal.signal(signal.SIGINT, interrupt)
+    try:
+        yield notice
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def _leave(number: int, frame: FrameType | None) -> None:
     del number, frame
     os.write(2, b"idbench: interrupted\n")

@@ -33,9 +33,31 @@ def test_a_real_interrupt_ends_the_process_without_a_traceback(tmp_path, start):
     time.sleep(0.2)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate()
-    assert process.returncode == 130
+    assert process.returncode == 130, err
     assert err.strip() == "idbench: interrupted"
     assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupt_that_comes_out_as_another_error_is_one(tmp_path, start):
+    """As of a module that is loaded late, and half loaded."""
+    code = """if True:
+        import sys, time
+        from experiments import cli
+        from experiments.cli import table1_command
+        def half_loaded(seed):
+            print("searching")
+            try:
+                time.sleep(30)
+            except KeyboardInterrupt:
+                raise ImportError("half loaded") from None
+        table1_command.Search = half_loaded
+        sys.exit(cli.main(["table1", "--seed", "1", "--out", "results"]))
+    """
+    process = start("-uc", code, cwd=tmp_path)
+    assert process.stdout.readline()
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate()
+    assert (process.returncode, err.strip()) == (130, "idbench: interrupted")
 
 
 @pytest.mark.parametrize("module", ["numpy", "scipy.signal", "mujoco", "rerun"])

@@ -154,6 +154,7 @@ def test_a_short_fast_log_gets_the_band_that_it_needs(idbench, first, tmp_path):
 )
 def test_options_that_make_no_sense_are_told(complaint, logs, tmp_path, monkeypatch, options, message):
     monkeypatch.chdir(tmp_path)
+    assert "is given twice" in complaint("identify", *[str(logs / "second.parquet")] * 2, *PUMA)
     (tmp_path / "wrong.toml").write_text("[operator]\ncutof = 3\n")
     assert message in complaint("identify", str(logs / "second.parquet"), *PUMA, *options)
 
