@@ -3,6 +3,7 @@
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -112,11 +113,7 @@ def _episodes(table: LogTable) -> tuple[dict[str, float], list[str]]:
 
 def _by_names(table: LogTable) -> LogLayout:
     """Return a layout by what columns are called."""
-    groups: dict[tuple[str, str], list[tuple[str, str]]] = {}
-    for name, column in table.columns.items():
-        kind, stem, place = _parsed(name)
-        if kind and not (column.ndim == 2 and kind == "t"):
-            groups.setdefault((kind, stem), []).append((name, place))
+    groups = _groups(table)
     found, n = LogLayout(q=Source(), tau=Source()), 0
     for kind in ("t", "q", "tau", "qd"):
         choices = {stem: names for (k, stem), names in groups.items() if k == kind}
@@ -129,7 +126,7 @@ def _by_names(table: LogTable) -> LogLayout:
             best = max(counts, key=lambda stem: counts[stem])
         if best is None:
             continue
-        names = _sorted(choices[best])
+        names = _sorted(choices[best], found.joints)
         n = n or counts[best]
         found = found.where(kind, Source(tuple(name for name, _ in names)))
         if kind == "q":
@@ -140,30 +137,61 @@ def _by_names(table: LogTable) -> LogLayout:
     return found
 
 
-def _parsed(name: str) -> tuple[str, str, str]:
-    """Return what a column's name stands for, what it has in common with those of other joints, and its number or joint."""
+class _Name(NamedTuple):
+    """A column's name: what it stands for, by which word, what else is in it, its number, and all beside the word."""
+
+    name: str
+    kind: str
+    word: str
+    rest: str
+    number: str
+    place: str
+
+
+def _groups(table: LogTable) -> dict[tuple[str, str], list[tuple[str, str]]]:
+    """Return columns that belong together, with the number or the name of their joint, by what they are and have in common.
+
+    Where one joint has a name without a number (elbow), those of others (wrist_1) are names, too.
+    """
+    parsed = [
+        found for name, column in table.columns.items() if (found := _parsed(name)) and (column.ndim == 1 or found.kind != "t")
+    ]
+    named = {(found.kind, found.word) for found in parsed if found.place and not found.number}
+    groups: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    for found in parsed:
+        by_name = (found.kind, found.word) in named
+        stem = found.word if by_name or not found.number else f"{found.word} {found.rest}"
+        place = found.place if by_name else found.number
+        groups.setdefault((found.kind, stem), []).append((found.name, place))
+    return groups
+
+
+def _parsed(name: str) -> _Name | None:
+    """Return what a column's name says; None if it is nothing that was measured of a joint, or a time."""
     bare = re.sub(r"\s*[\[(][^\])]*[\])]\s*$", "", name)
     tokens = re.findall(r"[a-z]+|\d+", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", bare).lower())
     if set(tokens) & set(OTHERS):
-        return "", "", ""
+        return None
     for kind, words in WORDS.items():
         hits = [token for token in tokens if token in words.split()]
         if hits:
             number = next((token for token in reversed(tokens) if token.isdigit()), "")
             rest = [token for token in tokens if token not in hits and not token.isdigit()]
-            if number:
-                return kind, " ".join([hits[0], *rest]), number
             place = re.sub(rf"(?i)^[\W_]*{hits[0]}[\W_]+|[\W_]+{hits[0]}[\W_]*$", "", bare)
-            return kind, hits[0], place if place != bare else ""
-    return "", "", ""
+            return _Name(name, kind, hits[0], " ".join(rest), number, place if place != bare else "")
+    return None
 
 
 def _entries(table: LogTable, name: str) -> int:
     return 1 if table.columns[name].ndim == 1 else int(table.columns[name].shape[1])
 
 
-def _sorted(names: list[tuple[str, str]]) -> list[tuple[str, str]]:
-    numbered = all(place.isdigit() for _, place in names)
+def _sorted(names: list[tuple[str, str]], joints: tuple[str, ...]) -> list[tuple[str, str]]:
+    """Return columns by the number of their joint, or in the order of named joints, or in that of the file."""
+    places = [place for _, place in names]
+    if joints and set(places) == set(joints):
+        return sorted(names, key=lambda pair: joints.index(pair[1]))
+    numbered = all(place.isdigit() for place in places)
     return sorted(names, key=lambda pair: int(pair[1])) if numbered else names
 
 

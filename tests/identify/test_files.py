@@ -117,6 +117,18 @@ def test_what_is_written_beside_a_log_is_how_it_is_read(name, tmp_path):
     assert (columns.joints == ("base", "elbow", "wrist")) == (name in ("tabs.tsv", "bag"))
 
 
+def test_joints_some_of_whose_names_have_numbers(tmp_path):
+    """A UR's: elbow beside wrist_1 and wrist_2; torques in another order are put right."""
+    names = "elbow_joint", "wrist_1_joint", "wrist_2_joint"
+    heads = ["t", *(f"q_{name}" for name in names), *(f"tau_{name}" for name in reversed(names))]
+    text(tmp_path / "log.csv", heads, [T, Q, TAU[:, ::-1]])
+    found = guess(tmp_path / "log.csv")
+    assert found.layout.joints == names
+    columns = read_columns(tmp_path / "log.csv", found.layout)
+    np.testing.assert_array_equal(columns.q, Q)
+    np.testing.assert_array_equal(columns.tau, TAU)
+
+
 def test_currents_ask_for_a_gain(tmp_path):
     path = tmp_path / "log.csv"
     text(path, ["t", *(f"q{j}" for j in (1, 2, 3)), *(f"current_{j}" for j in (1, 2, 3))], [T, Q, TAU / 5])
