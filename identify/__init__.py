@@ -12,10 +12,12 @@ from identify.basis import BLOCKS as BLOCKS
 from identify.basis import AbstractBlock as AbstractBlock
 from identify.basis import AbstractConservativeBlock as AbstractConservativeBlock
 from identify.basis import AbstractFriction as AbstractFriction
+from identify.basis import AbstractJointLaw as AbstractJointLaw
 from identify.basis import Armature as Armature
 from identify.basis import Basis as Basis
 from identify.basis import CoulombFriction as CoulombFriction
 from identify.basis import Offset as Offset
+from identify.basis import OfJoints as OfJoints
 from identify.basis import Parameter as Parameter
 from identify.basis import ScaraLinks as ScaraLinks
 from identify.basis import TreeLinks as TreeLinks

@@ -11,15 +11,21 @@ Array: TypeAlias = npt.NDArray[np.float64]
 Columns: TypeAlias = Mapping[tuple[int, str], Array]
 """Columns of an observation matrix that are not identically zero: (row of an instant, parameter) -> signal (..., time)."""
 
+HELD = ""
+"""In the place of a parameter's name: what torques have beside W X, the part of parameters that are known."""
+
 Multipliers: TypeAlias = Mapping[tuple[int, int], Array | float]
 """B of a model, where it is not 0: (row of an instant, joint) -> what the row multiplies the torque of the joint by: a signal
 (..., time), or a constant."""
 
 
 def combined(columns: Columns, names: Sequence[str], X: Array, total: Array) -> Array:
-    """Add columns times their parameters X, shape (..., p), of these names, to `total`, shape (..., row, time); return it."""
+    """Add columns times their parameters X, shape (..., p), of these names, to `total`, shape (..., row, time); return it.
+
+    Those that are held count once.
+    """
     for (row, name), column in columns.items():
-        total[..., row, :] += column * X[..., names.index(name), None]
+        total[..., row, :] += column if name == HELD else column * X[..., names.index(name), None]
     return total
 
 

@@ -34,5 +34,6 @@ def test_chains_recover_ideal_data(name, model, log, truth):
 
 
 def test_a_robot_is_the_sum_of_its_blocks():
-    basis = Basis(2, tuple(BLOCKS.create(name) for name in BLOCKS.builtin))
-    assert len(basis.names) == sum(len(BLOCKS.create(name).parameters(2)) for name in BLOCKS.builtin)
+    blocks = [BLOCKS.create(name) for name in BLOCKS.builtin if name != "stribeck-free"]  # it has the names of stribeck
+    basis = Basis(2, tuple(blocks))
+    assert len(basis.names) == sum(len(block.parameters(2)) for block in blocks)

@@ -17,6 +17,7 @@ from experiments.cli.mounting import mounting_of
 from experiments.cli.page import Page, new_page, shown
 from experiments.cli.reading import Question, file_of, stated_by
 from experiments.errors import ExperimentError
+from experiments.identification.friction_choice import with_suitable_friction, words
 from experiments.identification.identification_text import print_identified, print_validated
 from experiments.identification.identified import Identified
 from experiments.identification.log_warnings import warnings_of_log
@@ -60,8 +61,9 @@ def identify(asked: Identify) -> None:
     with ExitStack() as stack:
         audience, path = _followed(stack, asked, path, question_of(asked), named)
         fit = fit_logs(replace(asked, log=(path, *asked.log[1:])), named)
-        whole = replace(fit.named, logs=fit.logs, log_names=fit.names)
-        found, hidden = _shown(replace(whole, truth=_truth(stated, named)))
+        whole = replace(fit.named, logs=fit.logs, log_names=fit.names, truth=_truth(stated, named))
+        whole, friction = with_friction(whole)
+        found, hidden = _shown(whole)
         judged, said = judged_on(asked, found, fit)
         of_file = [*warnings_of_robot(found.subject.robot), *plugin_conflicts()]
         warnings = {LOG: _warnings(judged, fit), FILE: of_file, MOTION: hidden}
@@ -72,7 +74,7 @@ def identify(asked: Identify) -> None:
             for validated in judged:
                 print_validated(page, validated)
         warned = warn(page, warnings, warnings_of_result(found), _advice(judged[0], asked))
-        notes = [*_notes(fit), *fit.notes, *said]
+        notes = [*_notes(fit), *fit.notes, *friction, *said]
         for note in notes:
             page.print(Text(note), soft_wrap=True)
         page.found |= {**summary_of(judged, first.absolute()), "notes": notes}
@@ -84,6 +86,14 @@ def identify(asked: Identify) -> None:
         elif audience and not is_long(found.logs):
             _show(found, audience)
         results.export()
+
+
+def with_friction(whole: Identified) -> tuple[Identified, list[str]]:
+    """Return the identification with laws of friction that suit its logs, where that is asked for, and which these are."""
+    if not whole.subject.laws.auto:
+        return whole, []
+    found, choice = with_suitable_friction(whole)
+    return found, words(choice, found.subject.laws.names, found.subject.robot.joints)
 
 
 def _require_logs(asked: Identify) -> None:

@@ -73,6 +73,9 @@ class MountingOptions:
     """Joints of the log, in the order of its columns, where the robot has more: grippers, mobile bases."""
     lock: Annotated[tuple[str, ...], tyro.conf.arg(metavar="JOINT=VALUE")] = ()
     """Joints that do not move, and where they are held [rad, m]."""
+    coupling: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=JOINT+JOINT")] = ()
+    """Drives whose motor turns with several joints, each with a rotor and frictions of its own: motor6=joint_5+joint_6, or with
+    factors, m2=a-0.5*b. Those of an MJCF file are its fixed tendons."""
     gravity: Annotated[tuple[float, float, float] | None, tyro.conf.arg(metavar="X Y Z", help_behavior_hint="")] = None
     """Gravity in the frame of the robot's base [m/s^2], for one on a wall or a ceiling; the file's by default."""
 

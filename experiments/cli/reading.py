@@ -157,7 +157,7 @@ def with_delays(every: Sequence[ReadLog], named: Identified) -> list[ReadLog]:
 
 
 def _delayed(read: ReadLog, found: DelayEstimate) -> ReadLog:
-    logs = tuple(MotionLog(log.fs, log.q, log.tau, replace(log.torque, delay=found.delay)) for log in read.logs)
+    logs = tuple(replace(log, torque=replace(log.torque, delay=found.delay)) for log in read.logs)
     sure = f"{1e3 * found.delay:.4g} ms, sigma {1e3 * found.sigma:.2g} ms (not in the sigmas above)"
     channel = replace(read.channel, delay=found.delay)
     return replace(read, logs=logs, channel=channel, notes=(*read.notes, f"torque delay estimated from the log: {sure}"))

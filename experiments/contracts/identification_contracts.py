@@ -77,7 +77,8 @@ def block_names_its_parameters(block: Any, _: Example) -> None:
 def block_keeps_its_identities(block: Any, _: Example) -> None:
     """Explicit columns are d/dt momentum + remainder, and their power is d/dt energy + dissipation."""
     q, qd, qdd = np.random.default_rng(3).uniform(-2, 2, (3, 2, 50))
-    at, ahead = State(q, qd, lambda _: qdd), State(q + 1j * SMALL * qd, qd + 1j * SMALL * qdd, lambda x: x)
+    logged = {"temperature": 30.0 + q, "payload": np.ones_like(q[:1])}
+    at, ahead = State(q, qd, lambda _: qdd, logged), State(q + 1j * SMALL * qd, qd + 1j * SMALL * qdd, lambda x: x, logged)
     explicit = block.explicit(at)
     names = [parameter.name for parameter in block.parameters(2)]
     require({name for _, name in explicit} == set(names), "explicit columns are not those of its parameters")

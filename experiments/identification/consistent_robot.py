@@ -71,9 +71,10 @@ class Written:
     @cached_property
     def values(self) -> dict[str, float]:
         """The standard parameters by name; those that were not asked for are zero."""
-        found, asked = self.consistent, self.found.subject.asked
-        none = ("Ia",) * (asked.armature == "none") + ("Fv", "Fs") * (asked.friction == "none")
-        without = {f"{letters}{j + 1}": 0.0 for letters in none for j in range(self.found.basis.n)}
+        found, subject = self.consistent, self.found.subject
+        without = {f"Ia{j + 1}": 0.0 for j in range(subject.basis.n)} if subject.asked.armature == "none" else {}
+        for letters, law in (("Fv", "viscous"), ("Fs", "coulomb")):
+            without |= {f"{letters}{j + 1}": 0.0 for j, own in enumerate(subject.laws.names) if law not in own}
         return without | dict(zip(found.names, map(float, found.standard), strict=True))
 
     def write(self, path: Path) -> None:

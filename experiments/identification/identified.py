@@ -27,7 +27,10 @@ from identify import (
     attempt_each,
     encoder_steps,
 )
+from identify.blame import blamed
+from identify.estimators.settle import settled
 from identify.rows.rows import Rows
+from identify.signals.masks import ReversalMask
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,13 +78,22 @@ class Identified:
 
     @property
     def basis(self) -> Basis:
-        """The robot, linear in its parameters."""
-        return self.subject.basis
+        """The robot, linear in its parameters; about the estimate, where some of them are not."""
+        if not self.subject.basis.adaptive or not self.logs:
+            return self.subject.basis
+        return self._known_basis or self.problem.basis
+
+    @property
+    def _known_basis(self) -> Basis | None:
+        known = (outcome.problem.basis for outcome in (self.known or {}).values() if isinstance(outcome, Estimate))
+        return next(known, None)
 
     @property
     def processing(self) -> Chain:
         """The chain."""
         chain = self.method[0] if self.method else CHAINS.create(self.chain)
+        if (couplings := self.subject.tree.couplings) and isinstance(chain.mask, ReversalMask):
+            chain = replace(chain, mask=replace(chain.mask, couplings=tuple(c.weights for c in couplings)))
         return chain if self.trim is None else replace(chain, trim=self.trim)
 
     @property
@@ -97,7 +109,10 @@ class Identified:
     @cached_property
     def problem(self) -> Problem:
         """Logs, robot and chain, by the explicit model."""
-        return Problem(self.logs, self.basis, ExplicitModel(), self.processing)
+        basis = self._known_basis or self.subject.basis
+        with blamed():
+            found = Problem(self.logs, basis, ExplicitModel(), self.processing)
+            return found if self._known_basis else settled(found)
 
     @cached_property
     def outcomes(self) -> dict[str, Estimate | IdentificationError]:

@@ -6,6 +6,7 @@ from typing import Annotated, Literal, final
 import tyro
 
 Names = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME")]
+Laws = Annotated[tuple[str, ...], tyro.conf.arg(metavar="[JOINT=]LAW+LAW")]
 
 
 @final
@@ -20,5 +21,7 @@ class Parameters:
     """Laws of friction beside viscous and Coulomb friction, such as offset, a constant torque of each joint."""
     without: Names = ()
     """Parameters to leave out, as if they were zero."""
-    friction: Literal["joints", "none"] = "joints"
-    """Viscous and Coulomb friction of every joint, or none, as where torques are measured at the links."""
+    friction: Laws = ("standard",)
+    """Laws of friction: standard (viscous and Coulomb), none (torques measured at the links), asymmetric, or a sum such as
+    standard+load+stribeck; of one joint: 2=standard+load. auto: those that predict motion best that was not fitted. `idbench
+    list` has them all."""

@@ -52,7 +52,7 @@ class ScenarioRun:
     def __post_init__(self) -> None:
         # What is wrong with names, or a robot that is no SCARA, is reported before the simulation.
         Identified((), self.subject, chain=self.chain, estimator=self.estimator)
-        self.subject.truth(self.scenario.real_robot)
+        self.subject.truth(self.scenario.real_robot, self.scenario.friction)
 
     def require_bearable(self, yes: bool) -> None:
         """Say how long a simulation is that takes long; raise ExperimentError if it would hardly end, unless that is wanted."""
@@ -77,7 +77,7 @@ class ScenarioRun:
     @cached_property
     def identified(self) -> Identified:
         """What the models make of its log."""
-        truth = self.subject.truth(self.run.robots[0])
+        truth = self.subject.truth(self.run.robots[0], self.scenario.friction)
         log, name = (self.run.alone(),), f"{self.chain}-{self.estimator}-study" if self.method else ""
         return Identified(log, self.subject, truth, chain=self.chain, estimator=self.estimator, method=self.method, name=name)
 

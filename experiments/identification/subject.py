@@ -8,8 +8,10 @@ from typing import final
 import numpy as np
 
 from experiments.errors import ExperimentError
+from experiments.identification.friction_laws import STANDARD, FrictionLaws
 from experiments.identification.parameters import Parameters
-from identify import BLOCKS, AbstractFriction, BaseParameters, Basis, KinematicTree, scara, tree_basis
+from identify import BLOCKS, AbstractJointLaw, BaseParameters, Basis, KinematicTree, scara, tree_basis
+from sim.frictions import AbstractFrictionLaw
 from sim.robot.mounting import PLAIN, Mounting
 from sim.robot.robot import FILES, Robot
 from sim.robot.scara import scara_truth
@@ -46,43 +48,54 @@ class Subject:
     @cached_property
     def tree(self) -> KinematicTree:
         """Its description."""
-        tree = kinematic_tree(self.robot)
+        tree = kinematic_tree(self.robot, [name for name, _ in self.mounting.couplings])
         if self.asked.armature == "file":
             return tree
         rotors = self.asked.armature == "all"
-        return replace(tree, joints=tuple(replace(joint, armature=rotors) for joint in tree.joints))
+        joints = tuple(replace(joint, armature=rotors) for joint in tree.joints)
+        return replace(tree, joints=joints, couplings=tuple(replace(c, armature=rotors) for c in tree.couplings))
 
     @cached_property
     def grouping(self) -> BaseParameters:
         """How its standard parameters are grouped."""
-        basis = tree_basis(self.tree) if self.asked.friction == "joints" else tree_basis(self.tree, ())
-        return BaseParameters.of(self.tree, self._with_laws(basis))
+        return BaseParameters.of(self.tree, self._with_laws(tree_basis(self.tree, self.laws.blocks())))
+
+    @cached_property
+    def laws(self) -> FrictionLaws:
+        """The laws of friction of its joints."""
+        return FrictionLaws.of(self.asked.friction, self.robot.joints)
 
     @cached_property
     def base(self) -> BaseParameters | None:
         """The grouping, where its base parameters are what is identified; None for the closed form."""
         as_shipped = self.name == CLOSED_FORM and self.mounting.plain
-        return None if as_shipped and self.asked.armature == "file" and self.asked.friction == "joints" else self.grouping
+        return None if as_shipped and self.asked.armature == "file" and self.laws.standard else self.grouping
 
     @cached_property
     def whole(self) -> Basis:
         """What could be identified."""
-        return self._with_laws(scara()) if self.base is None else self.base.basis
+        if self.base is not None:
+            return self.base.basis
+        basis = scara()
+        for block in self.laws.blocks(leave=STANDARD):
+            basis = basis + block
+        return self._with_laws(basis)
 
     @cached_property
     def basis(self) -> Basis:
         """What is identified."""
         return self.whole.without(*self.asked.without) if self.asked.without else self.whole
 
-    def truth(self, robot: Robot) -> dict[str, float]:
-        """Return the true value of every parameter of the basis for `robot`, this one as it is simulated.
+    def truth(self, robot: Robot, friction: AbstractFrictionLaw | None = None) -> dict[str, float]:
+        """Return the true value of every parameter of the basis for `robot`, this one as it is simulated, with its friction.
 
         What the simulated robot does not have, such as an offset, is zero.
         """
+        laws = friction.truth(robot) if friction else {}
         if self.base is None:
-            known = scara_truth(robot)
+            known = scara_truth(robot) | laws
         else:
-            standard = standard_parameters(robot)
+            standard = standard_parameters(robot) | laws
             values = np.array([standard.get(name, 0.0) for name in self.base.standard.names])
             known = dict(zip(self.base.names, map(float, self.base.base(values)), strict=True))
         return {name: known.get(name, 0.0) for name in self.basis.names}
@@ -90,8 +103,8 @@ class Subject:
     def _with_laws(self, basis: Basis) -> Basis:
         for name in self.asked.add:
             block = BLOCKS.create(name)
-            if not isinstance(block, AbstractFriction):
-                laws = [known for known in BLOCKS if isinstance(BLOCKS.create(known), AbstractFriction)]
+            if not isinstance(block, AbstractJointLaw):
+                laws = [known for known in BLOCKS if isinstance(BLOCKS.create(known), AbstractJointLaw)]
                 raise ExperimentError(f"--add {name}: that is no law of a joint's friction; known: {', '.join(laws)}")
             basis = basis + block
         return basis

@@ -11,6 +11,7 @@ import numpy as np
 from experiments.identification.consistent_robot import Written
 from experiments.identification.identified import Identified
 from identify import Array, Basis, ExplicitModel, IdentificationError, MotionLog, Problem, State, Validation, split, validate
+from identify.arrays import combined
 from identify.rows.long_logs import manageable
 from sim.engine.replay import Replay, replay
 from sim.errors import BenchError
@@ -90,7 +91,7 @@ class Validated:
         try:
             written = Written(self.judged, model)
             log, qd = self._replayed
-            return replay(written.robot, _without(log, qd, self.judged.subject.grouping.standard, written.lost), qd, BANDWIDTH)
+            return replay(written.robot, _without(log, qd, self.judged.basis, written.lost), qd, BANDWIDTH)
         except (BenchError, IdentificationError) as error:
             return str(error)
 
@@ -134,12 +135,12 @@ class Validated:
         return {**found, "position_error_rms": None if off is None else off.tolist()}
 
 
-def _without(log: MotionLog, qd: Array, standard: Basis, lost: Mapping[str, float]) -> MotionLog:
+def _without(log: MotionLog, qd: Array, basis: Basis, lost: Mapping[str, float]) -> MotionLog:
     """Return a log without the torques of laws of friction that a simulated robot does not have."""
-    if not lost:
+    if not (there := [name for name in lost if name in basis.names]):
         return log
-    state = State(log.q.T, np.ascontiguousarray(qd.T), np.zeros_like)
-    tau = log.tau * np.asarray(log.torque.gain)
-    for (joint, name), column in standard.renamed({name: name for name in lost}).explicit(state).items():
-        tau[:, joint] -= lost[name] * column
-    return MotionLog(log.fs, log.q, tau, replace(log.torque, gain=1.0))
+    q, v, conditions = log.q.T, np.ascontiguousarray(qd.T), {name: x.T for name, x in log.conditions.items()}
+    state = State(q, v, lambda _: np.gradient(v, 1 / log.fs, axis=-1), conditions)
+    laws, X = basis.renamed({name: name for name in there}), np.array([lost[name] for name in there])
+    tau = log.tau * np.asarray(log.torque.gain) - combined(laws.explicit(state), laws.names, X, np.zeros(q.shape)).T
+    return replace(log, tau=tau, torque=replace(log.torque, gain=1.0))

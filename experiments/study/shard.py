@@ -12,6 +12,7 @@ from experiments.study.bound import bound_of
 from experiments.study.method import Method
 from experiments.study.study import Study
 from identify import Array, Estimate, ExplicitModel, IdentificationError, Problem, Status, attempt_each
+from identify.estimators.settle import settled
 from sim.engine.run import Run
 from sim.engine.simulation import Progress, simulate
 from sim.errors import BenchError
@@ -57,7 +58,7 @@ def run_shard(study: Study, runs: range, *, threads: int = 1, progress: Progress
         start = time.perf_counter()
         try:
             simulated = _simulate(scenarios, together, threads, _part(progress, done, len(together), len(runs)))
-            truth = study.subject.truth(simulated.robots[0])
+            truth = study.subject.truth(simulated.robots[0], simulated.scenario.friction)
             bound = bound_of(study, simulated, truth) if study.bound else None
         except BenchError as error:
             _fail(shard, study, scenarios, list(together), str(error))
@@ -107,7 +108,7 @@ def _identify(
     """Yield a row for every run and model."""
     found: dict[str, Estimate | IdentificationError]
     try:
-        problem = Problem((simulated.log,), study.subject.basis, ExplicitModel(), method.chain)
+        problem = settled(Problem((simulated.log,), study.subject.basis, ExplicitModel(), method.chain))
         found = attempt_each(problem, study.created_models, method.estimator, throw=False)
     except IdentificationError as error:
         found = dict.fromkeys(study.models, error)

@@ -13,6 +13,7 @@ from pydantic import Field
 
 from experiments.errors import StudyError
 from experiments.identification.defaults import CHAIN, ESTIMATOR
+from experiments.identification.parameters import Parameters
 from experiments.identification.subject import Subject
 from experiments.study.axis import Axis, Setting
 from experiments.study.method import Method, combinations, methods_of, whole_first
@@ -64,6 +65,8 @@ class Study:
     """Names of chains."""
     estimators: Names = (ESTIMATOR,)
     """Names of estimators."""
+    friction: Names = ("standard",)
+    """Laws of friction that are identified: standard, or a sum such as standard+stribeck."""
     bound: bool = False
     """Whether the least error that encoders and torque noise allow is computed beside (Cramer-Rao)."""
 
@@ -143,7 +146,7 @@ class Study:
     @cached_property
     def subject(self) -> Subject:
         """The robot of all its runs."""
-        return Subject(self._first.robot)
+        return Subject(self._first.robot, Parameters(friction=self.friction))
 
     def with_seeds(self, seeds: int) -> "Study":
         """Return this study with another number of independent runs."""
@@ -190,7 +193,7 @@ class Study:
             listed = {"values": list(axis.values)} if axis.values else {}
             axes.append({"field": axis.field, **listed, **spaced, **({"also": list(axis.also)} if axis.also else {})})
         plain = {key: getattr(self, key) for key in ("name", "question", "seeds", "seed", "motion")}
-        lists = {key: list(getattr(self, key)) for key in ("models", "chains", "estimators")}
+        lists = {key: list(getattr(self, key)) for key in ("models", "chains", "estimators", "friction")}
         return {**plain, **lists, "axes": axes, "scenario": self.scenario}
 
 

@@ -1,15 +1,15 @@
 """A robot as identification sees it: a sum of column blocks."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self, final
 
 import numpy as np
 
-from identify.arrays import Array, Columns
+from identify.arrays import HELD, Array, Columns
 from identify.basis.block import AbstractBlock, Narrowing
-from identify.basis.parameter import Parameter
+from identify.basis.parameter import RIGID, Parameter
 from identify.blame import expect
 from identify.errors import PluginError, SettingError
 from identify.signals.state import State
@@ -32,6 +32,8 @@ class Basis:
         Parameters of the blocks that stay, and what they are called here; all, by their own names, by default.
     slides : tuple of int
         Joints that slide, from 0: their frictions and rotors have units of translation.
+    held : mapping of str to Array or float
+        Parameters of the blocks that are known, shape (...): their torques are no part of W X, but stand in `HELD`.
 
     Raises
     ------
@@ -44,6 +46,7 @@ class Basis:
     order: tuple[str, ...] = ()
     kept: Mapping[str, str] | None = None
     slides: tuple[int, ...] = ()
+    held: Mapping[str, Array | float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         names = list(self._own)
@@ -56,6 +59,39 @@ class Basis:
     def __add__(self, block: AbstractBlock) -> Self:
         kept = None if self.kept is None else {**self.kept, **{p.name: p.name for p in block.parameters(self.n)}}
         return replace(self, blocks=(*self.blocks, block), kept=kept)
+
+    def holding(self, **values: Array | float) -> Self:
+        """Return the basis with parameters that are known to have these values, and are not identified."""
+        own = {new: old for old, new in self._renamed.items()}
+        held = {own[name]: value for name, value in values.items()}
+        return replace(self, held={**self.held, **held}).without(*values)
+
+    @property
+    def believed(self) -> dict[str, Array | float]:
+        """Where parameters are believed to be that enter nonlinearly, shape (...); their columns are slopes there."""
+        found = {name: value for block in self.blocks for name, value in block.believed(self.n).items()}
+        return {self._renamed[name]: value for name, value in found.items() if name in self._renamed}
+
+    @property
+    def adaptive(self) -> bool:
+        """Whether some columns depend on parameters, so that the basis holds about an estimate alone."""
+        return any(block.adaptive for block in self.blocks)
+
+    def adapted(self, X: Array) -> Self:
+        """Return the basis, linear about an estimate X, shape (..., p)."""
+        return replace(self, blocks=tuple(block.adapted(self, X) for block in self.blocks))
+
+    def value(self, name: str, X: Array) -> Array | None:
+        """Return the estimate, in X, of the parameter that a block calls `name`, shape (...); None if it is not identified."""
+        new = self._renamed.get(name)
+        return None if new is None else X[..., self.names.index(new)]
+
+    def rigid(self) -> Self:
+        """Return the basis of the rigid bodies and rotors alone."""
+        own = [name for name in self._renamed if self._own[name].kind in RIGID]
+        held = {name: value for name, value in self.held.items() if self._own[name].kind in RIGID}
+        blocks = [b for b in self.blocks if {p.name for p in b.parameters(self.n)} & {*own, *held}]
+        return replace(self, blocks=tuple(blocks), order=(), kept={name: self._renamed[name] for name in own}, held=held)
 
     def renamed(self, kept: Mapping[str, str]) -> Self:
         """Return the basis with these parameters alone, by new names; blocks are spared the work for others.
@@ -73,7 +109,7 @@ class Basis:
         if unknown := [name for name in kept if name not in self.names]:
             raise SettingError(f"there is no parameter {', '.join(unknown)}; there are {', '.join(self.names)}")
         own = {new: old for old, new in self._renamed.items()}
-        names = frozenset(own[name] for name in kept)
+        names = frozenset([*(own[name] for name in kept), *self.held])
         blocks = tuple(block.narrowed(names) if isinstance(block, Narrowing) else block for block in self.blocks)
         return replace(self, blocks=blocks, order=(), kept={own[name]: new for name, new in kept.items()})
 
@@ -135,6 +171,7 @@ class Basis:
         """Return what a column function of every block gives, together."""
         names, shape, total = self._renamed, (*state.q.shape[:-2], state.q.shape[-1]), dict[tuple[int, str], Array]()
         for block in self.blocks:
+            held = self._held_of(block)
             found = getattr(block, function)(state)
             if not isinstance(found, Mapping):
                 raise PluginError(
@@ -145,4 +182,16 @@ class Basis:
                     if np.shape(signal) != shape:
                         expect(block, f"{function} for {name}", signal, shape)
                     total[row, names[name]] = signal
+                if name in held:
+                    total[row, HELD] = total.get((row, HELD), 0.0) + np.asarray(held[name])[..., None] * signal
         return total
+
+    def _held_of(self, block: AbstractBlock) -> dict[str, Array | float]:
+        """Return what the columns of a block that are no part of W X are multiplied by.
+
+        With a slope F g'(b) as the column of b, F g(b) + F g'(b) (b - b0) has - F g'(b) b0 that depends on no parameter.
+        """
+        own = {p.name for p in block.parameters(self.n)} if self.held else set()
+        believed = block.believed(self.n)
+        found = {name: value for name, value in self.held.items() if name in own}
+        return found | {name: -np.asarray(value) for name, value in believed.items() if name in self._renamed}

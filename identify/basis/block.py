@@ -1,15 +1,15 @@
 """Column blocks: what a robot's basis is a sum of."""
 
 from abc import ABC, abstractmethod
-from typing import ClassVar, Protocol, final, runtime_checkable
-
-import numpy as np
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Protocol, final, runtime_checkable
 
 from identify.arrays import Array, Columns
-from identify.basis.parameter import Kind, Parameter
-from identify.blame import expect
-from identify.errors import SettingError
+from identify.basis.parameter import Parameter
 from identify.signals.state import State
+
+if TYPE_CHECKING:
+    from identify.basis.basis import Basis
 
 
 class AbstractBlock(ABC):
@@ -47,6 +47,21 @@ class AbstractBlock(ABC):
     def dissipation(self, state: State) -> Columns:
         """Return the columns of the dissipated power qd' Gamma_f in row 0 (Eq. 10)."""
 
+    @property
+    def adaptive(self) -> bool:
+        """Whether columns depend on parameters, so that the block holds about an estimate alone: see `adapted`."""
+        return False
+
+    def adapted(self, basis: "Basis", X: Array) -> "AbstractBlock":
+        """Return the block about an estimate X, shape (..., p), in a basis that has it: ``basis.value(name, X)`` is a value."""
+        del basis, X
+        return self
+
+    def believed(self, n: int) -> Mapping[str, Array | float]:
+        """Return where parameters are believed to be that enter nonlinearly, shape (...): their columns are slopes there."""
+        del n
+        return {}
+
 
 @runtime_checkable
 class Narrowing(Protocol):
@@ -64,69 +79,3 @@ class AbstractConservativeBlock(AbstractBlock):
         """Return no columns."""
         del state
         return {}
-
-
-class AbstractFriction(AbstractBlock):
-    """A friction law of every joint, with one parameter a joint; all that a law has to say is `force`.
-
-    A law with two coefficients is the sum of two blocks.
-    """
-
-    symbol: ClassVar[str]
-    """Letters of the parameter; the joint's number, from 1, follows them."""
-
-    unit: ClassVar[str]
-    """Unit of the parameter."""
-
-    kind: ClassVar[Kind] = "friction"
-    """What the parameter measures."""
-
-    @abstractmethod
-    def force(self, q: Array, qd: Array) -> Array:
-        """Return the friction torque of a unit parameter, (..., joint, time), positive when it resists qd > 0."""
-
-    @final
-    def parameters(self, n: int) -> tuple[Parameter, ...]:
-        """Return a parameter for each joint."""
-        return tuple(Parameter(f"{self.symbol}{j + 1}", j, self.kind, self.unit) for j in range(n))
-
-    @final
-    def explicit(self, state: State) -> Columns:
-        """Return the force columns: joint j's parameter in row j."""
-        return self.remainder(state)
-
-    @final
-    def momentum(self, state: State) -> Columns:
-        """Return no columns."""
-        del state
-        return {}
-
-    @final
-    def remainder(self, state: State) -> Columns:
-        """Return the force columns: joint j's parameter in row j."""
-        force = self._checked(state)
-        return {(j, p.name): force[..., j, :] for j, p in enumerate(self.parameters(state.n))}
-
-    @final
-    def energy(self, state: State) -> Columns:
-        """Return no columns."""
-        del state
-        return {}
-
-    @final
-    def dissipation(self, state: State) -> Columns:
-        """Return qd_j times the force of joint j, in row 0."""
-        power = state.qd * self._checked(state)
-        return {(0, p.name): power[..., j, :] for j, p in enumerate(self.parameters(state.n))}
-
-    def _checked(self, state: State) -> Array:
-        """Return the force; raise SettingError if it is not finite, PluginError if it is no array like the velocities."""
-        force = expect(self, "force", self.force(state.q, state.qd), state.qd.shape)
-        if not np.isfinite(force).all():
-            k = np.argwhere(~np.isfinite(force))[0]
-            q, qd = state.q[tuple(k)], state.qd[tuple(k)]
-            raise SettingError(
-                f"friction law {type(self).__name__} gives {force[tuple(k)]} at q = {q:.4g}, qd = {qd:.4g}: let it be finite "
-                "for all of them, also at rest"
-            )
-        return force

@@ -4,11 +4,24 @@ from dataclasses import dataclass, replace
 from typing import Literal, Self, final
 
 Kind = Literal[
-    "inertia", "first moment", "mass", "rotor inertia", "viscous friction", "Coulomb friction", "friction", "offset", "other"
+    "inertia",
+    "first moment",
+    "mass",
+    "rotor inertia",
+    "viscous friction",
+    "Coulomb friction",
+    "friction",
+    "shape of friction",
+    "offset",
+    "stiffness",
+    "other",
 ]
 
 BODY: frozenset[Kind] = frozenset({"inertia", "first moment", "mass"})
 """Kinds of parameters of a rigid body."""
+
+RIGID: frozenset[Kind] = BODY | {"rotor inertia"}
+"""Kinds of parameters of what has inertia."""
 
 NOT_NEGATIVE: frozenset[Kind] = frozenset({"rotor inertia", "viscous friction", "Coulomb friction"})
 """Kinds whose values cannot be below zero."""

@@ -6,9 +6,9 @@ from typing import final
 from identify.arrays import Columns
 from identify.basis.basis import Basis
 from identify.basis.block import AbstractConservativeBlock
-from identify.basis.coulomb_friction import CoulombFriction
+from identify.basis.friction.coulomb import CoulombFriction
+from identify.basis.friction.viscous import ViscousFriction
 from identify.basis.parameter import Parameter
-from identify.basis.viscous_friction import ViscousFriction
 from identify.errors import SettingError
 from identify.signals.state import State
 

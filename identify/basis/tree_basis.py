@@ -1,23 +1,48 @@
 """The basis of any tree of links."""
 
+from collections.abc import Iterator
+
+import numpy as np
+
 from identify.basis.armature import Armature
 from identify.basis.basis import Basis
 from identify.basis.block import AbstractBlock
-from identify.basis.coulomb_friction import CoulombFriction
+from identify.basis.coupled import Coupled
+from identify.basis.friction.coulomb import CoulombFriction
+from identify.basis.friction.tied import TiedFriction
+from identify.basis.friction.viscous import ViscousFriction
+from identify.basis.joint_law import AbstractFriction
+from identify.basis.spring import Spring
 from identify.basis.tree_links import TreeLinks
-from identify.basis.viscous_friction import ViscousFriction
 from identify.data.kinematics import KinematicTree
 
 
 def tree_basis(tree: KinematicTree, laws: tuple[AbstractBlock, ...] = (ViscousFriction(), CoulombFriction())) -> Basis:
-    """Return links, armatures where the tree has them, and laws of friction: the standard parameters, joint by joint.
+    """Return links, armatures and springs where the tree has them, and laws of friction: the standard parameters, by joint.
+
+    Drives that turn with several joints have an armature and the laws of friction, too.
 
     Friction laws are added as to any basis, as in ``tree_basis(tree) + Offset()``. Standard parameters cannot all be
     identified: `BaseParameters` groups them.
     """
     driven = tuple(j for j, joint in enumerate(tree.joints) if joint.armature)
-    blocks = TreeLinks(tree), Armature(driven), *laws
+    sprung = {j: joint.spring for j, joint in enumerate(tree.joints) if joint.spring is not None}
+    rest = tuple(sprung.get(j, 0.0) for j in range(tree.n))
+    springs = (Spring(rest, tuple(sprung)),) if sprung else ()
+    blocks = TreeLinks(tree), Armature(driven), *springs, *laws, *_of_couplings(tree, laws)
     parameters = [parameter for block in blocks for parameter in block.parameters(tree.n)]
     order = tuple(parameter.name for parameter in sorted(parameters, key=lambda p: -1 if p.joint is None else p.joint))
     slides = tuple(j for j, joint in enumerate(tree.joints) if joint.kind == "slide")
     return Basis(tree.n, blocks, order, slides=slides)
+
+
+def _of_couplings(tree: KinematicTree, laws: tuple[AbstractBlock, ...]) -> Iterator[AbstractBlock]:
+    """Yield what drives that turn with several joints have: rotor, spring, laws of friction that are of motion alone."""
+    for coupling in tree.couplings:
+        if coupling.armature:
+            yield Coupled(Armature(), coupling)
+        if coupling.spring is not None:
+            yield Coupled(Spring((coupling.spring,)), coupling)
+        yield from (Coupled(law, coupling) for law in laws if isinstance(law, AbstractFriction))
+        if any(isinstance(law, CoulombFriction) for law in laws) and np.count_nonzero(coupling.weights) > 1:
+            yield TiedFriction(coupling)

@@ -52,6 +52,8 @@ class Joint:
         Whether its drive adds an inertia of its own.
     massive : bool
         Whether its link has mass; False for the links between several joints of one body.
+    spring : float, optional
+        Position [rad or m] at which a spring on the joint makes no torque, if it has one.
 
     Raises
     ------
@@ -70,6 +72,7 @@ class Joint:
     range: tuple[float, float] = (-np.inf, np.inf)
     armature: bool = True
     massive: bool = True
+    spring: float | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in get_args(Kind):
@@ -92,6 +95,33 @@ class Joint:
 
 
 @final
+@dataclass(frozen=True)
+class Coupling:
+    """A drive whose motor turns with several joints, theta = weights' q.
+
+    Parameters
+    ----------
+    name : str
+        Of the drive.
+    weights : tuple of float
+        One a joint; 0 of those with which it does not turn.
+    armature : bool
+        Whether it adds an inertia of its own.
+    spring : float, optional
+        Position of the motor [rad] at which a spring on it makes no torque, if it has one.
+    """
+
+    name: str
+    weights: tuple[float, ...]
+    armature: bool = True
+    spring: float | None = None
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.weights).all() or not np.any(self.weights):
+            raise KinematicsError(f"coupling {self.name}: weights {self.weights} must be finite, and not all 0")
+
+
+@final
 @dataclass(frozen=True, eq=False)
 class KinematicTree:
     """A tree of links on the ground, a joint each, with bodies that are welded together as one link.
@@ -104,6 +134,8 @@ class KinematicTree:
         In the order of a log's columns; parents come before their children.
     gravity : array_like, shape (3,)
         [m/s^2], in the frame of the ground.
+    couplings : tuple of Coupling
+        Drives that turn with several joints.
 
     Raises
     ------
@@ -114,6 +146,7 @@ class KinematicTree:
     name: str
     joints: tuple[Joint, ...]
     gravity: Array
+    couplings: tuple[Coupling, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "gravity", frozen(self.gravity))

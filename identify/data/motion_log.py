@@ -1,6 +1,7 @@
 """What a robot logged: the one thing that a simulator, or a real robot, hands to identification."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Literal, Self, get_args
 
 import numpy as np
@@ -77,6 +78,8 @@ class MotionLog:
         Joint torques [N m], or what `torque.gain` turns into them.
     torque : TorqueChannel
         What a sample of `tau` means.
+    conditions : mapping of str to array_like, shape (..., time, joint or 1)
+        What else was logged that laws may need: ``temperature`` [deg C]; ``payload``, the share of the payload that is held.
 
     Raises
     ------
@@ -90,6 +93,7 @@ class MotionLog:
     q: Array
     tau: Array
     torque: TorqueChannel
+    conditions: Mapping[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         require_positive(fs=self.fs)
@@ -108,8 +112,16 @@ class MotionLog:
                     f"{name} is {values.flat[np.abs(values).argmax()]:.3g} at some instant, where nothing beyond {largest:.0e} "
                     "is believed: are columns exchanged, or is this a mark for missing samples?"
                 )
+        object.__setattr__(self, "conditions", {name: self._condition(name, x) for name, x in self.conditions.items()})
         if np.size(self.torque.gain) not in (1, self.n):
             raise LogError(f"{np.size(self.torque.gain)} torque gains for {self.n} joints: give one, or one a joint")
+
+    def _condition(self, name: str, values: npt.ArrayLike) -> Array:
+        found = frozen(_real(name, values))
+        if found.ndim < 2 or found.shape[-2] not in (1, self.samples) or found.shape[-1] not in (1, self.n):
+            raise LogError(f"{name} has shape {found.shape}, q {self.q.shape}: one value a sample is needed, or one a joint")
+        _require_finite(name, found)
+        return frozen(np.broadcast_to(found, (*found.shape[:-2], self.samples, found.shape[-1])))
 
     @property
     def n(self) -> int:
@@ -128,17 +140,30 @@ class MotionLog:
 
     def part(self, first: int, end: int) -> "MotionLog":
         """Return the samples `first` ... `end` - 1 as a log of its own."""
-        return MotionLog(self.fs, self.q[..., first:end, :], self.tau[..., first:end, :], self.torque)
+        q, tau, *others = (x[..., first:end, :] for x in (self.q, self.tau, *self.conditions.values()))
+        return replace(self, q=q, tau=tau, conditions=dict(zip(self.conditions, others, strict=True)))
+
+    def run(self, i: tuple[int, ...]) -> "MotionLog":
+        """Return one of independent runs as a log of its own."""
+        conditions = {name: x[i] if x.ndim > 2 else x for name, x in self.conditions.items()}
+        return replace(self, q=self.q[i], tau=self.tau[i], conditions=conditions)
 
     @classmethod
-    def at_times(cls, t: npt.ArrayLike, q: npt.ArrayLike, tau: npt.ArrayLike, torque: TorqueChannel) -> Self:
+    def at_times(
+        cls,
+        t: npt.ArrayLike,
+        q: npt.ArrayLike,
+        tau: npt.ArrayLike,
+        torque: TorqueChannel,
+        conditions: Mapping[str, Array] | None = None,
+    ) -> Self:
         """Make a log from samples at the times `t`, which must be uniform.
 
         Parameters
         ----------
         t : array_like, shape (time,)
             Sample times [s], increasing, their steps within 1 % of the mean step.
-        q, tau, torque
+        q, tau, torque, conditions
             As for the class.
 
         Raises
@@ -151,7 +176,7 @@ class MotionLog:
             raise LogError(f"q has shape {positions.shape}, not (..., time, joint)")
         if times.shape != positions.shape[-2:-1]:
             raise LogError(f"t has shape {times.shape}, q {positions.shape}: one time is needed for each sample of q")
-        return cls(sampling_frequency(times), positions, _real("tau", tau), torque)
+        return cls(sampling_frequency(times), positions, _real("tau", tau), torque, conditions or {})
 
 
 def sampling_frequency(t: Array) -> float:

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 import scipy
 
-from identify.arrays import Array
+from identify.arrays import HELD, Array
 from identify.basis.basis import Basis
 from identify.rows.linearization import observation
 from identify.rows.noise_propagation import NoiseLevels
@@ -113,6 +113,8 @@ class Information:
         weight, sums, weighted = self.weight(motion), np.zeros((3 * n + 1, motion.shape[-2])), np.zeros(motion.shape[-2:])
         q, qd, qdd = _states(copies)
         for (row, name), column in self.basis.explicit(State(q, qd, lambda _: qdd)).items():
+            if name == HELD:
+                continue
             fading = of_rows[:, row, place[name]].copy()
             whole = of_torques[:, row, place[name]]
             if name in self._frictions:

@@ -11,6 +11,7 @@ from identify.estimators.estimate import Estimate
 from identify.estimators.estimator import AbstractEstimator
 from identify.estimators.generalized_least_squares import GeneralizedLeastSquares
 from identify.estimators.problem import Problem
+from identify.estimators.settle import settled
 from identify.models.explicit import ExplicitModel
 from identify.models.model import AbstractModel
 from identify.rows.chain import Chain
@@ -152,7 +153,7 @@ def _problem(
     _require(basis, Basis, "a Basis, such as scara()")
     _require(chain, Chain, 'a Chain, such as CHAINS.create("paper")')
     with blamed():
-        return Problem((log,) if isinstance(log, MotionLog) else tuple(log), basis, model, chain, simulate)
+        return settled(Problem((log,) if isinstance(log, MotionLog) else tuple(log), basis, model, chain, simulate))
 
 
 def _require(given: object, kind: type, wanted: str, *others: type) -> None:

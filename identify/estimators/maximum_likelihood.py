@@ -6,7 +6,6 @@ from typing import ClassVar, final
 import numpy as np
 
 from identify.arrays import Array, frozen
-from identify.data.motion_log import MotionLog
 from identify.errors import IdentificationError
 from identify.estimators.estimate import Estimate
 from identify.estimators.estimator import AbstractEstimator, Need
@@ -85,7 +84,7 @@ class MaximumLikelihood(AbstractEstimator):
 
     def _found(self, problem: Problem, run: tuple[int, ...], start: Estimate, levels: NoiseLevels) -> JointFit:
         """Return the fit of one run."""
-        alone = tuple(MotionLog(log.fs, log.q[run], log.tau[run], log.torque) for log in problem.logs)
+        alone = tuple(log.run(run) for log in problem.logs)
         logs = tuple(map(Cells.of, alone))
         rms = np.sqrt(np.mean([np.mean(cells.torque[0] ** 2, axis=-1) for cells in logs], axis=0))
         # A joint that stands says nothing of its torque.

@@ -42,5 +42,5 @@ def unbiased(rows: Rows, level: Array, rebuilt: Callable[[MotionLog, Signals], R
     for _ in range(PAIRS):
         noise = size * rng.standard_normal(log.q.shape[-2:])
         for sign in (1.0, -1.0):
-            bias += rebuilt(MotionLog(log.fs, log.q + sign * noise, log.tau, log.torque), signals).W - rows.W
+            bias += rebuilt(replace(log, q=log.q + sign * noise), signals).W - rows.W
     return replace(rows, W=rows.W - bias / (2 * PAIRS))

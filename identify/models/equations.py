@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from identify.arrays import Array, Columns, Multipliers, combined
+from identify.arrays import HELD, Array, Columns, Multipliers, combined
 from identify.signals.signals import Signals
 
 
@@ -64,8 +64,8 @@ class Equations:
 
     @cached_property
     def addresses(self) -> tuple[tuple[int, str], ...]:
-        """(row, parameter) of every column of c + s e that is not zero at all times; k of them."""
-        return tuple(dict.fromkeys((*self.c, *self.e)))
+        """(row, parameter) of every column of c + s e that is not zero at all times; k of them, those that are held first."""
+        return tuple(sorted(dict.fromkeys((*self.c, *self.e)), key=lambda address: address[1] != HELD))
 
     @cached_property
     def rates(self) -> Columns:

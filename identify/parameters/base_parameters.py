@@ -6,7 +6,7 @@ from typing import Self, final
 
 import numpy as np
 
-from identify.arrays import Array
+from identify.arrays import HELD, Array
 from identify.basis.basis import Basis
 from identify.data.kinematics import KinematicTree
 from identify.errors import SettingError
@@ -154,7 +154,8 @@ def columns_at(basis: Basis, states: Array) -> Array:
     q, qd, qdd = states
     W = np.zeros((basis.n, len(basis.names), q.shape[-1]))
     for (row, name), signal in basis.explicit(State(q, qd, lambda _: qdd)).items():
-        W[row, basis.names.index(name)] = signal
+        if name != HELD:
+            W[row, basis.names.index(name)] = signal
     return W
 
 

@@ -1,6 +1,6 @@
 """Triangular factors: all that least squares needs to know of rows, however many there are."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cached_property
@@ -201,6 +201,14 @@ class Factors:
             return parts[0]
         R = triangular(np.concatenate([part.R for part in parts], axis=-2))
         return cls(R, np.sum([part.rows for part in parts], axis=0), parts[0].names)
+
+    def only(self, names: Sequence[str], known: Mapping[str, Array | float] | None = None) -> Self:
+        """Return the factors of the rows with these parameters alone; of the others those `known`, shape (...), count in Y."""
+        R = self.R.copy()
+        for name, value in (known or {}).items():
+            R[..., -1] -= np.asarray(value)[..., None, None] * R[..., self.names.index(name)]
+        kept = [*(self.names.index(name) for name in names), -1]
+        return type(self)(triangular(R[..., kept]), self.rows, tuple(names))
 
     @cached_property
     def together(self) -> Factor:

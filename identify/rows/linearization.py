@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from identify.arrays import Array, combined, frozen
+from identify.arrays import HELD, Array, combined, frozen
 from identify.basis.basis import Basis
 from identify.signals.signals import Signals
 from identify.signals.state import State
@@ -103,7 +103,8 @@ def observation(basis: Basis, q: Array, qd: Array, qdd: Array) -> Array:
     """Return D(q, qd, qdd) of a motion, shape (..., joint, time), at every instant, shape (..., time, joint, p)."""
     found = np.zeros((*q.shape[:-2], q.shape[-1], basis.n, len(basis.names)))
     for (row, name), column in basis.explicit(State(q, qd, lambda _: qdd)).items():
-        found[..., row, basis.names.index(name)] = column
+        if name != HELD:
+            found[..., row, basis.names.index(name)] = column
     return found
 
 

@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from identify.arrays import Array
+from identify.arrays import HELD, Array
 from identify.errors import LogError, SettingError
 from identify.models.equations import Equations
 from identify.rows.factors import Factors
@@ -53,9 +53,13 @@ class Rows:
         y, columns = _mapped(equations, to_rows)
         _require_finite(columns, equations)
         n, count, p = equations.kinds, to_rows.grid.count, len(equations.names)
-        parameter = [equations.names.index(name) for _, name in equations.addresses]
+        held = [row for row, name in equations.addresses if name == HELD]
+        y[..., held, :] -= columns[..., : len(held), :]
+        places = equations.addresses[len(held) :]
         W = np.zeros((*y.shape[:-2], n, p, count))
-        W[..., [row for row, _ in equations.addresses], parameter, :] = columns
+        W[..., [row for row, _ in places], [equations.names.index(name) for _, name in places], :] = columns[
+            ..., len(held) :, :
+        ]
         W = np.moveaxis(W, -1, -3).reshape(*y.shape[:-2], count * n, p)
         time, valid = np.repeat(to_rows.time, n), in_order(to_rows.outside) > 0
         return cls(in_order(y), W, valid, time, n, equations.names, (to_rows,))

@@ -55,7 +55,8 @@ class Signals:
         q = self._prefiltered(self.log.q)
         expect(self.differentiator, "derivative", self.s(q), q.shape)
         derivative, fs = self.differentiator.derivative, self.fs  # not self.s: a circle of references would outlive long pieces
-        return State.of(q, lambda x: derivative(x, fs))
+        conditions = {name: np.swapaxes(x, -1, -2) for name, x in self.log.conditions.items()}
+        return State.of(q, lambda x: derivative(x, fs), conditions)
 
     @cached_property
     def torque(self) -> Torque:

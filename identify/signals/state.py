@@ -1,13 +1,14 @@
 """How the joints move: what the column functions of a basis are functions of."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Self, TypeVar
 
 import numpy as np
 
 from identify.arrays import Array
+from identify.errors import LogError
 
 T = TypeVar("T")
 
@@ -24,16 +25,26 @@ class State:
         [rad], [rad/s].
     s : callable
         d/dt along the last axis; only asked for accelerations.
+    conditions : mapping of str to Array, shape (..., joint or 1, time)
+        What else the log says, such as temperatures.
     """
 
     q: Array
     qd: Array
     s: Callable[[Array], Array]
+    conditions: Mapping[str, Array] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, q: Array, s: Callable[[Array], Array]) -> Self:
+    def of(cls, q: Array, s: Callable[[Array], Array], conditions: Mapping[str, Array] | None = None) -> Self:
         """Return the state of positions [rad], shape (..., joint, time)."""
-        return cls(q, s(q), s)
+        return cls(q, s(q), s, conditions or {})
+
+    def condition(self, name: str) -> Array:
+        """Return what else the log says, shape (..., joint or 1, time); raise LogError if it says nothing of it."""
+        if name not in self.conditions:
+            known = ", ".join(self.conditions) or "nothing beside motion and torque"
+            raise LogError(f"the log does not say the {name} that a law needs; it has {known}: see `idbench log`")
+        return self.conditions[name]
 
     @property
     def n(self) -> int:

@@ -189,7 +189,8 @@ class Bench:
             current if scenario.torque.source == "current" else command, n, generators(self._seeds, NOISE)
         )
         planned = replace(self._planned, **{x: getattr(self._planned, x)[skipped:] for x in ("q", "qd", "qdd")})
-        log = MotionLog(scenario.fs, measured, logged, scenario.channel)
+        conditions = scenario.friction.conditions((skipped + np.arange(q.shape[1])) / scenario.fs, n)
+        log = MotionLog(scenario.fs, measured, logged, scenario.channel, conditions)
         return Run(scenario, self._seeds, self._plant.robots, planned, log, q, qd, tau, command, self._failures.reasons)
 
     def _stop_failed(self, step: int) -> None:

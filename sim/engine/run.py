@@ -48,4 +48,4 @@ class Run:
 
     def alone(self, i: int = 0) -> MotionLog:
         """Return the log of simulation `i` by itself."""
-        return MotionLog(self.log.fs, self.log.q[i], self.log.tau[i], self.log.torque)
+        return self.log.run((i,))

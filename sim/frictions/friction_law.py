@@ -7,6 +7,7 @@ import mujoco
 from mujoco.batch import Batch
 
 from sim.robot.motors import Array
+from sim.robot.robot import Robot
 from sim.settings import EachNotNegativeOrNone, per_joint
 
 
@@ -45,6 +46,16 @@ class AbstractFrictionLaw(ABC):
         if self.coulomb is not None:
             for joint, value in zip(spec.joints, per_joint(self.coulomb, n, "friction.coulomb"), strict=True):
                 joint.frictionloss = value
+
+    def truth(self, robot: Robot) -> dict[str, float]:
+        """Return what identification may find of it beside Fv and Fs, by the names of `identify`, such as vs1."""
+        del robot
+        return {}
+
+    def conditions(self, t: Array, n: int) -> dict[str, Array]:
+        """Return what the log says beside motion and torque at its instants t [s], shape (time, joint or 1)."""
+        del t, n
+        return {}
 
     @abstractmethod
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:

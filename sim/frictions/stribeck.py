@@ -8,6 +8,7 @@ from pydantic import Field
 
 from sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
 from sim.robot.motors import Array
+from sim.robot.robot import Robot
 from sim.settings import EachNotNegativeOrNone, Number, Positive, settings
 
 
@@ -29,6 +30,11 @@ class Stribeck(AbstractFrictionLaw):
     def steady(self) -> bool:
         """False."""
         return False
+
+    def truth(self, robot: Robot) -> dict[str, float]:
+        """Return Fst and vs."""
+        rise = (self.static - 1) * robot.model.dof_frictionloss
+        return {f"Fst{j + 1}": float(x) for j, x in enumerate(rise)} | {f"vs{j + 1}": self.velocity for j in range(robot.n)}
 
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
         """Return the law, which sets MuJoCo's Coulomb friction anew in every step: its constraint keeps standing joints."""

@@ -1,5 +1,6 @@
 """How a robot is mounted and which of its joints a log has: a file describes more than a log shows."""
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import final
@@ -24,6 +25,8 @@ class Mounting:
         `lock` says.
     lock : tuple of (str, float)
         Joints that do not move, and where they are held [rad, m].
+    couplings : tuple of (str, tuple of (str, float))
+        Drives whose motor turns with several joints: name, and joints with what the motor turns for a turn of each.
     gravity : tuple of float, optional
         [m/s^2] in the frame of the robot's base; by default what the file says, -9.81 along z in a URDF.
     """
@@ -31,6 +34,7 @@ class Mounting:
     joints: tuple[str, ...] = ()
     lock: tuple[tuple[str, float], ...] = ()
     gravity: tuple[float, float, float] | None = None
+    couplings: tuple[tuple[str, tuple[tuple[str, float], ...]], ...] = ()
 
     @property
     def plain(self) -> bool:
@@ -62,10 +66,26 @@ class Mounting:
             _forget(spec, set(held), names)
         for joint in [joint for joint in spec.joints if joint.name in held]:
             _hold(spec, joint, held[joint.name])
+        for name, weights in self.couplings:
+            _couple(spec, name, weights)
 
 
 PLAIN = Mounting()
 """As the file describes it."""
+
+
+def _couple(spec: mujoco.MjSpec, name: str, weights: Sequence[tuple[str, float]]) -> None:
+    """Add a drive that turns with several joints: a fixed tendon."""
+    joints = [joint.name for joint in spec.joints]
+    if name in [tendon.name for tendon in spec.tendons]:
+        raise RobotError(f"--coupling {name}: the robot's file has a tendon of this name already")
+    tendon = spec.add_tendon(name=name)
+    for joint, weight in weights:
+        if joint not in joints:
+            raise RobotError(
+                f"--coupling {name}: there is no joint {joint!r}{did_you_mean(joint, joints)}; the robot's: {', '.join(joints)}"
+            )
+        tendon.wrap_joint(joint, weight)
 
 
 def _hold(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, value: float) -> None:
@@ -154,3 +174,26 @@ def locked(texts: Sequence[str]) -> tuple[tuple[str, float], ...]:
             raise RobotError(f"--lock {text}: give a joint and where it is held [rad, m], such as finger=0.02") from None
         del mark
     return tuple(found)
+
+
+def coupled(texts: Sequence[str]) -> tuple[tuple[str, tuple[tuple[str, float], ...]], ...]:
+    """Return drives and joints of texts such as motor6=joint_5+joint_6, or motor2=q2-0.5*q3; RobotError if one is none."""
+    found = []
+    for text in texts:
+        name, _, terms = text.partition("=")
+        parts = TERM.findall(terms)
+        if (
+            not re.fullmatch(r"[A-Za-z]\w*", name)
+            or not parts
+            or "".join("".join(part) for part in parts) != terms.replace(" ", "")
+        ):
+            raise RobotError(
+                f"--coupling {text}: give a name and what its motor turns with, such as motor6=joint_5+joint_6 or m=a-0.5*b"
+            )
+        weights = ((joint, float(f"{sign}{factor.rstrip('*') or '1'}")) for sign, factor, joint in parts)
+        found.append((name, tuple(weights)))
+    return tuple(found)
+
+
+TERM = re.compile(r"([+-]?)((?:\d*\.)?\d+(?:[eE][+-]?\d+)?\*|)([A-Za-z_][\w./:]*)")
+"""A joint with a sign and a factor."""

@@ -17,12 +17,15 @@ from sim.robot.meshes import without_missing_meshes
 from sim.robot.motors import Array
 from sim.robot.mounting import PLAIN, Mounting
 from sim.robot.robot import Robot
-from sim.robot.tree import standard_parameters
+from sim.robot.tree import kinematic_tree, standard_parameters
 
 ROUNDING = 1e-9
 """Share of the largest parameter by which those of the compiled file may differ from what was written into it."""
 
 Values = Mapping[str, float]
+
+DRIVE = {"Ia": "armature", "Fv": "damping", "Fs": "frictionloss", "K": "stiffness"}
+"""Letters of the parameters of a drive, and the attributes of MJCF for them."""
 
 
 def rewritten(name: str, standard: Values, folder: Path | None = None, mounting: Mounting = PLAIN) -> str:
@@ -55,9 +58,11 @@ def rewritten(name: str, standard: Values, folder: Path | None = None, mounting:
     for compiler in root.iter("compiler"):
         compiler.attrib.pop("inertiafromgeom", None)  # bodies keep what they are given
     bodies, joints = _elements(root)
+    _set_tendons(robot, root, wanted)
     for j, joint in enumerate(joints):
-        for letters, attribute in (("Ia", "armature"), ("Fv", "damping"), ("Fs", "frictionloss")):
-            joint.set(attribute, repr(float(wanted[f"{letters}{j + 1}"])))
+        for letters, attribute in DRIVE.items():
+            if f"{letters}{j + 1}" in wanted:
+                joint.set(attribute, repr(float(wanted[f"{letters}{j + 1}"])))
         if f"M{j + 1}" in wanted:
             _set_link(robot, bodies, j, wanted)
     home = Robot.path(name).absolute().parent
@@ -159,6 +164,16 @@ def _require_alike(robot: Robot, root: ElementTree.Element) -> None:
             f"the file of robot {robot.name!r} makes its bodies by replicate, attach or composite: write it out flat first "
             "(mujoco.MjSpec.from_file(...).to_xml() does)"
         )
+
+
+def _set_tendons(robot: Robot, root: ElementTree.Element, wanted: Values) -> None:
+    """Give drives that turn with several joints their rotors, frictions and springs."""
+    known = {f"{letters}_{coupling.name}" for coupling in kinematic_tree(robot).couplings for letters in DRIVE}
+    for tendon in [fixed for tendons in root.iter("tendon") for fixed in tendons if fixed.tag == "fixed"]:
+        for letters, attribute in DRIVE.items():
+            name = f"{letters}_{tendon.get('name', '')}"
+            if name in wanted and (name in known or wanted[name]):
+                tendon.set(attribute, repr(float(wanted[name])))
 
 
 def _set_link(robot: Robot, bodies: list[ElementTree.Element], joint: int, wanted: Values) -> None:

@@ -1,25 +1,26 @@
 """Any robot's kinematic description and its true parameters, read from its compiled model."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import mujoco
 import numpy as np
 
-from identify.data.kinematics import GROUND, INERTIAL, Joint, KinematicTree
+from identify.data.kinematics import GROUND, INERTIAL, Coupling, Joint, KinematicTree
 from sim.errors import RobotError
 from sim.robot.motors import Array
 from sim.robot.robot import Robot
 
 
-def kinematic_tree(robot: Robot) -> KinematicTree:
+def kinematic_tree(robot: Robot, couplings: Sequence[str] = ()) -> KinematicTree:
     """Return the tree of a robot's links; bodies that are welded to a link belong to it.
 
-    A joint has an armature if the model gives it one.
+    A joint has an armature, or a spring, if the model gives it one. Drives that turn with several joints are its `fixed`
+    tendons with rotor, friction or spring, and those that `couplings` name.
 
     Raises
     ------
     RobotError
-        If equality constraints or tendons close chains or couple joints; they are named.
+        If equality constraints or spatial tendons close chains or couple joints; they are named.
     """
     model = robot.model
     _require_open(robot)
@@ -46,12 +47,32 @@ def kinematic_tree(robot: Robot) -> KinematicTree:
                     range=tuple(float(x) for x in robot.ranges[k]),  # type: ignore[arg-type]  # two of them
                     armature=bool(model.dof_armature[k] > 0),
                     massive=k == first + count - 1,
+                    spring=float(model.qpos_spring[k]) if model.jnt_stiffness[k].any() else None,
                 )
             )
             parent = k
         last[body] = parent
     weightless = model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
-    return KinematicTree(robot.name, tuple(joints), np.zeros(3) if weightless else model.opt.gravity)
+    gravity = np.zeros(3) if weightless else model.opt.gravity
+    return KinematicTree(robot.name, tuple(joints), gravity, tuple(_couplings(robot, couplings)))
+
+
+def _couplings(robot: Robot, named: Sequence[str]) -> Iterator[Coupling]:
+    """Yield the drives that turn with several joints."""
+    model = robot.model
+    for i in _fixed(model):
+        tendon, weights = model.tendon(i), np.zeros(robot.n)
+        for wrap in range(model.tendon_adr[i], model.tendon_adr[i] + model.tendon_num[i]):
+            weights[model.wrap_objid[wrap]] += model.wrap_prm[wrap]
+        if tendon.name in named or _is_stiff(model, i) or model.tendon_armature[i]:
+            name, rest = tendon.name or f"tendon{i + 1}", float(model.tendon_lengthspring[i].mean())
+            armature = tendon.name in named or bool(model.tendon_armature[i])
+            yield Coupling(name, tuple(map(float, weights)), armature, rest if model.tendon_stiffness[i].any() else None)
+
+
+def _fixed(model: mujoco.MjModel) -> list[int]:
+    """Return the tendons that are sums of joints."""
+    return [i for i in range(model.ntendon) if model.wrap_type[model.tendon_adr[i]] == int(mujoco.mjtWrap.mjWRAP_JOINT)]
 
 
 def standard_parameters(robot: Robot) -> dict[str, float]:
@@ -70,14 +91,23 @@ def standard_parameters(robot: Robot) -> dict[str, float]:
             found |= {f"{x}{j + 1}": float(v) for x, v in zip(INERTIAL, values, strict=True)}
         for letters, field in (("Ia", "dof_armature"), ("Fv", "dof_damping"), ("Fs", "dof_frictionloss")):
             found[f"{letters}{j + 1}"] = float(getattr(model, field)[j])
+        if model.jnt_stiffness[j].any():
+            found[f"K{j + 1}"] = float(np.ravel(model.jnt_stiffness[j])[0])
+    for i in _fixed(model):
+        for letters, field in TENDON.items():
+            found[f"{letters}_{model.tendon(i).name or f'tendon{i + 1}'}"] = float(np.ravel(getattr(model, field)[i])[0])
     return found
+
+
+TENDON = {"Ia": "tendon_armature", "Fv": "tendon_damping", "Fs": "tendon_frictionloss", "K": "tendon_stiffness"}
+"""Letters of the parameters of drives that turn with several joints, and MuJoCo's fields of them."""
 
 
 def _require_open(robot: Robot) -> None:
     """Raise RobotError if something other than the tree ties joints together."""
     model = robot.model
     ties = [_tie(model, i) for i in range(model.neq) if model.eq_active0[i]]
-    ties += [f"tendon {model.tendon(i).name!r}" for i in range(model.ntendon) if _is_stiff(model, i)]
+    ties += [f"tendon {model.tendon(i).name!r}" for i in range(model.ntendon) if i not in _fixed(model) and _is_stiff(model, i)]
     if ties:
         raise RobotError(
             f"robot {robot.name!r} is no open tree: {', '.join(ties)} closes a chain or couples joints; hold the "
@@ -97,8 +127,8 @@ def _tie(model: mujoco.MjModel, equality: int) -> str:
 def unmodelled(robot: Robot) -> list[str]:
     """Return what of a robot's file makes torques that no parameter describes."""
     model = robot.model
-    sprung = [robot.joints[j] for j in np.flatnonzero(model.jnt_stiffness.reshape(robot.n, -1).any(axis=1))]
-    found = [f"springs at {', '.join(sprung)}"] if sprung else []
+    sprung = [robot.joints[j] for j in np.flatnonzero(model.jnt_stiffnesspoly.any(axis=1))]
+    found = [f"springs that are not linear at {', '.join(sprung)}"] if sprung else []
     if model.body_gravcomp.any():
         found.append("gravity compensation (gravcomp)")
     if model.opt.density or model.opt.viscosity:
@@ -109,7 +139,8 @@ def unmodelled(robot: Robot) -> list[str]:
 
 
 def _is_stiff(model: mujoco.MjModel, tendon: int) -> bool:
-    return bool(model.tendon_stiffness[tendon] or model.tendon_damping[tendon] or model.tendon_frictionloss[tendon])
+    fields = model.tendon_stiffness, model.tendon_damping, model.tendon_frictionloss
+    return any(bool(np.any(field[tendon])) for field in fields)
 
 
 def _placement(model: mujoco.MjModel, body: int) -> tuple[int, Array, Array]:

@@ -106,7 +106,8 @@ PAIR = '<geom size="0.1"/><body name="b" pos="1 0 0"><joint name="second"/><geom
         (
             one(
                 '<joint name="first"/>',
-                '<tendon><fixed name="belt" stiffness="1"><joint joint="first" coef="1"/></fixed></tendon>',
+                '<tendon><spatial name="belt" stiffness="1"><site site="s"/><site site="t"/></spatial></tendon>',
+                '<geom size="0.1"/><site name="s"/><site name="t" pos="0.1 0 0"/>',
             ),
             "tendon 'belt' closes a chain or couples joints",
         ),

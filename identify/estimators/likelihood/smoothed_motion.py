@@ -70,7 +70,7 @@ def smoothed_log(fit: JointFit, log: int = 0) -> MotionLog:
     cells, motion = fit.logs[log], smoothed_motion(fit, log)
     first = round(motion.t[0] * cells.log.fs)
     tau, torque = cells.log.tau[first : first + len(motion.q)], replace(cells.log.torque, delay=cells.delay)
-    return MotionLog(cells.log.fs, motion.q, tau, torque)
+    return MotionLog(cells.log.fs, motion.q, tau, torque, cells.log.conditions)
 
 
 def _covariance(fit: JointFit, log: int) -> Array:

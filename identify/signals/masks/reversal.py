@@ -28,11 +28,15 @@ class ReversalMask(AbstractMask):
         The instants this close [s] to such a one are left out as well: as far as differences look across the kink.
     taper : float
         Time [s] over which the weight then rises from 0 to 1, and falls.
+    couplings : tuple of tuple of float
+        Of drives whose motor turns with several joints, what it turns for a turn of each: where it stands or turns these joints
+        are left out as well.
     """
 
     threshold: float = 0.1
     width: float = 0.03
     taper: float = 0.1
+    couplings: tuple[tuple[float, ...], ...] = ()
 
     def __post_init__(self) -> None:
         require_positive(threshold=self.threshold)
@@ -44,6 +48,13 @@ class ReversalMask(AbstractMask):
 
     def weight(self, qd: Array, fs: float) -> Array:
         """Return 1 where the joint slides, 0 where it stands or turns, and what is between near there."""
+        weight = self._weight(qd, fs)
+        for coupling in self.couplings:
+            motor = self._weight(np.sum(np.array(coupling)[:, None] * qd, axis=-2, keepdims=True), fs)
+            weight = np.where(np.array(coupling)[:, None] != 0, np.minimum(weight, motor), weight)
+        return weight
+
+    def _weight(self, qd: Array, fs: float) -> Array:
         slides = np.abs(qd) > self.threshold
         turns = np.signbit(qd[..., 1:]) != np.signbit(qd[..., :-1])  # a fast joint turns between two samples
         slides[..., 1:] &= ~turns

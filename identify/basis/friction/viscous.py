@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar, final
 
 from identify.arrays import Array
-from identify.basis.block import AbstractFriction
+from identify.basis.joint_law import AbstractFriction
 from identify.basis.parameter import Kind
 
 

@@ -6,7 +6,7 @@ from typing import ClassVar, final
 import numpy as np
 
 from identify.arrays import Array
-from identify.basis.block import AbstractFriction
+from identify.basis.joint_law import AbstractFriction
 from identify.basis.parameter import Kind
 
 

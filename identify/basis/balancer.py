@@ -1,0 +1,96 @@
+"""Balancers: springs and gas springs between two points."""
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from identify.arrays import Array, Columns
+from identify.basis.block import AbstractConservativeBlock
+from identify.basis.parameter import Parameter
+from identify.errors import require_positive
+from identify.signals.state import State
+
+
+@final
+@dataclass(frozen=True)
+class Balancer(AbstractConservativeBlock):
+    """A balancer of a joint, between a point of its link and one that stands: a spring, and a hydraulic gas spring.
+
+    Its length is l = sqrt(a^2 + b^2 - 2 a b cos(q - zero)), a and b the distances of the points from the axis. The spring pulls
+    with F0 + Kb (l - least); the gas, behind a piston that oil moves, with Fg (V/(V - l + least))^kappa, its volume V as a
+    length of the stroke. With geometry and V from a drawing, F0, Kb and Fg are linear: A. Klimchik et al., "Geometric and
+    elastostatic calibration of robotic manipulator with gravity compensator", IROS 2013, for the geometry.
+
+    Parameters
+    ----------
+    joint : int
+        Of the robot, from 0.
+    a, b : float
+        Distances of the points from the axis [m].
+    zero : float
+        Position of the joint at which both points lie in one direction from the axis [rad].
+    volume : float, optional
+        V, gas volume over the area of the piston [m], longer than the stroke; without it there is no gas.
+    kappa : float
+        1 of slow, 1.4 of fast motion (nitrogen).
+    """
+
+    joint: int = 1
+    a: float = 0.2
+    b: float = 0.6
+    zero: float = 0.0
+    volume: float | None = None
+    kappa: float = 1.2
+
+    def __post_init__(self) -> None:
+        require_positive(a=self.a, b=self.b, kappa=self.kappa, volume=1.0 if self.volume is None else self.volume)
+
+    def parameters(self, n: int) -> tuple[Parameter, ...]:
+        """Return F0 and Kb, and Fg of one with gas."""
+        del n
+        names = {"F0": "N", "Kb": "N/m", **({"Fg": "N"} if self.volume is not None else {})}
+        return tuple(Parameter(f"{x}{self.joint + 1}", self.joint, "stiffness", unit) for x, unit in names.items())
+
+    def explicit(self, state: State) -> Columns:
+        """Return forces times dl/dq."""
+        return self.remainder(state)
+
+    def momentum(self, state: State) -> Columns:
+        """Return no columns."""
+        del state
+        return {}
+
+    def remainder(self, state: State) -> Columns:
+        """Return forces times dl/dq."""
+        length, slope = self._length(state.q[..., self.joint, :])
+        return {(self.joint, name): force * slope for name, force in self._forces(length - self._least).items()}
+
+    def energy(self, state: State) -> Columns:
+        """Return the integrals of the forces over the length."""
+        length, _ = self._length(state.q[..., self.joint, :])
+        return {(0, name): work for name, work in self._works(length - self._least).items()}
+
+    @property
+    def _least(self) -> float:
+        return abs(self.a - self.b)
+
+    def _length(self, q: Array) -> tuple[Array, Array]:
+        """Return l and dl/dq."""
+        angle = q - self.zero
+        length = np.sqrt(self.a**2 + self.b**2 - 2 * self.a * self.b * np.cos(angle))
+        long = np.maximum(length, 1e-9)
+        return length, self.a * self.b * np.sin(angle) / long
+
+    def _forces(self, stroke: Array) -> dict[str, Array]:
+        gas = {} if self.volume is None else {"Fg": (self.volume / (self.volume - stroke)) ** self.kappa}
+        each = {"F0": np.ones_like(stroke), "Kb": stroke, **gas}
+        return {f"{x}{self.joint + 1}": force for x, force in each.items()}
+
+    def _works(self, stroke: Array) -> dict[str, Array]:
+        gas = {}
+        if self.volume is not None:
+            V, k = self.volume, self.kappa
+            gas = {"Fg": -V * np.log(1 - stroke / V) if k == 1 else V / (k - 1) * ((1 - stroke / V) ** (1 - k) - 1)}
+        each = {"F0": stroke, "Kb": stroke**2 / 2, **gas}
+        return {f"{x}{self.joint + 1}": work for x, work in each.items()}

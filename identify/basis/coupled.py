@@ -1,0 +1,80 @@
+"""A drive that turns with several joints."""
+
+from dataclasses import dataclass, replace
+from typing import final
+
+import numpy as np
+
+from identify.arrays import Array, Columns
+from identify.basis.block import AbstractBlock
+from identify.basis.parameter import Parameter
+from identify.data.kinematics import Coupling
+from identify.signals.state import State
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Coupled(AbstractBlock):
+    """What a drive adds whose motor turns with several joints, theta = weights' q: its rotor, its frictions, a spring.
+
+    A torque of the motor acts on each of the joints with the joint's weight, the dual of how positions add up: the columns are
+    weights times those of one joint that moves as the motor does.
+
+    Parameters
+    ----------
+    block : AbstractBlock
+        What the drive has, as of a single joint.
+    coupling : Coupling
+        With which joints it turns.
+    """
+
+    block: AbstractBlock
+    coupling: Coupling
+
+    def parameters(self, n: int) -> tuple[Parameter, ...]:
+        """Return those of the block, with the name of the coupling for the number of the joint."""
+        del n
+        return tuple(replace(p, name=self._name(p), joint=None) for p in self.block.parameters(1))
+
+    def explicit(self, state: State) -> Columns:
+        """Return the columns of the joint torques."""
+        return self._of_joints(self.block.explicit(self._motor(state)))
+
+    def momentum(self, state: State) -> Columns:
+        """Return the columns of the momenta."""
+        return self._of_joints(self.block.momentum(self._motor(state)))
+
+    def remainder(self, state: State) -> Columns:
+        """Return the columns of the torques that are no derivative of a momentum."""
+        return self._of_joints(self.block.remainder(self._motor(state)))
+
+    def energy(self, state: State) -> Columns:
+        """Return the columns of the energy."""
+        return {(row, self._names[name]): x for (row, name), x in self.block.energy(self._motor(state)).items()}
+
+    def dissipation(self, state: State) -> Columns:
+        """Return the columns of the dissipated power."""
+        return {(row, self._names[name]): x for (row, name), x in self.block.dissipation(self._motor(state)).items()}
+
+    def _motor(self, state: State) -> State:
+        """Return the motion of the motor."""
+
+        def along(x: Array) -> Array:
+            return np.sum(np.asarray(self.coupling.weights)[:, None] * x, axis=-2, keepdims=True)
+
+        return State(along(state.q), along(state.qd), lambda _: along(state.qdd))
+
+    def _of_joints(self, columns: Columns) -> Columns:
+        found = {}
+        for (_, name), column in columns.items():
+            for j, weight in enumerate(self.coupling.weights):
+                if weight:
+                    found[j, self._names[name]] = weight * column
+        return found
+
+    def _name(self, parameter: Parameter) -> str:
+        return f"{parameter.symbol}_{self.coupling.name}"
+
+    @property
+    def _names(self) -> dict[str, str]:
+        return {p.name: self._name(p) for p in self.block.parameters(1)}

@@ -1,0 +1,1 @@
+"""Laws of friction: what the torque of a joint has beside that of the rigid bodies."""

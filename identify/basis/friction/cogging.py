@@ -1,0 +1,38 @@
+"""Torque that depends on the position of a rotor."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.basis.joint_law import AbstractJointLaw
+from identify.basis.parameter import Kind
+from identify.errors import require_positive
+from identify.signals.state import State
+
+
+@final
+@dataclass(frozen=True)
+class Cogging(AbstractJointLaw):
+    """Cogging of a known period, Cs sin(periods q) + Cc cos(periods q).
+
+    Parameters
+    ----------
+    periods : float
+        In a turn of the joint: slots and poles of the motor, times the ratio of its gear.
+    """
+
+    periods: float = 12.0
+
+    def __post_init__(self) -> None:
+        require_positive(periods=self.periods)
+
+    def letters(self) -> Mapping[str, tuple[Kind, str]]:
+        """Return Cs and Cc."""
+        return {"Cs": ("other", "N m"), "Cc": ("other", "N m")}
+
+    def torques(self, state: State) -> Mapping[str, Array]:
+        """Return sine and cosine."""
+        return {"Cs": np.sin(self.periods * state.q), "Cc": np.cos(self.periods * state.q)}

@@ -1,0 +1,59 @@
+"""Friction that grows with the load."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Self, final
+
+import numpy as np
+
+from identify.arrays import Array, combined
+from identify.basis.basis import Basis
+from identify.basis.joint_law import AbstractJointLaw
+from identify.basis.parameter import Kind
+from identify.signals.state import State
+
+
+@final
+@dataclass(frozen=True)
+class LoadFriction(AbstractJointLaw):
+    """Friction in proportion to the torque that a joint carries, Fl |load| sign(qd).
+
+    The load is all torque but friction, gravity and inertia of links and rotors (which cannot be told apart at every joint), by
+    the estimate before: P. Hamon, M. Gautier and P. Garrec, "Dynamic identification of robots with a dry friction model
+    depending on load and velocity", IROS 2010. As long as there is none, it is that of a unit inertia.
+
+    Parameters
+    ----------
+    bodies : Basis, optional
+        The rigid bodies and rotors.
+    X : Array, shape (..., p), optional
+        Their parameters, as estimated before.
+    """
+
+    bodies: Basis | None = None
+    X: Array | None = None
+
+    def letters(self) -> Mapping[str, tuple[Kind, str]]:
+        """Return Fl."""
+        return {"Fl": ("friction", "1")}
+
+    def torques(self, state: State) -> Mapping[str, Array]:
+        """Return |load| sign(qd)."""
+        return {"Fl": np.abs(self.load(state)) * np.sign(state.qd)}
+
+    def load(self, state: State) -> Array:
+        """Return the torque that each joint carries [N m], shape (..., joint, time)."""
+        if self.bodies is None or self.X is None:
+            return state.qdd
+        return combined(self.bodies.explicit(state), self.bodies.names, self.X, np.zeros(state.q.shape))
+
+    @property
+    def adaptive(self) -> bool:
+        """True."""
+        return True
+
+    def adapted(self, basis: Basis, X: Array) -> Self:
+        """Return the law with the load of an estimate."""
+        bodies = basis.rigid()
+        x = np.stack([X[..., basis.names.index(name)] for name in bodies.names], axis=-1)
+        return replace(self, bodies=bodies, X=np.nan_to_num(x))

@@ -1,0 +1,136 @@
+"""Friction laws with parameters that enter nonlinearly."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, NamedTuple, Self, final
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.basis.basis import Basis
+from identify.basis.joint_law import AbstractFriction, AbstractJointLaw
+from identify.basis.parameter import Kind
+from identify.signals.state import State
+
+STEP = 1e-4
+"""Of central differences by the logarithm of a shape."""
+
+FACTOR = 2.0
+"""By which a shape changes at most from one round to the next: the slope there says little of what is farther away."""
+
+
+class Shape(NamedTuple):
+    """A parameter of a law that enters nonlinearly; it is above zero."""
+
+    setting: str
+    """The law's own setting."""
+
+    letters: str
+    """What it is called; the joint's number, from 1, follows."""
+
+    unit: str
+    """Its unit."""
+
+    starts: tuple[float, ...]
+    """Values from which the search begins: the best of them; the middle one where nothing is known."""
+
+    range: tuple[float, float]
+    """Within which it is looked for."""
+
+
+@final
+@dataclass(frozen=True)
+class ShapedFriction(AbstractJointLaw):
+    """A friction law F g(qd; b) with unknown shapes b, linear about where they are believed to be.
+
+    With the size F0 and the shapes b0 of an estimate, the columns are g(qd; b0) of F and F0 dg/db of b: at the optimum, where
+    F0 and b0 are the estimate itself, these are the slopes of the residual, and sigma is that of nonlinear least squares.
+
+    Parameters
+    ----------
+    law : AbstractFriction
+        The law; its settings of the shapes take arrays.
+    shapes : tuple of Shape
+        What of it is unknown.
+    size : Array or float
+        F0, shape (..., joint).
+    values : mapping of str to Array
+        b0 by the law's settings, shape (..., joint).
+    """
+
+    law: AbstractFriction
+    shapes: tuple[Shape, ...]
+    size: Array | float = 1.0
+    values: Mapping[str, Array | float] = field(default_factory=dict)
+
+    def letters(self) -> Mapping[str, tuple[Kind, str]]:
+        """Return those of the law's size and of the shapes."""
+        return {**self.law.letters(), **{shape.letters: ("shape of friction", shape.unit) for shape in self.shapes}}
+
+    def torques(self, state: State) -> Mapping[str, Array]:
+        """Return g, and F0 dg/db of every shape."""
+        n, force = state.n, partial(self._force, state)
+        size = np.broadcast_to(np.asarray(self.size), (*np.shape(self.size)[:-1], n))[..., None]
+        found = {self.law.symbol: force(self._at(n))}
+        for shape in self.shapes:
+            b = self._at(n)
+            ahead, behind = ({**b, shape.setting: b[shape.setting] * np.exp(h)} for h in (STEP, -STEP))
+            slope = (force(ahead) - force(behind)) / (2 * STEP * b[shape.setting][..., None])
+            found[shape.letters] = size * slope
+        return found
+
+    def believed(self, n: int) -> Mapping[str, Array | float]:
+        """Return b0."""
+        at = self._at(n)
+        return {f"{s.letters}{j + 1}": at[s.setting][..., j] for s in self.shapes for j in range(n)}
+
+    @property
+    def adaptive(self) -> bool:
+        """True."""
+        return True
+
+    def adapted(self, basis: Basis, X: Array) -> Self:
+        """Return the law, linear about an estimate."""
+        n, at = basis.n, self._at(basis.n)
+        size = _joints(n, X, lambda j: basis.value(f"{self.law.symbol}{j + 1}", X), self.size)
+        values = {}
+        for shape in self.shapes:
+            old = at[shape.setting]
+            new = _joints(n, X, partial(_named, basis, X, shape.letters), old)
+            low, high = np.maximum(old / FACTOR, shape.range[0]), np.minimum(old * FACTOR, shape.range[1])
+            values[shape.setting] = np.clip(new, low, high)
+        return replace(self, size=size, values=values)
+
+    def at(self, values: Mapping[str, Array | float]) -> Self:
+        """Return the law with other b0, by the law's settings, shape (..., joint)."""
+        return replace(self, values={**self.values, **values})
+
+    def _at(self, n: int) -> dict[str, Array]:
+        """Return b0, shape (..., joint)."""
+        middle = {shape.setting: shape.starts[len(shape.starts) // 2] for shape in self.shapes}
+        found = {name: np.asarray(value, dtype=np.float64) for name, value in {**middle, **self.values}.items()}
+        return {name: np.broadcast_to(x, (*x.shape[:-1], n)) for name, x in found.items()}
+
+    def _force(self, state: State, b: Mapping[str, Array]) -> Array:
+        return with_settings(self.law, {name: x[..., None] for name, x in b.items()}).force(state.q, state.qd)
+
+
+def with_settings(law: AbstractFriction, settings: Mapping[str, Any]) -> AbstractFriction:
+    """Return a law with other settings."""
+    made: Any = law
+    found: AbstractFriction = replace(made, **settings)
+    return found
+
+
+def _named(basis: Basis, X: Array, letters: str, j: int) -> Array | None:
+    return basis.value(f"{letters}{j + 1}", X)
+
+
+def _joints(n: int, X: Array, value: Callable[[int], Array | None], default: Array | float) -> Array:
+    """Return a value of every joint, shape (..., joint), that of `default` where there is none or it is not finite."""
+    found = np.array(np.broadcast_to(default, (*X.shape[:-1], n)), dtype=np.float64)
+    for j in range(n):
+        if (x := value(j)) is not None:
+            found[..., j] = np.where(np.isfinite(x), x, found[..., j])
+    return found

@@ -1,0 +1,67 @@
+"""Coulomb friction that does not jump."""
+
+from dataclasses import dataclass
+from typing import ClassVar, final
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.basis.friction.shape import Shape, ShapedFriction
+from identify.basis.joint_law import AbstractFriction
+
+STARTS = (0.05, 0.1, 0.2, 0.5, 1.0)
+RANGE = (0.005, 20.0)
+
+
+@final
+@dataclass(frozen=True)
+class TanhFriction(AbstractFriction):
+    """Ft tanh(qd/vt): Coulomb friction without its jump, in the place of it.
+
+    Parameters
+    ----------
+    vt : Array or float
+        Velocity over which it rises [rad/s].
+    """
+
+    symbol: ClassVar[str] = "Ft"
+    unit: ClassVar[str] = "N m"
+
+    vt: Array | float = 0.1
+
+    def force(self, q: Array, qd: Array) -> Array:
+        """Return tanh(qd/vt)."""
+        del q
+        return np.tanh(qd / self.vt)
+
+
+@final
+@dataclass(frozen=True)
+class ArctanFriction(AbstractFriction):
+    """Fat 2/pi arctan(qd/vat): Coulomb friction without its jump, in the place of it; it rises longer than tanh.
+
+    Parameters
+    ----------
+    vat : Array or float
+        Velocity at which it has risen by half [rad/s].
+    """
+
+    symbol: ClassVar[str] = "Fat"
+    unit: ClassVar[str] = "N m"
+
+    vat: Array | float = 0.1
+
+    def force(self, q: Array, qd: Array) -> Array:
+        """Return 2/pi arctan(qd/vat)."""
+        del q
+        return 2 / np.pi * np.arctan(qd / self.vat)
+
+
+def tanh() -> ShapedFriction:
+    """Coulomb friction that rises over an unknown velocity, Ft tanh(qd/vt); in the place of `coulomb`."""
+    return ShapedFriction(TanhFriction(), (Shape("vt", "vt", "rad/s", STARTS, RANGE),))
+
+
+def arctan() -> ShapedFriction:
+    """Coulomb friction that rises over an unknown velocity, Fat 2/pi arctan(qd/vat); in the place of `coulomb`."""
+    return ShapedFriction(ArctanFriction(), (Shape("vat", "vat", "rad/s", STARTS, RANGE),))

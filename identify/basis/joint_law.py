@@ -1,0 +1,100 @@
+"""Laws of a joint: torques that depend on its own motion, or load, alone."""
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from typing import ClassVar, final
+
+import numpy as np
+
+from identify.arrays import Array, Columns
+from identify.basis.block import AbstractBlock
+from identify.basis.parameter import Kind, Parameter
+from identify.blame import expect
+from identify.errors import SettingError
+from identify.signals.state import State
+
+
+class AbstractJointLaw(AbstractBlock):
+    """A law of every joint whose torque stands in the row of the joint alone; a law may have several parameters a joint."""
+
+    @abstractmethod
+    def letters(self) -> Mapping[str, tuple[Kind, str]]:
+        """Return kind and unit of the parameters, by their letters; the joint's number, from 1, follows them."""
+
+    @abstractmethod
+    def torques(self, state: State) -> Mapping[str, Array]:
+        """Return the torque of a unit parameter by its letters, shape (..., joint, time), positive when it resists qd > 0."""
+
+    @final
+    def parameters(self, n: int) -> tuple[Parameter, ...]:
+        """Return the parameters of each joint."""
+        return tuple(Parameter(f"{x}{j + 1}", j, *what) for j in range(n) for x, what in self.letters().items())
+
+    @final
+    def explicit(self, state: State) -> Columns:
+        """Return the torques: joint j's parameters in row j."""
+        return self.remainder(state)
+
+    @final
+    def momentum(self, state: State) -> Columns:
+        """Return no columns."""
+        del state
+        return {}
+
+    @final
+    def remainder(self, state: State) -> Columns:
+        """Return the torques: joint j's parameters in row j."""
+        found = self._checked(state)
+        return {(j, f"{x}{j + 1}"): torque[..., j, :] for j in range(state.n) for x, torque in found.items()}
+
+    @final
+    def energy(self, state: State) -> Columns:
+        """Return no columns."""
+        del state
+        return {}
+
+    @final
+    def dissipation(self, state: State) -> Columns:
+        """Return qd_j times the torques of joint j, in row 0."""
+        found = {x: state.qd * torque for x, torque in self._checked(state).items()}
+        return {(0, f"{x}{j + 1}"): power[..., j, :] for j in range(state.n) for x, power in found.items()}
+
+    def _checked(self, state: State) -> dict[str, Array]:
+        """Return the torques; raise SettingError if one is not finite, PluginError if it is no array like the velocities."""
+        found = {x: expect(self, "force", torque, state.qd.shape) for x, torque in self.torques(state).items()}
+        for torque in found.values():
+            if not np.isfinite(torque).all():
+                k = np.argwhere(~np.isfinite(torque))[0]
+                q, qd = state.q[tuple(k)], state.qd[tuple(k)]
+                raise SettingError(
+                    f"friction law {type(self).__name__} gives {torque[tuple(k)]} at q = {q:.4g}, qd = {qd:.4g}: let it be "
+                    "finite for all of them, also at rest"
+                )
+        return found
+
+
+class AbstractFriction(AbstractJointLaw):
+    """A friction law of every joint, with one parameter a joint; all that a law has to say is `force`."""
+
+    symbol: ClassVar[str]
+    """Letters of the parameter; the joint's number, from 1, follows them."""
+
+    unit: ClassVar[str]
+    """Unit of the parameter."""
+
+    kind: ClassVar[Kind] = "friction"
+    """What the parameter measures."""
+
+    @abstractmethod
+    def force(self, q: Array, qd: Array) -> Array:
+        """Return the friction torque of a unit parameter, (..., joint, time), positive when it resists qd > 0."""
+
+    @final
+    def letters(self) -> Mapping[str, tuple[Kind, str]]:
+        """Return the one."""
+        return {self.symbol: (self.kind, self.unit)}
+
+    @final
+    def torques(self, state: State) -> Mapping[str, Array]:
+        """Return the force."""
+        return {self.symbol: self.force(state.q, state.qd)}

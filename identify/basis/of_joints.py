@@ -1,0 +1,72 @@
+"""A block of some joints."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Self, final
+
+from identify.arrays import Array, Columns
+from identify.basis.block import AbstractBlock
+from identify.basis.parameter import Parameter
+from identify.signals.state import State
+
+if TYPE_CHECKING:
+    from identify.basis.basis import Basis
+
+
+@final
+@dataclass(frozen=True)
+class OfJoints(AbstractBlock):
+    """A block, the parameters of some joints of it alone: friction that differs from joint to joint.
+
+    Parameters
+    ----------
+    block : AbstractBlock
+        Any.
+    joints : tuple of int
+        From 0.
+    """
+
+    block: AbstractBlock
+    joints: tuple[int, ...]
+
+    def parameters(self, n: int) -> tuple[Parameter, ...]:
+        """Return those of the joints."""
+        return tuple(p for p in self.block.parameters(n) if p.joint in self.joints)
+
+    def explicit(self, state: State) -> Columns:
+        """Return the columns of the joint torques."""
+        return self._of(state, self.block.explicit(state))
+
+    def momentum(self, state: State) -> Columns:
+        """Return the columns of the momenta."""
+        return self._of(state, self.block.momentum(state))
+
+    def remainder(self, state: State) -> Columns:
+        """Return the columns of the torques that are no derivative of a momentum."""
+        return self._of(state, self.block.remainder(state))
+
+    def energy(self, state: State) -> Columns:
+        """Return the columns of the energy."""
+        return self._of(state, self.block.energy(state))
+
+    def dissipation(self, state: State) -> Columns:
+        """Return the columns of the dissipated power."""
+        return self._of(state, self.block.dissipation(state))
+
+    @property
+    def adaptive(self) -> bool:
+        """Whether the block is."""
+        return self.block.adaptive
+
+    def adapted(self, basis: "Basis", X: Array) -> Self:
+        """Return the block about an estimate."""
+        return replace(self, block=self.block.adapted(basis, X))
+
+    def believed(self, n: int) -> Mapping[str, Array | float]:
+        """Return where parameters of the joints are believed to be that enter nonlinearly."""
+        own = {p.name for p in self.parameters(n)}
+        return {name: value for name, value in self.block.believed(n).items() if name in own}
+
+    def _of(self, state: State, columns: Columns) -> Columns:
+        own = {p.name for p in self.parameters(state.n)}
+        return {address: column for address, column in columns.items() if address[1] in own}

@@ -1,0 +1,58 @@
+"""Springs."""
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from identify.arrays import Array, Columns
+from identify.basis.block import AbstractConservativeBlock
+from identify.basis.parameter import Parameter
+from identify.errors import SettingError
+from identify.signals.state import State
+
+
+@final
+@dataclass(frozen=True)
+class Spring(AbstractConservativeBlock):
+    """Springs of joints, K (q - rest); where the rest position is not known, `offset` takes its torque.
+
+    Parameters
+    ----------
+    rest : tuple of float
+        Position without a torque [rad or m], of all joints or of each.
+    joints : tuple of int, optional
+        Joints that have one, from 0; all by default.
+    """
+
+    rest: tuple[float, ...] = (0.0,)
+    joints: tuple[int, ...] | None = None
+
+    def parameters(self, n: int) -> tuple[Parameter, ...]:
+        """Return K of each joint that has a spring."""
+        return tuple(Parameter(f"K{j + 1}", j, "stiffness", "N m/rad") for j in self._numbers(n))
+
+    def explicit(self, state: State) -> Columns:
+        """Return q - rest."""
+        return self.remainder(state)
+
+    def momentum(self, state: State) -> Columns:
+        """Return no columns."""
+        del state
+        return {}
+
+    def remainder(self, state: State) -> Columns:
+        """Return q - rest."""
+        return {(j, f"K{j + 1}"): self._bent(state, j) for j in self._numbers(state.n)}
+
+    def energy(self, state: State) -> Columns:
+        """Return (q - rest)^2 / 2."""
+        return {(0, f"K{j + 1}"): 0.5 * self._bent(state, j) ** 2 for j in self._numbers(state.n)}
+
+    def _bent(self, state: State, j: int) -> Array:
+        if len(self.rest) not in (1, state.n):
+            raise SettingError(f"{len(self.rest)} rest positions of springs for {state.n} joints: give one, or one a joint")
+        return state.q[..., j, :] - np.broadcast_to(self.rest, (state.n,))[j]
+
+    def _numbers(self, n: int) -> tuple[int, ...]:
+        return tuple(range(n)) if self.joints is None else self.joints

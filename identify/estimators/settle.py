@@ -1,0 +1,193 @@
+"""Settling parameters that enter nonlinearly: the basis, made linear about its own estimate."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from typing import final
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.basis.basis import Basis
+from identify.basis.friction.shape import ShapedFriction, with_settings
+from identify.basis.joint_law import AbstractFriction, AbstractJointLaw
+from identify.basis.of_joints import OfJoints
+from identify.basis.parameter import Kind
+from identify.estimators.problem import Problem
+from identify.rows.factors import Factors, Status
+from identify.rows.rows import Rows
+from identify.signals.state import State
+
+ROUNDS = 30
+"""At most; most laws take five."""
+
+SETTLED = 1e-3
+"""Steps below this share of sigma no longer matter."""
+
+SHARES = (1.0, 0.5, 0.25, 0.1)
+"""Of a step, in turn, until the rows are explained better."""
+
+TINY = 1e-300
+
+
+def settled(problem: Problem) -> Problem:
+    """Return the problem with its basis linear about the estimate that it gives by weighted least squares.
+
+    Variable projection: for fixed shapes of friction the other parameters are linear. G. Golub and V. Pereyra, "The
+    differentiation of pseudo-inverses and nonlinear least squares problems whose variables separate", SIAM J. Numerical
+    Analysis 10 (1973) 413-432; with columns of the shapes as slopes about the estimate, a round is a step of Gauss and Newton.
+    Of logs too long for their rows to be kept, some pieces say what the shapes are.
+    """
+    if not problem.basis.adaptive:
+        return problem
+    rows = AdaptiveRows(problem.explicit)
+    here = _started(rows, problem.basis)
+    there, cost = rows.factors(here), rows.misfit(here)
+    for _ in range(ROUNDS):
+        fit = there.fit(2)
+        ahead, cost = _step(rows, here, fit.X, cost)
+        moved = rows.factors(ahead)
+        step = np.abs(moved.fit(2).X - fit.X) / _sigma(there)
+        here, there = ahead, moved
+        if not (step > SETTLED).any():
+            break
+    return problem.explicit.with_basis(here).with_model(problem.model)
+
+
+def _step(rows: "AdaptiveRows", here: Basis, X: Array, cost: Array) -> tuple[Basis, Array]:
+    """Return the basis about an estimate, or a share of the way there if that explains more, and its misfit, shape (...)."""
+    for share in SHARES:
+        ahead = here.adapted(_between(here, X, share))
+        found = rows.misfit(ahead)
+        if not (found > cost).any():
+            break
+    return ahead, found
+
+
+def _between(basis: Basis, X: Array, share: float) -> Array:
+    """Return X with the shapes of friction moved by a share of their step alone."""
+    found = X.copy()
+    for name, old in basis.believed.items():
+        i = basis.names.index(name)
+        found[..., i] = old + share * (X[..., i] - old)
+    return found
+
+
+def _sigma(factors: Factors) -> Array:
+    """Return sigma of every parameter as the residuals of its rows have it, shape (..., p)."""
+    factor = factors.fit(2).factor
+    return np.sqrt(np.diagonal(factor.inverse(factor.status == Status.OK), axis1=-2, axis2=-1))
+
+
+@dataclass(frozen=True, eq=False)
+class AdaptiveRows:
+    """The rows of a problem with other laws of friction: the columns of what does not depend on an estimate are made once.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of the explicit model.
+    """
+
+    problem: Problem
+
+    def factors(self, basis: Basis) -> Factors:
+        """Return the factors with the laws of a basis in the place of those of the problem."""
+        key = id(basis)
+        if key not in self._known:
+            laws = replace(basis, blocks=tuple(b for b in basis.blocks if b.adaptive), order=(), kept=None, held={})
+            own = [name for name in basis.names if name in laws.names]
+            moving = self._rows_of(laws.renamed({name: name for name in own}))
+            fixed = self._fixed
+            W = np.concatenate([fixed.W, moving.W], axis=-1)
+            names = (*fixed.names, *moving.names)
+            order = [names.index(name) for name in basis.names]
+            rows = replace(fixed, Y=fixed.Y + moving.Y - self._measured, W=W[..., order], names=basis.names)
+            self._known[key] = basis, rows.factors
+        return self._known[key][1]
+
+    def misfit(self, basis: Basis) -> Array:
+        """Return what is left with the shapes of friction where they are believed to be, shape (...)."""
+        shapes = basis.believed
+        return misfit(self.factors(basis).only([name for name in basis.names if name not in shapes], shapes))
+
+    @cached_property
+    def _known(self) -> dict[int, tuple[Basis, Factors]]:
+        return {}
+
+    @cached_property
+    def _fixed(self) -> Rows:
+        basis = self.problem.basis
+        adaptive = {p.name for block in basis.blocks if block.adaptive for p in block.parameters(basis.n)}
+        return self._rows_of(basis.without(*(name for name in basis.names if name in adaptive)))
+
+    @cached_property
+    def _measured(self) -> Array:
+        return np.concatenate([rows.measurement(rows.signals.torque.mean) for rows in self._fixed.maps], axis=-1)
+
+    def _rows_of(self, basis: Basis) -> Rows:
+        return Rows.stack(self.problem.with_basis(basis).parts)
+
+
+def misfit(factors: Factors) -> Array:
+    """Return minus twice the logarithm of the likelihood, with a level of noise of each joint, shape (...)."""
+    return np.asarray(np.sum(factors.rows * np.log(np.maximum(factors.squares(factors.fit(2).X), TINY)), axis=-1))
+
+
+def _started(rows: AdaptiveRows, basis: Basis) -> Basis:
+    """Return the basis with every shape at the best of its starting values, joint by joint."""
+    for k, block in enumerate(basis.blocks):
+        inner, joints = (block.block, block.joints) if isinstance(block, OfJoints) else (block, range(basis.n))
+        if isinstance(inner, ShapedFriction) and not inner.values:
+            found = _best(rows, basis, inner, joints)
+            made = replace(block, block=found) if isinstance(block, OfJoints) else found
+            basis = replace(basis, blocks=(*basis.blocks[:k], made, *basis.blocks[k + 1 :]))
+    return basis
+
+
+def _best(rows: AdaptiveRows, basis: Basis, shaped: ShapedFriction, joints: Sequence[int]) -> ShapedFriction:
+    """Return a law with the starting values that explain most, joint by joint, without the same law at other joints."""
+    grid = [
+        dict(zip((s.setting for s in shaped.shapes), at, strict=True)) for at in product(*(s.starts for s in shaped.shapes))
+    ]
+    rest = basis.without(*(p.name for p in shaped.parameters(basis.n) if p.name in basis.names))
+    factors = rows.factors(rest + OfJoints(Candidates(shaped.law, tuple(grid)), tuple(joints)))
+    shapes = rest.believed
+    names = [name for name in rest.names if name not in shapes]
+    chosen = np.zeros((*factors.R.shape[:-3], basis.n), dtype=np.intp)
+    for j in joints:
+        costs = [misfit(factors.only([*names, f"{shaped.law.symbol}@{i}:{j + 1}"], shapes)) for i in range(len(grid))]
+        chosen[..., j] = np.argmin(costs, axis=0)
+    return shaped.at({s.setting: np.array([at[s.setting] for at in grid])[chosen] for s in shaped.shapes})
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Candidates(AbstractJointLaw):
+    """One law with several settings, a parameter each: to see which of them explains most.
+
+    Parameters
+    ----------
+    law : AbstractFriction
+        The law.
+    grid : tuple of mapping of str to float
+        Values of its settings.
+    """
+
+    law: AbstractFriction
+    grid: tuple[Mapping[str, float], ...]
+
+    @property
+    def adaptive(self) -> bool:
+        """True: it stands for what is yet to be found."""
+        return True
+
+    def letters(self) -> Mapping[str, tuple[Kind, str]]:
+        """Return a name for each of the settings."""
+        return {f"{self.law.symbol}@{i}:": (self.law.kind, self.law.unit) for i in range(len(self.grid))}
+
+    def torques(self, state: State) -> Mapping[str, Array]:
+        """Return the torque with each of the settings."""
+        each = (with_settings(self.law, at).force(state.q, state.qd) for at in self.grid)
+        return dict(zip(self.letters(), each, strict=True))

@@ -1,0 +1,122 @@
+"""Drives that turn with several joints, and springs, against MuJoCo's own torques."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from identify import ExplicitModel, tree_basis
+from identify.signals.state import State
+from sim.errors import RobotError
+from sim.robot.mounting import Mounting, coupled
+from sim.robot.rewrite import compiled, rewritten
+from sim.robot.robot import Robot
+from sim.robot.tree import kinematic_tree, standard_parameters
+
+WRIST = """<mujoco><compiler angle="radian"/><worldbody>
+<body name="a"><joint name="bend" axis="0 1 0" stiffness="3" springref="0.2" armature="0.1" damping="0.4"/>
+<inertial pos="0.1 0 0.2" mass="2" diaginertia="0.1 0.1 0.1"/>
+<body name="b" pos="0.3 0 0"><joint name="turn" axis="1 0 0" armature="0.05"/>
+<inertial pos="0 0.05 0" mass="1" diaginertia="0.02 0.02 0.02"/></body></body></worldbody>
+<tendon><fixed name="motor" armature="0.3" damping="0.7" frictionloss="0.9" stiffness="1.5" springlength="0.4">
+<joint joint="bend" coef="1"/><joint joint="turn" coef="-0.5"/></fixed></tendon></mujoco>"""
+
+
+@pytest.fixture
+def wrist(tmp_path):
+    (tmp_path / "wrist.xml").write_text(WRIST)
+    return str(tmp_path / "wrist.xml")
+
+
+def torques(robot, q, qd, qdd):
+    """Return what MuJoCo needs for a motion, with Coulomb friction of the tendon, which is no force of its inverse dynamics."""
+    data, found = mujoco.MjData(robot.model), []
+    for at in zip(q.T, qd.T, qdd.T, strict=True):
+        data.qpos, data.qvel, data.qacc = at
+        mujoco.mj_inverse(robot.model, data)
+        J = np.array([1.0, -0.5])
+        # mj_inverse takes the constraint's friction for given accelerations; that of sliding is its sign.
+        inverse = data.qfrc_inverse + data.qfrc_constraint
+        found.append(inverse + J * 0.9 * np.sign(J @ at[1]))
+    return np.array(found).T
+
+
+def test_columns_times_truth_are_mujocos_torques(wrist, rng):
+    robot = Robot.load(wrist)
+    tree, truth = kinematic_tree(robot), standard_parameters(robot)
+    assert tree.couplings[0].weights == (1.0, -0.5)
+    basis = tree_basis(tree)
+    X = np.array([truth.get(name, 0.0) for name in basis.names])
+    q, qd, qdd = rng.uniform(-1, 1, (3, 2, 40))
+    found = np.zeros((2, 40))
+    for (row, name), column in basis.explicit(State(q, qd, lambda _: qdd)).items():
+        found[row] += X[basis.names.index(name)] * column
+    np.testing.assert_allclose(found, torques(robot, q, qd, qdd), atol=1e-10)
+
+
+def test_a_coupling_keeps_the_identities_of_a_block(wrist, rng):
+    """Explicit columns are d/dt momentum + remainder, their power d/dt energy + dissipation, to a complex step."""
+    basis, h = tree_basis(kinematic_tree(Robot.load(wrist))), 1e-30
+    q, qd, qdd = rng.uniform(-1, 1, (3, 2, 20))
+    at, ahead = State(q, qd, lambda _: qdd), State(q + 1j * h * qd, qd + 1j * h * qdd, lambda x: x)
+    own = [name for name in basis.names if name.endswith("_motor") or name.startswith("K")]
+    assert {"Ia_motor", "Fv_motor", "Fs_motor", "Fsx_motor", "K_motor", "K1"} == set(own)
+    explicit, momentum, remainder = basis.explicit(at), basis.momentum(ahead), basis.remainder(at)
+    energy, dissipation = basis.energy(ahead), basis.dissipation(at)
+    for name in own:
+        power = 0.0
+        for row in range(2):
+            column = np.imag(momentum.get((row, name), 0j)) / h + remainder.get((row, name), 0.0)
+            np.testing.assert_allclose(explicit.get((row, name), 0.0), column + 0 * q[0], atol=1e-12)
+            power = power + qd[row] * explicit.get((row, name), 0.0)
+        stored = np.imag(energy.get((0, name), 0j)) / h + dissipation.get((0, name), 0.0)
+        np.testing.assert_allclose(power, stored + 0 * q[0], atol=1e-12)
+
+
+def test_a_file_with_couplings_and_springs_comes_back(wrist):
+    robot = Robot.load(wrist)
+    values = {**standard_parameters(robot), "Ia_motor": 0.25, "Fv_motor": 0.5, "Fs_motor": 0.4, "K_motor": 2.0, "K1": 5.0}
+    again = standard_parameters(compiled(wrist, rewritten(wrist, values)))
+    assert {name: again[name] for name in values} == pytest.approx(values)
+
+
+def test_an_option_adds_a_coupling():
+    mounting = Mounting(couplings=coupled(["m=joint5-0.5*joint6"]))
+    robot = Robot.load("puma560", mounting.edit)
+    (coupling,) = kinematic_tree(robot, ["m"]).couplings
+    assert coupling.weights == (0, 0, 0, 0, 1.0, -0.5)
+    assert coupling.armature
+    assert kinematic_tree(robot).couplings == ()  # it has nothing of its own in the file
+    values = {**standard_parameters(robot), "Ia_m": 0.02, "Fs_m": 0.3}
+    again = standard_parameters(compiled("puma560", rewritten("puma560", values, mounting=mounting)))
+    assert (again["Ia_m"], again["Fs_m"]) == pytest.approx((0.02, 0.3))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("m", "give a name and what its motor turns with"),
+        ("m=", "give a name and what its motor turns with"),
+        ("6=a+b", "give a name and what its motor turns with"),
+        ("m=a**b", "give a name and what its motor turns with"),
+        ("m=joint5+joynt6", "there is no joint 'joynt6' .did you mean 'joint6'?"),
+    ],
+)
+def test_what_is_no_coupling_is_refused(text, message):
+    with pytest.raises(RobotError, match=message):
+        Robot.load("puma560", Mounting(couplings=coupled([text])).edit)
+
+
+def test_a_wrist_is_identified_with_its_coupling(wrist):
+    """On noise-free data, to the differences' own error; without the coupling it is far off."""
+    from experiments.identification.subject import Subject
+    from identify import identify
+    from sim.engine.simulation import simulate
+    from sim.scenario.scenario_file import from_dict
+
+    trajectory = {"kind": "random", "moves": 12, "durations": [1.0, 1.4], "rest": 1.0}
+    run = simulate(from_dict({"name": "wrist", "robot": wrist, "trajectory": trajectory, "fs": 200.0}))
+    subject = Subject(wrist)
+    truth = subject.truth(run.robots[0])
+    found = identify(run.alone(), subject.basis, ExplicitModel())
+    for name in ("Ia_motor", "Fv_motor", "Fs_motor", "K_motor", "K1"):
+        assert found.X[found.names.index(name)] == pytest.approx(truth[name], rel=2e-3), name
