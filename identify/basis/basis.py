@@ -73,6 +73,11 @@ class Basis:
         return {self._renamed[name]: value for name, value in found.items() if name in self._renamed}
 
     @property
+    def kept_names(self) -> Mapping[str, str]:
+        """Parameters of the blocks that stay, and what they are called here."""
+        return self._renamed
+
+    @property
     def adaptive(self) -> bool:
         """Whether some columns depend on parameters, so that the basis holds about an estimate alone."""
         return any(block.adaptive for block in self.blocks)

@@ -1,7 +1,7 @@
 """What rows whose noise differs are divided by in weighted least squares."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from weakref import WeakKeyDictionary
 
@@ -17,7 +17,6 @@ from identify.rows.linearization import smoothed
 from identify.rows.noise_propagation import NoisyRows
 from identify.rows.row_map import RowMap
 from identify.rows.rows import Rows
-from identify.signals.state import State
 
 LEAST, MOST = 0.01, 10.0
 """Range of b/a: residuals of some hundred rows do not show less, and more is as good as equal weights."""
@@ -84,7 +83,7 @@ class RowWeights:
         """
         signals, linear = rows.signals, self.noise.linear(rows.signals)
         speed = rectified(smoothed(signals.state.qd, signals.fs), self.noise.levels.position[..., None] * signals.gain)
-        columns = self.model.c(linear.basis, State(signals.state.q, speed, signals.s))
+        columns = self.model.c(linear.basis, replace(signals.state, qd=speed))
         return rows.measurement(combined(columns, linear.basis.names, linear.X, np.zeros(rows.inside.shape)))
 
     def _variance(self, rows: RowMap) -> Array:

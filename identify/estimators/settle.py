@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
@@ -22,6 +22,12 @@ from identify.signals.state import State
 ROUNDS = 30
 """At most; most laws take five."""
 
+COARSE, FINE = 6, 24
+"""Values of a shape that are looked at to begin with, and once it has settled."""
+
+AGAIN = 2
+"""How often others are looked at, at most."""
+
 SETTLED = 1e-3
 """Steps below this share of sigma no longer matter."""
 
@@ -37,22 +43,46 @@ def settled(problem: Problem) -> Problem:
     Variable projection: for fixed shapes of friction the other parameters are linear. G. Golub and V. Pereyra, "The
     differentiation of pseudo-inverses and nonlinear least squares problems whose variables separate", SIAM J. Numerical
     Analysis 10 (1973) 413-432; with columns of the shapes as slopes about the estimate, a round is a step of Gauss and Newton.
+    Where it has settled, other shapes are looked at once more, joint by joint: the misfit has several minima.
     Of logs too long for their rows to be kept, some pieces say what the shapes are.
     """
     if not problem.basis.adaptive:
         return problem
     rows = AdaptiveRows(problem.explicit)
-    here = _started(rows, problem.basis)
+    basis = _settled(rows, _scanned(rows, problem.basis, COARSE))
+    for _ in range(AGAIN):
+        looked = _scanned(rows, basis, FINE)
+        if looked is basis:
+            break
+        basis = _settled(rows, looked)
+    return problem.explicit.with_basis(basis).with_model(problem.model)
+
+
+def _settled(rows: "AdaptiveRows", here: Basis) -> Basis:
+    """Return the basis about its own estimate, near where it begins."""
     there, cost = rows.factors(here), rows.misfit(here)
     for _ in range(ROUNDS):
-        fit = there.fit(2)
-        ahead, cost = _step(rows, here, fit.X, cost)
+        X = _estimate(there, here)
+        ahead, cost = _step(rows, here, X, cost)
         moved = rows.factors(ahead)
-        step = np.abs(moved.fit(2).X - fit.X) / _sigma(there)
+        step = np.abs(moved.fit(2).X - X) / _sigma(there)
         here, there = ahead, moved
         if not (step > SETTLED).any():
             break
-    return problem.explicit.with_basis(here).with_model(problem.model)
+    return here
+
+
+def _estimate(factors: Factors, basis: Basis) -> Array:
+    """Return the estimate; where it leaves the shapes of friction open, that of the others, the shapes as they are."""
+    X, shapes = factors.fit(2).X, basis.believed
+    if np.isfinite(X).all():
+        return X
+    rest = [name for name in basis.names if name not in shapes]
+    plain = np.empty_like(X)
+    plain[..., [basis.names.index(name) for name in rest]] = factors.only(rest, shapes).fit(2).X
+    for name, value in shapes.items():
+        plain[..., basis.names.index(name)] = value
+    return np.where(np.isfinite(X).all(axis=-1, keepdims=True), X, plain)
 
 
 def _step(rows: "AdaptiveRows", here: Basis, X: Array, cost: Array) -> tuple[Basis, Array]:
@@ -135,31 +165,42 @@ def misfit(factors: Factors) -> Array:
     return np.asarray(np.sum(factors.rows * np.log(np.maximum(factors.squares(factors.fit(2).X), TINY)), axis=-1))
 
 
-def _started(rows: AdaptiveRows, basis: Basis) -> Basis:
-    """Return the basis with every shape at the best of its starting values, joint by joint."""
+def _scanned(rows: AdaptiveRows, basis: Basis, count: int) -> Basis:
+    """Return the basis with other shapes where they explain more, joint by joint; the same if there are none."""
     for k, block in enumerate(basis.blocks):
-        inner, joints = (block.block, block.joints) if isinstance(block, OfJoints) else (block, range(basis.n))
-        if isinstance(inner, ShapedFriction) and not inner.values:
-            found = _best(rows, basis, inner, joints)
-            made = replace(block, block=found) if isinstance(block, OfJoints) else found
-            basis = replace(basis, blocks=(*basis.blocks[:k], made, *basis.blocks[k + 1 :]))
+        inner, joints = (block.block, block.joints) if isinstance(block, OfJoints) else (block, tuple(range(basis.n)))
+        if isinstance(inner, ShapedFriction):
+            found = _best(rows, basis, inner, joints, count)
+            if found is not inner:
+                made = replace(block, block=found) if isinstance(block, OfJoints) else found
+                basis = replace(basis, blocks=(*basis.blocks[:k], made, *basis.blocks[k + 1 :]))
     return basis
 
 
-def _best(rows: AdaptiveRows, basis: Basis, shaped: ShapedFriction, joints: Sequence[int]) -> ShapedFriction:
-    """Return a law with the starting values that explain most, joint by joint, without the same law at other joints."""
-    grid = [
-        dict(zip((s.setting for s in shaped.shapes), at, strict=True)) for at in product(*(s.starts for s in shaped.shapes))
-    ]
-    rest = basis.without(*(p.name for p in shaped.parameters(basis.n) if p.name in basis.names))
-    factors = rows.factors(rest + OfJoints(Candidates(shaped.law, tuple(grid)), tuple(joints)))
-    shapes = rest.believed
-    names = [name for name in rest.names if name not in shapes]
-    chosen = np.zeros((*factors.R.shape[:-3], basis.n), dtype=np.intp)
-    for j in joints:
-        costs = [misfit(factors.only([*names, f"{shaped.law.symbol}@{i}:{j + 1}"], shapes)) for i in range(len(grid))]
-        chosen[..., j] = np.argmin(costs, axis=0)
-    return shaped.at({s.setting: np.array([at[s.setting] for at in grid])[chosen] for s in shaped.shapes})
+def _best(rows: AdaptiveRows, basis: Basis, shaped: ShapedFriction, joints: Sequence[int], count: int) -> ShapedFriction:
+    """Return a law with the shapes of a grid that explain most beside the others, joint by joint; where it is, if that does."""
+    n, settings = basis.n, [shape.setting for shape in shaped.shapes]
+    grid = [dict(zip(settings, at, strict=True)) for at in product(*(shape.grid(count) for shape in shaped.shapes))]
+    here = [{name: x[..., None] for name, x in shaped.at_joints(n).items()}] if shaped.values else []
+    candidates = Candidates(shaped.law, (*grid, *here))
+    rest = basis.without(*(p.name for p in shaped.parameters(n) if p.name in basis.names))
+    factors, shapes = rows.factors(rest + OfJoints(candidates, tuple(joints))), rest.believed
+    plain = [name for name in rest.names if name not in shapes]
+    chosen = np.full((*factors.R.shape[:-3], n), len(grid), dtype=np.intp)
+    for run in np.ndindex(chosen.shape[:-1]):
+        alone = Factors(factors.R[run], factors.rows[run], factors.names)
+        at = {name: np.asarray(value)[run] if np.ndim(value) else value for name, value in shapes.items()}
+        found = dict.fromkeys(joints, len(grid)) if here else {}
+        for j in joints if here else (*joints, *joints):  # at first, a second time beside what the others have
+            others = [f"{shaped.law.symbol}@{i}:{k + 1}" for k, i in found.items() if k != j]
+            own = [f"{shaped.law.symbol}@{i}:{j + 1}" for i in range(len(candidates.grid))]
+            found[j] = int(np.argmin([misfit(alone.only([*plain, *others, name], at)) for name in own]))
+        chosen[run][list(found)] = list(found.values())
+    if here and (chosen == len(grid)).all():
+        return shaped
+    each = {name: np.array([*(at[name] for at in grid), np.nan])[chosen] for name in settings}
+    now = shaped.at_joints(n)
+    return shaped.at({name: np.where(np.isnan(x), now[name], x) for name, x in each.items()})
 
 
 @final
@@ -171,12 +212,12 @@ class Candidates(AbstractJointLaw):
     ----------
     law : AbstractFriction
         The law.
-    grid : tuple of mapping of str to float
+    grid : tuple of mapping of str to float or Array
         Values of its settings.
     """
 
     law: AbstractFriction
-    grid: tuple[Mapping[str, float], ...]
+    grid: tuple[Mapping[str, Any], ...]
 
     @property
     def adaptive(self) -> bool:

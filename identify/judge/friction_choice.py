@@ -15,6 +15,9 @@ from identify.basis.of_joints import OfJoints
 from identify.estimators.problem import Problem
 from identify.estimators.settle import Candidates, settled
 
+GRID = 7
+"""Values of each unknown shape of a law that are compared."""
+
 FOLDS = 10
 """Stretches of the logs, each of which is predicted by a fit of the others."""
 
@@ -253,7 +256,7 @@ def _at_all_shapes(block: AbstractBlock) -> AbstractBlock:
     """Return a block with a parameter for every combination of starting shapes, in the place of unknown shapes."""
     if not isinstance(block, ShapedFriction):
         return block
-    grid = product(*(shape.starts for shape in block.shapes))
+    grid = product(*(shape.grid(GRID) for shape in block.shapes))
     return Candidates(block.law, tuple(dict(zip((s.setting for s in block.shapes), at, strict=True)) for at in grid))
 
 

@@ -153,7 +153,9 @@ def columns_at(basis: Basis, states: Array) -> Array:
     """Return the columns of the explicit model at q, qd, qdd, shape (3, joint, state), as (joint, p, state)."""
     q, qd, qdd = states
     W = np.zeros((basis.n, len(basis.names), q.shape[-1]))
-    for (row, name), signal in basis.explicit(State(q, qd, lambda _: qdd)).items():
+    rng = np.random.default_rng(SEED)
+    logged = {"temperature": rng.uniform(0, 60, q.shape), "payload": rng.integers(0, 2, (1, q.shape[-1])).astype(np.float64)}
+    for (row, name), signal in basis.explicit(State(q, qd, lambda _: qdd, logged)).items():
         if name != HELD:
             W[row, basis.names.index(name)] = signal
     return W

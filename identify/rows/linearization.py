@@ -1,5 +1,6 @@
 """What errors of the positions do to the torques that a robot's model predicts."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NamedTuple
@@ -67,10 +68,13 @@ class Linearization:
     def _slopes(self, some: slice) -> Slopes:
         state = self.signals.state
         slow = smoothed(state.qd, self.signals.fs)[..., some]
-        return slopes(self.basis, self.X, state.q[..., some], state.qd[..., some], state.qdd[..., some], slow)
+        conditions = {name: x[..., some] for name, x in state.conditions.items()}
+        return slopes(self.basis, self.X, state.q[..., some], state.qd[..., some], state.qdd[..., some], slow, conditions)
 
 
-def slopes(basis: Basis, X: Array, q: Array, qd: Array, qdd: Array, slow: Array) -> Slopes:
+def slopes(
+    basis: Basis, X: Array, q: Array, qd: Array, qdd: Array, slow: Array, conditions: Mapping[str, Array] | None = None
+) -> Slopes:
     """Return M(q) from the momenta at unit velocities, and central differences of the torques, joint by joint.
 
     Parameters
@@ -83,6 +87,8 @@ def slopes(basis: Basis, X: Array, q: Array, qd: Array, qdd: Array, slow: Array)
         The motion.
     slow : Array, shape (..., joint, time)
         Velocities at which damping is taken.
+    conditions : mapping of str to Array, shape (..., joint or 1, time)
+        What else the log says.
     """
     n = basis.n
     slides = np.where(np.abs(slow) < SLIDING, np.copysign(SLIDING, slow), slow)
@@ -91,9 +97,9 @@ def slopes(basis: Basis, X: Array, q: Array, qd: Array, qdd: Array, slow: Array)
     q_steps, qd_steps = STEP_Q * unit, STEP_QD * unit
     turned = np.concatenate([q + still, q + still, q + q_steps, q - q_steps])
     moved = np.concatenate([slides + qd_steps, slides - qd_steps, qd + still, qd + still])
-    there = State(turned, moved, lambda _: np.broadcast_to(qdd, turned.shape))
+    there = State(turned, moved, lambda _: np.broadcast_to(qdd, turned.shape), conditions or {})
     faster, slower, ahead, behind = np.split(combined(basis.explicit(there), basis.names, X, np.zeros_like(turned)), 4)
-    at_rest = State(q + still, unit + still, lambda x: x)
+    at_rest = State(q + still, unit + still, lambda x: x, conditions or {})
     inertia = combined(basis.momentum(at_rest), basis.names, X, np.zeros_like(at_rest.q))
     found = inertia, (faster - slower) / (2 * STEP_QD), (ahead - behind) / (2 * STEP_Q)
     return Slopes(*(np.moveaxis(x, 0, -2) for x in found))

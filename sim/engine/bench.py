@@ -116,6 +116,7 @@ class Bench:
         expect(self._drive, "step", electric, (1, *self._each), (steps, *self._each))
         self._sensor.take(electric, steps * self._h)
         tau = electric * constant + self._ripple.cogging.at(mid_q)
+        self._friction.driven(tau[0])
         resistance = self._friction.torque(mid_qd[0])
         expect(self._friction, "torque", np.asarray(resistance), (), self._each)
         total = tau + resistance

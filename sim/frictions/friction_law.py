@@ -14,6 +14,10 @@ from sim.settings import EachNotNegativeOrNone, per_joint
 class AbstractContact(ABC):
     """A friction at work; what it remembers is of shape (nsim, joint)."""
 
+    def driven(self, tau: Array) -> None:
+        """Receive the torque of the drives in the step to come [N m], shape (nsim, joint), before `torque` is asked for."""
+        del tau
+
     @abstractmethod
     def torque(self, qd: Array) -> Array | float:
         """Return the torque on the joints in the step to come [N m], beside what MuJoCo itself applies.

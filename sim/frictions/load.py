@@ -16,7 +16,7 @@ from sim.settings import EachNotNegative, EachNotNegativeOrNone, per_joint, sett
 class LoadDependent(AbstractFrictionLaw):
     """(Fs + share |load|) sign(qd) + Fv qd, the load being all torque but friction, of gravity and inertia of links and rotors.
 
-    It is that of the physics step before.
+    The friction in it is that of the physics step before.
     """
 
     share: EachNotNegative = (0.1,)
@@ -44,9 +44,14 @@ class LoadDependent(AbstractFrictionLaw):
 class _Contact(AbstractContact):
     def __init__(self, plant: Batch, Fs: Array, share: Array) -> None:
         self._frictionloss, self._Fs, self._share = plant.expand("dof_frictionloss"), Fs.copy(), share
-        self._on_joints = [plant.bind(f"qfrc_{name}") for name in ("applied", "passive", "constraint")]
+        self._frictions = [plant.bind(f"qfrc_{name}") for name in ("passive", "constraint")]
+        self._tau = np.zeros(Fs.shape)
+
+    def driven(self, tau: Array) -> None:
+        """Receive what the joints carry, friction included."""
+        self._tau = tau
 
     def torque(self, qd: Array) -> Array | float:
         del qd
-        self._frictionloss[:] = self._Fs + self._share * np.abs(np.sum(self._on_joints, axis=0))
+        self._frictionloss[:] = self._Fs + self._share * np.abs(np.sum([self._tau, *self._frictions], axis=0))
         return 0.0

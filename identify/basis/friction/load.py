@@ -56,4 +56,7 @@ class LoadFriction(AbstractJointLaw):
         """Return the law with the load of an estimate."""
         bodies = basis.rigid()
         x = np.stack([X[..., basis.names.index(name)] for name in bodies.names], axis=-1)
-        return replace(self, bodies=bodies, X=np.nan_to_num(x))
+        known = np.isfinite(x).all(axis=-1, keepdims=True)
+        if self.X is None and not known.any():
+            return self
+        return replace(self, bodies=bodies, X=np.where(known, x, 0.0 if self.X is None else self.X))

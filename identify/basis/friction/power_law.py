@@ -34,4 +34,4 @@ class PowerFriction(AbstractFriction):
 
 def power() -> ShapedFriction:
     """Friction of an unknown power of the velocity, Fp |qd|^ap sign(qd)."""
-    return ShapedFriction(PowerFriction(), (Shape("exponent", "ap", "1", (0.25, 0.5, 0.75), (0.05, 3.0)),))
+    return ShapedFriction(PowerFriction(), (Shape("exponent", "ap", "1", 0.5, (0.1, 2.0)),))

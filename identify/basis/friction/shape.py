@@ -32,11 +32,15 @@ class Shape(NamedTuple):
     unit: str
     """Its unit."""
 
-    starts: tuple[float, ...]
-    """Values from which the search begins: the best of them; the middle one where nothing is known."""
+    start: float
+    """Where it is believed to be while nothing is known."""
 
     range: tuple[float, float]
     """Within which it is looked for."""
+
+    def grid(self, count: int) -> tuple[float, ...]:
+        """Return values over the range, in even ratios; of several shapes of one law fewer will do."""
+        return tuple(float(x) for x in np.geomspace(*self.range, count))
 
 
 @final
@@ -72,9 +76,9 @@ class ShapedFriction(AbstractJointLaw):
         """Return g, and F0 dg/db of every shape."""
         n, force = state.n, partial(self._force, state)
         size = np.broadcast_to(np.asarray(self.size), (*np.shape(self.size)[:-1], n))[..., None]
-        found = {self.law.symbol: force(self._at(n))}
+        found = {self.law.symbol: force(self.at_joints(n))}
         for shape in self.shapes:
-            b = self._at(n)
+            b = self.at_joints(n)
             ahead, behind = ({**b, shape.setting: b[shape.setting] * np.exp(h)} for h in (STEP, -STEP))
             slope = (force(ahead) - force(behind)) / (2 * STEP * b[shape.setting][..., None])
             found[shape.letters] = size * slope
@@ -82,7 +86,7 @@ class ShapedFriction(AbstractJointLaw):
 
     def believed(self, n: int) -> Mapping[str, Array | float]:
         """Return b0."""
-        at = self._at(n)
+        at = self.at_joints(n)
         return {f"{s.letters}{j + 1}": at[s.setting][..., j] for s in self.shapes for j in range(n)}
 
     @property
@@ -92,7 +96,7 @@ class ShapedFriction(AbstractJointLaw):
 
     def adapted(self, basis: Basis, X: Array) -> Self:
         """Return the law, linear about an estimate."""
-        n, at = basis.n, self._at(basis.n)
+        n, at = basis.n, self.at_joints(basis.n)
         size = _joints(n, X, lambda j: basis.value(f"{self.law.symbol}{j + 1}", X), self.size)
         values = {}
         for shape in self.shapes:
@@ -106,9 +110,9 @@ class ShapedFriction(AbstractJointLaw):
         """Return the law with other b0, by the law's settings, shape (..., joint)."""
         return replace(self, values={**self.values, **values})
 
-    def _at(self, n: int) -> dict[str, Array]:
+    def at_joints(self, n: int) -> dict[str, Array]:
         """Return b0, shape (..., joint)."""
-        middle = {shape.setting: shape.starts[len(shape.starts) // 2] for shape in self.shapes}
+        middle = {shape.setting: shape.start for shape in self.shapes}
         found = {name: np.asarray(value, dtype=np.float64) for name, value in {**middle, **self.values}.items()}
         return {name: np.broadcast_to(x, (*x.shape[:-1], n)) for name, x in found.items()}
 

@@ -9,8 +9,7 @@ from identify.arrays import Array
 from identify.basis.friction.shape import Shape, ShapedFriction
 from identify.basis.joint_law import AbstractFriction
 
-STARTS = (0.05, 0.1, 0.2, 0.5, 1.0)
-RANGE = (0.005, 20.0)
+START, RANGE = 0.2, (0.01, 5.0)
 
 
 @final
@@ -59,9 +58,9 @@ class ArctanFriction(AbstractFriction):
 
 def tanh() -> ShapedFriction:
     """Coulomb friction that rises over an unknown velocity, Ft tanh(qd/vt); in the place of `coulomb`."""
-    return ShapedFriction(TanhFriction(), (Shape("vt", "vt", "rad/s", STARTS, RANGE),))
+    return ShapedFriction(TanhFriction(), (Shape("vt", "vt", "rad/s", START, RANGE),))
 
 
 def arctan() -> ShapedFriction:
     """Coulomb friction that rises over an unknown velocity, Fat 2/pi arctan(qd/vat); in the place of `coulomb`."""
-    return ShapedFriction(ArctanFriction(), (Shape("vat", "vat", "rad/s", STARTS, RANGE),))
+    return ShapedFriction(ArctanFriction(), (Shape("vat", "vat", "rad/s", START, RANGE),))

@@ -37,8 +37,8 @@ class StribeckFriction(AbstractFriction):
         return np.exp(-((np.abs(qd) / self.vs) ** self.exponent)) * np.sign(qd)
 
 
-SPEED = Shape("vs", "vs", "rad/s", (0.02, 0.05, 0.1, 0.2, 0.4, 0.8), (0.005, 1.0))
-EXPONENT = Shape("exponent", "ds", "1", (1.0, 2.0), (0.3, 4.0))
+SPEED = Shape("vs", "vs", "rad/s", 0.1, (0.01, 1.0))
+EXPONENT = Shape("exponent", "ds", "1", 1.0, (0.5, 3.0))
 
 
 def stribeck() -> ShapedFriction:

@@ -1,0 +1,62 @@
+"""Gains of drives."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Self, final
+
+import numpy as np
+
+from identify.arrays import Array, combined
+from identify.basis.basis import Basis
+from identify.basis.joint_law import AbstractJointLaw
+from identify.basis.parameter import Kind
+from identify.signals.state import State
+
+
+@final
+@dataclass(frozen=True)
+class DriveGains(AbstractJointLaw):
+    """What the gain of a drive is in multiples of the one that a log was read with, kg.
+
+    With the torque g i of a current i, g = kg g0, the rows of joint j are g0 i = model / kg, linear about kg = 1 and the torque
+    of the model by an estimate. The column has no noise of the current in it, so that there is no bias as in least squares of
+    currents, nor are errors in all variables assumed as in total least squares: M. Gautier and S. Briot, "Global identification
+    of joint drive gains and dynamic parameters of robots", J. Dynamic Systems, Measurement, and Control 136 (2014) 051025.
+
+    Parameters
+    ----------
+    model : Basis, optional
+        The robot without the gains.
+    X : Array, shape (..., p), optional
+        Its parameters, as estimated before.
+    """
+
+    model: Basis | None = None
+    X: Array | None = None
+
+    @property
+    def adaptive(self) -> bool:
+        """True."""
+        return True
+
+    def letters(self) -> Mapping[str, tuple[Kind, str]]:
+        """Return kg."""
+        return {"kg": ("other", "1")}
+
+    def torques(self, state: State) -> Mapping[str, Array]:
+        """Return the torque of the model, with the other sign; before there is one, ones."""
+        if self.model is None or self.X is None:
+            return {"kg": np.ones_like(state.qd)}
+        return {"kg": -combined(self.model.explicit(state), self.model.names, self.X, np.zeros(state.q.shape))}
+
+    def believed(self, n: int) -> Mapping[str, Array | float]:
+        """Return ones."""
+        return {f"kg{j + 1}": 1.0 for j in range(n)} if self.model is not None else {}
+
+    def adapted(self, basis: Basis, X: Array) -> Self:
+        """Return the gains about an estimate."""
+        blocks = tuple(block for block in basis.blocks if not isinstance(block, DriveGains))
+        own = {p.name for block in blocks for p in block.parameters(basis.n)}
+        kept = {name: new for name, new in basis.kept_names.items() if name in own}
+        model = replace(basis, blocks=blocks, order=(), kept=kept)
+        return replace(self, model=model, X=np.stack([X[..., basis.names.index(name)] for name in model.names], axis=-1))

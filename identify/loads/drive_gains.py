@@ -1,0 +1,109 @@
+"""The gains of drives, from logs without and with a known payload."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from identify.arrays import Array
+from identify.basis.drive_gains import DriveGains
+from identify.data.motion_log import MotionLog
+from identify.errors import IdentificationError, SettingError
+from identify.estimators.estimate import Estimate
+from identify.estimators.problem import Problem
+from identify.estimators.settle import settled
+from identify.loads.loaded_robot import LoadedRobot
+from identify.models.explicit import ExplicitModel
+
+ROUNDS = 20
+"""At most; most logs take four."""
+
+SETTLED = 1e-2
+"""Steps below this share of sigma no longer matter."""
+
+FACTOR = 1.5
+"""By which a gain changes at most from one round to the next."""
+
+VAGUE = 0.1
+"""Sigma above this share of a gain is none: the payload says nothing of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class GainEstimate:
+    """Gains of drives.
+
+    Parameters
+    ----------
+    gains, sigma : Array, shape (joint,)
+        Torque over what was logged, in the unit of the logs' own gain, and standard deviations.
+    found : Estimate
+        Robot, what was unknown of the payload, and kg, the gains in multiples of those of the logs.
+    """
+
+    gains: Array
+    sigma: Array
+    found: Estimate
+
+    @property
+    def told(self) -> npt.NDArray[np.bool_]:
+        """Whether the payload says something of each gain, shape (joint,)."""
+        return np.isfinite(self.sigma) & (self.sigma <= VAGUE * np.abs(self.gains))
+
+
+def identify_drive_gains(robot: LoadedRobot) -> GainEstimate:
+    """Return the gains with which currents of logs without and with a known payload are torques.
+
+    A payload whose mass, or more, is known makes known torques: they set the scale of each joint's current. Currents count as
+    noisy, each joint's by a level of its own, the motion as exact. Least squares with currents on the side of the parameters
+    instead finds gains too small, the more noise they have; see `DriveGains`.
+
+    Parameters
+    ----------
+    robot : LoadedRobot
+        Its logs, read with some gains from which the search begins, and what is known of the payload.
+
+    Raises
+    ------
+    SettingError
+        If nothing is known of the payload, or there is no log without it.
+    IdentificationError
+        If the gains do not settle, or one would be negative.
+    """
+    if not robot.known:
+        raise SettingError("nothing is known of the payload: the gains need its mass at least")
+    if not robot.without:
+        raise SettingError("there is no log without the payload: what the robot's own mass is cannot be told from the gains")
+    n, ratio = robot.tree.n, np.ones(robot.tree.n)
+    basis = robot.basis
+    for _ in range(ROUNDS):
+        logs = tuple(_read_with(log, ratio) for log in robot.of_both)
+        problem = settled(Problem(logs, basis, ExplicitModel(), robot.chain))
+        basis = problem.basis
+        start = np.concatenate([problem.factors.fit(2).X, np.ones(n)])
+        with_gains = problem.with_basis((basis + DriveGains()).adapted(start))
+        with_gains.factors.together.check()
+        found = with_gains.factors.fit(2)
+        step = found.X[-n:]
+        sigma = np.sqrt(np.diagonal(found.factor.inverse(np.array(True))))[-n:]
+        if (np.abs(step - 1) < SETTLED * sigma).all():
+            break
+        ratio = ratio * np.clip(step, 1 / FACTOR, FACTOR)
+    else:
+        raise IdentificationError(
+            f"the gains of {', '.join(_names(robot, np.abs(step - 1) > sigma))} do not settle: move them more, with a heavier "
+            "payload"
+        )
+    final = robot.estimator.fit(with_gains)
+    gains = final.X[-n:] * ratio * np.broadcast_to(robot.loaded[0].torque.gain, (n,))
+    relative = final.best_sigma[-n:] / final.X[-n:]
+    return GainEstimate(gains, np.abs(gains) * relative, final)
+
+
+def _read_with(log: MotionLog, ratio: Array) -> MotionLog:
+    """Return a log with its gains in other multiples."""
+    gain = tuple(np.broadcast_to(log.torque.gain, ratio.shape) * ratio)
+    return replace(log, torque=replace(log.torque, gain=gain))
+
+
+def _names(robot: LoadedRobot, which: npt.NDArray[np.bool_]) -> list[str]:
+    return [joint.name for joint, one in zip(robot.tree.joints, which, strict=True) if one]

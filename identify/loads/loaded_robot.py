@@ -1,0 +1,114 @@
+"""Logs of a robot without and with a payload."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.basis.basis import Basis
+from identify.basis.payload import HELD_SHARE, PayloadLink
+from identify.data.kinematics import INERTIAL, KinematicTree
+from identify.data.motion_log import MotionLog
+from identify.errors import LogError, SettingError
+from identify.estimators.estimate import Estimate
+from identify.estimators.estimator import AbstractEstimator
+from identify.estimators.generalized_least_squares import GeneralizedLeastSquares
+from identify.estimators.identification import estimate
+from identify.estimators.problem import Problem
+from identify.estimators.settle import settled
+from identify.models.explicit import ExplicitModel
+from identify.parameters.base_parameters import BaseParameters
+from identify.rows.chain import Chain
+from identify.rows.chains import idbench_chain
+
+LETTERS = tuple(f"{letters}L" for letters in INERTIAL)
+"""Names of the parameters of a payload: inertia about the origin of the link's frame, first moments, mass."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedRobot:
+    """Logs of a robot without and with a payload on its last link, and how they are identified.
+
+    Parameters
+    ----------
+    tree : KinematicTree
+        The robot.
+    standard : Basis
+        Its standard parameters, laws of friction included.
+    without, loaded : tuple of MotionLog
+        What was logged without and with the payload.
+    chain : Chain
+        Signal processing.
+    estimator : AbstractEstimator
+        Generalized least squares by default.
+    known : mapping of str to float
+        Parameters of the payload that are known, such as ML, its mass [kg].
+    link : int, optional
+        Number of the joint whose link holds it, from 0; the last by default.
+    """
+
+    tree: KinematicTree
+    standard: Basis
+    without: tuple[MotionLog, ...]
+    loaded: tuple[MotionLog, ...]
+    chain: Chain = field(default_factory=idbench_chain)
+    estimator: AbstractEstimator = field(default_factory=GeneralizedLeastSquares)
+    known: Mapping[str, float] = field(default_factory=dict)
+    link: int | None = None
+
+    def __post_init__(self) -> None:
+        if not self.loaded:
+            raise LogError("there is no log with the payload")
+        if unknown := [name for name in self.known if name not in LETTERS]:
+            raise SettingError(f"a payload has no parameter {', '.join(unknown)}; it has {', '.join(LETTERS)}")
+
+    @cached_property
+    def robot(self) -> BaseParameters:
+        """The base parameters of the robot without the payload."""
+        return BaseParameters.of(self.tree, self.standard)
+
+    @cached_property
+    def both(self) -> BaseParameters:
+        """The base parameters of robot and payload."""
+        link = self.tree.n - 1 if self.link is None else self.link
+        return BaseParameters.of(self.tree, self.standard + PayloadLink(self.tree, link))
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the payload's base parameters that are not known."""
+        p = len(self.standard.names)
+        own = [name for name, k in zip(self.both.names, self.both.kept, strict=True) if k >= p]
+        return tuple(name for name in own if name not in self.known)
+
+    @cached_property
+    def basis(self) -> Basis:
+        """Robot and payload, what is known of it held."""
+        basis = self.both.basis
+        if missing := [name for name in self.known if name not in basis.names]:
+            raise SettingError(
+                f"{', '.join(missing)} of a payload cannot be told from its other parameters on robot {self.tree.name!r}: give "
+                f"values of {', '.join(self.names)}"
+            )
+        return basis.holding(**self.known) if self.known else basis
+
+    @property
+    def of_both(self) -> tuple[MotionLog, ...]:
+        """All logs, each with whether it has the payload."""
+        return (*marked(self.without, 0.0), *marked(self.loaded, 1.0))
+
+    def estimated(self, logs: Sequence[MotionLog], basis: Basis) -> Estimate:
+        """Return the estimate of the explicit model."""
+        return estimate(settled(Problem(tuple(logs), basis, ExplicitModel(), self.chain)), self.estimator)
+
+
+def marked(logs: Sequence[MotionLog], share: float) -> tuple[MotionLog, ...]:
+    """Return logs that say which share of the payload is held."""
+    return tuple(replace(log, conditions={**log.conditions, HELD_SHARE: np.full((1, 1), share)}) for log in logs)
+
+
+def of_payload(found: Estimate, names: Sequence[str]) -> tuple[Array, Array]:
+    """Return the parameters of these names, and their covariance."""
+    place = [found.names.index(name) for name in names]
+    return found.X[place], found.best_covariance[np.ix_(place, place)]

@@ -1,0 +1,206 @@
+"""Four ways to the parameters of a payload.
+
+W. Khalil, M. Gautier and P. Lemoine, "Identification of the payload inertial parameters of industrial manipulators", IEEE ICRA
+2007, compare them on a real arm.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from identify.arrays import Array
+from identify.data.kinematics import INERTIAL
+from identify.data.motion_log import MotionLog
+from identify.errors import IdentificationError, LogError
+from identify.estimators.problem import Problem
+from identify.loads.loaded_robot import LETTERS, LoadedRobot, marked, of_payload
+from identify.models.explicit import ExplicitModel
+from identify.parameters.pseudo_inertia import inertial, pseudo_inertia
+
+REPEATED = 0.05
+"""Rms distance of two motions [rad or m] up to which they count as one that was repeated."""
+
+LEAST = 1e-6
+"""Least eigenvalue of a body's pseudo-inertia, as a share of the largest."""
+
+
+@dataclass(frozen=True, eq=False)
+class Payload:
+    """The parameters of a payload.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Base parameters: of XXL XYL XZL YYL YZL ZZL MXL MYL MZL ML, in the frame of the link, those that the robot shows.
+    X : Array, shape (p,)
+        The estimate.
+    covariance : Array, shape (p, p)
+        Of its error.
+    known : mapping of str to float
+        Parameters that were known.
+    """
+
+    names: tuple[str, ...]
+    X: Array
+    covariance: Array
+    known: Mapping[str, float]
+
+    @property
+    def sigma(self) -> Array:
+        """Standard deviation of every parameter, shape (p,)."""
+        return np.sqrt(np.diagonal(self.covariance))
+
+    @property
+    def complete(self) -> bool:
+        """Whether all ten parameters are known."""
+        return {*self.names, *self.known} == set(LETTERS)
+
+    def standard(self) -> Array:
+        """Return the ten parameters, shape (10,); raise IdentificationError if the robot does not show all of them."""
+        if not self.complete:
+            raise IdentificationError(
+                f"this robot shows {', '.join(self.names)} of a payload alone: what it leaves open must be known beforehand"
+            )
+        values = {**dict(zip(self.names, self.X, strict=True)), **self.known}
+        return np.array([values[name] for name in LETTERS])
+
+    def consistent(self) -> Array:
+        """Return the ten parameters of the body that agrees best with the estimate, in the metric of its covariance.
+
+        Over pseudo-inertias L L', which are those of bodies that can exist; what was known stays.
+        """
+        estimate = self.standard()
+        free = [LETTERS.index(name) for name in self.names]
+        root = np.linalg.cholesky(self.covariance)
+        size = max(abs(estimate[-1]), 1e-6)
+        start = _root(pseudo_inertia(estimate), size)
+        exact = [LETTERS.index(name) for name in self.known]
+        scale = np.maximum(np.abs(estimate), 1e-3 * size)
+
+        def misfit(lower: Array) -> Array:
+            x = inertial(_outer(lower))
+            sigmas = scipy.linalg.solve_triangular(root, (x - estimate)[free], lower=True)
+            return np.concatenate([sigmas, 1e4 * ((x - estimate) / scale)[exact]])
+
+        return inertial(_outer(scipy.optimize.least_squares(misfit, start, x_scale="jac", xtol=1e-12, ftol=1e-12).x))
+
+
+def together(robot: LoadedRobot) -> Payload:
+    """Identify robot and payload in one fit of all logs: what the robot is counts for both."""
+    found = robot.estimated(robot.of_both, robot.basis)
+    return Payload(robot.names, *of_payload(found, robot.names), robot.known)
+
+
+def fixed(robot: LoadedRobot) -> Payload:
+    """Identify the robot without the payload, then the payload alone, the robot's parameters held."""
+    first = robot.estimated(robot.without, robot.robot.basis)
+    return with_known_robot(robot, first.names, first.X, first.best_covariance)
+
+
+def with_known_robot(robot: LoadedRobot, names: tuple[str, ...], X: Array, covariance: Array) -> Payload:
+    """Return the payload with the parameters of the robot, identified before, held; their sigma is in that of the payload.
+
+    Parameters
+    ----------
+    robot : LoadedRobot
+        Of which the logs with the payload count.
+    names : tuple of str
+        Base parameters of the robot.
+    X, covariance : Array, shape (p,) and (p, p)
+        Their values.
+    """
+    basis, logs = robot.basis, marked(robot.loaded, 1.0)
+    values = dict(zip(names, map(float, X), strict=True))
+    held = basis.holding(**{name: values.get(name, 0.0) for name in basis.names if name not in robot.names})
+    found = robot.estimated(logs, held)
+    of_robot = Problem(logs, basis.renamed({name: name for name in names}), ExplicitModel(), robot.chain).rows
+    rows = found.problem.rows
+    slope = np.zeros((len(found.names), len(names)))
+    if found.influence is not None:
+        slope = -found.influence(rows).T @ of_robot.W
+    X_payload, C = of_payload(found, robot.names)
+    place = [found.names.index(name) for name in robot.names]
+    return Payload(robot.names, X_payload, C + slope[place] @ covariance @ slope[place].T, robot.known)
+
+
+def apart(robot: LoadedRobot) -> Payload:
+    """Identify the robot twice, without and with the payload as a part of its last link, and subtract."""
+    basis = robot.robot.basis
+    first, second = robot.estimated(robot.without, basis), robot.estimated(robot.loaded, basis)
+    T, known = _as_link(robot)
+    difference, C = second.X - first.X - known, first.best_covariance + second.best_covariance
+    rows = [i for i, name in enumerate(basis.names) if np.any(T[i])]
+    A, root = T[rows], np.linalg.cholesky(C[np.ix_(rows, rows)])
+    W, y = (scipy.linalg.solve_triangular(root, x, lower=True) for x in (A, difference[rows]))
+    covariance = np.linalg.inv(W.T @ W)
+    return Payload(robot.names, covariance @ W.T @ y, covariance, robot.known)
+
+
+def difference(robot: LoadedRobot) -> Payload:
+    """Identify the payload from the difference of the torques of one motion, repeated: friction falls out of it."""
+    pairs = list(zip(robot.without, robot.loaded, strict=False))
+    if not pairs or len(robot.without) != len(robot.loaded) or not all(_repeated(*pair) for pair in pairs):
+        raise LogError(
+            "the logs with the payload are no repetitions of those without it, sample by sample, on which the difference of "
+            "torques rests: take another way"
+        )
+    first = Problem(marked(robot.without, 0.0), robot.robot.basis, ExplicitModel(), robot.chain).rows
+    own = robot.basis.renamed({name: name for name in robot.names})
+    problem = Problem(marked(robot.loaded, 1.0), own, ExplicitModel(), robot.chain)
+    rows = problem.rows  # what is known of the payload is out of their Y
+    Y, W = rows.Y - first.Y, rows.W
+    weight = np.ones(rows.kinds)
+    for _ in range(2):
+        w = np.tile(weight, len(Y) // rows.kinds) * (rows.valid & first.valid)
+        X, *_ = np.linalg.lstsq(W * w[:, None], Y * w, rcond=None)
+        left = rows.by_kind((Y - W @ X) * (rows.valid & first.valid))
+        weight = 1 / np.sqrt(np.maximum(np.sum(left**2, axis=-1) / np.maximum(rows.count, 1), 1e-300))
+    w = np.tile(weight, len(Y) // rows.kinds) * (rows.valid & first.valid)
+    A: Array = np.asarray(W * w[:, None], dtype=np.float64)
+    covariance: Array = np.asarray(np.linalg.inv(A.T @ A), dtype=np.float64)
+    return Payload(robot.names, np.asarray(X, dtype=np.float64), covariance, robot.known)
+
+
+WAYS: Mapping[str, Callable[[LoadedRobot], Payload]] = {
+    "together": together,
+    "fixed": fixed,
+    "apart": apart,
+    "difference": difference,
+}
+"""The four ways by name, the best first."""
+
+
+def _as_link(robot: LoadedRobot) -> tuple[Array, Array]:
+    """Return T, which makes of the payload's free parameters what they add to the robot's, and what known ones add."""
+    p, link = len(robot.standard.names), robot.tree.n - 1 if robot.link is None else robot.link
+    own = [robot.standard.names.index(f"{letters}{link + 1}") for letters in INERTIAL]
+    add = robot.robot.K[:, own]  # of ten parameters of the link
+    of_payload_ = [i for i, k in enumerate(robot.both.kept) if k >= p]
+    K = robot.both.K[of_payload_, p:]
+    T = add @ np.linalg.pinv(K)
+    names = [robot.both.names[i] for i in of_payload_]
+    free = [names.index(name) for name in robot.names]
+    known = T @ np.array([robot.known.get(name, 0.0) for name in names])
+    return T[:, free], known
+
+
+def _repeated(one: MotionLog, other: MotionLog) -> bool:
+    """Return whether two logs are of one motion."""
+    return one.q.shape == other.q.shape and bool(np.sqrt(np.mean((one.q - other.q) ** 2)) < REPEATED)
+
+
+def _outer(lower: Array) -> Array:
+    L = np.zeros((4, 4))
+    L[np.tril_indices(4)] = lower
+    return L @ L.T
+
+
+def _root(S: Array, size: float) -> Array:
+    """Return the lower triangle of the root of a pseudo-inertia, or of one that is near and can exist."""
+    values, axes = np.linalg.eigh(S)
+    least = max(LEAST * values[-1], 1e-9 * size)
+    lower = np.linalg.cholesky((axes * np.maximum(values, least)) @ axes.T)
+    found: Array = lower[np.tril_indices(4)]
+    return found
