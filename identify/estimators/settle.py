@@ -161,8 +161,9 @@ class AdaptiveRows:
 
 
 def misfit(factors: Factors) -> Array:
-    """Return minus twice the logarithm of the likelihood, with a level of noise of each joint, shape (...)."""
-    return np.asarray(np.sum(factors.rows * np.log(np.maximum(factors.squares(factors.fit(2).X), TINY)), axis=-1))
+    """Return minus twice the logarithm of the likelihood, with a level of noise of each joint, shape (...); inf without any."""
+    found = np.sum(factors.rows * np.log(np.maximum(factors.squares(factors.fit(2).X), TINY)), axis=-1)
+    return np.where(np.isnan(found), np.inf, found)
 
 
 def _scanned(rows: AdaptiveRows, basis: Basis, count: int) -> Basis:
