@@ -74,6 +74,45 @@ def rewritten(name: str, standard: Values, folder: Path | None = None, mounting:
     return text
 
 
+def with_body(name: str, body: str, values: Array, folder: Path | None = None, mounting: Mounting = PLAIN) -> str:
+    """Return the file of a robot as MJCF, with one more body, bolted to the link of its last joint.
+
+    Parameters
+    ----------
+    name : str
+        Name of a robot that ships, or path of its file.
+    body : str
+        What to call it.
+    values : Array, shape (10,)
+        Its inertia matrix XX XY XZ YY YZ ZZ about the origin of the link's frame, first moments and mass.
+    folder, mounting
+        As for `rewritten`.
+
+    Raises
+    ------
+    RobotError
+        If the robot has a body of this name, or the file does not compile.
+    """
+    robot, root = Robot.load(name, mounting.edit), _document(name, mounting)
+    _require_alike(robot, root)
+    if any(element.get("name") == body for element in root.iter("body")):
+        raise RobotError(f"the file of robot {robot.name!r} has a body {body!r} already")
+    link = _elements(root)[0][int(robot.model.jnt_bodyid[robot.n - 1])]
+    xx, xy, xz, yy, yz, zz, *first, mass = (float(x) for x in values)
+    centre = np.array(first) / mass
+    about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) - mass * (
+        centre @ centre * np.eye(3) - np.outer(centre, centre)
+    )
+    _give(ElementTree.SubElement(link, "body", {"name": body}), mass, centre, about)
+    home = Robot.path(name).absolute().parent
+    if folder is not None:
+        _relocate(root, home, folder)
+    text = ElementTree.tostring(root, encoding="unicode")
+    text = text if _made(Robot.path(name)) else _around(name, text)
+    compiled(name, text, folder or home)
+    return text
+
+
 def compiled(name: str, text: str, folder: Path | None = None) -> Robot:
     """Return the robot of a text that stands for the file of a robot; raise RobotError if it does not compile.
 

@@ -1,0 +1,1 @@
+"""Payloads, and gains of drives: from logs, and from simulated robots whose payload and gains are known."""

@@ -1,0 +1,169 @@
+"""Payloads and gains of simulated robots, whose truth is known, run by run."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from time import perf_counter
+from typing import TypeAlias
+
+import numpy as np
+
+from experiments.errors import ExperimentError
+from experiments.identification.parameters import Parameters
+from experiments.identification.subject import Subject
+from identify import Array, IdentificationError
+from identify.data.kinematics import INERTIAL
+from identify.loads.drive_gains import identify_drive_gains
+from identify.loads.loaded_robot import LETTERS, LoadedRobot
+from identify.loads.payload import WAYS
+from identify.loads.payload import Payload as Identified
+from sim.engine.run import Run
+from sim.engine.simulation import simulate
+from sim.robot.payload import Payload
+from sim.robot.tree import standard_parameters
+from sim.scenario.scenario import Scenario
+
+GAINS = (0.7, 1.4)
+"""True gains are drawn between these multiples of those that logs are read with."""
+
+Told = Callable[[float], None]
+
+Found: TypeAlias = tuple[tuple[str, ...], Array, Array, Array]
+"""Names, estimate, sigma and truth."""
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """How far estimates of many runs are off.
+
+    Parameters
+    ----------
+    names : tuple of str
+        What was estimated.
+    truth, error, z : Array, shape (run, p)
+        True values, errors, and these in sigma.
+    seconds : float
+        A run took.
+    failures : tuple of str
+        Why runs have no estimate.
+    """
+
+    names: tuple[str, ...]
+    truth: Array
+    error: Array
+    z: Array
+    seconds: float
+    failures: tuple[str, ...] = ()
+
+    @property
+    def coverage(self) -> float:
+        """Share of the estimates within two sigma of the truth."""
+        return float(np.mean(np.abs(self.z) < 2)) if self.z.size else float("nan")
+
+    @property
+    def rms(self) -> Array:
+        """Rms errors, shape (p,)."""
+        return np.sqrt(np.mean(self.error**2, axis=0))
+
+    @property
+    def bias(self) -> Array:
+        """Mean errors, shape (p,)."""
+        return np.asarray(np.mean(self.error, axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """A scenario with a payload, simulated with and without it, many times; only what is random differs from run to run.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With the payload.
+    runs : int
+        How many.
+    parameters : Parameters
+        Which parameters of the robot are identified.
+    """
+
+    scenario: Scenario
+    runs: int
+    parameters: Parameters = Parameters()  # noqa: RUF009  # frozen
+
+    def __post_init__(self) -> None:
+        if not self.scenario.payload.mass:
+            raise ExperimentError(f"scenario {self.scenario.name} has no payload: give it a table [payload] with a mass")
+        if self.runs < 1:
+            raise ExperimentError(f"--runs {self.runs} must be at least 1")
+
+    @cached_property
+    def subject(self) -> Subject:
+        """The robot."""
+        return Subject(self.scenario.robot, self.parameters)
+
+    @cached_property
+    def simulated(self) -> tuple[Run, Run]:
+        """The runs without and with the payload."""
+        first = self.scenario.seed
+        seeds = range(first, first + self.runs), range(first + self.runs, first + 2 * self.runs)
+        bare = replace(self.scenario, payload=Payload())
+        return simulate(bare, list(seeds[0])), simulate(self.scenario, list(seeds[1]))
+
+    @cached_property
+    def truth(self) -> dict[str, float]:
+        """The parameters of the payload."""
+        link = self.subject.tree.n
+        before, after = (standard_parameters(run.robots[0]) for run in self.simulated)
+        return {f"{x}L": after[f"{x}{link}"] - before[f"{x}{link}"] for x in INERTIAL}
+
+    def robot(self, run: int, known: Mapping[str, float], gains: Array | float = 1.0) -> LoadedRobot:
+        """Return the robot with the logs of a run, currents as if its drives had these gains."""
+        logs = [replace(each.alone(run), tau=each.alone(run).tau / gains) for each in self.simulated]
+        first, second = ((log,) for log in logs)
+        return LoadedRobot(self.subject.tree, self.subject.grouping.standard, first, second, known=known)
+
+    def payloads(self, told: Told) -> dict[str, Score]:
+        """Return how well each way finds the payload."""
+        found, ways = dict[str, Score](), list(WAYS)
+        for way, identify in WAYS.items():
+            one = partial(self._payload, identify)
+            found[way] = self._scored(one, partial(_part, told, ways.index(way), len(ways)))
+        return found
+
+    def gains(self, known: Mapping[str, float], told: Told) -> Score:
+        """Return how well gains that are drawn for each run are found, with what is known of the payload."""
+        rng, n = np.random.default_rng(self.scenario.seed), self.subject.tree.n
+        true = rng.uniform(*GAINS, (self.runs, n))
+
+        def found(run: int) -> Found:
+            gains = identify_drive_gains(self.robot(run, known, true[run]))
+            return tuple(f"g{j + 1}" for j in range(n)), gains.gains, gains.sigma, true[run]
+
+        return self._scored(found, told)
+
+    def _payload(self, identify: Callable[[LoadedRobot], Identified], run: int) -> Found:
+        """Return names, estimate, sigma and truth of the payload's base parameters in a run."""
+        robot = self.robot(run, {})
+        found, p = identify(robot), len(robot.standard.names)
+        own = [i for i, k in enumerate(robot.both.kept) if k >= p]
+        base = robot.both.K[own, p:] @ np.array([self.truth[x] for x in LETTERS])
+        return found.names, found.X, found.sigma, base
+
+    def _scored(self, one: Callable[[int], Found], told: Told) -> Score:
+        names: tuple[str, ...] = ()
+        start, rows, failures = perf_counter(), list[tuple[Array, Array, Array]](), list[str]()
+        for run in range(self.runs):
+            try:
+                names, X, sigma, truth = one(run)
+                rows.append((truth, X - truth, (X - truth) / sigma))
+            except IdentificationError as failed:
+                failures.append(str(failed))
+            told((run + 1) / self.runs)
+        if not rows:
+            empty = np.empty((0, 0))
+            return Score((), empty, empty, empty, 0.0, tuple(failures))
+        each = [np.array(x) for x in zip(*rows, strict=True)]
+        return Score(names, each[0], each[1], each[2], (perf_counter() - start) / self.runs, tuple(failures))
+
+
+def _part(told: Told, number: int, count: int, share: float) -> None:
+    told((number + share) / count)
