@@ -20,6 +20,7 @@ from identify.basis import Offset as Offset
 from identify.basis import OfJoints as OfJoints
 from identify.basis import Parameter as Parameter
 from identify.basis import ScaraLinks as ScaraLinks
+from identify.basis import ShapedFriction as ShapedFriction
 from identify.basis import TreeLinks as TreeLinks
 from identify.basis import ViscousFriction as ViscousFriction
 from identify.basis import scara as scara

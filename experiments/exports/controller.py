@@ -5,6 +5,7 @@ from importlib.resources import files
 from pathlib import Path
 from pprint import pformat
 
+from experiments.exports.friction_terms import lines_of
 from experiments.exports.standard import require_known, standard_of
 from experiments.identification.identified import Identified
 from identify.data.kinematics import INERTIAL, Joint
@@ -24,6 +25,7 @@ def python_text(found: Identified, model: str, target: Path) -> str:
     each = {x: [values.get(f"{x}{j + 1}", 0.0) for j in range(n)] for x in ("Ia", "Fv", "Fs", "off")}
     text = files("experiments.exports").joinpath("inverse_dynamics.py.txt").read_text(encoding="utf-8")
     words = {
+        "{laws}": "".join(f"    {line}\n" for line in lines_of(found, values)),
         "{name}": tree.name,
         "{version}": version("idbench"),
         "{logs}": ", ".join(found.log_names) or "a log",

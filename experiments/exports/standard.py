@@ -3,10 +3,11 @@
 import numpy as np
 
 from experiments.errors import ExperimentError
+from experiments.exports.friction_terms import TERMS
 from experiments.identification.identified import Identified
 from identify import Array, transfer
 
-KNOWN = ("Ia", "Fv", "Fs", "off")
+KNOWN = ("Ia", "Fv", "Fs", "off", *TERMS, *(letters for _, settings in TERMS.values() for letters in settings.values()))
 """Beginnings of the names of the laws that a controller's function has, beside the links."""
 
 
@@ -28,12 +29,12 @@ def standard_of(found: Identified, model: str) -> dict[str, float]:
 
 def require_known(found: Identified, target: object) -> None:
     """Raise ExperimentError if the estimate has a law of friction that a controller's function does not."""
-    kinds = {p.name for p in found.subject.grouping.standard.parameters if p.joint is not None and p.kind not in LINKS}
+    kinds = {p.name for p in found.subject.grouping.standard.parameters if p.kind not in LINKS}
     strange = sorted(name for name in kinds if name.rstrip("0123456789") not in KNOWN)
     if strange:
         raise ExperimentError(
-            f"{target}: the function of a controller has links, rotors, viscous and Coulomb friction and offsets, not "
-            f"{', '.join(strange[:6])}: leave out what --add adds"
+            f"{target}: the function of a controller has links, rotors, laws of friction and offsets of joints, not "
+            f"{', '.join(strange[:6])}: leave out what makes them (--add, --friction, --coupling)"
         )
 
 

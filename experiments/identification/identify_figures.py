@@ -7,26 +7,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.html_report import svg
+from experiments.identification.friction_curves import FRICTIONS, FrictionCurves
 from experiments.identification.identified import Identified
 from experiments.identification.validated import Validated
 from experiments.recording.style import model_color
 from experiments.text import percentage
-from identify import Array, Chain, ExplicitModel
-from identify.judge.diagnosis import cutoffs, filtered, instants, spectrum
+from identify import Array, ExplicitModel
+from identify.judge.diagnosis import cutoffs, instants, spectrum
 from identify.judge.noise_spectra import noise_spectra
-from identify.rows.grid import Kernel
-from identify.rows.rows import Rows
-from identify.signals.signals import Signals
 
-FRICTIONS = ("viscous friction", "Coulomb friction", "friction", "offset")
 RESOLUTION = 0.25
 """Distance of the frequencies of spectra [Hz]."""
 
 SIGMAS = 2.0
 """Half the width of intervals, in sigma: 95 %."""
-
-WHOLE = 0.99
-"""Share of a row's weights from which on the mask takes nothing of it."""
 
 FEW = 2
 """Joints from which on panels stand in two columns."""
@@ -80,23 +74,25 @@ def parameters_figure(found: Identified) -> str:
 
 
 def friction_figure(found: Identified) -> str:
-    """Return friction over velocity: what the rigid body leaves of the torque, and the law that was found."""
+    """Return friction over velocity: what the rigid body leaves of the torque, and the law that was found.
+
+    Beyond the speeds of the log the law is dotted. One that grows with the load is drawn at the least and most load of the log.
+    """
     estimate = found.estimates[next(iter(found.estimates))]
-    parts = found.problem.parts
-    seen = [_seen(signals, found.processing) for signals in found.problem.signals]
     if not any(p.kind in FRICTIONS for p in found.basis.parameters):
         return ""
+    curves = FrictionCurves(found, estimate.X)
     figure, panels = _panels(found.basis.n, 1.6)
     for j, panel in enumerate(panels):
-        mine = np.array([p.kind in FRICTIONS and p.joint == j for p in found.basis.parameters])
-        v, torque, law = (np.concatenate(x) for x in zip(*(_friction(p, q, estimate.X, mine, j) for p, q in zip(
-            parts, seen, strict=True)), strict=True))  # fmt: skip
+        v, torque = curves.measured(j)
         panel.plot(v, torque, ".", ms=2, color="0.6", label="torque less the rigid body's")
-        order = np.argsort(v)
-        slow = np.flatnonzero(np.diff(np.sign(v[order])) != 0)
-        line = np.insert(law[order], slow + 1, np.nan)
-        panel.plot(np.insert(v[order], slow + 1, 0.0), line, color=_color("explicit"), lw=1.6, label="law that was found")
-        panel.set_title(found.subject.robot.joints[j], loc="left")
+        for number, line in enumerate(curves.laws(j)):
+            inside = np.abs(line.v) <= np.abs(v).max(initial=0.0)
+            label = "law that was found" if number == 0 else None
+            panel.plot(line.v[inside], line.torque[inside], color=_color("explicit"), lw=1.6, label=label)
+            beyond = np.where(inside, np.nan, line.torque)
+            panel.plot(line.v, beyond, ":", color=_color("power"), lw=1.6, label=label and "beyond the speeds of the log")
+        panel.set_title(f"{found.subject.robot.joints[j]}: {' + '.join(found.subject.laws.names[j])}", loc="left")
     _last(panels, "velocity [rad/s]", "friction [N m]")
     _legend(figure, panels[0])
     return svg(figure)
@@ -131,22 +127,6 @@ def spectra_figure(found: Identified) -> str:
     _last(panels, "frequency [Hz]", "[N m/√Hz]")
     _legend(figure, panels[0])
     return svg(figure)
-
-
-def _seen(signals: Signals, chain: Chain) -> tuple[Array, Array]:
-    """Return velocities and weights as the rows see them, shape (joint, row) each."""
-    response = chain.operator.response(signals.fs)
-    mean = Kernel(response / response.sum(), (len(response) - 1) // 2, chain.grid(signals.log))
-    return filtered(signals, chain)["qd"], mean.apply(signals.weight)
-
-
-def _friction(rows: Rows, seen: tuple[Array, Array], X: Array, mine: Array, j: int) -> tuple[Array, Array, Array]:
-    """Return velocity, friction as measured, and by the law, at the rows of a joint of which the mask takes nothing."""
-    own = np.flatnonzero(rows.group == j)
-    qd, weight = (x[j] for x in seen)
-    kept = weight > WHOLE
-    law = rows.W[own[kept]] @ np.where(mine, X, 0.0)
-    return qd[kept], (rows.Y - rows.predicted(X))[own[kept]] + law, law
 
 
 def _panels(count: int, height: float) -> tuple[Figure, list[Axes]]:

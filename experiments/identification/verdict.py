@@ -1,6 +1,6 @@
 """Is an identification any good? A word, the reasons for it, and what is most likely to mend it."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, final
@@ -8,12 +8,15 @@ from typing import Any, final
 import numpy as np
 
 from experiments.errors import ExperimentError
+from experiments.identification.friction_choice import with_suitable_friction
 from experiments.identification.identified import Identified
+from experiments.identification.subject import Subject
 from experiments.identification.validated import Validated
 from experiments.identification.warnings import wrong_sign
 from identify import Array, IdentificationError, RangeError, Validation, estimate, validate
 from identify.judge.delay import estimate_delay
 from identify.judge.validation import MARGIN
+from sim.errors import BenchError
 
 GOOD, FAIR = 2.0, 10.0
 """Torque errors [% of the torque] beyond noise and sigma up to which a model is called good, or fair.
@@ -28,6 +31,9 @@ SURE = 4.0
 
 WORTH, TOLERABLE = 0.7, 20.0
 """Options are recommended if they bring the error below this share of what it was, and below so many per cent."""
+
+DRASTIC = 1 / 3
+"""Below this share of what it was they are recommended whatever is left."""
 
 
 @final
@@ -142,20 +148,30 @@ class Remedies:
 
     def options(self) -> Iterator[str]:
         """Yield options with which the error falls, and how far."""
-        subject = self.validated.found.subject
-        options = {}
-        if not all(joint.armature for joint in subject.tree.joints):
-            options["--armature all"] = replace(subject.asked, armature="all")
-        if "offset" not in subject.asked.add:
-            options["--add offset"] = replace(subject.asked, add=(*subject.asked.add, "offset"))
         before = self._worst(self.validated.judged)
-        for option, asked in options.items():
+        for option, make in self._others().items():
             try:
-                after = self._worst(replace(self.validated.judged, subject=replace(subject, asked=asked), truth=None))
-            except (IdentificationError, ExperimentError):
+                after = self._worst(replace(self.validated.judged, subject=make(), truth=None))
+            except (IdentificationError, ExperimentError, BenchError):
                 continue
-            if after < min(WORTH * before, TOLERABLE):
+            if after < min(WORTH * before, TOLERABLE) or after < DRASTIC * before:
                 yield f"with {option} the worst joint's error falls from {percent(before)} to {percent(after)}"
+
+    def _others(self) -> dict[str, Callable[[], Subject]]:
+        """Return the options, and what makes the robot that each describes."""
+        subject, found = self.validated.found.subject, dict[str, Callable[[], Subject]]()
+        asked, mounting, joints = subject.asked, subject.mounting, subject.robot.joints
+        if not all(joint.armature for joint in subject.tree.joints):
+            found["--armature all"] = lambda: replace(subject, asked=replace(asked, armature="all"))
+        if "offset" not in asked.add:
+            found["--add offset"] = lambda: replace(subject, asked=replace(asked, add=(*asked.add, "offset")))
+        if len(joints) > 1 and not subject.tree.couplings:
+            drive = f"motor{len(joints)}", ((joints[-2], 1.0), (joints[-1], 1.0))
+            option = f"--coupling {drive[0]}={joints[-2]}+{joints[-1]}"
+            found[option] = lambda: replace(subject, mounting=replace(mounting, couplings=(drive,)))
+        if subject.laws.standard and asked.friction == ("standard",):
+            found["--friction auto"] = lambda: with_suitable_friction(self.validated.judged)[0].subject
+        return found
 
     def _worst(self, judged: Identified) -> float:
         """Return the largest error [%] of the explicit model on the unseen motion."""

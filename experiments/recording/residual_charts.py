@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from experiments.identification.friction_curves import FRICTIONS
 from experiments.identification.identified import Identified
 from experiments.recording.chart import NARROW, Chart
 from experiments.recording.scales import decades, linear
@@ -32,9 +33,6 @@ FAINTEST = 1e-3
 
 DARK: Color = (90, 90, 90)
 """What the mask leaves out."""
-
-FRICTIONS = ("viscous friction", "Coulomb friction", "friction", "offset")
-"""Kinds of parameters that make a friction law."""
 
 
 @dataclass(frozen=True, eq=False)
