@@ -22,8 +22,11 @@ from identify.signals.state import State
 ROUNDS = 30
 """At most; most laws take five."""
 
-COARSE, FINE = 6, 24
+COARSE, FINE = 6, 32
 """Values of a shape that are looked at to begin with, and once it has settled."""
+
+FEWEST = 4
+"""Values of each shape of a law with several."""
 
 AGAIN = 2
 """How often others are looked at, at most."""
@@ -31,7 +34,7 @@ AGAIN = 2
 SETTLED = 1e-3
 """Steps below this share of sigma no longer matter."""
 
-SHARES = (1.0, 0.5, 0.25, 0.1)
+SHARES = (0.5, 0.25, 0.1, 0.0)
 """Of a step, in turn, until the rows are explained better."""
 
 TINY = 1e-300
@@ -87,15 +90,17 @@ def _estimate(factors: Factors, basis: Basis) -> Array:
 
 def _step(rows: "AdaptiveRows", here: Basis, X: Array, cost: Array) -> tuple[Basis, Array]:
     """Return the basis about an estimate, or a share of the way there if that explains more, and its misfit, shape (...)."""
-    for share in SHARES:
+    share = np.ones(cost.shape)
+    for smaller in SHARES:
         ahead = here.adapted(_between(here, X, share))
         found = rows.misfit(ahead)
-        if not (found > cost).any():
+        if not (worse := found > cost).any():
             break
+        share = np.where(worse, smaller, share)
     return ahead, found
 
 
-def _between(basis: Basis, X: Array, share: float) -> Array:
+def _between(basis: Basis, X: Array, share: Array) -> Array:
     """Return X with the shapes of friction moved by a share of their step alone."""
     found = X.copy()
     for name, old in basis.believed.items():
@@ -178,10 +183,21 @@ def _scanned(rows: AdaptiveRows, basis: Basis, count: int) -> Basis:
     return basis
 
 
+def _below(costs: Array) -> Array:
+    """Return how far the minimum of a parabola lies below each value of a grid that is less than its neighbours, shape (i,)."""
+    found = np.zeros(len(costs))
+    before, here, after = costs[:-2], costs[1:-1], costs[2:]
+    bend = before - 2 * here + after
+    inside = (here <= before) & (here <= after) & np.isfinite(bend) & (bend > 0)
+    found[1:-1][inside] = (after - before)[inside] ** 2 / (8 * bend[inside])
+    return found
+
+
 def _best(rows: AdaptiveRows, basis: Basis, shaped: ShapedFriction, joints: Sequence[int], count: int) -> ShapedFriction:
     """Return a law with the shapes of a grid that explain most beside the others, joint by joint; where it is, if that does."""
     n, settings = basis.n, [shape.setting for shape in shaped.shapes]
-    grid = [dict(zip(settings, at, strict=True)) for at in product(*(shape.grid(count) for shape in shaped.shapes))]
+    each = max(FEWEST, round(count ** (1 / len(settings))))
+    grid = [dict(zip(settings, at, strict=True)) for at in product(*(shape.grid(each) for shape in shaped.shapes))]
     here = [{name: x[..., None] for name, x in shaped.at_joints(n).items()}] if shaped.values else []
     candidates = Candidates(shaped.law, (*grid, *here))
     rest = basis.without(*(p.name for p in shaped.parameters(n) if p.name in basis.names))
@@ -195,13 +211,15 @@ def _best(rows: AdaptiveRows, basis: Basis, shaped: ShapedFriction, joints: Sequ
         for j in joints if here else (*joints, *joints):  # at first, a second time beside what the others have
             others = [f"{shaped.law.symbol}@{i}:{k + 1}" for k, i in found.items() if k != j]
             own = [f"{shaped.law.symbol}@{i}:{j + 1}" for i in range(len(candidates.grid))]
-            found[j] = int(np.argmin([misfit(alone.only([*plain, *others, name], at)) for name in own]))
+            costs = np.array([misfit(alone.only([*plain, *others, name], at)) for name in own])
+            costs[: len(grid)] -= _below(costs[: len(grid)]) if len(settings) == 1 else 0.0
+            found[j] = int(np.argmin(costs))
         chosen[run][list(found)] = list(found.values())
     if here and (chosen == len(grid)).all():
         return shaped
-    each = {name: np.array([*(at[name] for at in grid), np.nan])[chosen] for name in settings}
+    new = {name: np.array([*(at[name] for at in grid), np.nan])[chosen] for name in settings}
     now = shaped.at_joints(n)
-    return shaped.at({name: np.where(np.isnan(x), now[name], x) for name, x in each.items()})
+    return shaped.at({name: np.where(np.isnan(x), now[name], x) for name, x in new.items()})
 
 
 @final

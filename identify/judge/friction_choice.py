@@ -15,7 +15,7 @@ from identify.basis.of_joints import OfJoints
 from identify.estimators.problem import Problem
 from identify.estimators.settle import Candidates, settled
 
-GRID = 7
+GRID = 16
 """Values of each unknown shape of a law that are compared."""
 
 FOLDS = 10
@@ -25,8 +25,14 @@ FAST = 0.8
 """Speeds of a joint above this share of the rows are predicted once more, by a fit of the slower ones: a law that holds within
 the speeds of a fit alone fails there."""
 
-SURE = 3.0
+SURE = 2.0
 """A law is taken when what it gains is this many times the standard deviation of that over the stretches."""
+
+WORSE = 0.25
+"""Share of the squared error that a law may add at speeds above those of a fit: an eighth of the error."""
+
+EXCUSED = 2.0
+"""Squares at speeds above those of a fit that sigma makes, in multiples of what it makes on average, are no fault of a law."""
 
 WORTH = 0.02
 """Least share of a joint's squared error that a law must take: less is of no use, and of a chain's own errors."""
@@ -85,8 +91,8 @@ def choose_friction(problem: Problem, candidates: Mapping[str, AbstractBlock]) -
     """Return the laws that predict torques of motion that was not fitted better, joint by joint.
 
     Stretches of the logs are left out one by one (cross-validation), and the fastest motion of each joint once more. A law is
-    added where it takes `WORTH` of the squared error, `SURE` times the standard deviation of that, and takes of that of the
-    fastest motion, too; the one that takes most first. In the end those are dropped again that others have made idle.
+    added where it takes `WORTH` of the squared error, `SURE` times the standard deviation of that, and does no harm to the
+    fastest motion; the one that takes most first. In the end those are dropped again that others have made idle.
 
     Parameters
     ----------
@@ -101,83 +107,106 @@ def choose_friction(problem: Problem, candidates: Mapping[str, AbstractBlock]) -
         If the logs are too long for their rows to be kept, or the motion does not show the parameters.
     """
     problem.require_rows("laws of friction are compared by rows, and ")
-    start = settled(problem.explicit)
-    start.factors.together.check()
-    return _Search(start, candidates).run()
+    problem.factors.together.check()
+    return _Choice(problem.explicit, candidates).run()
 
 
 @dataclass(frozen=True, eq=False)
-class _Search:
-    start: Problem
+class _Choice:
+    problem: Problem
     candidates: Mapping[str, AbstractBlock]
 
     def run(self) -> FrictionChoice:
-        n = self.start.basis.n
-        laws: list[tuple[str, ...]] = [()] * n
+        laws: list[tuple[str, ...]] = [()] * self.problem.basis.n
         scores = dict[tuple[int, str], LawScore]()
         while True:
-            found = [self._best(laws, j, scores) for j in range(n)]
+            search = self._search(laws, self.candidates)
+            tried = {key: search.score(*key) for key in search.places}
+            scores |= tried
+            found = [_best(tried, j) for j in range(len(laws))]
             if not any(found):
                 break
             laws = [(*own, name) if name else own for own, name in zip(laws, found, strict=True)]
-        laws = [self._needed(laws, j) for j in range(n)]
+        laws = [self._needed(laws, j) if len(own) > 1 else own for j, own in enumerate(laws)]
         kept = (replace(score, taken=score.law in laws[score.joint]) for score in scores.values())
         return FrictionChoice(tuple(laws), tuple(kept))
-
-    def _best(self, laws: Sequence[tuple[str, ...]], j: int, scores: dict[tuple[int, str], LawScore]) -> str | None:
-        """Return the law that gains most at a joint, if one is worth it."""
-        untried = [name for name in self.candidates if name not in laws[j] and (name, j) in self._products.places]
-        tried = {name: self._score(laws, j, name) for name in untried}
-        scores |= {(j, name): score for name, score in tried.items()}
-        worth = {name: s.share for name, s in tried.items() if s.share > WORTH and s.deviations > SURE and s.beyond > 0}
-        return max(worth, key=lambda name: worth[name], default=None)
 
     def _needed(self, laws: Sequence[tuple[str, ...]], j: int) -> tuple[str, ...]:
         """Return the laws of a joint without those that gain nothing beside the others."""
         own = laws[j]
         for name in laws[j]:
             rest = tuple(other for other in own if other != name)
-            score = self._score([*laws[:j], rest, *laws[j + 1 :]], j, name)
-            if not (score.share > WORTH and score.deviations > SURE and score.beyond > 0):
+            search = self._search([*laws[:j], rest, *laws[j + 1 :]], {name: self.candidates[name]})
+            if not _worth(search.score(j, name)):
                 own = rest
                 laws = [*laws[:j], rest, *laws[j + 1 :]]
         return own
 
-    def _score(self, laws: Sequence[tuple[str, ...]], j: int, name: str) -> LawScore:
-        """Return what a law gains at a joint, beside those that the joints have."""
-        more = [*laws[:j], (*laws[j], name), *laws[j + 1 :]]
-        before, after = self._errors(tuple(laws), j), self._errors(tuple(more), j)
-        ratio = np.log(np.maximum(before, TINY) / np.maximum(after, TINY))
-        spread = float(np.std(ratio[:-1], ddof=1) / np.sqrt(FOLDS))
-        deviations = float(ratio[:-1].mean() / spread) if spread > 0 else 0.0
-        share = float(1 - after[:-1].sum() / max(before[:-1].sum(), TINY))
-        return LawScore(j, name, share, deviations, float(1 - np.exp(-ratio[-1])), taken=False)
+    def _search(self, laws: Sequence[tuple[str, ...]], candidates: Mapping[str, AbstractBlock]) -> "_Search":
+        """Return the comparison of further laws, beside these with their own shapes."""
+        basis = self.problem.basis
+        for name in dict.fromkeys(name for own in laws for name in own):
+            joints = tuple(j for j, own in enumerate(laws) if name in own)
+            basis = basis + OfJoints(self.candidates[name], joints)
+        return _Search(_Products.of(settled(self.problem.with_basis(basis)), candidates))
 
-    def _errors(self, laws: tuple[tuple[str, ...], ...], j: int) -> Array:
-        """Return the squared errors of a joint's rows in every stretch and in the fastest motion, none of which was fitted."""
-        key = laws, j
+
+def _worth(score: LawScore) -> bool:
+    return score.share > WORTH and score.deviations > SURE and score.beyond > -WORSE
+
+
+def _best(tried: Mapping[tuple[int, str], LawScore], j: int) -> str | None:
+    """Return the law that gains most at a joint, if one is worth it."""
+    worth = {name: score.share for (joint, name), score in tried.items() if joint == j and _worth(score)}
+    return max(worth, key=lambda name: worth[name], default=None)
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    products: "_Products"
+
+    @property
+    def places(self) -> list[tuple[int, str]]:
+        """Joints and laws that are compared."""
+        return [(j, name) for name, j in self.products.places]
+
+    def score(self, j: int, name: str) -> LawScore:
+        """Return what a law gains at a joint."""
+        (before, left_open), (after, more_open) = self._errors(j, None), self._errors(j, name)
+        ratio = np.log(np.maximum(before, TINY) / np.maximum(after, TINY))[:-1]
+        spread = float(np.std(ratio, ddof=1) / np.sqrt(FOLDS))
+        deviations = float(ratio.mean() / spread) if spread > 0 else 0.0
+        share = float(1 - after[:-1].sum() / max(before[:-1].sum(), TINY))
+        # What the noise of the fit makes farther out is no fault of the law.
+        beyond = 1 - (after[-1] - EXCUSED * (more_open[-1] - left_open[-1])) / max(before[-1], TINY)
+        return LawScore(j, name, share, deviations, float(beyond), taken=False)
+
+    def _errors(self, j: int, law: str | None) -> Array:
+        """Return squared errors of a joint in every stretch and in the fastest motion, and what sigma makes, (2, FOLDS + 1)."""
+        key = law, j
         if key not in self._known:
-            self._known[key] = np.array([self._predicted(laws, j, k) for k in range(FOLDS + 1)])
+            self._known[key] = np.array([self._predicted(j, law, k) for k in range(FOLDS + 1)]).T
         return self._known[key]
 
     @cached_property
-    def _known(self) -> dict[tuple[tuple[tuple[str, ...], ...], int], Array]:
+    def _known(self) -> dict[tuple[str | None, int], Array]:
         return {}
 
-    def _predicted(self, laws: Sequence[tuple[str, ...]], j: int, fold: int) -> float:
-        """Return the squared error of a joint in a stretch, by a fit of the rest; shapes are those that fit the rest best."""
-        products = self._products
+    def _predicted(self, j: int, law: str | None, fold: int) -> tuple[float, float]:
+        """Return the squared error of a joint in a stretch, by a fit of the rest, and what sigma makes of it in fast motion.
+
+        Shapes are those that fit the rest best.
+        """
+        products = self.products
         judged, fitted = products.held[fold][j], products.fitted(fold, j)
-        least, best = np.inf, 0.0
-        for columns in products.choices(laws, j):
+        least, best, spread = np.inf, 0.0, 0.0
+        for own in [[]] if law is None else products.places[law, j]:
+            columns = [*range(products.p), *own]
             X = _solved(fitted, columns)
             if (misfit := _squares(fitted, columns, X)) < least:
                 least, best = misfit, _squares(judged, columns, X)
-        return best
-
-    @cached_property
-    def _products(self) -> "_Products":
-        return _Products.of(self.start, self.candidates)
+                spread = _spread(fitted, judged, columns) if fold == FOLDS else 0.0
+        return best, spread
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +218,7 @@ class _Products:
     held : Array, shape (FOLDS + 1, joint, P + 1, P + 1)
         Of what is left out, of every joint: stretch by stretch, and its fastest motion.
     weight : Array, shape (joint,)
-        1 over the joint's squared error without the laws.
+        1 over the variance of the joint's error without the laws.
     p : int
         Number of parameters that all joints have.
     places : mapping of (str, int) to list of lists of int
@@ -219,7 +248,8 @@ class _Products:
         speed = np.abs(np.array([joined[j, :, first + j] for j in range(basis.n)]))
         joined = np.concatenate([joined[..., :first], joined[..., -1:]], axis=-1)
         level = start.factors.squares(X)
-        return cls(_held(joined, speed), 1 / np.maximum(level, 1e-300), len(start.names), places)
+        weight = start.factors.rows / np.maximum(level, 1e-300)
+        return cls(_held(joined, speed), weight, len(start.names), places)
 
     def fitted(self, fold: int, j: int) -> Array:
         """Return the products of all rows but those that are left out, weighted, shape (P + 1, P + 1)."""
@@ -233,12 +263,6 @@ class _Products:
     @cached_property
     def _known(self) -> dict[tuple[int, int], Array]:
         return {}
-
-    def choices(self, laws: Sequence[tuple[str, ...]], j: int) -> list[list[int]]:
-        """Return the columns of the parameters, for every combination of shapes of a joint; of others the middle ones."""
-        others = [i for k, own in enumerate(laws) if k != j for law in own for i in _middle(self.places[law, k])]
-        own = product(*(self.places[law, j] for law in laws[j]))
-        return [[*range(self.p), *others, *(i for columns in choice for i in columns)] for choice in own]
 
 
 class _Speed(AbstractFriction):
@@ -269,10 +293,6 @@ def _held(joined: Array, speed: Array) -> Array:
     return np.array([np.matmul(np.swapaxes(x, -1, -2), x) for x in (*stretches, fast)])
 
 
-def _middle(choices: list[list[int]]) -> list[int]:
-    return choices[len(choices) // 2]
-
-
 def _solved(products: Array, columns: Sequence[int]) -> Array:
     """Return the least-squares solution from products of columns."""
     A, b = products[np.ix_(columns, columns)], products[columns, -1]
@@ -280,6 +300,14 @@ def _solved(products: Array, columns: Sequence[int]) -> Array:
     A = A / np.outer(scale, scale) + RIDGE * np.eye(len(columns))
     found: Array = np.linalg.solve(A, b / scale) / scale
     return found
+
+
+def _spread(products: Array, judged: Array, columns: Sequence[int]) -> float:
+    """Return the squares that the sigma of a fit, with rows of unit variance, makes in others."""
+    A = products[np.ix_(columns, columns)]
+    scale = np.sqrt(np.maximum(np.diagonal(A), 1e-300))
+    inverse = np.linalg.inv(A / np.outer(scale, scale) + RIDGE * np.eye(len(columns))) / np.outer(scale, scale)
+    return float(np.sum(inverse * judged[np.ix_(columns, columns)]))
 
 
 def _squares(products: Array, columns: Sequence[int], X: Array) -> float:

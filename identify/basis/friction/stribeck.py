@@ -37,7 +37,7 @@ class StribeckFriction(AbstractFriction):
         return np.exp(-((np.abs(qd) / self.vs) ** self.exponent)) * np.sign(qd)
 
 
-SPEED = Shape("vs", "vs", "rad/s", 0.1, (0.01, 1.0))
+SPEED = Shape("vs", "vs", "rad/s", 0.1, (0.02, 1.0))
 EXPONENT = Shape("exponent", "ds", "1", 1.0, (0.5, 3.0))
 
 
