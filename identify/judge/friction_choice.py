@@ -126,10 +126,22 @@ class _Choice:
             found = [_best(tried, j) for j in range(len(laws))]
             if not any(found):
                 break
-            laws = [(*own, name) if name else own for own, name in zip(laws, found, strict=True)]
+            laws = self._better(laws, found)
         laws = [self._needed(laws, j) if len(own) > 1 else own for j, own in enumerate(laws)]
         kept = (replace(score, taken=score.law in laws[score.joint]) for score in scores.values())
         return FrictionChoice(tuple(laws), tuple(kept))
+
+    def _better(self, laws: Sequence[tuple[str, ...]], found: Sequence[Sequence[str]]) -> list[tuple[str, ...]]:
+        """Return the laws with one more of each joint: of its best two that which is better with shapes of its own."""
+        each = []
+        for rank in (0, 1):
+            more = [(*own, names[min(rank, len(names) - 1)]) if names else own for own, names in zip(laws, found, strict=True)]
+            each.append(more)
+        if each[0] == each[1]:
+            return each[0]
+        searches = [self._search(more, {}) for more in each]
+        errors = np.array([[search.error(j) for j in range(len(laws))] for search in searches])
+        return [each[int(rank)][j] for j, rank in enumerate(np.argmin(errors, axis=0))]
 
     def _needed(self, laws: Sequence[tuple[str, ...]], j: int) -> tuple[str, ...]:
         """Return the laws of a joint without those that gain nothing beside the others."""
@@ -155,10 +167,10 @@ def _worth(score: LawScore) -> bool:
     return score.share > WORTH and score.deviations > SURE and score.beyond > -WORSE
 
 
-def _best(tried: Mapping[tuple[int, str], LawScore], j: int) -> str | None:
-    """Return the law that gains most at a joint, if one is worth it."""
+def _best(tried: Mapping[tuple[int, str], LawScore], j: int) -> list[str]:
+    """Return the laws that are worth it at a joint, that which gains most first."""
     worth = {name: score.share for (joint, name), score in tried.items() if joint == j and _worth(score)}
-    return max(worth, key=lambda name: worth[name], default=None)
+    return sorted(worth, key=lambda name: -worth[name])
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,6 +192,10 @@ class _Search:
         # What the noise of the fit makes farther out is no fault of the law.
         beyond = 1 - (after[-1] - EXCUSED * (more_open[-1] - left_open[-1])) / max(before[-1], TINY)
         return LawScore(j, name, share, deviations, float(beyond), taken=False)
+
+    def error(self, j: int) -> float:
+        """Return the squared error of a joint on stretches that were not fitted, without further laws."""
+        return float(self._errors(j, None)[0][:-1].sum())
 
     def _errors(self, j: int, law: str | None) -> Array:
         """Return squared errors of a joint in every stretch and in the fastest motion, and what sigma makes, (2, FOLDS + 1)."""
