@@ -135,7 +135,7 @@ def read(path: Path, question: Question, named: Identified) -> ReadLog:
         words = [*repaired.words(named.subject.robot.joints), *notes]
         return ReadLog(path, repaired.logs, columns, channel, repaired, tuple(words))
     try:
-        log = MotionLog.at_times(columns.t, columns.q, columns.tau, channel)
+        log = MotionLog.at_times(columns.t, columns.q, columns.tau, channel, columns.conditions)
     except TimeError as error:
         late = f" --torque-delay {channel.delay:g}" if channel.delay else ""
         raise ExperimentError(

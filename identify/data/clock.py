@@ -124,7 +124,8 @@ class Clock:
         pick = self.kept
         own = columns.t_tau is not None
         tau = columns.tau if own else columns.tau[pick]
-        return replace(columns, t=self.t, q=columns.q[pick], tau=tau, qd=None if columns.qd is None else columns.qd[pick])
+        qd, warm = (None if x is None else x[pick] for x in (columns.qd, columns.temperature))
+        return replace(columns, t=self.t, q=columns.q[pick], tau=tau, qd=qd, temperature=warm)
 
     def words(self) -> Iterator[str]:
         """Yield what was done, a sentence each."""

@@ -27,6 +27,8 @@ class LogColumns:
         Logged velocities [rad/s].
     t_tau : Array, shape (time of torques,), optional
         Times of the torques, where they are others than those of the positions [s].
+    temperature : Array, shape (time, joint or 1), optional
+        [deg C].
     """
 
     t: Array
@@ -36,6 +38,12 @@ class LogColumns:
     joints: tuple[str, ...] = ()
     qd: Array | None = None
     t_tau: Array | None = None
+    temperature: Array | None = None
+
+    @property
+    def conditions(self) -> dict[str, Array]:
+        """What else the log says that laws may need."""
+        return {} if self.temperature is None else {"temperature": self.temperature}
 
     @property
     def n(self) -> int:
@@ -60,4 +68,7 @@ class LogColumns:
             return self
         place = [self.joints.index(joint) for joint in joints]
         qd = None if self.qd is None else self.qd[:, place]
-        return replace(self, q=self.q[:, place], tau=self.tau[:, place], qd=qd, joints=tuple(joints))
+        warm = self.temperature
+        if warm is not None and warm.shape[1] > 1:
+            warm = warm[:, place]
+        return replace(self, q=self.q[:, place], tau=self.tau[:, place], qd=qd, temperature=warm, joints=tuple(joints))

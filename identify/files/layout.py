@@ -8,9 +8,17 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
+
 from identify.data.motion_log import TorqueChannel
 from identify.errors import IdentificationError, LogError
 from identify.files.units import SI, factor
+
+QUANTITIES = ("t", "q", "qd", "tau", "temperature")
+"""What columns may be."""
+
+SINGULAR = 1e-12
+"""Determinants below this are none."""
 
 LAYOUT = "log.toml"
 """Name of the file that says what all logs of its folder hold."""
@@ -64,6 +72,10 @@ class LogLayout:
         Torque over what is logged, in the unit of tau, joint by joint, or one for all.
     rows : mapping of str to float
         Only rows in which these columns have these values: an episode.
+    temperature : Source
+        Temperatures of the joints, or of all; without columns if there are none.
+    motors : tuple of tuple of float
+        Of a log of motors: motor positions = matrix times joint positions; torques are turned by its dual.
     """
 
     t: Source = Source(("t",))  # frozen
@@ -74,6 +86,8 @@ class LogLayout:
     torque: TorqueChannel | None = None
     gain: tuple[float, ...] = ()
     rows: Mapping[str, float] = field(default_factory=dict)
+    temperature: Source = Source()  # frozen
+    motors: tuple[tuple[float, ...], ...] = ()
 
     @classmethod
     def beside(cls, log: Path) -> tuple[Self, Path] | None:
@@ -97,9 +111,11 @@ class LogLayout:
 
     @classmethod
     def _of(cls, stated: dict[str, Any]) -> Self:
-        _require_known("", stated, ("t", "q", "qd", "tau", "joints", "torque", "rows", "file"))
+        _require_known("", stated, (*QUANTITIES, "joints", "torque", "rows", "file", "motors"))
         file = str(stated.get("file", ""))
-        sources = {name: _source(name, stated[name], file) for name in ("t", "q", "qd", "tau") if name in stated}
+        sources = {name: _source(name, stated[name], file) for name in QUANTITIES if name in stated}
+        motors = dict(stated.get("motors", {}))
+        _require_known("motors", motors, ("matrix",))
         torque = dict(stated.get("torque", {}))
         _require_known("torque", torque, ("meaning", "delay", "gain"))
         gain = torque.pop("gain", [])
@@ -111,7 +127,10 @@ class LogLayout:
         if not isinstance(rows, dict):
             raise LogError(f"rows = {rows!r} must be a table: [rows], then lines such as episode_index = 3")
         rows = {str(k): float(v) for k, v in rows.items()}
-        return cls(**sources, joints=tuple(stated.get("joints", ())), torque=channel, gain=gains, rows=rows)
+        matrix = tuple(tuple(map(float, row)) for row in motors.get("matrix", ()))
+        return cls(
+            **sources, joints=tuple(stated.get("joints", ())), torque=channel, gain=gains, rows=rows, motors=_regular(matrix)
+        )
 
     def where(self, quantity: str, source: Source) -> Self:
         """Return the layout with another source of a quantity: t, q, qd or tau."""
@@ -122,7 +141,7 @@ class LogLayout:
     def text(self) -> str:
         """The layout as the text of a file."""
         lines = [f"joints = {json.dumps(list(self.joints), ensure_ascii=False)}"] if self.joints else []
-        for name in ("t", "q", "qd", "tau"):
+        for name in QUANTITIES:
             source: Source = getattr(self, name)
             if source != Source():
                 lines += ["", f"[{name}]", *_lines(source, SI[name])]
@@ -133,9 +152,19 @@ class LogLayout:
             lines += ['# meaning = "held"  # or "instantaneous", "averaged": see docs/real-logs.md', "# delay = 0.0  # [s]"]
         if self.gain:
             lines += [f"gain = {list(self.gain)}"]
+        if self.motors:
+            lines += ["", "[motors]", f"matrix = {[list(row) for row in self.motors]}"]
         if self.rows:
             lines += ["", "[rows]", *(f"{json.dumps(name)} = {value!r}" for name, value in self.rows.items())]
         return "\n".join(lines).strip() + "\n"
+
+
+def _regular(matrix: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
+    """Return a matrix; raise LogError if it has no inverse."""
+    n = len(matrix)
+    if matrix and (any(len(row) != n for row in matrix) or abs(np.linalg.det(np.array(matrix))) < SINGULAR):
+        raise LogError(f"[motors]: matrix = {[list(row) for row in matrix]} must be square and have an inverse")
+    return matrix
 
 
 def matching(pattern: str, names: Sequence[str]) -> list[tuple[str, str]]:

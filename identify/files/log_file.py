@@ -38,6 +38,8 @@ def write_log(log: MotionLog, path: Path, joints: Sequence[str] = ()) -> None:
     in_newton_metres = path.suffix.lower() == CSV
     tau = log.tau * np.asarray(log.torque.gain) if in_newton_metres else log.tau
     columns |= {f"tau{end}": x for end, x in zip(ends, tau.T, strict=True)}
+    if (warm := log.conditions.get("temperature")) is not None:
+        columns |= {f"temperature{end}": x for end, x in zip(ends, np.broadcast_to(warm, log.q.shape).T, strict=True)}
     table = pa.table({name: pa.array(values) for name, values in columns.items()})
     if in_newton_metres:
         csv.write_csv(table, path)
@@ -76,4 +78,4 @@ def read_log(path: Path, torque: TorqueChannel | None = None, joints: Sequence[s
             f"{path} does not say what its torque means: instantaneous, held or averaged, and with what "
             "delay; say it with torque=TorqueChannel(...)"
         )
-    return MotionLog.at_times(found.t, found.q, found.tau, channel)
+    return MotionLog.at_times(found.t, found.q, found.tau, channel, found.conditions)

@@ -85,7 +85,9 @@ def standard_layout(path: Path, table: LogTable) -> LogLayout:
     qd = tuple(f"qd{end}" for end in ends)
     velocities = Source(qd) if set(qd) <= set(table.columns) else Source()
     q, tau = (Source(tuple(f"{x}{end}" for end in ends)) for x in ("q", "tau"))
-    return LogLayout(Source(("t",)), q, tau, velocities, joints)
+    warm = tuple(f"temperature{end}" for end in ends)
+    every = warm if set(warm) <= set(table.columns) else ("temperature",) if "temperature" in table.columns else ()
+    return LogLayout(Source(("t",)), q, tau, velocities, joints, temperature=Source(every))
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +120,19 @@ class _Files:
         start = since if other or abs(since) > CLOCKS else 0.0  # since 1970
         channel = layout.torque or self._stated()
         tau = tau * self._gain(tau.shape[1])
-        return LogColumns(t - start, q, tau, channel, names, qd, t_tau - start if other else None)
+        q, tau, qd = self._of_joints(q, tau, qd)
+        warm = self._of("temperature", layout.temperature)[0] if layout.temperature.columns else None
+        return LogColumns(t - start, q, tau, channel, names, qd, t_tau - start if other else None, warm)
+
+    def _of_joints(self, q: Array, tau: Array, qd: Array | None) -> tuple[Array, Array, Array | None]:
+        """Return positions, torques and velocities of joints, where those of motors were logged."""
+        if not self.layout.motors:
+            return q, tau, qd
+        M = np.array(self.layout.motors)
+        if len(M) != q.shape[1]:
+            raise LogError(f"{self.log}: the matrix of [motors] has {len(M)} rows, the log {q.shape[1]} motors")
+        back = np.linalg.inv(M).T
+        return q @ back, tau @ M, None if qd is None else qd @ back
 
     def _ordered(self, quantity: str, values: Array, joints: tuple[str, ...], names: tuple[str, ...]) -> Array:
         """Return columns in the order of the joints' names, where they have names themselves."""

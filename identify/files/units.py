@@ -26,10 +26,10 @@ TORQUES = {
 }
 """Those that are no torques need a gain beside them."""
 
-UNITS = {"t": TIMES, "q": POSITIONS, "qd": VELOCITIES, "tau": TORQUES}
+UNITS = {"t": TIMES, "q": POSITIONS, "qd": VELOCITIES, "tau": TORQUES, "temperature": {"degC": 1.0}}
 """Units of each quantity of a log."""
 
-SI = {"t": "s", "q": "rad", "qd": "rad/s", "tau": "N m"}
+SI = {"t": "s", "q": "rad", "qd": "rad/s", "tau": "N m", "temperature": "degC"}
 """Units that are taken where a file states none; those of slides are m and N, which are of the same size."""
 
 NEED_GAIN = ("A", "mA", "%")

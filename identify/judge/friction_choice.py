@@ -15,7 +15,7 @@ from identify.basis.of_joints import OfJoints
 from identify.estimators.problem import Problem
 from identify.estimators.settle import Candidates, settled
 
-GRID = 16
+GRID = 32
 """Values of each unknown shape of a law that are compared."""
 
 FOLDS = 10
@@ -25,8 +25,11 @@ FAST = 0.8
 """Speeds of a joint above this share of the rows are predicted once more, by a fit of the slower ones: a law that holds within
 the speeds of a fit alone fails there."""
 
-SURE = 2.0
+SURE = 2.5
 """A law is taken when what it gains is this many times the standard deviation of that over the stretches."""
+
+SOLID = 0.3
+"""Or when it takes this share of the squared error also without the stretch in which it takes most."""
 
 WORSE = 0.25
 """Share of the squared error that a law may add at speeds above those of a fit: an eighth of the error."""
@@ -57,6 +60,8 @@ class LawScore:
         Of the joint's squared error, how much it takes; negative if it adds to it.
     deviations : float
         What it takes of the logarithm of the squared errors of the stretches, on average, in standard deviations of that.
+    least : float
+        Share that it takes without the stretch in which it takes most.
     beyond : float
         Share that it takes of the squared error at speeds above those of a fit.
     taken : bool
@@ -67,6 +72,7 @@ class LawScore:
     law: str
     share: float
     deviations: float
+    least: float
     beyond: float
     taken: bool
 
@@ -122,7 +128,7 @@ class _Choice:
         while True:
             search = self._search(laws, self.candidates)
             tried = {key: search.score(*key) for key in search.places}
-            scores |= tried
+            scores = tried | scores
             found = [_best(tried, j) for j in range(len(laws))]
             if not any(found):
                 break
@@ -140,8 +146,16 @@ class _Choice:
         if each[0] == each[1]:
             return each[0]
         searches = [self._search(more, {}) for more in each]
-        errors = np.array([[search.error(j) for j in range(len(laws))] for search in searches])
-        return [each[int(rank)][j] for j, rank in enumerate(np.argmin(errors, axis=0))]
+        chosen, n = list[tuple[str, ...]](), len(laws)
+        for j in range(n):
+            marks = [(self._drives(search, more[j], j), search.error(j)) for search, more in zip(searches, each, strict=True)]
+            chosen.append(each[0][j] if marks[0] <= marks[1] else each[1][j])
+        return chosen
+
+    def _drives(self, search: "_Search", own: Sequence[str], j: int) -> bool:
+        """Return whether the last law of a joint has a size below zero: a law of another form, stood on its head."""
+        block = self.candidates[own[-1]] if own else None
+        return isinstance(block, ShapedFriction) and search.products.value(f"{block.law.symbol}{j + 1}") < 0
 
     def _needed(self, laws: Sequence[tuple[str, ...]], j: int) -> tuple[str, ...]:
         """Return the laws of a joint without those that gain nothing beside the others."""
@@ -164,7 +178,8 @@ class _Choice:
 
 
 def _worth(score: LawScore) -> bool:
-    return score.share > WORTH and score.deviations > SURE and score.beyond > -WORSE
+    sure = score.share > WORTH and score.deviations > SURE
+    return (sure or score.least > SOLID) and score.beyond > -WORSE
 
 
 def _best(tried: Mapping[tuple[int, str], LawScore], j: int) -> list[str]:
@@ -189,9 +204,11 @@ class _Search:
         spread = float(np.std(ratio, ddof=1) / np.sqrt(FOLDS))
         deviations = float(ratio.mean() / spread) if spread > 0 else 0.0
         share = float(1 - after[:-1].sum() / max(before[:-1].sum(), TINY))
+        others = np.delete(np.arange(FOLDS), np.argmax((before - after)[:-1]))
+        least = float(1 - after[others].sum() / max(before[others].sum(), TINY))
         # What the noise of the fit makes farther out is no fault of the law.
         beyond = 1 - (after[-1] - EXCUSED * (more_open[-1] - left_open[-1])) / max(before[-1], TINY)
-        return LawScore(j, name, share, deviations, float(beyond), taken=False)
+        return LawScore(j, name, share, deviations, least, float(beyond), taken=False)
 
     def error(self, j: int) -> float:
         """Return the squared error of a joint on stretches that were not fitted, without further laws."""
@@ -231,6 +248,8 @@ class _Products:
 
     Parameters
     ----------
+    start : Problem
+        That of the laws that all joints have.
     held : Array, shape (FOLDS + 1, joint, P + 1, P + 1)
         Of what is left out, of every joint: stretch by stretch, and its fastest motion.
     weight : Array, shape (joint,)
@@ -241,6 +260,7 @@ class _Products:
         Which columns a law of a joint has, one list for every combination of its shapes.
     """
 
+    start: Problem
     held: Array
     weight: Array
     p: int
@@ -265,7 +285,11 @@ class _Products:
         joined = np.concatenate([joined[..., :first], joined[..., -1:]], axis=-1)
         level = start.factors.squares(X)
         weight = start.factors.rows / np.maximum(level, 1e-300)
-        return cls(_held(joined, speed), weight, len(start.names), places)
+        return cls(start, _held(joined, speed), weight, len(start.names), places)
+
+    def value(self, name: str) -> float:
+        """Return the estimate of a parameter without further laws."""
+        return float(self.start.factors.fit(2).X[self.start.names.index(name)])
 
     def fitted(self, fold: int, j: int) -> Array:
         """Return the products of all rows but those that are left out, weighted, shape (P + 1, P + 1)."""
