@@ -92,6 +92,7 @@ def _designed(asked: Excite) -> Design:
     if asked.until is not None and asked.log:
         raise ExperimentError("--until simulates its own logs: leave --log out")
     subject = Subject(absolute(asked.robot), asked.parameters)
+    subject.require_linear()
     if len(asked.torque_noise) not in (0, 1, subject.robot.n):
         count = len(asked.torque_noise)
         raise ExperimentError(

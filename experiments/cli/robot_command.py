@@ -25,6 +25,7 @@ MANY = 30
 def describe(asked: DescribeRobot) -> None:
     """Show what can be identified of a robot."""
     subject, page = Subject(absolute(asked.name), asked.parameters, mounting_of(asked.mounting)), new_page(machine=asked.json)
+    subject.require_laws()
     if subject.robot.n > MANY:
         sys.stderr.write(f"idbench: grouping the parameters of {subject.robot.n} joints takes a while\n")
     truth = subject.truth(subject.robot)

@@ -120,7 +120,7 @@ def law_of(name: str) -> AbstractBlock:
         found: AbstractBlock = replace(law, **{settings[0]: float(value)})
         return found
     except (IndexError, ValueError, TypeError) as error:
-        raise ExperimentError(f"--friction {name}: {value!r} is no setting of {kind}, which takes a number") from error
+        raise ExperimentError(f"--friction {name}: {value!r} is no setting of {kind}, which takes a number: {error}") from error
 
 
 def _joint(text: str, where: str, joints: Sequence[str]) -> set[int]:

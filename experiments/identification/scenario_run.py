@@ -1,12 +1,13 @@
 """A scenario, simulated and identified: what do its imperfections do to each model?"""
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 from experiments.errors import ExperimentError
 from experiments.identification.defaults import CHAIN, ESTIMATOR
+from experiments.identification.friction_choice import with_suitable_friction
 from experiments.identification.identified import Identified
 from experiments.identification.parameters import Parameters
 from experiments.identification.subject import Subject
@@ -77,9 +78,11 @@ class ScenarioRun:
     @cached_property
     def identified(self) -> Identified:
         """What the models make of its log."""
-        truth = self.subject.truth(self.run.robots[0], self.scenario.friction)
         log, name = (self.run.alone(),), f"{self.chain}-{self.estimator}-study" if self.method else ""
-        return Identified(log, self.subject, truth, chain=self.chain, estimator=self.estimator, method=self.method, name=name)
+        found = Identified(log, self.subject, chain=self.chain, estimator=self.estimator, method=self.method, name=name)
+        if self.subject.laws.auto:
+            found, _ = with_suitable_friction(found)
+        return replace(found, truth=found.subject.truth(self.run.robots[0], self.scenario.friction))
 
     def summary(self) -> dict[str, Any]:
         """Return summary.json."""

@@ -60,6 +60,20 @@ class Subject:
         """How its standard parameters are grouped."""
         return BaseParameters.of(self.tree, self._with_laws(tree_basis(self.tree, self.laws.blocks())))
 
+    def require_laws(self) -> None:
+        """Raise ExperimentError if its laws of friction are those that suit a log, where there is none."""
+        if self.laws.auto:
+            raise ExperimentError("--friction auto looks at a log, and there is none here: name the laws")
+
+    def require_linear(self) -> None:
+        """Raise ExperimentError if its laws of friction hold about an estimate alone."""
+        self.require_laws()
+        if self.basis.adaptive:
+            raise ExperimentError(
+                "--friction: motions are designed for laws that are linear; give their shapes, as in stribeck:0.1, and leave "
+                "load out"
+            )
+
     @cached_property
     def laws(self) -> FrictionLaws:
         """The laws of friction of its joints."""

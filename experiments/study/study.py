@@ -146,7 +146,9 @@ class Study:
     @cached_property
     def subject(self) -> Subject:
         """The robot of all its runs."""
-        return Subject(self._first.robot, Parameters(friction=self.friction))
+        subject = Subject(self._first.robot, Parameters(friction=self.friction))
+        subject.require_laws()
+        return subject
 
     def with_seeds(self, seeds: int) -> "Study":
         """Return this study with another number of independent runs."""

@@ -1,0 +1,145 @@
+"""Laws of friction on the command line: by name, by joint, and those that a log asks for."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from experiments.cli import main
+from experiments.errors import ExperimentError
+from experiments.identification.friction_laws import FrictionLaws
+from identify import OfJoints
+from identify.basis import StribeckFriction
+from sim.engine.simulation import simulate
+from sim.scenario.scenario_file import from_dict
+
+JOINTS = ("hip", "knee")
+
+
+def test_laws_are_named_for_all_joints_or_for_one():
+    assert FrictionLaws.of((), JOINTS).names == (("viscous", "coulomb"),) * 2
+    found = FrictionLaws.of(("asymmetric", "knee=standard+load", "1=none"), JOINTS)
+    assert found.names == ((), ("viscous", "coulomb", "load"))
+    assert not found.standard
+    assert all(isinstance(block, OfJoints) and block.joints == (1,) for block in found.blocks())
+    assert FrictionLaws.of(found.texts, JOINTS) == found
+    assert FrictionLaws.of(("auto",), JOINTS).auto
+    (block,) = FrictionLaws.of(("stribeck:0.2",), JOINTS).blocks()
+    assert block == StribeckFriction(0.2)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("stribek", r"no law 'stribek' .did you mean 'stribeck'"),
+        ("standard+scara", "scara is no law of a joint's friction"),
+        ("3=load", "there is no joint '3'; there are 1 to 2: hip, knee"),
+        ("ankle=load", "there is no joint 'ankle'"),
+        ("stribeck:fast", "'fast' is no setting of stribeck"),
+        ("viscous:2", "'2' is no setting of viscous"),
+        ("cogging:-1", "periods = -1"),
+    ],
+)
+def test_what_is_no_law_is_refused(text, message):
+    with pytest.raises(ExperimentError, match=message):
+        FrictionLaws.of((text,), JOINTS).blocks()
+
+
+@pytest.mark.parametrize("words", [["robot", "scara"], ["excite", "scara"]])
+def test_without_a_log_there_is_nothing_to_choose_from(words, capsys):
+    assert main([*words, "--friction", "auto"]) == 2
+    assert "looks at a log, and there is none here" in capsys.readouterr().err
+
+
+def test_motions_are_designed_for_linear_laws(capsys):
+    assert main(["excite", "scara", "--friction", "standard+load"]) == 2
+    assert "designed for laws that are linear" in capsys.readouterr().err
+
+
+def test_the_log_says_which_law(tmp_path, monkeypatch, capsys):
+    """Stribeck friction is chosen, true to 4 sigma, said, summarized, drawn beyond the speeds of the log, and exported."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "slow.toml").write_text(
+        'name = "slow"\n[trajectory]\nkind = "random"\nmoves = 12\ndurations = [2.5, 2.5]\nrest = 1.0\n'
+        '[torque]\nnoise = 0.01\n[encoder]\nkind = "incremental"\nlines = 16384\n'
+        '[friction]\nkind = "stribeck"\nstatic = 1.6\nvelocity = 0.25\n'
+    )
+    assert main(["run", "slow.toml", "--out", "run", "--no-rerun", "--friction", "auto"]) == 0
+    found = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert {"Fst1", "vs1"} <= set(found["parameters"])
+    values = {
+        name: (x, s, true)
+        for name, x, s, true in zip(
+            found["parameters"],
+            found["models"]["explicit"]["estimate"],
+            found["models"]["explicit"]["corrected_sigma"],
+            found["truth"],
+            strict=True,
+        )
+    }
+    for name in ("Fst1", "vs1"):
+        x, sigma, true = values[name]
+        assert abs(x - true) < 4 * sigma < 0.3 * true
+    capsys.readouterr()
+    words = [
+        "identify",
+        "run",
+        "--friction",
+        "auto",
+        "--model",
+        "explicit",
+        "--out",
+        "found",
+        "--no-rerun",
+        "--write",
+        "arm.py",
+    ]
+    assert main(words) == 0
+    out = capsys.readouterr().out
+    assert re.search(r"friction of joint1: viscous \+ coulomb \+ stribeck \(stribeck takes \d+ %", out)
+    assert "beyond the speeds of the log" in (tmp_path / "found" / "report.html").read_text()
+    module: dict = {}
+    exec((tmp_path / "arm.py").read_text(), module)  # what a controller would import
+    slow, fast = (module["inverse_dynamics"](np.zeros(2), np.array([v, 0.0]), np.zeros(2))[0] for v in (1e-3, 2.0))
+    assert slow == pytest.approx(0.8, rel=0.1)
+    assert fast == pytest.approx(0.6, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("friction", "name", "tolerance"),
+    [
+        ({"kind": "asymmetric", "offset": 0.05, "difference": 0.01}, "asymmetric", 0.01),
+        ({"kind": "load", "share": 0.1}, "standard+load", 0.02),
+        ({"kind": "warming", "slope": -0.002, "time": 10.0}, "standard+temperature", 0.01),
+        ({"kind": "stribeck", "static": 1.6, "velocity": 0.25}, "standard+stribeck", 0.01),
+    ],
+)
+def test_simulated_laws_are_identified(friction, name, tolerance):
+    """Without noise, to what the physics step leaves of loads, and reversals of slow joints."""
+    from experiments.identification.parameters import Parameters
+    from experiments.identification.subject import Subject
+    from identify import ExplicitModel, identify
+
+    trajectory = {"kind": "random", "moves": 10, "durations": [2.0, 2.0], "rest": 1.0}
+    scenario = from_dict({"name": "law", "trajectory": trajectory, "friction": friction})
+    run = simulate(scenario)
+    subject = Subject("scara", Parameters(friction=(name,)))
+    truth = subject.truth(run.robots[0], scenario.friction)
+    found = identify(run.alone(), subject.basis, ExplicitModel())
+    for letters in ("Fst", "vs", "Fl", "off", "Fva", "FvT"):
+        for key in (key for key in truth if key.startswith(letters) and truth[key]):
+            assert found.X[found.names.index(key)] == pytest.approx(truth[key], rel=tolerance), key
+
+
+def test_hysteresis_is_seen(tmp_path):
+    """Dahl friction is below Coulomb's where a joint has just turned: the fit takes it for less friction than there is."""
+    del tmp_path
+    trajectory = {"kind": "random", "moves": 4, "durations": [1.0, 1.0], "rest": 1.0}
+    dahl = {"kind": "dahl", "deflection": 0.02}
+    run = simulate(from_dict({"name": "dahl", "trajectory": trajectory, "friction": dahl}))
+    assert not run.failures
+    from identify import ExplicitModel, identify, scara
+
+    found = identify(run.alone(), scara(), ExplicitModel())
+    assert 0.3 < found.X[2] < 0.51
