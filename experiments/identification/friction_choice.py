@@ -50,6 +50,7 @@ def summary(choice: FrictionChoice) -> list[dict[str, Any]]:
             "law": score.law,
             "share": score.share,
             "deviations": score.deviations,
+            "sigmas": score.sigmas,
             "least": score.least,
             "beyond": score.beyond,
             "taken": score.taken,

@@ -25,8 +25,11 @@ FAST = 0.8
 """Speeds of a joint above this share of the rows are predicted once more, by a fit of the slower ones: a law that holds within
 the speeds of a fit alone fails there."""
 
-SURE = 2.5
+SURE = 1.5
 """A law is taken when what it gains is this many times the standard deviation of that over the stretches."""
+
+PLAIN = 5.0
+"""Its parameter is at least so many sigma away from zero: of a hundred laws and joints none is there by chance."""
 
 SOLID = 0.3
 """Or when it takes this share of the squared error also without the stretch in which it takes most."""
@@ -60,6 +63,8 @@ class LawScore:
         Of the joint's squared error, how much it takes; negative if it adds to it.
     deviations : float
         What it takes of the logarithm of the squared errors of the stretches, on average, in standard deviations of that.
+    sigmas : float
+        How many sigma its parameter is away from zero, with independent rows.
     least : float
         Share that it takes without the stretch in which it takes most.
     beyond : float
@@ -72,6 +77,7 @@ class LawScore:
     law: str
     share: float
     deviations: float
+    sigmas: float
     least: float
     beyond: float
     taken: bool
@@ -97,8 +103,9 @@ def choose_friction(problem: Problem, candidates: Mapping[str, AbstractBlock]) -
     """Return the laws that predict torques of motion that was not fitted better, joint by joint.
 
     Stretches of the logs are left out one by one (cross-validation), and the fastest motion of each joint once more. A law is
-    added where it takes `WORTH` of the squared error, `SURE` times the standard deviation of that, and does no harm to the
-    fastest motion; the one that takes most first. In the end those are dropped again that others have made idle.
+    added where it takes `WORTH` of the squared error, `SURE` times the standard deviation of that, its parameter is `PLAIN`
+    sigma away from zero, and it does no harm to the fastest motion; the one that takes most first. In the end those are dropped
+    again that others have made idle.
 
     Parameters
     ----------
@@ -178,8 +185,8 @@ class _Choice:
 
 
 def _worth(score: LawScore) -> bool:
-    sure = score.share > WORTH and score.deviations > SURE
-    return (sure or score.least > SOLID) and score.beyond > -WORSE
+    gains = (score.share > WORTH and score.deviations > SURE) or score.least > SOLID
+    return gains and score.sigmas > PLAIN and score.beyond > -WORSE
 
 
 def _best(tried: Mapping[tuple[int, str], LawScore], j: int) -> list[str]:
@@ -208,7 +215,7 @@ class _Search:
         least = float(1 - after[others].sum() / max(before[others].sum(), TINY))
         # What the noise of the fit makes farther out is no fault of the law.
         beyond = 1 - (after[-1] - EXCUSED * (more_open[-1] - left_open[-1])) / max(before[-1], TINY)
-        return LawScore(j, name, share, deviations, least, float(beyond), taken=False)
+        return LawScore(j, name, share, deviations, self.products.sigmas(name, j), least, float(beyond), taken=False)
 
     def error(self, j: int) -> float:
         """Return the squared error of a joint on stretches that were not fitted, without further laws."""
@@ -291,6 +298,17 @@ class _Products:
         """Return the estimate of a parameter without further laws."""
         return float(self.start.factors.fit(2).X[self.start.names.index(name)])
 
+    def sigmas(self, law: str, j: int) -> float:
+        """Return how many sigma the parameters of a law are away from zero, at the shapes that explain most."""
+        every = np.einsum("k,kab->ab", self.weight, self.held[:FOLDS].sum(axis=0))
+        found = []
+        for own in self.places[law, j]:
+            columns = [*range(self.p), *own]
+            X, C = _solved(every, columns), _inverse(every, columns)
+            ratio = np.abs(X[self.p :]) / np.sqrt(np.maximum(np.diagonal(C)[self.p :], 1e-300))
+            found.append((_squares(every, columns, X), float(ratio.max())))
+        return min(found)[1]
+
     def fitted(self, fold: int, j: int) -> Array:
         """Return the products of all rows but those that are left out, weighted, shape (P + 1, P + 1)."""
         key = fold, j if fold == FOLDS else -1
@@ -344,10 +362,15 @@ def _solved(products: Array, columns: Sequence[int]) -> Array:
 
 def _spread(products: Array, judged: Array, columns: Sequence[int]) -> float:
     """Return the squares that the sigma of a fit, with rows of unit variance, makes in others."""
+    return float(np.sum(_inverse(products, columns) * judged[np.ix_(columns, columns)]))
+
+
+def _inverse(products: Array, columns: Sequence[int]) -> Array:
+    """Return the covariance of a fit, with rows of unit variance."""
     A = products[np.ix_(columns, columns)]
     scale = np.sqrt(np.maximum(np.diagonal(A), 1e-300))
-    inverse = np.linalg.inv(A / np.outer(scale, scale) + RIDGE * np.eye(len(columns))) / np.outer(scale, scale)
-    return float(np.sum(inverse * judged[np.ix_(columns, columns)]))
+    found: Array = np.linalg.inv(A / np.outer(scale, scale) + RIDGE * np.eye(len(columns))) / np.outer(scale, scale)
+    return found
 
 
 def _squares(products: Array, columns: Sequence[int], X: Array) -> float:
