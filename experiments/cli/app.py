@@ -19,7 +19,6 @@ idbench: identify the dynamics of robots, on simulated data whose truth is known
   idbench view                    look at the latest results
   idbench identify LOG.csv        identify a log; --robot names the arm
   idbench robot panda             what can be identified of an arm
-  idbench payload LOG.csv         what the gripper holds; idbench gains: of motor currents
   idbench excite panda            design a motion that tells its parameters well
   idbench study encoder           ask a question of many simulated robots
   idbench new scenario mine       begin a scenario, a study or a plug-in of your own

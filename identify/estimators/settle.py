@@ -185,10 +185,10 @@ def _scanned(rows: AdaptiveRows, basis: Basis, count: int) -> Basis:
 
 def _below(costs: Array) -> Array:
     """Return how far the minimum of a parabola lies below each value of a grid that is less than its neighbours, shape (i,)."""
-    found = np.zeros(len(costs))
+    found, costs = np.zeros(len(costs)), np.where(np.isfinite(costs), costs, np.nan)
     before, here, after = costs[:-2], costs[1:-1], costs[2:]
     bend = before - 2 * here + after
-    inside = (here <= before) & (here <= after) & np.isfinite(bend) & (bend > 0)
+    inside = (here <= before) & (here <= after) & (bend > 0)
     found[1:-1][inside] = (after - before)[inside] ** 2 / (8 * bend[inside])
     return found
 

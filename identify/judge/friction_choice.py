@@ -43,7 +43,8 @@ EXCUSED = 2.0
 WORTH = 0.02
 """Least share of a joint's squared error that a law must take: less is of no use, and of a chain's own errors."""
 
-TINY = 1e-300
+TINY, NOTHING = 1e-300, 1e-200
+"""Squares below the first count as this, and columns whose squares are below the second as none."""
 
 RIDGE = 1e-11
 """Share of its diagonal that a matrix of products may lack before columns count as dependent."""
@@ -305,7 +306,7 @@ class _Products:
         for own in self.places[law, j]:
             columns = [*range(self.p), *own]
             X, C = _solved(every, columns), _inverse(every, columns)
-            ratio = np.abs(X[self.p :]) / np.sqrt(np.maximum(np.diagonal(C)[self.p :], 1e-300))
+            ratio = np.abs(X[self.p :]) / np.sqrt(np.maximum(np.diagonal(C)[self.p :], TINY))
             found.append((_squares(every, columns, X), float(ratio.max())))
         return min(found)[1]
 
@@ -354,7 +355,7 @@ def _held(joined: Array, speed: Array) -> Array:
 def _solved(products: Array, columns: Sequence[int]) -> Array:
     """Return the least-squares solution from products of columns."""
     A, b = products[np.ix_(columns, columns)], products[columns, -1]
-    scale = np.sqrt(np.maximum(np.diagonal(A), 1e-300))
+    scale = np.sqrt(np.maximum(np.diagonal(A), NOTHING))
     A = A / np.outer(scale, scale) + RIDGE * np.eye(len(columns))
     found: Array = np.linalg.solve(A, b / scale) / scale
     return found
@@ -368,7 +369,7 @@ def _spread(products: Array, judged: Array, columns: Sequence[int]) -> float:
 def _inverse(products: Array, columns: Sequence[int]) -> Array:
     """Return the covariance of a fit, with rows of unit variance."""
     A = products[np.ix_(columns, columns)]
-    scale = np.sqrt(np.maximum(np.diagonal(A), 1e-300))
+    scale = np.sqrt(np.maximum(np.diagonal(A), NOTHING))
     found: Array = np.linalg.inv(A / np.outer(scale, scale) + RIDGE * np.eye(len(columns))) / np.outer(scale, scale)
     return found
 
