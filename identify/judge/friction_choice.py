@@ -18,6 +18,9 @@ from identify.estimators.settle import Candidates, settled
 GRID = 32
 """Values of each unknown shape of a law that are compared."""
 
+LOOKED = 4
+"""Of these, those that explain all rows best are compared on rows that are left out."""
+
 FOLDS = 10
 """Stretches of the logs, each of which is predicted by a fit of the others."""
 
@@ -241,7 +244,9 @@ class _Search:
         products = self.products
         judged, fitted = products.held[fold][j], products.fitted(fold, j)
         least, best, spread = np.inf, 0.0, 0.0
-        for own in [[]] if law is None else products.places[law, j]:
+        # The fastest motion has had no say in the shapes: they are those that fit the slower best.
+        every = [[]] if law is None else products.places[law, j] if fold == FOLDS else products.likely(law, j)
+        for own in every:
             columns = [*range(products.p), *own]
             X = _solved(fitted, columns)
             if (misfit := _squares(fitted, columns, X)) < least:
@@ -301,22 +306,36 @@ class _Products:
 
     def sigmas(self, law: str, j: int) -> float:
         """Return how many sigma the parameters of a law are away from zero, at the shapes that explain most."""
-        every = np.einsum("k,kab->ab", self.weight, self.held[:FOLDS].sum(axis=0))
-        found = []
-        for own in self.places[law, j]:
-            columns = [*range(self.p), *own]
-            X, C = _solved(every, columns), _inverse(every, columns)
-            ratio = np.abs(X[self.p :]) / np.sqrt(np.maximum(np.diagonal(C)[self.p :], TINY))
-            found.append((_squares(every, columns, X), float(ratio.max())))
-        return min(found)[1]
+        columns = [*range(self.p), *self.likely(law, j)[0]]
+        X, C = _solved(self._every, columns), _inverse(self._every, columns)
+        return float((np.abs(X[self.p :]) / np.sqrt(np.maximum(np.diagonal(C)[self.p :], TINY))).max())
+
+    def likely(self, law: str, j: int) -> list[list[int]]:
+        """Return the columns of a law at the shapes that explain all rows best, the best first."""
+        if (law, j) not in self._likely:
+            misfits = []
+            for own in self.places[law, j]:
+                columns = [*range(self.p), *own]
+                misfits.append(_squares(self._every, columns, _solved(self._every, columns)))
+            order = np.argsort(misfits, kind="stable")[:LOOKED]
+            self._likely[law, j] = [self.places[law, j][int(i)] for i in order]
+        return self._likely[law, j]
+
+    @cached_property
+    def _likely(self) -> dict[tuple[str, int], list[list[int]]]:
+        return {}
+
+    @cached_property
+    def _every(self) -> Array:
+        """The products of all rows, weighted, shape (P + 1, P + 1)."""
+        return np.einsum("k,kab->ab", self.weight, self.held[:FOLDS].sum(axis=0))
 
     def fitted(self, fold: int, j: int) -> Array:
         """Return the products of all rows but those that are left out, weighted, shape (P + 1, P + 1)."""
         key = fold, j if fold == FOLDS else -1
         if key not in self._known:
             left = self.weight * np.where(np.arange(len(self.weight)) == j, 1.0, 0.0 if fold == FOLDS else 1.0)
-            every = np.einsum("k,kab->ab", self.weight, self.held[:FOLDS].sum(axis=0))
-            self._known[key] = every - np.einsum("k,kab->ab", left, self.held[fold])
+            self._known[key] = self._every - np.einsum("k,kab->ab", left, self.held[fold])
         return self._known[key]
 
     @cached_property

@@ -36,6 +36,11 @@ def pairs():
     return Pairs(from_dict(content), 1)
 
 
+def short(pairs):
+    """Return the scenario with fewer moves."""
+    return replace(pairs.scenario, trajectory=replace(pairs.scenario.trajectory, moves=7))
+
+
 @pytest.fixture
 def robot(pairs):
     return replace(pairs.robot(0, {}), estimator=ESTIMATORS.create("WLS"))
@@ -101,7 +106,7 @@ def test_gains_are_found(pairs, all_known):
 
 def test_least_squares_of_currents_finds_gains_too_small(pairs):
     """Noise of the currents on the side of the parameters: the classical fault, which the way taken here does not have."""
-    noisy = replace(pairs.scenario, torque=replace(pairs.scenario.torque, noise=(2.0,)))
+    noisy = replace(short(pairs), torque=replace(pairs.scenario.torque, noise=(2.0,)))
     pair = Pairs(noisy, 1)
     robot = replace(pair.robot(0, {"ML": 2.0}), estimator=ESTIMATORS.create("WLS"))
     ours = identify_drive_gains(robot)
@@ -118,7 +123,7 @@ def test_least_squares_of_currents_finds_gains_too_small(pairs):
 
 def test_a_payload_on_the_axis_says_nothing_of_its_gain(pairs):
     """The last joint of a payload whose mass alone counts, on its axis, is refused; the others are not."""
-    on_axis = replace(pairs.scenario, payload=replace(pairs.scenario.payload, position=(0.0, 0.0, 0.15), inertia=0.0))
+    on_axis = replace(short(pairs), payload=replace(pairs.scenario.payload, position=(0.0, 0.0, 0.15), inertia=0.0))
     pair = Pairs(on_axis, 1)
     gains = np.array([0.8, 1.3, 1.1, 0.75, 1.25, 0.9])
     robot = replace(pair.robot(0, {"ML": 2.0}, gains), estimator=ESTIMATORS.create("WLS"))
@@ -198,7 +203,7 @@ def test_what_cannot_be_is_said(files, capsys, words, message):
 
 def test_all_ways_are_compared_on_a_simulated_robot(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert main(["payload", "--simulate", "payload", "--runs", "2", "--out", "ways"]) == 0
+    assert main(["payload", "--simulate", "payload", "--runs", "1", "--out", "ways"]) == 0
     out = capsys.readouterr().out
     assert "within 2 sigma" in out
     summary = json.loads((tmp_path / "ways" / "summary.json").read_text())

@@ -20,8 +20,8 @@ NAMES = ("nothing", "hold, not given", "standstill, not masked")
 
 @pytest.fixture
 def short(monkeypatch):
-    """Twelve moves, three of the imperfections."""
-    points = RandomMoves(moves=12).plan(load("table2").nominal_robot)
+    """Six moves, three of the imperfections."""
+    points = RandomMoves(moves=6).plan(load("table2").nominal_robot)
     trajectory = Quintic(tuple(map(tuple, points.waypoints.tolist())), tuple(points.durations.tolist()), 3.0)
     scenario = replace(load("table2"), trajectory=trajectory, drive=AveragedDrive())
     monkeypatch.setattr(parallel_attribution, "imperfections", lambda s: [i for i in imperfections(s) if i.name in NAMES])

@@ -30,7 +30,7 @@ def offsets(lines):
     ]
 
 
-@pytest.mark.parametrize(("bits", "dynamic", "power"), [(20, 0.5, 0.5), (16, 1.0, 2.0)])
+@pytest.mark.parametrize(("bits", "dynamic", "power"), [(16, 1.0, 2.0)])
 def test_the_encoder_is_all_that_an_averaged_drive_leaves(bits, dynamic, power, truth):
     """Worst of five realizations and of eight parameters [%]."""
     found = [errors(simulate(scenario).alone(), truth) for scenario in offsets(2 ** (bits - 2))]

@@ -92,7 +92,7 @@ def test_it_solves_the_normal_equations_with_the_covariance_of_the_rows(model, l
 @pytest.mark.parametrize("torque", [(0.0, 0.0), (0.02, 0.001), (0.1, 0.005)])
 def test_levels_are_found(torque, log):
     """Positions to 10 %, as torque noise hides them; torques to 5 %, or below 0.001 and 5e-5 N m where there is none."""
-    problem = identify(noisy(log, BITS16, torque), scara(), EVERY["power"], estimator=GLS).problem
+    problem = Problem((noisy(log, BITS16, torque),), scara(), EVERY["power"], idbench_chain())
     levels = problem.likely_noise.levels
     np.testing.assert_allclose(np.sqrt(np.mean(levels.position**2, axis=0)), BITS16, rtol=0.1)
     rms = np.sqrt(np.mean(levels.torque**2, axis=0))
@@ -104,7 +104,7 @@ def test_levels_are_found(torque, log):
 
 @pytest.mark.parametrize(
     ("position", "torque", "most"),
-    [(BITS16, (0.0, 0.0), 0.25), (4 * BITS16, (0.0, 0.0), 0.3), (BITS16, (0.1, 0.1), 1.02), (0.0, (0.1, 0.005), 1.02)],
+    [(BITS16, (0.0, 0.0), 0.25), (BITS16, (0.1, 0.1), 1.02), (0.0, (0.1, 0.005), 1.02)],
 )
 def test_errors_against_weighted_least_squares(position, torque, most, log, truth):
     """Typical error over 100 draws, and sigma within a quarter, for the models whose rows are torques."""
