@@ -22,7 +22,7 @@ def logs(robot):
 
 @pytest.mark.parametrize(
     ("sigma", "estimator"),
-    [((0.5, 0.025), "OLS"), ((0.5, 0.025), "WLS"), ((0.025, 0.5), "WLS"), ((0.5, 0.025), "GLS")],
+    [((0.5, 0.025), "OLS"), ((0.025, 0.5), "WLS"), ((0.5, 0.025), "GLS")],
 )
 def test_two_corrected_sigma_hold_the_truth_in_93_to_97_percent(estimator, sigma, logs, truth):
     """For every parameter and model; 95.4 % is right, and 1500 runs tell it to 0.5 %. The paper's sigma does not do that."""
