@@ -17,7 +17,7 @@ from experiments.cli.mounting import mounting_of
 from experiments.cli.page import Page, new_page, shown
 from experiments.cli.reading import Question, file_of, stated_by
 from experiments.errors import ExperimentError
-from experiments.identification.friction_choice import with_suitable_friction, words
+from experiments.identification.friction_choice import summary, with_suitable_friction, words
 from experiments.identification.identification_text import print_identified, print_validated
 from experiments.identification.identified import Identified
 from experiments.identification.log_warnings import warnings_of_log
@@ -38,6 +38,7 @@ from experiments.identification.warnings import (
 from experiments.plugin_tables import plugin_conflicts
 from experiments.recording.audience import Audience, Watching
 from identify import MODELS, ExcitationError, IdentificationError
+from identify.judge.friction_choice import FrictionChoice
 from identify.rows.long_logs import is_long
 
 
@@ -62,7 +63,8 @@ def identify(asked: Identify) -> None:
         audience, path = _followed(stack, asked, path, question_of(asked), named)
         fit = fit_logs(replace(asked, log=(path, *asked.log[1:])), named)
         whole = replace(fit.named, logs=fit.logs, log_names=fit.names, truth=_truth(stated, named))
-        whole, friction = with_friction(whole)
+        whole, choice = with_friction(whole)
+        friction = words(choice, whole.subject.laws.names, whole.subject.robot.joints) if choice else []
         found, hidden = _shown(whole)
         judged, said = judged_on(asked, found, fit)
         of_file = [*warnings_of_robot(found.subject.robot), *plugin_conflicts()]
@@ -77,8 +79,9 @@ def identify(asked: Identify) -> None:
         notes = [*_notes(fit), *fit.notes, *friction, *said]
         for note in notes:
             page.print(Text(note), soft_wrap=True)
-        page.found |= {**summary_of(judged, first.absolute()), "notes": notes}
-        results = Results(page, asked, found, judged, fit, warned, notes)
+        compared = {"friction": summary(choice)} if choice else {}
+        page.found |= {**summary_of(judged, first.absolute()), "notes": notes, **compared}
+        results = Results(page, asked, found, judged, fit, warned, notes, compared)
         if place is not None:
             results.write(place, audience)
         elif first.is_dir() and asked.watching.rerun and not is_long(found.logs):
@@ -88,12 +91,9 @@ def identify(asked: Identify) -> None:
         results.export()
 
 
-def with_friction(whole: Identified) -> tuple[Identified, list[str]]:
-    """Return the identification with laws of friction that suit its logs, where that is asked for, and which these are."""
-    if not whole.subject.laws.auto:
-        return whole, []
-    found, choice = with_suitable_friction(whole)
-    return found, words(choice, found.subject.laws.names, found.subject.robot.joints)
+def with_friction(whole: Identified) -> tuple[Identified, FrictionChoice | None]:
+    """Return the identification with laws of friction that suit its logs, where that is asked for, and what was compared."""
+    return with_suitable_friction(whole) if whole.subject.laws.auto else (whole, None)
 
 
 def _require_logs(asked: Identify) -> None:

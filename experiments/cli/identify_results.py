@@ -1,7 +1,7 @@
 """What an identification leaves behind: a folder, a robot's files, a page."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +50,8 @@ class Results:
         Warnings by what they are about.
     notes : sequence of str
         What was done and chosen.
+    further : mapping
+        What else a summary.json says.
     """
 
     page: Page
@@ -59,6 +61,7 @@ class Results:
     fit: FitLogs
     warned: Mapping[str, Sequence[str]]
     notes: Sequence[str]
+    further: Mapping[str, Any] = field(default_factory=dict)
 
     def write(self, place: Place, audience: Audience | None) -> None:
         """Write the folder: summary, logs, recording, page."""
@@ -66,7 +69,9 @@ class Results:
         with results_folder(place) as folder:
             for k, log in enumerate(found.logs):
                 write_log(log, folder / f"log{k + 1 if k else ''}.parquet")
-            write_summary(folder / "summary.json", {**summary_of(self.judged, Path(place.of)), "notes": list(self.notes)})
+            write_summary(
+                folder / "summary.json", {**summary_of(self.judged, Path(place.of)), "notes": list(self.notes), **self.further}
+            )
             if not is_long(found.logs):
                 (folder / "report.html").write_text(self._report(), encoding="utf-8")
             if is_long(found.logs):

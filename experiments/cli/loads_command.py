@@ -114,7 +114,7 @@ def _identify_gains(page: Page, asked: IdentifyGains) -> None:
     joints = named.subject.robot.joints
     page.warn({"the gains": print_gains(page, found, given, joints)})
     told = " ".join(
-        f"{g:.5g}" if t else f"{given[j]:.5g}" for j, (g, t) in enumerate(zip(found.gains, found.told, strict=True))
+        f"{g:.5g}" if t else f"{given[j]:.5g}" for j, (g, t) in enumerate(zip(found.gains, found.shown, strict=True))
     )
     page.print(Text(f"to read logs with them: --gain {told}"), soft_wrap=True)
     for note in notes:

@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 
 from experiments.identification.identified import Identified
-from identify import AbstractBlock, OfJoints, ShapedFriction
+from identify import AbstractBlock, ShapedFriction
+from identify.basis import LoadFriction
+from identify.basis.of_joints import inner_of
 
 TERMS: Mapping[str, tuple[str, Mapping[str, str]]] = {
     "Fva": ("np.abs(qd)", {}),
@@ -24,7 +26,7 @@ def lines_of(found: Identified, values: Mapping[str, float]) -> list[str]:
     n, lines = found.basis.n, list[str]()
     for block in found.basis.blocks:
         law = _law(block)
-        letters = getattr(law, "symbol", "Fl" if type(law).__name__ == "LoadFriction" else "")
+        letters = getattr(law, "symbol", "Fl" if isinstance(law, LoadFriction) else "")
         if letters not in TERMS or not any(f"{letters}{j + 1}" in values for j in range(n)):
             continue
         text, settings = TERMS[letters]
@@ -36,7 +38,7 @@ def lines_of(found: Identified, values: Mapping[str, float]) -> list[str]:
 
 def _law(block: AbstractBlock) -> Any:
     """Return the law of a block, of some joints, with unknown shapes or without."""
-    inner = block.block if isinstance(block, OfJoints) else block
+    inner = inner_of(block)
     return inner.law if isinstance(inner, ShapedFriction) else inner
 
 

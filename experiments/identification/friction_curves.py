@@ -11,6 +11,7 @@ from identify import AbstractBlock, Array, Basis, Chain, OfJoints
 from identify.arrays import combined
 from identify.basis import LoadFriction
 from identify.basis.joint_law import AbstractFriction
+from identify.basis.of_joints import inner_of
 from identify.judge.diagnosis import filtered
 from identify.rows.grid import Kernel
 from identify.signals.signals import Signals
@@ -96,7 +97,7 @@ class FrictionCurves:
 
     def _loads(self, j: int) -> list[float]:
         """Return the loads at which a law of a joint is drawn: one, if it depends on none."""
-        own = [_inner(block) for block in self._laws[0].blocks if not isinstance(block, OfJoints) or j in block.joints]
+        own = [inner_of(block) for block in self._laws[0].blocks if not isinstance(block, OfJoints) or j in block.joints]
         law = next((block for block in own if isinstance(block, LoadFriction)), None)
         if law is None:
             return [0.0]
@@ -129,12 +130,8 @@ class _Loaded(AbstractFriction):
 
 def _loaded(block: AbstractBlock, load: float) -> AbstractBlock:
     """Return a block whose load is a given one."""
-    made = _Loaded(load) if isinstance(_inner(block), LoadFriction) else _inner(block)
+    made = _Loaded(load) if isinstance(inner_of(block), LoadFriction) else inner_of(block)
     return replace(block, block=made) if isinstance(block, OfJoints) else made
-
-
-def _inner(block: AbstractBlock) -> AbstractBlock:
-    return block.block if isinstance(block, OfJoints) else block
 
 
 def _seen(signals: Signals, chain: Chain) -> tuple[Array, Array]:

@@ -90,9 +90,9 @@ def print_gains(console: Console, found: GainEstimate, given: Sequence[float], j
             f"{100 * sigma / abs(gain):.2g}",
             f"{100 * (gain / given[j] - 1):+.2f}",
         ]
-        grid.add_row(joint, *(cells if found.told[j] else [cells[0], "refused", cells[2], cells[3], ""]))
+        grid.add_row(joint, *(cells if found.shown[j] else [cells[0], "refused", cells[2], cells[3], ""]))
     print_titled(console, "gains of the drives: torque over what was logged", grid, 1)
-    lost = [joint for joint, told in zip(joints, found.told, strict=True) if not told]
+    lost = [joint for joint, told in zip(joints, found.shown, strict=True) if not told]
     if not lost:
         return []
     return [
@@ -106,6 +106,6 @@ def gains_summary(found: GainEstimate, given: Sequence[float], joints: Sequence[
     return {
         "joints": list(joints),
         "read_with": list(map(float, given)),
-        "gains": [float(g) if told else None for g, told in zip(found.gains, found.told, strict=True)],
+        "gains": [float(g) if told else None for g, told in zip(found.gains, found.shown, strict=True)],
         "sigma": [float(s) if np.isfinite(s) else None for s in found.sigma],
     }

@@ -70,3 +70,8 @@ class OfJoints(AbstractBlock):
     def _of(self, state: State, columns: Columns) -> Columns:
         own = {p.name for p in self.parameters(state.n)}
         return {address: column for address, column in columns.items() if address[1] in own}
+
+
+def inner_of(block: AbstractBlock) -> AbstractBlock:
+    """Return a block as it is of all joints."""
+    return block.block if isinstance(block, OfJoints) else block

@@ -45,8 +45,8 @@ class GainEstimate:
     found: Estimate
 
     @property
-    def told(self) -> npt.NDArray[np.bool_]:
-        """Whether the payload says something of each gain, shape (joint,)."""
+    def shown(self) -> npt.NDArray[np.bool_]:
+        """Whether the payload shows each gain, shape (joint,)."""
         return np.isfinite(self.sigma) & (self.sigma <= VAGUE * np.abs(self.gains))
 
 
@@ -67,7 +67,7 @@ def identify_drive_gains(robot: LoadedRobot) -> GainEstimate:
     SettingError
         If nothing is known of the payload, or there is no log without it.
     IdentificationError
-        If the gains do not settle, or one would be negative.
+        If the gains do not settle, or the motion does not show the robot.
     """
     if not robot.known:
         raise SettingError("nothing is known of the payload: the gains need its mass at least")

@@ -99,7 +99,7 @@ def test_gains_are_found(pairs, all_known):
     known = pairs.truth if all_known else {"ML": 2.0}
     robot = replace(pairs.robot(0, known, gains), estimator=ESTIMATORS.create("WLS"))
     found = identify_drive_gains(robot)
-    assert found.told.all()
+    assert found.shown.all()
     np.testing.assert_allclose(found.gains, gains, rtol=0.02)
     assert np.abs((found.gains - gains) / found.sigma).max() < 4.0
 
@@ -128,8 +128,8 @@ def test_a_payload_on_the_axis_says_nothing_of_its_gain(pairs):
     gains = np.array([0.8, 1.3, 1.1, 0.75, 1.25, 0.9])
     robot = replace(pair.robot(0, {"ML": 2.0}, gains), estimator=ESTIMATORS.create("WLS"))
     found = identify_drive_gains(robot)
-    assert found.told[:5].all()
-    assert not found.told[5]
+    assert found.shown[:5].all()
+    assert not found.shown[5]
 
 
 def test_gains_need_what_is_known(pairs):
