@@ -53,25 +53,18 @@ class KnownOptions:
 Known = Annotated[KnownOptions, tyro.conf.OmitArgPrefixes]
 
 
-@APP.command(name="payload")
-@final
 @dataclass(frozen=True)
-class IdentifyPayload:
-    """Identify what the gripper holds: mass, first moments, inertia, from logs with it and logs without it."""
+class LoadOptions:
+    """What both commands are given."""
 
     log: tyro.conf.Positional[tuple[Path, ...]] = ()
     """Logs with the payload."""
     unloaded: Files = ()
-    """Logs without it; or --before."""
-    before: File = None
-    """The robot without it, identified before: base parameters as `idbench identify --write FILE.json` leaves them."""
+    """Logs without it."""
     robot: Robot = None
     """Name of a robot that ships, or a file that describes it."""
-    way: Way = "together"
-    """together: all logs in one fit, the best; fixed: the robot first, then the payload alone; apart: both, subtracted;
-    difference: of the torques of one repeated motion; all: to compare them."""
-    known: Known = KnownOptions()  # frozen
-    """What is known of it."""
+    known: Known = KnownOptions()
+    """What is known of the payload."""
     torque: Torque = None
     """What a torque sample means; asked for unless the file says it."""
     torque_delay: Delay = None
@@ -83,21 +76,34 @@ class IdentifyPayload:
     parameters: Asked = Parameters()  # noqa: RUF009  # frozen
     """Which parameters of the robot are asked for."""
     cutoff: Hertz = None
-    """Band of the fit [Hz]."""
+    """Band of the fit [Hz]; by default 5, or what short logs need."""
     estimator: str = ESTIMATOR
     """OLS, WLS, GLS."""
-    write_mjcf: File = None
-    """File to write: the robot's own with the payload as a body, one that can exist."""
     out: Folder = None
     """Folder for summary.json."""
     force: bool = False
     """Replace results of another experiment in the folder."""
     simulate: Scenario = None
-    """Instead of logs: a scenario with a payload, simulated with and without it; all ways are compared with the truth."""
+    """Instead of logs: a scenario with a payload, simulated with and without it; what is found is compared with the truth."""
     runs: Number = None
     """How often it is simulated; 20 by default."""
     json: Json = False
     """Print the summary as JSON; what is for people goes to the error stream."""
+
+
+@APP.command(name="payload")
+@final
+@dataclass(frozen=True)
+class IdentifyPayload(LoadOptions):
+    """Identify what the gripper holds: mass, first moments, inertia, from logs with it and logs without it."""
+
+    before: File = None
+    """Instead of logs without it: the robot, identified before, as `idbench identify --write FILE.json` leaves it."""
+    way: Way = "together"
+    """together: all logs in one fit, the best; fixed: the robot first, then the payload alone; apart: both, subtracted;
+    difference: of the torques of one repeated motion; all: to compare them."""
+    write_mjcf: File = None
+    """File to write: the robot's own with the payload as a body, one that can exist."""
 
     def __call__(self) -> None:
         """Run it."""
@@ -109,41 +115,11 @@ class IdentifyPayload:
 @APP.command(name="gains")
 @final
 @dataclass(frozen=True)
-class IdentifyGains:
-    """Identify the gains of drives, torque over current, from logs without and with a payload whose mass is known."""
+class IdentifyGains(LoadOptions):
+    """Identify the gains of drives, torque over current, from logs of currents, without and with a payload of known mass.
 
-    log: tyro.conf.Positional[tuple[Path, ...]] = ()
-    """Logs with the payload: currents, read with --gain as a first guess, or with 1."""
-    unloaded: Files = ()
-    """Logs without it."""
-    robot: Robot = None
-    """Name of a robot that ships, or a file that describes it."""
-    known: Known = KnownOptions()  # frozen
-    """What is known of the payload: its mass at least."""
-    torque: Torque = None
-    """What a torque sample means; asked for unless the file says it."""
-    torque_delay: Delay = None
-    """From a sample to the instant it speaks for, in seconds, or `estimate`."""
-    reading: Reading = ColumnOptions()  # noqa: RUF009  # frozen
-    """What its columns are."""
-    mounting: Mounted = MountingOptions()  # noqa: RUF009  # frozen
-    """How the robot is mounted."""
-    parameters: Asked = Parameters()  # noqa: RUF009  # frozen
-    """Which parameters of the robot are asked for."""
-    cutoff: Hertz = None
-    """Band of the fit [Hz]."""
-    estimator: str = ESTIMATOR
-    """OLS, WLS, GLS."""
-    out: Folder = None
-    """Folder for summary.json."""
-    force: bool = False
-    """Replace results of another experiment in the folder."""
-    simulate: Scenario = None
-    """Instead of logs: a scenario with a payload; gains are drawn for each run, and compared with what is found."""
-    runs: Number = None
-    """How often it is simulated; 20 by default."""
-    json: Json = False
-    """Print the summary as JSON; what is for people goes to the error stream."""
+    Currents are read with --gain as a first guess, or with 1.
+    """
 
     def __call__(self) -> None:
         """Run it."""

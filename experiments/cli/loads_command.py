@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from rich.text import Text
 
-from experiments.cli.loads import IdentifyGains, IdentifyPayload
+from experiments.cli.loads import IdentifyGains, IdentifyPayload, LoadOptions
 from experiments.cli.mounting import mounting_of
 from experiments.cli.page import Page, new_page, shown
 from experiments.cli.progress import progress_of
@@ -61,9 +61,9 @@ def gains(asked: IdentifyGains) -> None:
 
 
 def _identify_payload(page: Page, asked: IdentifyPayload) -> None:
-    robot, named, notes = _loaded(asked)
     if asked.before is not None and asked.unloaded:
         raise ExperimentError("--before and --unloaded both say what the robot is: give one")
+    robot, named, notes = _loaded(asked)
     if asked.before is not None:
         names, X, C = _before(asked.before)
         found: dict[str, Payload | str] = {"fixed": with_known_robot(robot, names, X, C)}
@@ -123,7 +123,7 @@ def _identify_gains(page: Page, asked: IdentifyGains) -> None:
     page.found |= {"robot": named.subject.name, **gains_summary(found, given, joints)}
 
 
-def _loaded(asked: IdentifyPayload | IdentifyGains) -> tuple[LoadedRobot, Identified, list[str]]:
+def _loaded(asked: LoadOptions) -> tuple[LoadedRobot, Identified, list[str]]:
     """Return the robot with its logs, how these were read, and what was done to them."""
     if not asked.log:
         raise ExperimentError("name the logs with the payload, or --simulate SCENARIO")
@@ -178,7 +178,7 @@ def _before(path: Path) -> tuple[tuple[str, ...], Array, Array]:
     return names, X, C
 
 
-def _pairs(asked: IdentifyPayload | IdentifyGains) -> Pairs:
+def _pairs(asked: LoadOptions) -> Pairs:
     if asked.log or asked.unloaded:
         raise ExperimentError("--simulate needs no logs: leave them out")
     scenario = load(str(asked.simulate))
@@ -235,7 +235,7 @@ def _summary(score: Score) -> dict[str, Any]:
     }
 
 
-def _place(asked: IdentifyPayload | IdentifyGains, experiment: str) -> Place | None:
+def _place(asked: LoadOptions, experiment: str) -> Place | None:
     of = str(asked.simulate) if asked.simulate else str(asked.log[0].absolute()) if asked.log else ""
     place = None if asked.out is None else Place(asked.out, experiment, of, asked.force)
     if place:

@@ -1,7 +1,8 @@
 """The laws of friction that suit logs, and why."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
+from math import isfinite
 from typing import Any
 
 from experiments.identification.friction_laws import COMPARED, law_of
@@ -44,16 +45,8 @@ def words(choice: FrictionChoice, laws: Sequence[Sequence[str]], joints: Sequenc
 
 def summary(choice: FrictionChoice) -> list[dict[str, Any]]:
     """Return what a summary.json says of what was compared."""
-    return [
-        {
-            "joint": score.joint + 1,
-            "law": score.law,
-            "share": score.share,
-            "deviations": score.deviations,
-            "sigmas": score.sigmas,
-            "least": score.least,
-            "beyond": score.beyond,
-            "taken": score.taken,
-        }
-        for score in choice.scores
-    ]
+    return [{name: _finite(x) for name, x in (asdict(score) | {"joint": score.joint + 1}).items()} for score in choice.scores]
+
+
+def _finite(x: Any) -> Any:
+    return None if isinstance(x, float) and not isfinite(x) else x

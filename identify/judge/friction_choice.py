@@ -3,30 +3,16 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise, product
 
 import numpy as np
 
 from identify.arrays import Array
 from identify.basis.block import AbstractBlock
 from identify.basis.friction.shape import ShapedFriction
-from identify.basis.joint_law import AbstractFriction
 from identify.basis.of_joints import OfJoints
 from identify.estimators.problem import Problem
-from identify.estimators.settle import Candidates, settled
-
-GRID = 32
-"""Values of each unknown shape of a law that are compared."""
-
-LOOKED = 4
-"""Of these, those that explain all rows best are compared on rows that are left out."""
-
-FOLDS = 10
-"""Stretches of the logs, each of which is predicted by a fit of the others."""
-
-FAST = 0.8
-"""Speeds of a joint above this share of the rows are predicted once more, by a fit of the slower ones: a law that holds within
-the speeds of a fit alone fails there."""
+from identify.estimators.settle import settled
+from identify.judge.held_out import FOLDS, TINY, HeldOut, sigma_squares, solved, squares
 
 SURE = 1.5
 """A law is taken when what it gains is this many times the standard deviation of that over the stretches."""
@@ -45,12 +31,6 @@ EXCUSED = 2.0
 
 WORTH = 0.02
 """Least share of a joint's squared error that a law must take: less is of no use, and of a chain's own errors."""
-
-TINY, NOTHING = 1e-300, 1e-200
-"""Squares below the first count as this, and columns whose squares are below the second as none."""
-
-RIDGE = 1e-11
-"""Share of its diagonal that a matrix of products may lack before columns count as dependent."""
 
 
 @dataclass(frozen=True)
@@ -185,7 +165,7 @@ class _Choice:
         for name in dict.fromkeys(name for own in laws for name in own):
             joints = tuple(j for j, own in enumerate(laws) if name in own)
             basis = basis + OfJoints(self.candidates[name], joints)
-        return _Search(_Products.of(settled(self.problem.with_basis(basis)), candidates))
+        return _Search(HeldOut.of(settled(self.problem.with_basis(basis)), candidates))
 
 
 def _worth(score: LawScore) -> bool:
@@ -201,7 +181,7 @@ def _best(tried: Mapping[tuple[int, str], LawScore], j: int) -> list[str]:
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    products: "_Products"
+    products: HeldOut
 
     @property
     def places(self) -> list[tuple[int, str]]:
@@ -248,152 +228,8 @@ class _Search:
         every = [[]] if law is None else products.places[law, j] if fold == FOLDS else products.likely(law, j)
         for own in every:
             columns = [*range(products.p), *own]
-            X = _solved(fitted, columns)
-            if (misfit := _squares(fitted, columns, X)) < least:
-                least, best = misfit, _squares(judged, columns, X)
-                spread = _spread(fitted, judged, columns) if fold == FOLDS else 0.0
+            X = solved(fitted, columns)
+            if (misfit := squares(fitted, columns, X)) < least:
+                least, best = misfit, squares(judged, columns, X)
+                spread = sigma_squares(fitted, judged, columns) if fold == FOLDS else 0.0
         return best, spread
-
-
-@dataclass(frozen=True, eq=False)
-class _Products:
-    """Products of columns with each other, P of them with those of all laws at all their starting shapes, and with Y.
-
-    Parameters
-    ----------
-    start : Problem
-        That of the laws that all joints have.
-    held : Array, shape (FOLDS + 1, joint, P + 1, P + 1)
-        Of what is left out, of every joint: stretch by stretch, and its fastest motion.
-    weight : Array, shape (joint,)
-        1 over the variance of the joint's error without the laws.
-    p : int
-        Number of parameters that all joints have.
-    places : mapping of (str, int) to list of lists of int
-        Which columns a law of a joint has, one list for every combination of its shapes.
-    """
-
-    start: Problem
-    held: Array
-    weight: Array
-    p: int
-    places: Mapping[tuple[str, int], list[list[int]]]
-
-    @classmethod
-    def of(cls, start: Problem, candidates: Mapping[str, AbstractBlock]) -> "_Products":
-        X, basis, places = start.factors.fit(2).X, start.basis, dict[tuple[str, int], list[list[int]]]()
-        for law, block in candidates.items():
-            there = {p.joint for p in block.parameters(basis.n) if p.name in basis.names}
-            shaped, first = _at_all_shapes(block), len(basis.names)
-            made = OfJoints(shaped.adapted(start.basis, X), tuple(j for j in range(basis.n) if j not in there))
-            basis = basis + made
-            for j in made.joints:
-                own = [first + i for i, parameter in enumerate(made.parameters(basis.n)) if parameter.joint == j]
-                places[law, j] = [[i] for i in own] if isinstance(shaped, Candidates) else [own]
-        basis = basis + _Speed()
-        rows = start.with_basis(basis).rows
-        joined = np.swapaxes(rows.joined.reshape(-1, rows.kinds, len(basis.names) + 1), 0, 1)
-        first = len(basis.names) - basis.n
-        speed = np.abs(np.array([joined[j, :, first + j] for j in range(basis.n)]))
-        joined = np.concatenate([joined[..., :first], joined[..., -1:]], axis=-1)
-        level = start.factors.squares(X)
-        weight = start.factors.rows / np.maximum(level, 1e-300)
-        return cls(start, _held(joined, speed), weight, len(start.names), places)
-
-    def value(self, name: str) -> float:
-        """Return the estimate of a parameter without further laws."""
-        return float(self.start.factors.fit(2).X[self.start.names.index(name)])
-
-    def sigmas(self, law: str, j: int) -> float:
-        """Return how many sigma the parameters of a law are away from zero, at the shapes that explain most."""
-        columns = [*range(self.p), *self.likely(law, j)[0]]
-        X, C = _solved(self._every, columns), _inverse(self._every, columns)
-        return float((np.abs(X[self.p :]) / np.sqrt(np.maximum(np.diagonal(C)[self.p :], TINY))).max())
-
-    def likely(self, law: str, j: int) -> list[list[int]]:
-        """Return the columns of a law at the shapes that explain all rows best, the best first."""
-        if (law, j) not in self._likely:
-            misfits = []
-            for own in self.places[law, j]:
-                columns = [*range(self.p), *own]
-                misfits.append(_squares(self._every, columns, _solved(self._every, columns)))
-            order = np.argsort(misfits, kind="stable")[:LOOKED]
-            self._likely[law, j] = [self.places[law, j][int(i)] for i in order]
-        return self._likely[law, j]
-
-    @cached_property
-    def _likely(self) -> dict[tuple[str, int], list[list[int]]]:
-        return {}
-
-    @cached_property
-    def _every(self) -> Array:
-        """The products of all rows, weighted, shape (P + 1, P + 1)."""
-        return np.einsum("k,kab->ab", self.weight, self.held[:FOLDS].sum(axis=0))
-
-    def fitted(self, fold: int, j: int) -> Array:
-        """Return the products of all rows but those that are left out, weighted, shape (P + 1, P + 1)."""
-        key = fold, j if fold == FOLDS else -1
-        if key not in self._known:
-            left = self.weight * np.where(np.arange(len(self.weight)) == j, 1.0, 0.0 if fold == FOLDS else 1.0)
-            self._known[key] = self._every - np.einsum("k,kab->ab", left, self.held[fold])
-        return self._known[key]
-
-    @cached_property
-    def _known(self) -> dict[tuple[int, int], Array]:
-        return {}
-
-
-class _Speed(AbstractFriction):
-    """Velocities of the rows."""
-
-    symbol = "speed of row "
-    unit = "rad/s"
-
-    def force(self, q: Array, qd: Array) -> Array:
-        del q
-        return qd
-
-
-def _at_all_shapes(block: AbstractBlock) -> AbstractBlock:
-    """Return a block with a parameter for every combination of starting shapes, in the place of unknown shapes."""
-    if not isinstance(block, ShapedFriction):
-        return block
-    grid = product(*(shape.grid(GRID) for shape in block.shapes))
-    return Candidates(block.law, tuple(dict(zip((s.setting for s in block.shapes), at, strict=True)) for at in grid))
-
-
-def _held(joined: Array, speed: Array) -> Array:
-    """Return the products of what is left out, shape (FOLDS + 1, joint, P + 1, P + 1), of rows (joint, time, P + 1)."""
-    ends = np.linspace(0, joined.shape[1], FOLDS + 1).round().astype(int)
-    stretches = [joined[:, a:b] for a, b in pairwise(ends)]
-    moving = [np.quantile(v[v > 0], FAST) if (v > 0).any() else np.inf for v in speed]
-    fast = joined * (speed > np.array(moving)[:, None])[..., None]
-    return np.array([np.matmul(np.swapaxes(x, -1, -2), x) for x in (*stretches, fast)])
-
-
-def _solved(products: Array, columns: Sequence[int]) -> Array:
-    """Return the least-squares solution from products of columns."""
-    A, b = products[np.ix_(columns, columns)], products[columns, -1]
-    scale = np.sqrt(np.maximum(np.diagonal(A), NOTHING))
-    A = A / np.outer(scale, scale) + RIDGE * np.eye(len(columns))
-    found: Array = np.linalg.solve(A, b / scale) / scale
-    return found
-
-
-def _spread(products: Array, judged: Array, columns: Sequence[int]) -> float:
-    """Return the squares that the sigma of a fit, with rows of unit variance, makes in others."""
-    return float(np.sum(_inverse(products, columns) * judged[np.ix_(columns, columns)]))
-
-
-def _inverse(products: Array, columns: Sequence[int]) -> Array:
-    """Return the covariance of a fit, with rows of unit variance."""
-    A = products[np.ix_(columns, columns)]
-    scale = np.sqrt(np.maximum(np.diagonal(A), NOTHING))
-    found: Array = np.linalg.inv(A / np.outer(scale, scale) + RIDGE * np.eye(len(columns))) / np.outer(scale, scale)
-    return found
-
-
-def _squares(products: Array, columns: Sequence[int], X: Array) -> float:
-    """Return the squares of what parameters leave, from products of columns."""
-    A, b = products[np.ix_(columns, columns)], products[columns, -1]
-    return float(products[-1, -1] - 2 * X @ b + X @ A @ X)
