@@ -13,13 +13,16 @@ from identify.judge.friction_choice import FrictionChoice, choose_friction
 from identify.models.explicit import ExplicitModel
 
 
-def with_suitable_friction(found: Identified) -> tuple[Identified, FrictionChoice]:
-    """Return the identification with the laws of friction that predict motion best that was not fitted, joint by joint."""
+def with_suitable_friction(found: Identified, most: int | None = None) -> tuple[Identified, FrictionChoice]:
+    """Return the identification with the laws of friction that predict motion best that was not fitted, joint by joint.
+
+    At most so many are added to a joint.
+    """
     subject = found.subject
     candidates = {name: law_of(name) for name in COMPARED if name != "temperature" or "temperature" in found.logs[0].conditions}
     with blamed():
         problem = Problem(found.logs, subject.basis, ExplicitModel(), found.processing)
-        choice = choose_friction(problem, candidates)
+        choice = choose_friction(problem, candidates, most=most)
     laws = subject.laws.with_more(choice.laws)
     asked = replace(subject.asked, friction=laws.texts)
     truth = (

@@ -22,6 +22,9 @@ RESOLUTION = 0.25
 SIGMAS = 2.0
 """Half the width of intervals, in sigma: 95 %."""
 
+WIDTH = 11.0
+"""Of figures [inch]."""
+
 FEW = 2
 """Joints from which on panels stand in two columns."""
 
@@ -53,8 +56,8 @@ def parameters_figure(found: Identified) -> str:
     models = list(found.estimates)
     leading = found.estimates[models[0]].X
     size = np.maximum(np.abs(leading), 1e-300)
-    figure = Figure(figsize=(11, 3.4), layout="constrained")
-    panel, at = figure.subplots(), np.arange(len(names))
+    figure, (panel,) = _panels(1, 2.9)
+    at = np.arange(len(names))
     for i, model in enumerate(models):
         estimate = found.estimates[model]
         off, half = 100 * (estimate.X - leading) / size, 100 * SIGMAS * estimate.best_sigma / size
@@ -124,6 +127,7 @@ def spectra_figure(found: Identified) -> str:
         panel.set_xscale("log")
         panel.set_yscale("log")
         panel.set_ylim(top * 1e-5, top * 3)
+        panel.minorticks_off()
     _last(panels, "frequency [Hz]", "[N m/√Hz]")
     _legend(figure, panels[0])
     return svg(figure)
@@ -133,8 +137,12 @@ def _panels(count: int, height: float) -> tuple[Figure, list[Axes]]:
     """Return a figure with a panel each, in two columns if there are many."""
     columns = 2 if count > FEW else 1
     lines = -(-count // columns)
-    figure = Figure(figsize=(11, height * lines + 0.5), layout="constrained")
+    whole = height * lines + 0.5
+    figure = Figure(figsize=(WIDTH, whole))
     panels = list(np.atleast_1d(figure.subplots(lines, columns)).ravel())
+    # By hand: a layout that is solved for draws everything twice.
+    left, right, bottom, top = 0.75 / WIDTH, 1 - 0.1 / WIDTH, 0.5 / whole, 1 - 0.5 / whole
+    figure.subplots_adjust(left, bottom, right, top, wspace=0.15, hspace=0.42)
     for panel in panels[count:]:
         panel.set_visible(False)
     return figure, panels[:count]
@@ -149,7 +157,7 @@ def _last(panels: Sequence[Axes], x: str, y: str) -> None:
 
 def _legend(figure: Figure, panel: Axes) -> None:
     handles, labels = panel.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper right", ncols=8, frameon=False)
+    figure.legend(handles, labels, loc="upper right", ncols=8, frameon=False)
 
 
 def _color(model: str) -> Array:

@@ -152,6 +152,8 @@ class Remedies:
         """Yield options with which the error falls, and how far."""
         before = least = self._worst(self.validated.judged)
         for option, make in self._others().items():
+            if option == AUTO and least < TOLERABLE:  # what is well enough is not worth the time
+                continue
             try:
                 after = self._worst(replace(self.validated.judged, subject=make(), truth=None))
             except (IdentificationError, ExperimentError, BenchError):
@@ -175,7 +177,7 @@ class Remedies:
             option = f"--coupling {drive[0]}={joints[-2]}+{joints[-1]}"
             found[option] = lambda: replace(subject, mounting=replace(mounting, couplings=(drive,)))
         if subject.laws.standard and asked.friction == ("standard",):
-            found[AUTO] = lambda: with_suitable_friction(self.validated.judged)[0].subject
+            found[AUTO] = lambda: with_suitable_friction(self.validated.judged, most=1)[0].subject
         return found
 
     def _worst(self, judged: Identified) -> float:

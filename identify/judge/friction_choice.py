@@ -83,7 +83,7 @@ class FrictionChoice:
     scores: tuple[LawScore, ...]
 
 
-def choose_friction(problem: Problem, candidates: Mapping[str, AbstractBlock]) -> FrictionChoice:
+def choose_friction(problem: Problem, candidates: Mapping[str, AbstractBlock], *, most: int | None = None) -> FrictionChoice:
     """Return the laws that predict torques of motion that was not fitted better, joint by joint.
 
     Stretches of the logs are left out one by one (cross-validation), and the fastest motion of each joint once more. A law is
@@ -97,6 +97,8 @@ def choose_friction(problem: Problem, candidates: Mapping[str, AbstractBlock]) -
         Of one run, with the laws that all joints have.
     candidates : mapping of str to AbstractBlock
         What they may have beside these, by name.
+    most : int, optional
+        Laws that are added to a joint at most.
 
     Raises
     ------
@@ -105,7 +107,7 @@ def choose_friction(problem: Problem, candidates: Mapping[str, AbstractBlock]) -
     """
     problem.require_rows("laws of friction are compared by rows, and ")
     problem.factors.together.check()
-    return _Choice(problem.explicit, candidates).run()
+    return _Choice(problem.explicit, candidates).run(most)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +115,7 @@ class _Choice:
     problem: Problem
     candidates: Mapping[str, AbstractBlock]
 
-    def run(self) -> FrictionChoice:
+    def run(self, most: int | None) -> FrictionChoice:
         laws: list[tuple[str, ...]] = [()] * self.problem.basis.n
         scores = dict[tuple[int, str], LawScore]()
         while True:
@@ -124,6 +126,8 @@ class _Choice:
             if not any(found):
                 break
             laws = self._better(laws, found)
+            if max(map(len, laws)) == most:
+                break
         laws = [self._needed(laws, j) if len(own) > 1 else own for j, own in enumerate(laws)]
         kept = (replace(score, taken=score.law in laws[score.joint]) for score in scores.values())
         return FrictionChoice(tuple(laws), tuple(kept))

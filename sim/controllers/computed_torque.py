@@ -3,7 +3,6 @@
 from typing import final
 
 from sim.controllers.controller import AbstractController, AbstractLaw, Error, Task
-from sim.robot.inverse_dynamics import InverseDynamics
 from sim.robot.motors import Array
 from sim.settings import EachPositive, Number, Positive, per_joint, settings
 
@@ -31,7 +30,7 @@ class _Law(AbstractLaw):
     def __init__(self, settings: ComputedTorque, task: Task) -> None:
         w = per_joint(settings.bandwidth, task.nominal.n, "controller.bandwidth")
         self._kp, self._kd, self._share = w**2, 2 * settings.damping * w, 1 + settings.model_error
-        self._reference, self._model = task.reference, InverseDynamics(task.nominal, task.nsim)
+        self._reference, self._model = task.reference, task.model
         self._error = Error(task.reference, task.nsim, settings.cutoff)
 
     def command(self, k: int, q: Array) -> Array:

@@ -1,9 +1,11 @@
 """What a controller is: a law that turns sampled positions into commanded torques, for many simulations at once."""
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
 from sim.robot.inverse_dynamics import InverseDynamics, inverse_dynamics
 from sim.robot.motors import Array
@@ -23,25 +25,42 @@ class Task:
         The planned motion at the sample rate, of all simulations or of each.
     nsim : int
         Number of simulations.
+    vary : mapping of str to array_like, optional
+        Fields of MuJoCo's model of a nominal robot that is another one in each simulation, shape (nsim, ...).
     """
 
     nominal: Robot
     reference: Reference
     nsim: int
+    vary: Mapping[str, npt.ArrayLike] = field(default_factory=dict)
+
+    @property
+    def model(self) -> InverseDynamics:
+        """The nominal robot of every simulation."""
+        return InverseDynamics(self.nominal, self.nsim, self.vary)
 
     @property
     def inertia(self) -> Array:
         """Inertia that each joint's motor sees when the motion starts [kg m^2], shape (1 or nsim, joint)."""
         at = np.atleast_2d(self.reference.q[0])
-        model = InverseDynamics(self.nominal, len(at))
-        model(at, np.zeros_like(at), np.zeros_like(at))
+        model = self.model if self.vary else InverseDynamics(self.nominal, len(at))
+        still = np.zeros((self.nsim, self.nominal.n)) if self.vary else np.zeros_like(at)
+        model(at + still, still, still)
         return model.inertia().copy()
 
     @property
     def feedforward(self) -> Array:
-        """Torque of the nominal robot along the planned motion, without Coulomb friction [N m], shape as the motion's."""
-        q, qd, qdd = (x.reshape(-1, self.nominal.n) for x in (self.reference.q, self.reference.qd, self.reference.qdd))
-        return inverse_dynamics(self.nominal, q, qd, qdd).reshape(self.reference.q.shape)
+        """Torque of the nominal robot along the planned motion, without Coulomb friction [N m].
+
+        Of the shape of the motion, or (time, nsim, joint) if the nominal robot differs.
+        """
+        planned = self.reference
+        if self.vary:
+            model, shape = self.model, (len(planned.q), self.nsim, self.nominal.n)
+            every = (np.broadcast_to(x if x.ndim == 3 else x[:, None], shape) for x in (planned.q, planned.qd, planned.qdd))
+            return np.stack([model(*state) for state in zip(*every, strict=True)])
+        q, qd, qdd = (x.reshape(-1, self.nominal.n) for x in (planned.q, planned.qd, planned.qdd))
+        return inverse_dynamics(self.nominal, q, qd, qdd).reshape(planned.q.shape)
 
 
 class AbstractLaw(ABC):

@@ -21,7 +21,7 @@ from sim.engine.run import Run
 from sim.engine.watch import Step, Watcher
 from sim.errors import ScenarioError
 from sim.frictions.friction_law import AbstractContact
-from sim.robot.inverse_dynamics import inverse_dynamics
+from sim.robot.inverse_dynamics import InverseDynamics
 from sim.robot.motors import Array
 from sim.robot.robot import Robot
 from sim.scenario.measurement import CurrentSensor
@@ -50,6 +50,8 @@ class Bench:
         vary: Mapping[str, npt.ArrayLike],
         threads: int,
         watcher: Watcher | None = None,
+        *,
+        informed: bool = False,
     ) -> None:
         fs, n, nsim, samples = scenario.fs, robot.n, len(seeds), len(planned.q)
         self._scenario, self._planned, self._seeds, self._watcher = scenario, planned, seeds, watcher
@@ -57,7 +59,7 @@ class Bench:
         self._clock = clock = Clock(round(1 / fs / self._h), self._h, scenario.timing.delay)
         self._plant = Plant(robot, nsim, scenario.physics, self._h, vary, threads)
         self._plant.q[:] = planned.q[0]
-        task = Task(scenario.nominal_robot, planned, nsim)
+        task = Task(scenario.nominal_robot, planned, nsim, vary if informed else {})
         self._law = _started(scenario.controller, scenario.controller.start(task), AbstractLaw)
         self._drive = _started(scenario.drive, scenario.drive.start(robot, nsim, self._h), AbstractAmplifier)
         self._ripple = scenario.ripple.start(robot)
@@ -72,7 +74,7 @@ class Bench:
         self._going: npt.NDArray[np.intp] | None = None
         at_rest = every(planned.q[0], nsim) if planned.q.ndim == 2 else planned.q[0]
         self._at_rest, still = at_rest, np.zeros((nsim, n))
-        self._before = self._command = self._demand = inverse_dynamics(robot, at_rest, still, still)
+        self._before = self._command = self._demand = InverseDynamics(robot, nsim, vary)(at_rest, still, still)
         self._qd, self._steps, self._instants = np.zeros((nsim, n)), 1, dict[int, Array]()
         self._steady = scenario.drive.steady and scenario.ripple.steady
         watched = scenario.timing.jitter or scenario.torque.source == "current"

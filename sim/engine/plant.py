@@ -2,15 +2,16 @@
 
 from collections.abc import Mapping
 from copy import copy
+from functools import cached_property
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
 from mujoco.batch import Batch, SimulationError
 
-from sim.errors import ScenarioError
 from sim.robot.motors import Array
 from sim.robot.robot import Robot
+from sim.robot.varied import vary_fields
 from sim.scenario.scenario import Physics
 
 SWITCHED_OFF = (
@@ -52,13 +53,19 @@ class Plant:
             model.opt.disableflags |= int(flag)
         self.robot, self.batch = robot, Batch(model, nsim, threads)
         self._errors: dict[int, str] = {}
-        for name, values in vary.items():
-            _vary(self.batch, name, np.asarray(values, dtype=np.float64))
-        varied = (Robot(robot.name, self.batch.get_model(i)) for i in range(nsim))
-        self.robots = tuple(varied) if vary else (robot,) * nsim
+        vary_fields(self.batch, vary)
+        self._varied = bool(vary)
         self.q, self.qd, self._applied = (self.batch.bind(name) for name in ("qpos", "qvel", "qfrc_applied"))
         expanded = self.batch.expanded("dof_frictionloss")
         self.Fs: Array = np.array(np.broadcast_to(model.dof_frictionloss, (nsim, robot.n)) if expanded is None else expanded)
+
+    @cached_property
+    def robots(self) -> tuple[Robot, ...]:
+        """The robot of every simulation."""
+        count = self.batch.nsim
+        if not self._varied:
+            return (self.robot,) * count
+        return tuple(Robot(self.robot.name, self.batch.get_model(i)) for i in range(count))
 
     def step(self, torques: Array, steps: int, going: npt.NDArray[np.intp] | None = None) -> None:
         """Advance simulations by `steps` physics steps.
@@ -91,15 +98,3 @@ class Plant:
         for sim, kind in np.argwhere(self.batch.warning[..., 1]).tolist():
             found.setdefault(sim, mujoco.mju_warningText(kind, int(self.batch.warning[sim, kind, 0])))
         return found
-
-
-def _vary(batch: Batch, name: str, values: Array) -> None:
-    """Give a field of the model the values of every simulation."""
-    try:
-        field = batch.expand(name)
-    except (AttributeError, ValueError, KeyError, TypeError) as error:
-        raise ScenarioError(f"vary: MuJoCo's model has no field {name!r} that could vary: {error}") from error
-    if values.shape != field.shape:
-        raise ScenarioError(f"vary: {name} needs the shape {field.shape}, not {values.shape}")
-    field[:] = values
-    batch.set_const()

@@ -30,6 +30,7 @@ def simulate(  # noqa: PLR0913  # all but two by their names
     progress: Progress | None = None,
     watch: Watch | None = None,
     throw: bool = True,
+    informed: bool = False,
 ) -> Run:
     """Run a scenario in closed loop.
 
@@ -51,6 +52,8 @@ def simulate(  # noqa: PLR0913  # all but two by their names
         Receives what the first simulation does, while it runs. No bit depends on it.
     throw : bool
         Raise if a simulation fails while it runs; otherwise `Run.failures` says why, and the others go on.
+    informed : bool
+        Whether the controller's nominal robot varies, too: its gains and feedforward are then those for the simulated robot.
 
     Raises
     ------
@@ -66,7 +69,7 @@ def simulate(  # noqa: PLR0913  # all but two by their names
     logged = partial(scenario.torque.logged, n=robot.n, rngs=generators(seeds[:1], NOISE))
     watcher = Watcher(watch, scenario.fs, h, skipped, logged) if watch else None
     with blamed():
-        bench = Bench(scenario, robot, planned, seeds, vary or {}, threads, watcher)
+        bench = Bench(scenario, robot, planned, seeds, vary or {}, threads, watcher, informed=informed)
     step, reported, bearable = 0, -1, 0 if throw else len(seeds) - 1
     # Of simulations that diverge: each is reported, and ends, alone.
     with np.errstate(over="ignore", invalid="ignore"), blamed():

@@ -1,11 +1,15 @@
 """Torques that make a robot move along given states: MuJoCo's inverse dynamics, and a friction law."""
 
+from collections.abc import Mapping
+
 import numpy as np
+import numpy.typing as npt
 from mujoco import mjtStage
 from mujoco.batch import Batch
 
 from sim.robot.motors import Array
 from sim.robot.robot import Robot
+from sim.robot.varied import vary_fields
 
 BLOCK = 8192
 """States evaluated together: bounds the memory of long trajectories."""
@@ -23,10 +27,13 @@ class InverseDynamics:
         The arm.
     count : int
         Number of states of every call.
+    vary : mapping of str to array_like, optional
+        Fields of MuJoCo's model with a value for each state, shape (state, ...).
     """
 
-    def __init__(self, robot: Robot, count: int) -> None:
+    def __init__(self, robot: Robot, count: int, vary: Mapping[str, npt.ArrayLike] | None = None) -> None:
         self._states = Batch(robot.model, count)
+        vary_fields(self._states, vary or {})
         names = ("qpos", "qvel", "M", "qfrc_bias", "qfrc_passive")
         self._q, self._qd, self._packed, self._bias, self._passive = (self._states.bind(name) for name in names)
         self._M = np.zeros((count, robot.n, robot.n))

@@ -60,19 +60,24 @@ def kinematic_tree(robot: Robot, couplings: Sequence[str] = ()) -> KinematicTree
 def _couplings(robot: Robot, named: Sequence[str]) -> Iterator[Coupling]:
     """Yield the drives that turn with several joints."""
     model = robot.model
-    for i in _fixed(model):
+    for i in fixed_tendons(model):
         tendon, weights = model.tendon(i), np.zeros(robot.n)
         for wrap in range(model.tendon_adr[i], model.tendon_adr[i] + model.tendon_num[i]):
             weights[model.wrap_objid[wrap]] += model.wrap_prm[wrap]
         if tendon.name in named or _is_stiff(model, i) or model.tendon_armature[i]:
-            name, rest = tendon.name or f"tendon{i + 1}", float(model.tendon_lengthspring[i].mean())
+            name, rest = tendon_name(model, i), float(model.tendon_lengthspring[i].mean())
             armature = tendon.name in named or bool(model.tendon_armature[i])
             yield Coupling(name, tuple(map(float, weights)), armature, rest if model.tendon_stiffness[i].any() else None)
 
 
-def _fixed(model: mujoco.MjModel) -> list[int]:
+def fixed_tendons(model: mujoco.MjModel) -> list[int]:
     """Return the tendons that are sums of joints."""
     return [i for i in range(model.ntendon) if model.wrap_type[model.tendon_adr[i]] == int(mujoco.mjtWrap.mjWRAP_JOINT)]
+
+
+def tendon_name(model: mujoco.MjModel, i: int) -> str:
+    """Return the name of a tendon, or its number."""
+    return model.tendon(i).name or f"tendon{i + 1}"
 
 
 def standard_parameters(robot: Robot) -> dict[str, float]:
@@ -93,9 +98,9 @@ def standard_parameters(robot: Robot) -> dict[str, float]:
             found[f"{letters}{j + 1}"] = float(getattr(model, field)[j])
         if model.jnt_stiffness[j].any():
             found[f"K{j + 1}"] = float(np.ravel(model.jnt_stiffness[j])[0])
-    for i in _fixed(model):
+    for i in fixed_tendons(model):
         for letters, field in TENDON.items():
-            found[f"{letters}_{model.tendon(i).name or f'tendon{i + 1}'}"] = float(np.ravel(getattr(model, field)[i])[0])
+            found[f"{letters}_{tendon_name(model, i)}"] = float(np.ravel(getattr(model, field)[i])[0])
     return found
 
 
@@ -107,7 +112,11 @@ def _require_open(robot: Robot) -> None:
     """Raise RobotError if something other than the tree ties joints together."""
     model = robot.model
     ties = [_tie(model, i) for i in range(model.neq) if model.eq_active0[i]]
-    ties += [f"tendon {model.tendon(i).name!r}" for i in range(model.ntendon) if i not in _fixed(model) and _is_stiff(model, i)]
+    ties += [
+        f"tendon {model.tendon(i).name!r}"
+        for i in range(model.ntendon)
+        if i not in fixed_tendons(model) and _is_stiff(model, i)
+    ]
     if ties:
         raise RobotError(
             f"robot {robot.name!r} is no open tree: {', '.join(ties)} closes a chain or couples joints; hold the "

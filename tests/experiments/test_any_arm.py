@@ -20,9 +20,9 @@ ARMS = "puma560", "panda"
 
 
 def scenario(robot, moves, seed):
-    """Averaged drives, 17-bit encoders, gravity, friction, half a millisecond of computing time, at 500 Hz."""
+    """Averaged drives, 17-bit encoders, gravity, friction, half a millisecond of computing time, at 250 Hz."""
     arm = load("arm")
-    return replace(arm, robot=robot, fs=500.0, trajectory=replace(arm.trajectory, moves=moves, seed=seed))
+    return replace(arm, robot=robot, fs=250.0, trajectory=replace(arm.trajectory, moves=moves, seed=seed))
 
 
 @pytest.fixture(scope="module", params=["panda"])

@@ -75,7 +75,7 @@ def test_its_scenario_runs_and_its_errors_are_as_predicted(written, tmp_path):
 @pytest.mark.parametrize("kind", EXCITATIONS.builtin)
 def test_limits_hold_at_a_thousand_hertz_by_mujocos_own_torques(kind, monkeypatch):
     """Also with the parameters of the file off by 30 %: all of them larger, or each at random."""
-    few = tuple(stage._replace(keep=1, steps=stage.steps // 2) for stage in STAGES)
+    few = tuple(stage._replace(keep=1, steps=stage.steps // 4) for stage in STAGES)
     monkeypatch.setattr("experiments.excite.stages.STAGES", few)  # limits hold, however far the search has come
     noisy = replace(load("arm"), torque=TorqueMeasurement(noise=(0.05,)))
     found = Excited.of(Design("puma560", noisy, kind, 4.0, 1.0, MotionLimits(torque=TORQUES)))

@@ -127,8 +127,13 @@ def test_a_short_fast_log_gets_the_band_that_it_needs(idbench, first, tmp_path):
     assert found(tmp_path / "chosen")["models"]["power"]["rows"] > 150
     _, out, _ = idbench(*words, "power", "--cutoff", "5")
     assert "this log does not show" in " ".join(out.split())
+
+
+def test_a_chain_of_a_file(idbench, log, tmp_path):
     (tmp_path / "chain.toml").write_text('chain = "idbench"\n[operator]\ncutoff = 12.0\n[mask]\nkind = "none"\n')
-    assert idbench(*words, "explicit", "--out", "file", "--chain-file", "chain.toml")[0] == 0
+    write_log(log, tmp_path / "log.parquet")
+    words = ("identify", "log.parquet", "--out", "file", "--chain-file", "chain.toml", "--no-rerun")
+    assert idbench(*words, "--model", "explicit")[0] == 0
     assert found(tmp_path / "file")["cutoff"] == 12.0
 
 

@@ -32,8 +32,7 @@ DRIVES = {
 }
 
 
-@pytest.mark.parametrize("every", [0.05, 0.37, np.inf])
-@pytest.mark.parametrize("name", DRIVES)
+@pytest.mark.parametrize(("name", "every"), [*((name, 0.37) for name in DRIVES), ("fine and late", 0.05), ("switched", np.inf)])
 def test_stretches_are_the_run_and_change_no_bit_of_it(name, every):
     described, heard = scenario(**DRIVES[name]), []
     alone, watched = simulate(described, [3, 4]), simulate(described, [3, 4], watch=Watch(heard.append, every))
