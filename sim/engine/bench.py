@@ -41,7 +41,7 @@ then off by 2e-7 rad and 5e-4 rad/s."""
 class Bench:
     """A run in progress: controller, drive and encoder around a plant."""
 
-    def __init__(
+    def __init__(  # noqa: PLR0913  # the last by its name
         self,
         scenario: Scenario,
         robot: Robot,
