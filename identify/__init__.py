@@ -44,6 +44,7 @@ from identify.estimators import ESTIMATORS as ESTIMATORS
 from identify.estimators import AbstractEstimator as AbstractEstimator
 from identify.estimators import Estimate as Estimate
 from identify.estimators import GeneralizedLeastSquares as GeneralizedLeastSquares
+from identify.estimators import InstrumentalVariables as InstrumentalVariables
 from identify.estimators import MaximumLikelihood as MaximumLikelihood
 from identify.estimators import OrdinaryLeastSquares as OrdinaryLeastSquares
 from identify.estimators import Problem as Problem
@@ -58,6 +59,10 @@ from identify.estimators.likelihood.smoothed_motion import smoothed_log as smoot
 from identify.estimators.likelihood.smoothed_motion import smoothed_motion as smoothed_motion
 from identify.estimators.recursive_least_squares import Recursive as Recursive
 from identify.estimators.recursive_least_squares import recursive_least_squares as recursive_least_squares
+from identify.estimators.simulator import AbstractLoop as AbstractLoop
+from identify.estimators.simulator import AbstractPlant as AbstractPlant
+from identify.estimators.simulator import Simulated as Simulated
+from identify.estimators.simulator import Simulation as Simulation
 from identify.judge.bound import cramer_rao as cramer_rao
 from identify.judge.diagnosis import Instants as Instants
 from identify.judge.diagnosis import binned as binned
@@ -68,6 +73,8 @@ from identify.judge.diagnosis import measured_state as measured_state
 from identify.judge.diagnosis import spectrum as spectrum
 from identify.judge.excitation import brisk_shares as brisk_shares
 from identify.judge.excitation import showing_moves as showing_moves
+from identify.judge.noise_in_rows import NoiseInRows as NoiseInRows
+from identify.judge.noise_in_rows import noise_in_rows as noise_in_rows
 from identify.judge.noise_spectra import noise_spectra as noise_spectra
 from identify.judge.validation import Validation as Validation
 from identify.judge.validation import split as split

@@ -50,7 +50,7 @@ def readme_package(tmp_path, root):
 def test_the_readmes_package_is_listed(readme_package, monkeypatch):
     listed = python("from experiments.cli import main; main(['list'])", readme_package, monkeypatch)
     assert re.search(r"drag\s+Drag that grows with the square of the velocity", listed)
-    assert re.search(r"TLS\s+Least squares that allows for noise in W", listed)
+    assert re.search(r"plain-TLS\s+Least squares that allows for noise in W", listed)
 
 
 def test_the_readmes_friction_is_identified_by_all_models_with_its_estimator(readme_package, monkeypatch):
@@ -66,7 +66,7 @@ def test_the_readmes_friction_is_identified_by_all_models_with_its_estimator(rea
         dragged = MotionLog(log.fs, log.q, log.tau + [0.03, 0.004] * qd * abs(qd), log.torque)
         basis = scara() + BLOCKS.create("drag")
         for model in MODELS:
-            print(*identify(dragged, basis, MODELS.create(model), estimator=ESTIMATORS.create("TLS")).X[-2:])
+            print(*identify(dragged, basis, MODELS.create(model), estimator=ESTIMATORS.create("plain-TLS")).X[-2:])
         """,
         readme_package,
         monkeypatch,
@@ -86,8 +86,8 @@ def test_the_readmes_estimator_identifies_every_run_by_itself(readme_package, mo
         noise = np.random.default_rng(1).normal(size=(3, *log.tau.shape)) * [[[0.0]], [[1.0]], [[2.0]]]
         noisy = MotionLog(log.fs, np.broadcast_to(log.q, noise.shape), log.tau + noise, log.torque)
         alone = MotionLog(log.fs, log.q, log.tau + noise[2], log.torque)
-        X = identify(noisy, scara(), ExplicitModel(), estimator=ESTIMATORS.create("TLS")).X
-        print(*X[0], *(X[2] - identify(alone, scara(), ExplicitModel(), estimator=ESTIMATORS.create("TLS")).X))
+        X = identify(noisy, scara(), ExplicitModel(), estimator=ESTIMATORS.create("plain-TLS")).X
+        print(*X[0], *(X[2] - identify(alone, scara(), ExplicitModel(), estimator=ESTIMATORS.create("plain-TLS")).X))
         print(*(X[2] - identify(alone, scara(), ExplicitModel(), estimator=ESTIMATORS.create("OLS")).X))
         """,
         readme_package,

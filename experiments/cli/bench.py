@@ -11,6 +11,7 @@ from experiments.cli.interruption import importing
 from experiments.cli.options import Asked, Count, File, Folder, Json, Number, Robot, Scenario, Watched, Window
 from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.parameters import Parameters
+from experiments.identification.start import Start
 from experiments.recording.audience import Watching
 
 
@@ -29,7 +30,9 @@ class Run:
     chain: str = CHAIN
     """Signal processing."""
     estimator: str = ESTIMATOR
-    """OLS, WLS, GLS, ML, ML-delay (the last two: explicit model alone), or of a plug-in: idbench list."""
+    """GLS, ML, OLS, WLS, IRLS, TLS, RLS, IV, DIDIM, CLIE, CLOE, OE, UKF, ML-delay, or of a plug-in: docs/estimators.md."""
+    start: Start = "least-squares"
+    """Where estimators begin that simulate or filter: at the least-squares estimate, or at the robot's file."""
     study: Annotated[Path | None, tyro.conf.arg(name="from", metavar="DIR", help_behavior_hint="")] = None
     """Instead of a scenario: the folder of a study, one run of which is made again."""
     index: Number = None

@@ -40,6 +40,8 @@ from experiments.recording.audience import Audience, Watching
 from identify import MODELS, ExcitationError, IdentificationError
 from identify.judge.friction_choice import FrictionChoice
 from identify.rows.long_logs import is_long
+from sim.scenario.scenario import Scenario
+from sim.scenario.scenario_file import load
 
 
 def identify(asked: Identify) -> None:
@@ -56,8 +58,9 @@ def identify(asked: Identify) -> None:
     if place:
         place.check()
     named = Identified(  # complains of names first
-        (), subject, models=models, chain=asked.chain, estimator=asked.estimator, name=asked.label
-    )
+        (), subject, models=models, chain=asked.chain, estimator=asked.estimator, name=asked.label, loops=_loops(asked),
+        start=asked.start,
+    )  # fmt: skip
     named = with_chain(asked, named)
     with ExitStack() as stack:
         audience, path = _followed(stack, asked, path, question_of(asked), named)
@@ -89,6 +92,13 @@ def identify(asked: Identify) -> None:
         elif audience and not is_long(found.logs):
             _show(found, audience)
         results.export()
+
+
+def _loops(asked: Identify) -> tuple[Scenario, ...]:
+    """Return the closed loops of the logs: those that are named, or that of the run whose folder is given."""
+    own = asked.log[0] / "scenario.toml"
+    named = asked.loop or ([str(own)] if len(asked.log) == 1 and own.is_file() else [])
+    return tuple(map(load, named))
 
 
 def with_friction(whole: Identified) -> tuple[Identified, FrictionChoice | None]:

@@ -14,6 +14,7 @@ from experiments.cli.page import Page
 from experiments.errors import ExperimentError, ResultsError
 from experiments.exports.exports import EXPORTS
 from experiments.identification.identified import Identified
+from experiments.identification.iterations import iterations
 from experiments.identification.results import Place, results_folder, tell_of, write_recording, write_summary
 from experiments.identification.subject import Subject
 from experiments.identification.validated import Validated
@@ -141,7 +142,8 @@ def summary_of(judged: Sequence[Validated], log: Path) -> dict[str, Any]:
     """Return what a summary.json says of an identification."""
     found = {"experiment": "identify", "log": log.name, "path": str(log)}
     each = [_judged(validated) for validated in judged]
-    return {**found, **judged[0].found.summary(), "validation": each[0], "validations": each}
+    rounds = {"iterations": iterations(judged[0].found)}
+    return {**found, **judged[0].found.summary(), **rounds, "validation": each[0], "validations": each}
 
 
 def _judged(validated: Validated) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from experiments.cli.options import (
     Folder,
     Hertz,
     Json,
+    Loops,
     Mounted,
     MountingOptions,
     Reading,
@@ -26,6 +27,7 @@ from experiments.cli.options import (
 )
 from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.parameters import Parameters
+from experiments.identification.start import Start
 from experiments.recording.audience import Watching
 
 
@@ -61,7 +63,12 @@ class Identify:
     model: str = "all"
     """all, explicit, implicit or power."""
     estimator: str = ESTIMATOR
-    """OLS, WLS, GLS, ML, ML-delay (the last two: explicit model alone), or of a plug-in: idbench list."""
+    """GLS, ML, OLS, WLS, IRLS, TLS, RLS, IV, DIDIM, CLIE, CLOE, OE, UKF, ML-delay, or of a plug-in: docs/estimators.md."""
+    loop: Loops = ()
+    """Scenarios that describe the closed loop of each log, for IV, DIDIM, CLIE and CLOE: robot, motion, controller, timing,
+    drive. Of a run's folder its own."""
+    start: Start = "least-squares"
+    """Where estimators begin that simulate or filter: at the least-squares estimate, or at the robot's file."""
     follow: Annotated[float | None, tyro.conf.arg(metavar="SECONDS", help_behavior_hint="")] = None
     """Identify a CSV log while it is being written, until it has not grown for so long; then as a whole. With --live or
     --serve estimates and residuals are seen to grow."""

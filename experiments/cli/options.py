@@ -19,6 +19,8 @@ Count = Annotated[int | None, tyro.conf.arg(metavar="INT", help_behavior_hint=""
 Number = Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="")]
 Window = Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="FROM TO", help_behavior_hint="")]
 
+Loops = Annotated[tuple[str, ...], tyro.conf.arg(metavar="SCENARIO", help_behavior_hint="")]
+
 Json = Annotated[bool, tyro.conf.FlagCreatePairsOff]
 """Whether standard output is for a program: what summary.json has, and warnings; text goes to the error stream."""
 

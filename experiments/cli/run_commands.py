@@ -41,10 +41,11 @@ def run(asked: Run) -> None:
     if asked.scenario is None:
         if asked.robot is not None:
             raise ExperimentError(f"--robot {asked.robot}: a run of a study is of the study's robot")
-        made = replace(_again(page, asked.study, asked.index, asked.method), parameters=asked.parameters)
+        made = _again(page, asked.study, asked.index, asked.method)
+        made = replace(made, parameters=asked.parameters, start=asked.start)
     else:
         described = _with_robot(page, load(_alone(asked.scenario, asked.study, asked.index)), asked.robot)
-        made = ScenarioRun(described, asked.chain, asked.estimator, parameters=asked.parameters)
+        made = ScenarioRun(described, asked.chain, asked.estimator, parameters=asked.parameters, start=asked.start)
     _require_window(inner, watching)
     described, lost = made.scenario, ""
     place = Place(asked.out or Path("runs") / described.name, "run", described.name, asked.force)

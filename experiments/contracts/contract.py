@@ -1,18 +1,22 @@
 """What a contract is made of: examples to try a plug-in with, and complaints that say what is wrong."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from experiments.errors import ExperimentError
+from experiments.identification.simulators import RobotPlant, ScenarioLoop
+from experiments.identification.subject import Subject
 from experiments.paper.table1 import SCENARIO, Table1
-from identify import Array, MotionLog
+from identify import Array, MotionLog, Simulation
+from sim.engine.run import Run
+from sim.engine.simulation import simulate
 from sim.robot.robot import Robot
 from sim.scenario.scenario_file import load
-from sim.trajectories import Reference
+from sim.trajectories import RandomMoves, Reference
 
 FS = 100.0
 """Sampling frequency of the examples [Hz]."""
@@ -42,6 +46,18 @@ class Example:
     def truth(self) -> Array:
         """Its parameters."""
         return np.array(list(self._table.truth.values()))
+
+    @cached_property
+    def run(self) -> Run:
+        """A closed loop of the SCARA without noise."""
+        moves = RandomMoves(moves=4, durations=(0.9, 1.3), rest=0.5)
+        return simulate(replace(load("ideal"), trajectory=moves))
+
+    @property
+    def simulation(self) -> Simulation:
+        """What simulates it."""
+        loop = ScenarioLoop(Subject(), (self.run.scenario,), (self.run.alone(),))
+        return Simulation(loop, RobotPlant(Subject()))
 
     @property
     def robot(self) -> Robot:

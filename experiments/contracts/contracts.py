@@ -27,7 +27,7 @@ CONTRACTS: Mapping[str, tuple[Clause, ...]] = {
     "operators": (identification.operator_agrees_with_its_step,),
     "chains": (identification.chain_recovers_ideal_data,),
     "estimators": (
-        identification.estimator_recovers_noiseless_rows,
+        identification.estimator_recovers_the_truth,
         identification.estimator_takes_every_run_by_itself,
     ),
     "trajectories": (simulation.trajectory_rests_at_both_ends,),

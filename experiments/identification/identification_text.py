@@ -7,6 +7,7 @@ from rich.console import Console
 from rich.text import Text
 
 from experiments.identification.identified import Identified
+from experiments.identification.iterations import words_of_iterations
 from experiments.identification.validated import Validated
 from experiments.identification.verdict import SURE, Verdict
 from experiments.identification.warnings import FLAGS, doubtful, used
@@ -55,6 +56,8 @@ def print_identified(console: Console, found: Identified, title: str) -> None:
             words += f"; what follows judges them at {1e3 * channel.delay:.4g} ms: give --torque-delay {1e-3 * delay:.4g}"
         console.print(Text(words), soft_wrap=True)
     console.print(Text(_noise(found)), soft_wrap=True)
+    for words in words_of_iterations(found):
+        console.print(Text(words), soft_wrap=True)
     if len(found.logs) > 1 and found.torque_errors:
         _print_logs(console, found)
     console.print()

@@ -10,6 +10,8 @@ import numpy as np
 
 from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.results import summarize
+from experiments.identification.simulators import RobotPlant, ScenarioLoop
+from experiments.identification.start import Start
 from experiments.identification.subject import Subject
 from identify import (
     CHAINS,
@@ -24,6 +26,7 @@ from identify import (
     IdentificationError,
     MotionLog,
     Problem,
+    Simulation,
     attempt_each,
     encoder_steps,
 )
@@ -31,6 +34,7 @@ from identify.blame import blamed
 from identify.estimators.settle import settled
 from identify.rows.rows import Rows
 from identify.signals.masks import ReversalMask
+from sim.scenario.scenario import Scenario
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +61,10 @@ class Identified:
         What to call it beside others of the same log; by default chain and estimator.
     log_names : tuple of str
         What to call the logs, where there are several.
+    loops : tuple of Scenario
+        The closed loops in which the logs were recorded, for estimators that simulate them: one for each log.
+    start : {"least-squares", "file"}
+        Where estimators begin that simulate or filter: at the least-squares estimate, or at the parameters of the robot's file.
     known : mapping of str to Estimate, optional
         Estimates that were made from other logs, to be looked at on these.
     """
@@ -71,6 +79,8 @@ class Identified:
     trim: float | None = None
     name: str = ""
     log_names: tuple[str, ...] = ()
+    loops: tuple[Scenario, ...] = ()
+    start: Start = "least-squares"
     known: Mapping[str, Estimate | IdentificationError] | None = None
 
     def __post_init__(self) -> None:
@@ -111,8 +121,16 @@ class Identified:
         """Logs, robot and chain, by the explicit model."""
         basis = self._known_basis or self.subject.basis
         with blamed():
-            found = Problem(self.logs, basis, ExplicitModel(), self.processing)
+            found = Problem(self.logs, basis, ExplicitModel(), self.processing, self.simulation)
             return found if self._known_basis else settled(found)
+
+    @property
+    def simulation(self) -> Simulation:
+        """How the robot is simulated, for estimators that need it."""
+        start = None if self.start == "least-squares" else np.array(list(self.subject.truth(self.subject.robot).values()))
+        needs = self.solver.needs
+        loop = ScenarioLoop.of(self.subject, self.loops, self.logs) if "loop" in needs and self.loops else None
+        return Simulation(loop, RobotPlant(self.subject) if "plant" in needs else None, start)
 
     @cached_property
     def outcomes(self) -> dict[str, Estimate | IdentificationError]:

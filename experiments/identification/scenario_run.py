@@ -9,7 +9,9 @@ from experiments.errors import ExperimentError
 from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.friction_choice import with_suitable_friction
 from experiments.identification.identified import Identified
+from experiments.identification.iterations import iterations
 from experiments.identification.parameters import Parameters
+from experiments.identification.start import Start
 from experiments.identification.subject import Subject
 from identify import AbstractEstimator, Chain
 from sim.engine.run import Run
@@ -40,6 +42,8 @@ class ScenarioRun:
         Receives what happens in it.
     parameters : Parameters
         Which parameters are identified.
+    start : {"least-squares", "file"}
+        Where estimators begin that simulate or filter.
     """
 
     scenario: Scenario
@@ -49,6 +53,7 @@ class ScenarioRun:
     progress: Progress | None = None
     watch: Watch | None = None
     parameters: Parameters = Parameters()  # noqa: RUF009  # frozen
+    start: Start = "least-squares"
 
     def __post_init__(self) -> None:
         # What is wrong with names, or a robot that is no SCARA, is reported before the simulation.
@@ -80,6 +85,7 @@ class ScenarioRun:
         """What the models make of its log."""
         log, name = (self.run.alone(),), f"{self.chain}-{self.estimator}-study" if self.method else ""
         found = Identified(log, self.subject, chain=self.chain, estimator=self.estimator, method=self.method, name=name)
+        found = replace(found, loops=(self.scenario,), start=self.start)
         if self.subject.laws.auto:
             found, _ = with_suitable_friction(found)
         return replace(found, truth=found.subject.truth(self.run.robots[0], self.scenario.friction))
@@ -91,4 +97,5 @@ class ScenarioRun:
             "seed": self.scenario.seed,
             "scenario": to_dict(self.scenario),
             **self.identified.summary(),
+            "iterations": iterations(self.identified),
         }

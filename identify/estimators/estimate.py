@@ -42,6 +42,12 @@ class Estimate:
         The noise of the logs as the estimator found it; by default that of the problem.
     fits : mapping of tuple of int to JointFit
         Of maximum likelihood, motion and parameters of every run that could be solved, () of a single one.
+    failures : mapping of tuple of int to str
+        Why runs have no estimate, beside rows that do not determine it.
+    path : tuple of Array, shape (..., p)
+        Of estimators that go on from one round to the next: where each began, and the last ended.
+    simulations : int array, shape (...), optional
+        How often the robot was simulated.
     """
 
     problem: Problem
@@ -53,6 +59,9 @@ class Estimate:
     honest: Array | None = None
     levels: NoiseLevels | None = None
     fits: Mapping[tuple[int, ...], JointFit] = field(default_factory=dict)
+    failures: Mapping[tuple[int, ...], str] = field(default_factory=dict)
+    path: tuple[Array, ...] = ()
+    simulations: npt.NDArray[np.intp] | None = None
 
     @classmethod
     def judge(

@@ -11,7 +11,7 @@ from identify.estimators.estimate import Estimate
 from identify.estimators.problem import Problem
 from identify.rows.factors import Status
 
-Need = Literal["factors", "rows", "logs", "simulate"]
+Need = Literal["factors", "rows", "logs", "loop", "plant"]
 
 
 class AbstractEstimator(ABC):
@@ -19,7 +19,8 @@ class AbstractEstimator(ABC):
 
     needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
     """What it uses of a problem: `factors` of its rows, which every log has; its `rows`, which are not kept of logs that are
-    too long; its `logs`; or `simulate`, which the caller may give."""
+    too long; its `logs`; the `loop` in which they were recorded, or the robot by itself, its `plant`, which the caller may
+    give."""
 
     full_rank: ClassVar[bool] = True
     """Whether it needs a motion that shows every parameter; one with a prior or a penalty does not."""
@@ -44,6 +45,8 @@ class AbstractEstimator(ABC):
         if not isinstance(estimate, Estimate):
             raise PluginError(f"plug-in {type(self).__name__}.solve returned {estimate!r:.60}, expected an Estimate")
         expect(self, "solve", estimate.X, (*status.shape, len(problem.names)))
+        if throw and estimate.failures:
+            raise IdentificationError(next(iter(estimate.failures.values())))
         lost = ~np.isfinite(estimate.X) & (status == Status.OK)[..., None]
         if throw and lost.any():
             names = ", ".join(np.array(problem.names)[lost.reshape(-1, len(problem.names)).any(axis=0)])
@@ -53,7 +56,14 @@ class AbstractEstimator(ABC):
         return estimate
 
     def _require(self, problem: Problem) -> None:
-        if "simulate" in self.needs and problem.simulate is None:
-            raise IdentificationError(f"{type(self).__name__} needs a way to simulate the robot, which the caller did not give")
+        if "loop" in self.needs and problem.simulation.loop is None:
+            raise IdentificationError(
+                f"{type(self).__name__} simulates the closed loop in which a log was recorded, which is not known: name the "
+                "scenario that describes it (--loop scenario.toml)"
+            )
+        if "plant" in self.needs and problem.simulation.plant is None:
+            raise IdentificationError(
+                f"{type(self).__name__} simulates the robot from the torques of the log, and the caller gave no simulator"
+            )
         if "rows" in self.needs:
             problem.require_rows(f"{type(self).__name__} needs rows, and ")

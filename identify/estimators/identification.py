@@ -1,8 +1,7 @@
 """From logs to estimates: what users call."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
-from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.blame import blamed
 from identify.data.motion_log import MotionLog
@@ -12,6 +11,7 @@ from identify.estimators.estimator import AbstractEstimator
 from identify.estimators.generalized_least_squares import GeneralizedLeastSquares
 from identify.estimators.problem import Problem
 from identify.estimators.settle import settled
+from identify.estimators.simulator import Simulation
 from identify.models.explicit import ExplicitModel
 from identify.models.model import AbstractModel
 from identify.rows.chain import Chain
@@ -25,7 +25,7 @@ def identify(
     chain: Chain | None = None,
     estimator: AbstractEstimator | None = None,
     *,
-    simulate: Callable[[Array], MotionLog] | None = None,
+    simulation: Simulation | None = None,
     throw: bool = True,
 ) -> Estimate:
     """Identify the parameters of a robot.
@@ -42,8 +42,8 @@ def identify(
         Signal processing; chain `idbench` by default.
     estimator : AbstractEstimator, optional
         Generalized least squares by default.
-    simulate : callable, optional
-        Simulates the robot with given parameters, for estimators that need it.
+    simulation : Simulation, optional
+        How the robot is simulated, for estimators that need it.
     throw : bool
         Raise if a run cannot be solved; otherwise the estimate's `status` says it.
 
@@ -58,7 +58,7 @@ def identify(
         If the log, a setting, or the motion does not allow an estimate; the message says what to try.
     """
     _require(model, AbstractModel, 'a model, such as MODELS.create("power")')
-    problem = _problem(log, basis, model, chain, simulate)
+    problem = _problem(log, basis, model, chain, simulation)
     return estimate(problem, estimator or GeneralizedLeastSquares(), throw=throw)
 
 
@@ -69,11 +69,11 @@ def identify_each(
     chain: Chain | None = None,
     estimator: AbstractEstimator | None = None,
     *,
-    simulate: Callable[[Array], MotionLog] | None = None,
+    simulation: Simulation | None = None,
     throw: bool = True,
 ) -> dict[str, Estimate]:
     """Identify with several models, by name, from the same signals; otherwise as `identify`."""
-    found = attempt_each(_problem(log, basis, ExplicitModel(), chain, simulate), models, estimator, throw=throw)
+    found = attempt_each(_problem(log, basis, ExplicitModel(), chain, simulation), models, estimator, throw=throw)
     for outcome in found.values():
         if isinstance(outcome, IdentificationError):
             raise outcome
@@ -146,14 +146,16 @@ def _problem(
     basis: Basis,
     model: AbstractModel,
     chain: Chain | None,
-    simulate: Callable[[Array], MotionLog] | None,
+    simulation: Simulation | None,
 ) -> Problem:
     chain = chain or idbench_chain()
     _require(log, Sequence, "a MotionLog or a sequence of them, such as read_log(path)", MotionLog)
     _require(basis, Basis, "a Basis, such as scara()")
     _require(chain, Chain, 'a Chain, such as CHAINS.create("paper")')
     with blamed():
-        return settled(Problem((log,) if isinstance(log, MotionLog) else tuple(log), basis, model, chain, simulate))
+        return settled(
+            Problem((log,) if isinstance(log, MotionLog) else tuple(log), basis, model, chain, simulation or Simulation())
+        )
 
 
 def _require(given: object, kind: type, wanted: str, *others: type) -> None:

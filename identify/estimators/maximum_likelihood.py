@@ -64,7 +64,7 @@ class MaximumLikelihood(AbstractEstimator):
         # Rows show little of the positions' noise where torques are noisy; their differences show all of it.
         start, position = GeneralizedLeastSquares().solve(problem), np.maximum(problem.position_noise, SMALLEST)
         torque = problem.likely_noise.levels.torque.copy()
-        runs, p, failures = start.X.shape[:-1], len(problem.names), list[IdentificationError]()
+        runs, p, failures = start.X.shape[:-1], len(problem.names), dict[tuple[int, ...], str]()
         X, covariance = np.full((*runs, p), np.nan), np.full((*runs, p, p), np.nan)
         fits: dict[tuple[int, ...], JointFit] = {}
         for run in np.ndindex(runs):
@@ -73,14 +73,15 @@ class MaximumLikelihood(AbstractEstimator):
             try:
                 found = self._found(problem, run, start, NoiseLevels(torque[run], position[run]))
             except IdentificationError as error:  # one run does not take the others away
-                failures.append(error)
+                failures[run] = str(error)
                 continue
             fits[run], X[run], covariance[run] = found, found.X, found.covariance[:p, :p]
             torque[run] = np.where(np.isfinite(torque[run]), found.levels.torque, np.nan)
         if failures and not fits:
-            raise failures[0]
+            raise IdentificationError(next(iter(failures.values())))
         honest = frozen(covariance)
-        return Estimate(problem, frozen(X), honest, honest=honest, levels=NoiseLevels(torque, position), fits=fits)
+        levels = NoiseLevels(torque, position)
+        return Estimate(problem, frozen(X), honest, honest=honest, levels=levels, fits=fits, failures=failures)
 
     def _found(self, problem: Problem, run: tuple[int, ...], start: Estimate, levels: NoiseLevels) -> JointFit:
         """Return the fit of one run."""

@@ -1,6 +1,6 @@
 """What an estimator is given."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, Self
@@ -12,6 +12,7 @@ from identify.errors import IdentificationError, LogError
 from identify.estimators.noise import noise_of, position_noise
 from identify.estimators.restricted_likelihood import likely_noise
 from identify.estimators.row_weights import RowWeights
+from identify.estimators.simulator import Simulation
 from identify.estimators.unbiased import unbiased
 from identify.models.explicit import ExplicitModel
 from identify.models.model import AbstractModel
@@ -43,15 +44,15 @@ class Problem:
         Explicit, implicit or power.
     chain : Chain
         Signal processing.
-    simulate : callable, optional
-        Returns the log of the robot with parameters X that repeats the motion (output error, DIDIM).
+    simulation : Simulation
+        How the robot is simulated, for estimators that need it.
     """
 
     logs: tuple[MotionLog, ...]
     basis: Basis
     model: AbstractModel
     chain: Chain
-    simulate: Callable[[Array], MotionLog] | None = None
+    simulation: Simulation = Simulation()  # noqa: RUF009  # frozen
     _signals: tuple[Signals, ...] = field(default=(), repr=False)
     _explicit: "Problem | None" = field(default=None, repr=False)
 
@@ -199,7 +200,7 @@ class Problem:
         self.require_rows("rows at another log need those of this one, and ")
         logs = [log] if isinstance(log, MotionLog) else list(log)
         _require_logs(logs)
-        if [(one.q.shape, one.fs) for one in logs] != [(one.q.shape, one.fs) for one in self.logs]:
+        if [(one.q.shape[-2:], one.fs) for one in logs] != [(one.q.shape[-2:], one.fs) for one in self.logs]:
             raise LogError(
                 "rows at other logs need one log for each of the problem's, of the same length, frequency and joints"
             )
@@ -218,6 +219,10 @@ class Problem:
     def with_basis(self, basis: Basis) -> Self:
         """Return the problem of another basis, such as one with other nonlinear parameters; signals are shared."""
         return replace(self, basis=basis, _signals=self.signals, _explicit=None)
+
+    def with_logs(self, logs: Sequence[MotionLog]) -> Self:
+        """Return the problem of other logs, such as those without wild samples."""
+        return replace(self, logs=tuple(logs), _signals=(), _explicit=None)
 
     def _rows_of(self, signals: Signals) -> Rows:
         return self.chain.rows(signals, self.basis, self.model)

@@ -1,13 +1,57 @@
-"""Recursive least squares: the estimate as the rows come in."""
+"""Recursive least squares: the estimate as the rows come in, and one that forgets."""
 
 from dataclasses import dataclass
+from typing import ClassVar, final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.errors import IdentificationError
+from identify.arrays import Array, frozen
+from identify.errors import IdentificationError, require_positive
 from identify.estimators.estimate import Estimate
+from identify.estimators.estimator import AbstractEstimator, Need
+from identify.estimators.problem import Problem
+from identify.estimators.row_products import Kinds, solve_with, with_weights
 from identify.rows.factors import Factor, Status
+
+
+@final
+@dataclass(frozen=True)
+class RecursiveLeastSquares(AbstractEstimator):
+    """Recursive least squares (RLS) that forgets: its last estimate, as a controller has it that adapts while it moves.
+
+    Rows count exp(-(T - t) / memory), T being the end of the log, and by the residuals of their joint as in weighted least
+    squares, which it is for an endless memory. What it forgets it pays with variance.
+
+    Parameters
+    ----------
+    memory : float
+        Time [s] after which a row counts a third.
+    """
+
+    needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
+
+    memory: float = 10.0
+
+    def __post_init__(self) -> None:
+        require_positive(memory=self.memory)
+
+    def solve(self, problem: Problem) -> Estimate:
+        """Return the estimate at the end of the last log."""
+        rows, kinds = problem.rows, Kinds.of_rows(problem)
+        ages, later = list[Array](), 0.0
+        for part in reversed(rows.maps):
+            ages.insert(0, np.repeat(part.time[-1] - part.time, rows.kinds) + later)
+            later += float(part.time[-1] - part.time[0])
+        every = solve_with(kinds, rows.Y, rows.W, rows.W)
+        weight = kinds.weights(every.residual) * np.exp(-np.concatenate(ages) / (2 * self.memory))
+        found = with_weights(rows.Y, rows.W, weight)
+        return Estimate(
+            problem,
+            frozen(found.X),
+            frozen(found.covariance),
+            lambda _: found.G,
+            whiten=lambda given: given.joined * weight[..., None],
+        )
 
 
 @dataclass(frozen=True, eq=False)

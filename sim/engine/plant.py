@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from copy import copy
-from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -11,7 +10,7 @@ from mujoco.batch import Batch, SimulationError
 
 from sim.robot.motors import Array
 from sim.robot.robot import Robot
-from sim.robot.varied import vary_fields
+from sim.robot.varied import VariedRobots, vary_fields
 from sim.scenario.scenario import Physics
 
 SWITCHED_OFF = (
@@ -54,18 +53,10 @@ class Plant:
         self.robot, self.batch = robot, Batch(model, nsim, threads)
         self._errors: dict[int, str] = {}
         vary_fields(self.batch, vary)
-        self._varied = bool(vary)
+        self.robots = VariedRobots(robot, nsim, vary) if vary else (robot,) * nsim
         self.q, self.qd, self._applied = (self.batch.bind(name) for name in ("qpos", "qvel", "qfrc_applied"))
         expanded = self.batch.expanded("dof_frictionloss")
         self.Fs: Array = np.array(np.broadcast_to(model.dof_frictionloss, (nsim, robot.n)) if expanded is None else expanded)
-
-    @cached_property
-    def robots(self) -> tuple[Robot, ...]:
-        """The robot of every simulation."""
-        count = self.batch.nsim
-        if not self._varied:
-            return (self.robot,) * count
-        return tuple(Robot(self.robot.name, self.batch.get_model(i)) for i in range(count))
 
     def step(self, torques: Array, steps: int, going: npt.NDArray[np.intp] | None = None) -> None:
         """Advance simulations by `steps` physics steps.

@@ -56,11 +56,10 @@ def replay(robot: Robot, log: MotionLog, qd: Array, bandwidth: float) -> Replay:
         If it runs away.
     """
     physics = Physics()
-    per_sample = int(np.ceil(1 / log.fs / physics.step - 1e-9))
-    h = 1 / log.fs / per_sample
+    h, per_sample = physics_steps(log.fs, physics.step)
     plant = Plant(robot, 1, physics, h, {}, 1)
     plant.q[:], plant.qd[:] = log.q[0], qd[0]
-    torques = _mean_torques(log, h, per_sample)
+    torques = mean_torques(log, h, per_sample)
     kp = _inertia(robot, log.q) * bandwidth**2
     q, feedback = np.empty(log.q.shape), np.empty(log.q.shape)
     bounds = Bounds(robot, Reference(log.fs, log.q, qd, np.zeros_like(qd)), 1)
@@ -73,7 +72,13 @@ def replay(robot: Robot, log: MotionLog, qd: Array, bandwidth: float) -> Replay:
     return Replay(q, feedback)
 
 
-def _mean_torques(log: MotionLog, h: float, per_sample: int) -> Array:
+def physics_steps(fs: float, longest: float) -> tuple[float, int]:
+    """Return the length of physics steps of at most `longest` [s], and how many a sample takes."""
+    per_sample = int(np.ceil(1 / fs / longest - 1e-9))
+    return 1 / fs / per_sample, per_sample
+
+
+def mean_torques(log: MotionLog, h: float, per_sample: int) -> Array:
     """Return the mean of the torque that acts in every physics step, shape (time, step, joint)."""
     tau, T, delay = log.tau * np.asarray(log.torque.gain), 1 / log.fs, log.torque.delay
     edges = np.arange(log.samples * per_sample + 1) * h

@@ -1,5 +1,6 @@
 """What a simulation gives: the log that a robot would give, and the truth behind it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from identify.data.motion_log import MotionLog
@@ -19,7 +20,7 @@ class Run:
         What was simulated.
     seeds : tuple of int
         Seed of every simulation.
-    robots : tuple of Robot
+    robots : sequence of Robot
         The true robot of every simulation.
     reference : Reference
         The planned motion.
@@ -37,7 +38,7 @@ class Run:
 
     scenario: Scenario
     seeds: tuple[int, ...]
-    robots: tuple[Robot, ...]
+    robots: Sequence[Robot]
     reference: Reference
     log: MotionLog
     q: Array

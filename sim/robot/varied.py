@@ -1,11 +1,12 @@
 """Robots with other parameters: fields of MuJoCo's model, without compiling it anew."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import overload
 
+import mujoco
 import numpy as np
 import numpy.typing as npt
 from mujoco.batch import Batch
-from scipy.spatial.transform import Rotation
 
 from identify.data.kinematics import INERTIAL
 from sim.errors import RobotError, ScenarioError
@@ -73,6 +74,41 @@ def vary_fields(batch: Batch, fields: Mapping[str, npt.ArrayLike]) -> None:
         batch.set_const()
 
 
+class VariedRobots(Sequence[Robot]):
+    """Robots of which fields of MuJoCo's model vary, each made when it is asked for.
+
+    Parameters
+    ----------
+    robot : Robot
+        What they have in common.
+    nsim : int
+        How many.
+    vary : mapping of str to array_like
+        Fields of MuJoCo's model with a value for each, shape (nsim, ...).
+    """
+
+    def __init__(self, robot: Robot, nsim: int, vary: Mapping[str, npt.ArrayLike]) -> None:
+        self._robot, self._vary = robot, vary
+        self._places = tuple(range(nsim))
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    @overload
+    def __getitem__(self, place: int) -> Robot: ...
+
+    @overload
+    def __getitem__(self, place: slice) -> Sequence[Robot]: ...
+
+    def __getitem__(self, place: int | slice) -> Robot | Sequence[Robot]:
+        if isinstance(place, slice):
+            return [self[i] for i in self._places[place]]
+        i = self._places[place]
+        one = Batch(self._robot.model, 1)
+        vary_fields(one, {name: np.asarray(values, dtype=np.float64)[i : i + 1] for name, values in self._vary.items()})
+        return Robot(self._robot.name, one.get_model(0))
+
+
 def _set_link(robot: Robot, joint: int, values: Array, fields: dict[str, Array]) -> None:
     """Give a link inertia about its origin, first moments and mass, shape (nsim, 10), and the bodies welded to it none."""
     link, model = int(robot.model.jnt_bodyid[joint]), robot.model
@@ -96,5 +132,7 @@ def _set_link(robot: Robot, joint: int, values: Array, fields: dict[str, Array])
 
 def _quaternions(rotation: Array) -> Array:
     """Return unit quaternions w x y z of rotation matrices, shape (nsim, 4)."""
-    found: Array = Rotation.from_matrix(rotation).as_quat(scalar_first=True)
+    found = np.zeros((len(rotation), 4))
+    for quaternion, matrix in zip(found, rotation.reshape(-1, 9), strict=True):
+        mujoco.mju_mat2Quat(quaternion, matrix)
     return found

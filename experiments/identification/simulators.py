@@ -1,0 +1,204 @@
+"""The simulated robot with any parameters, for estimators that simulate: in the loop of a log, and by itself."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self, final
+
+import numpy as np
+import numpy.typing as npt
+
+from experiments.identification.subject import Subject
+from identify import AbstractLoop, AbstractPlant, Array, IdentificationError, MotionLog, Simulated, transfer
+from sim.encoders import ExactEncoder
+from sim.engine.shooting import shoot
+from sim.engine.simulation import simulate
+from sim.errors import BenchError
+from sim.frictions import CoulombViscous
+from sim.robot.payload import Payload
+from sim.robot.robot import Robot
+from sim.robot.tree import standard_parameters
+from sim.robot.varied import model_fields
+from sim.scenario.measurement import TorqueMeasurement
+from sim.scenario.ripple import Ripple
+from sim.scenario.scenario import Scenario
+from sim.trajectories import Reference
+
+SAME = 1e-6
+"""Share by which frequencies that are the same differ at most."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Fields:
+    """MuJoCo's model of a robot with parameters of its basis.
+
+    Parameters
+    ----------
+    subject : Subject
+        The robot.
+    """
+
+    subject: Subject
+
+    @cached_property
+    def robot(self) -> Robot:
+        """The robot as its file describes it."""
+        return self.subject.robot
+
+    def of(self, X: Array) -> dict[str, Array]:
+        """Return the fields of robots with parameters X, shape (nsim, p): those nearest to the file's standard parameters.
+
+        Raises
+        ------
+        IdentificationError
+            If a parameter is of a law of friction that the simulated robot does not have.
+        """
+        names, grouping = self.subject.whole.names, self.subject.grouping
+        place = [names.index(name) for name in self.subject.basis.names]
+        whole = np.zeros((len(X), len(names)))
+        whole[:, place] = X
+        given = np.array([self._given.get(name, 0.0) for name in grouping.standard.names])
+        if unknown := [name for name in grouping.standard.names if name not in self._given]:
+            raise IdentificationError(
+                f"{', '.join(unknown)} cannot be simulated: robots of MuJoCo have viscous and Coulomb friction alone; take an "
+                "estimator that does not simulate, or leave these laws out"
+            )
+        # Robot by robot: a product of all of them at once would have other bits for other numbers of robots.
+        base = np.matmul(self._to_base, whole[..., None])
+        standard = given + np.matmul(self._back, base - grouping.base(given)[:, None])[..., 0]
+        return model_fields(self.robot, dict(zip(grouping.standard.names, standard.T, strict=True)))
+
+    @cached_property
+    def _given(self) -> dict[str, float]:
+        return standard_parameters(self.robot)
+
+    @cached_property
+    def _to_base(self) -> Array:
+        subject = self.subject
+        if subject.base is not None:
+            return np.eye(len(subject.grouping.names))
+        return transfer(subject.tree, subject.whole, subject.grouping.basis)
+
+    @cached_property
+    def _back(self) -> Array:
+        grouping = self.subject.grouping
+        given = np.array([self._given.get(name, 0.0) for name in grouping.standard.names])
+        scale = np.where(given == 0, 1.0, np.abs(given))
+        return scale[:, None] * np.linalg.pinv(grouping.K * scale)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ScenarioLoop(AbstractLoop):
+    """The closed loops of scenarios, one for each log, without noise, ripple and payload.
+
+    Parameters
+    ----------
+    subject : Subject
+        The robot.
+    scenarios : tuple of Scenario
+        Controller, timing, drive and motion of each log.
+    logs : tuple of MotionLog
+        What they are to repeat.
+    motions : tuple of Reference
+        Planned motions of all runs of the only log, where they differ; those of the scenarios by default.
+    """
+
+    subject: Subject
+    scenarios: tuple[Scenario, ...]
+    logs: tuple[MotionLog, ...]
+    motions: tuple[Reference, ...] = ()
+
+    @classmethod
+    def of(cls, subject: Subject, scenarios: tuple[Scenario, ...], logs: tuple[MotionLog, ...]) -> Self:
+        """Return the loops of logs, which may be the beginnings of what the scenarios make.
+
+        Raises
+        ------
+        IdentificationError
+            If scenarios are not as many as logs, or one has another robot, frequency or motion than its log.
+        """
+        if len(scenarios) != len(logs):
+            raise IdentificationError(f"{len(scenarios)} loops are given for {len(logs)} logs: one scenario is needed for each")
+        for scenario, log in zip(scenarios, logs, strict=True):
+            _require_matching(scenario, log, subject)
+        return cls(subject, scenarios, logs)
+
+    def repeat(self, X: Array, *, informed: bool = False) -> Simulated:
+        """Return the logs that robots with these parameters give."""
+        flat = X.reshape(-1, X.shape[-1])
+        vary, failures = self._fields.of(flat), dict[tuple[int, ...], str]()
+        made = [self._log(k, X.shape[:-1], vary, failures, informed=informed) for k in range(len(self.logs))]
+        return Simulated(tuple(made), failures)
+
+    def _log(
+        self, k: int, shape: tuple[int, ...], vary: Mapping[str, Array], failures: dict[tuple[int, ...], str], *, informed: bool
+    ) -> MotionLog:
+        nsim = int(np.prod(shape, dtype=np.intp))
+        motions = [*self.motions] * (nsim // len(self.motions)) if self.motions else ()
+        try:
+            alone = noiseless(self.scenarios[k])
+            run = simulate(alone, range(nsim), motions=motions, vary=vary, throw=False, informed=informed)
+        except BenchError as error:
+            raise IdentificationError(f"the loop cannot be simulated: {error}") from error
+        for sim, why in run.failures.items():
+            place = tuple(int(i) for i in np.unravel_index(sim, shape)) if shape else ()
+            failures.setdefault(place, f"the robot with the parameters of a round cannot be simulated: {why}")
+        samples = self.logs[k].samples
+        q, tau = (x[:, :samples].reshape(*shape, samples, x.shape[-1]) for x in (run.log.q, run.log.tau))
+        return replace(run.log, q=q, tau=tau, conditions={})
+
+    @cached_property
+    def _fields(self) -> Fields:
+        return Fields(self.subject)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class RobotPlant(AbstractPlant):
+    """The robot by itself.
+
+    Parameters
+    ----------
+    subject : Subject
+        The robot.
+    """
+
+    subject: Subject
+
+    def shoot(self, X: Array, q: Array, qd: Array, log: MotionLog, first: npt.NDArray[np.intp], count: int) -> Array:
+        """Return the positions of robots that start somewhere in a log."""
+        return shoot(self._fields.robot, self._fields.of(X), q, qd, log, first, count)
+
+    @cached_property
+    def _fields(self) -> Fields:
+        return Fields(self.subject)
+
+
+def noiseless(scenario: Scenario) -> Scenario:
+    """Return a scenario without what is random, or not known of a robot: noise, counts, jitter, ripple, payload, friction."""
+    return replace(
+        scenario,
+        encoder=ExactEncoder(),
+        torque=TorqueMeasurement(source=scenario.torque.source, cutoff=scenario.torque.cutoff),
+        timing=replace(scenario.timing, jitter=0.0),
+        ripple=Ripple(),
+        payload=Payload(),
+        friction=CoulombViscous(),
+    )
+
+
+def _require_matching(scenario: Scenario, log: MotionLog, subject: Subject) -> None:
+    """Raise IdentificationError if a scenario is no loop of a log: other robot, frequency or duration."""
+    name, other = f"loop {scenario.name}", scenario.nominal_robot
+    if other.joints != subject.robot.joints:
+        raise IdentificationError(
+            f"{name} moves robot {scenario.robot}, whose joints are {', '.join(other.joints)}: it is none of {subject.name}"
+        )
+    if abs(scenario.fs / log.fs - 1) > SAME:
+        raise IdentificationError(f"{name} runs at {scenario.fs:g} Hz, the log has {log.fs:g} Hz: write the log's fs into it")
+    if (samples := round(scenario.trajectory.plan(other).duration * scenario.fs)) < log.samples:
+        raise IdentificationError(
+            f"{name} moves for {samples / scenario.fs:g} s, the log for {log.samples / log.fs:g} s: it is of another motion"
+        )

@@ -1,0 +1,142 @@
+"""Least squares of rows with instruments, every run by itself."""
+
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from identify.arrays import Array
+from identify.estimators.problem import Problem
+
+WORST = 1e-12
+"""Reciprocal condition number of Z' W, its rows and columns scaled to length 1, below which it counts as singular."""
+
+ROUNDS = 2
+"""How often weights are taken from the residuals of the solution before."""
+
+
+@dataclass(frozen=True, eq=False)
+class Kinds:
+    """Which residuals have the same variance.
+
+    Parameters
+    ----------
+    count : int
+        Kinds; residuals follow each other kind by kind.
+    own : Array, shape (..., r)
+        What residuals of a kind are multiplied by where they differ; 0 for those that are void.
+    """
+
+    count: int
+    own: Array
+
+    @classmethod
+    def of_rows(cls, problem: Problem) -> Self:
+        """Return the kinds of a problem's rows."""
+        rows = problem.rows
+        own = 1.0 if problem.row_weights is None else problem.row_weights.of(rows)
+        return cls(rows.kinds, np.asarray(rows.valid * own, dtype=np.float64))
+
+    def by_kind(self, x: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Return values of all residuals, shape (..., r), as (..., instant, kind)."""
+        return x.reshape(*x.shape[:-1], -1, self.count)
+
+    def weights(self, residual: Array) -> Array:
+        """Return one over the rms of the residuals of every kind, times what they are multiplied by, shape (..., r)."""
+        number = np.maximum(np.sum(self.by_kind(self.own) > 0, axis=-2), 1)
+        rms = np.sqrt(np.sum(self.by_kind(residual * self.own) ** 2, axis=-2) / number)
+        largest = np.max(rms, axis=-1, keepdims=True)
+        rms = np.where((largest > 0) & np.isfinite(rms), np.maximum(rms, 1e-12 * largest), 1.0)
+        return self.own / np.tile(rms, residual.shape[-1] // self.count)
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """X = G' Y of rows Y = W X + rho.
+
+    Parameters
+    ----------
+    X : Array, shape (..., p)
+        NaN where Z' W is singular.
+    G : Array, shape (..., r, p)
+        What X changes by if a row of Y does.
+    residual : Array, shape (..., r)
+        Y - W X.
+    covariance : Array, shape (..., p, p)
+        Of X, as if weighted residuals were independent and alike.
+    """
+
+    X: Array
+    G: Array
+    residual: Array
+    covariance: Array
+
+    @property
+    def sigma(self) -> Array:
+        """Standard deviations of X, shape (..., p)."""
+        return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
+
+    def moved(self, X: Array) -> Self:
+        """Return the solution of which X is the step from somewhere."""
+        return replace(self, X=X + self.X)
+
+    def where(self, active: npt.NDArray[np.bool_], before: "Solved | None") -> "Solved":
+        """Return this solution in the runs that are active, and that before in the others."""
+        if before is None:
+            return self
+        pairs = [(getattr(self, x), getattr(before, x)) for x in ("X", "G", "residual", "covariance")]
+        return Solved(*(np.where(active.reshape(*active.shape, *[1] * (a.ndim - active.ndim)), a, b) for a, b in pairs))
+
+
+def solve_with(kinds: Kinds, Y: Array, W: Array, Z: Array) -> Solved:
+    """Return X = (Z' w^2 W)^-1 Z' w^2 Y, weights w from the residuals of the solution before, twice.
+
+    Parameters
+    ----------
+    kinds : Kinds
+        Which rows have residuals of the same variance.
+    Y : Array, shape (..., r)
+        Measurements.
+    W, Z : Array, shape (..., r, p)
+        Regressors and instruments; those of least squares are the regressors.
+    """
+    found = _solved(Y, W, Z, kinds.own)
+    for _ in range(ROUNDS):
+        found = _solved(Y, W, Z, kinds.weights(found.residual))
+    return found
+
+
+def with_weights(Y: Array, W: Array, weight: Array) -> Solved:
+    """Return the least-squares solution of rows multiplied by weights, shape (..., r)."""
+    return _solved(Y, W, W, weight)
+
+
+def _solved(Y: Array, W: Array, Z: Array, weight: Array) -> Solved:
+    weighted = Z * (weight**2)[..., None]
+    inverse = _inverse(np.matmul(np.swapaxes(weighted, -1, -2), W))
+    G = np.matmul(weighted, np.swapaxes(inverse, -1, -2))
+    X = np.sum(G * Y[..., None], axis=-2)
+    residual = Y - np.matmul(W, X[..., None])[..., 0]
+    freedom = np.maximum(np.sum(weight > 0, axis=-1) - X.shape[-1], 1)
+    variance = np.sum((residual * weight) ** 2, axis=-1) / freedom
+    white = G / np.where(weight > 0, weight, np.inf)[..., None]
+    covariance = variance[..., None, None] * np.matmul(np.swapaxes(white, -1, -2), white)
+    return Solved(X, G, residual, covariance)
+
+
+def _inverse(product: Array) -> Array:
+    """Return the inverses of matrices, shape (..., p, p), NaN of singular ones."""
+    rows = _lengths(product, -1)
+    columns = _lengths(product / rows, -2)
+    scaled = product / rows / columns
+    known = np.asarray(np.isfinite(scaled).all(axis=(-2, -1)))
+    values: Array = np.linalg.svd(np.where(known[..., None, None], scaled, 0.0), compute_uv=False)
+    good = np.asarray(known & (values[..., -1] > WORST * values[..., 0]))[..., None, None]
+    inverse = np.linalg.inv(np.where(good, scaled, np.eye(product.shape[-1])))
+    return np.where(good, inverse / np.swapaxes(columns, -1, -2) / np.swapaxes(rows, -1, -2), np.nan)
+
+
+def _lengths(product: Array, axis: int) -> Array:
+    length = np.linalg.norm(product, axis=axis, keepdims=True)
+    return np.where(length > 0, length, 1.0)

@@ -1,0 +1,184 @@
+"""Estimators that simulate the robot with the parameters of the round before, until these no longer move."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from identify.arrays import Array, frozen
+from identify.data.motion_log import MotionLog
+from identify.errors import IdentificationError
+from identify.estimators.estimate import Estimate
+from identify.estimators.problem import Problem
+from identify.estimators.propagated import Influence
+from identify.estimators.row_products import Solved
+from identify.estimators.simulator import AbstractLoop, Simulated
+
+SMALL = 1e-3
+"""Change of a parameter, as a share of what makes the whole torque of a joint."""
+
+NOTHING = 1e-2
+"""Steps that make less than this share of 0.1 % of the torque count as none, however sure the estimate is of itself."""
+
+UNSETTLED = 1.0
+"""A last step of this many sigma is none of an estimate that has settled."""
+
+STRAYS = 0.1
+"""Rms by which a simulated motion may differ from the logged one, as a share of that motion's own rms about its mean."""
+
+
+@dataclass(eq=False)
+class Rounds:
+    """What has been simulated, run by run.
+
+    Parameters
+    ----------
+    problem : Problem
+        What is solved.
+    most : int
+        Rounds at most.
+    settled : float
+        Step, in sigma, below which parameters count as settled.
+    """
+
+    problem: Problem
+    most: int
+    settled: float
+    path: list[Array] = field(default_factory=list)
+    failures: dict[tuple[int, ...], str] = field(default_factory=dict)
+    simulations: npt.NDArray[np.intp] = field(init=False)
+    _last: tuple[MotionLog, ...] = ()
+    _small: Array = field(init=False)
+    active: npt.NDArray[np.bool_] = field(init=False)
+
+    def __post_init__(self) -> None:
+        runs = self.problem.factors.together.status.shape
+        self._small = small_steps(self.problem)
+        self.simulations, self.active = np.zeros(runs, dtype=np.intp), np.ones(runs, dtype=bool)
+
+    def start(self) -> Array:
+        """Return where to begin, shape (..., p)."""
+        X = starting_point(self.problem)
+        for run in map(tuple, np.argwhere(~np.isfinite(X).all(axis=-1)).tolist()):
+            self.fail(run, "its rows do not determine the parameters")
+        self.path.append(X)
+        return X
+
+    def until_settled(self, step: Callable[[Array], Solved], X: Array) -> Solved:
+        """Return the solution of `step` that does not move any more; runs that have settled are left as they are.
+
+        Raises
+        ------
+        IdentificationError
+            If every run fails; the reason of the first.
+        """
+        found: Solved | None = None
+        move = np.full(X.shape, np.inf)
+        for _ in range(self.most):
+            new = step(X)
+            self._require_finite(new.X, "the simulated motion does not determine the parameters")
+            found = new.where(self.active, found)
+            with np.errstate(invalid="ignore", divide="ignore"):
+                unit = np.maximum(new.sigma, NOTHING * self._small)
+                move = np.where(self.active[..., None], np.abs(new.X - X) / unit, move)
+            X = found.X
+            self.path.append(X)
+            self.active &= ~(np.max(move, axis=-1) < self.settled)
+            if not self.active.any():
+                break
+        self._require_same_motion()
+        for run in map(tuple, np.argwhere(self.active & (np.max(move, axis=-1) > UNSETTLED)).tolist()):
+            k = int(np.argmax(move[run]))
+            self.fail(
+                run,
+                f"{self.problem.names[k]} still moves by {move[run][k]:.2g} sigma after {self.most} rounds: does the simulated "
+                "loop have the controller and the motion of the log? If it does, begin nearer to the truth",
+            )
+        if found is None:
+            raise IdentificationError(f"{self.most} rounds are none: give at least 1")
+        return found
+
+    def simulated(self, X: Array) -> Simulated:
+        """Return the logs of robots with these parameters, shape (..., run, p); those of runs that failed mean nothing.
+
+        In the first round of a start that was given the controller knows the robot, so that it follows the motion.
+        """
+        informed = self.problem.simulation.start is not None and not self.simulations.any()
+        found = loop_of(self.problem).repeat(np.nan_to_num(X), informed=informed)
+        extra = X.ndim - 1 - self.simulations.ndim
+        for place, why in found.failures.items():
+            self.fail(place[extra:], why)
+        self.simulations += self.active * int(np.prod(X.shape[:extra], dtype=np.intp))
+        self._last = tuple(replace(log, q=log.q[(0,) * extra], tau=log.tau[(0,) * extra], conditions={}) for log in found.logs)
+        return found
+
+    def _require_same_motion(self) -> None:
+        """Let runs fail whose simulated motion, if a loop was simulated, is not that of their log."""
+        for measured, simulated in zip(self.problem.logs, self._last, strict=False):
+            moved = np.sqrt(np.mean((measured.q - np.mean(measured.q, axis=-2, keepdims=True)) ** 2, axis=-2))
+            off = np.sqrt(np.mean((simulated.q - measured.q) ** 2, axis=-2))
+            for *run, j in np.argwhere(off > STRAYS * moved.max(axis=-1, keepdims=True)).tolist():
+                self.fail(
+                    tuple(run),
+                    f"the simulated motion of joint {j + 1} strays by {off[(*run, j)]:.2g} rad (rms) from that of the log, "
+                    f"which moves by {moved[(*run, j)]:.2g}: the loop has another motion, controller or sampling instant",
+                )
+
+    def fail(self, run: tuple[int, ...], why: str) -> None:
+        """Let a run fail, for the first reason that is found."""
+        self.failures.setdefault(run, why)
+        self.active[run] = False
+
+    def estimate(self, found: Solved, *, influence: Influence | None = None, honest: Array | None = None) -> Estimate:
+        """Return the estimate of a solution, NaN in the runs that failed; raise IdentificationError if all did."""
+        if len(self.failures) == self.active.size:
+            raise IdentificationError(next(iter(self.failures.values())))
+        X, covariance = found.X.copy(), found.covariance
+        for run in self.failures:
+            X[run] = np.nan
+        return Estimate(
+            self.problem,
+            frozen(X),
+            frozen(covariance),
+            influence,
+            honest=None if honest is None else frozen(honest),
+            failures=self.failures,
+            path=tuple(self.path),
+            simulations=self.simulations,
+        )
+
+    def _require_finite(self, X: Array, why: str) -> None:
+        for run in map(tuple, np.argwhere(self.active & ~np.isfinite(X).all(axis=-1)).tolist()):
+            self.fail(run, why)
+
+
+def starting_point(problem: Problem) -> Array:
+    """Return where estimators begin that simulate or filter, shape (..., p): what is given, or weighted least squares."""
+    if problem.simulation.start is None:
+        return problem.scaled_factors.fit(2).X
+    shape = *problem.factors.together.status.shape, len(problem.names)
+    return np.broadcast_to(problem.simulation.start, shape).astype(np.float64)
+
+
+def loop_of(problem: Problem) -> AbstractLoop:
+    """Return the closed loop of a problem; raise IdentificationError if it has none."""
+    if problem.simulation.loop is None:
+        raise IdentificationError("the closed loop of the log is not known: give the scenario that simulates it (--loop)")
+    return problem.simulation.loop
+
+
+def rates(problem: Problem) -> list[tuple[slice, float]]:
+    """Return which rows are those of each log, and how many instants [1/s] they have."""
+    maps = problem.rows.maps
+    return [(problem.rows.of_log(k), part.signals.fs / part.grid.step) for k, part in enumerate(maps)]
+
+
+def small_steps(problem: Problem) -> Array:
+    """Return small changes of the parameters, shape (..., p): in every kind of row below `SMALL` of the torque's rms."""
+    rows = problem.rows
+    W = rows.W.reshape(*rows.W.shape[:-2], -1, rows.kinds, rows.W.shape[-1])
+    Y = rows.Y.reshape(*rows.Y.shape[:-1], -1, rows.kinds)
+    columns, torque = np.sqrt(np.mean(W**2, axis=-3)), np.sqrt(np.mean(Y**2, axis=-2))
+    share = np.max(columns / np.where(torque > 0, torque, np.inf)[..., None], axis=-2)
+    return SMALL / np.where(share > 0, share, 1.0)
