@@ -24,6 +24,12 @@ ACROSS = 3
 TICKS = 8
 """Values of an axis that have room beside it."""
 
+PANEL = 2.2
+"""Height of a panel [inch]."""
+
+REACH = 4.0
+"""How far panels of error bars reach, over the median of the bars."""
+
 WIDE = 8.0
 """Ratio of the largest to the smallest value above which an axis is logarithmic."""
 
@@ -91,6 +97,40 @@ def coverage_figure(cells: Sequence[Cell], axis: Axis) -> str:
     return _finished(figure, panels, axis.field, f"truth within {SIGMAS:g} sigma [%]")
 
 
+def bars_figure(cells: Sequence[Cell]) -> str:
+    """Return mean and standard deviation of every parameter's error, a bar a method, against the least that noise allows.
+
+    A panel reaches as far as four times the median of the bars; what is beyond points there.
+    """
+    figure, panels = _panels(cells[0].parameters, below=1.1, gap=0.65)
+    for p, (name, panel) in enumerate(panels.items()):
+        mean = 100 * np.array([cell.bias[p] for cell in cells])
+        spread = np.nan_to_num(100 * np.array([cell.deviation[p] for cell in cells]))
+        least = np.array([100 * cell.least[p] for cell in cells])
+        limit = REACH * float(np.nanmedian(np.abs(mean) + spread)) or 1.0
+        panel.axhline(0.0, color="black", lw=0.6)
+        if np.isfinite(least).any():
+            panel.axhspan(-np.nanmean(least), np.nanmean(least), color="0.8", lw=0, label="bound")
+        at = np.arange(len(cells))
+        inside = np.abs(mean) < limit
+        bars = at[inside], mean[inside], spread[inside]
+        panel.errorbar(*bars, fmt="o", ms=3, lw=1.2, capsize=2, color="#5b7db1", label="error")
+        panel.plot(at[~inside], np.sign(mean[~inside]) * 0.95 * limit, "v", ms=4, color="#b15b5b", label="beyond")
+        panel.set_ylim(-limit, limit)
+        panel.set_xticks(at, [_name(cell, cells) for cell in cells], rotation=90, fontsize=6)
+        panel.tick_params(labelbottom=True)
+        panel.set_title(name)
+    return _finished(figure, panels, "", "error [%]")
+
+
+def _name(cell: Cell, cells: Sequence[Cell]) -> str:
+    """Return what to call a method beside others: its estimator, and chain and model where they differ."""
+    words = [cell.names[1]]
+    words += [cell.names[0]] if len({other.names[0] for other in cells}) > 1 and cell.names[0] != cells[0].names[0] else []
+    words += [cell.names[2]] if len({other.names[2] for other in cells}) > 1 else []
+    return " ".join(words)
+
+
 def cost_figure(seconds: dict[str, float], runs: int) -> str:
     """Return how long a run takes, in simulation and in each method."""
     if not seconds:
@@ -107,11 +147,14 @@ def cost_figure(seconds: dict[str, float], runs: int) -> str:
     return svg(figure)
 
 
-def _panels(parameters: Sequence[str]) -> tuple[Figure, dict[str, Panel]]:
+def _panels(parameters: Sequence[str], below: float = 0.6, gap: float = 0.3) -> tuple[Figure, dict[str, Panel]]:
     columns = 4
     rows = -(-len(parameters) // columns)
-    figure = Figure(figsize=(11, 2.2 * rows + 0.5), layout="constrained")
+    height = PANEL * rows + 0.9
+    figure = Figure(figsize=(11, height))
     grid = np.atleast_1d(figure.subplots(rows, columns, sharex=True)).ravel()
+    # By hand: a layout that is solved for draws everything twice.
+    figure.subplots_adjust(0.06, below / height, 0.99, 1 - 0.6 / height, wspace=0.25, hspace=gap)
     for spare in grid[len(parameters) :]:
         spare.set_visible(False)
     return figure, dict(zip(parameters, grid, strict=False))
@@ -159,7 +202,7 @@ def _color(model: str) -> tuple[float, ...]:
 
 def _finished(figure: Figure, panels: dict[str, Panel], axis: str, y: str) -> str:
     handles, labels = next(iter(panels.values())).get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=6, frameon=False)
-    figure.supylabel(y, fontsize=9)
+    figure.legend(handles, labels, loc="upper center", ncols=6, frameon=False)
+    figure.supylabel(y, fontsize=9, x=0.005)
     figure.supxlabel(axis, fontsize=9)
     return svg(figure)

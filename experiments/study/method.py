@@ -30,9 +30,11 @@ class Method:
 
 
 def methods_of(chains: Sequence[str], estimators: Sequence[str], axes: Sequence[Axis]) -> Iterator[Method]:
-    """Yield every combination of chains, estimators and the values of axes."""
+    """Yield every combination of chains, estimators and the values of axes; estimators that see no chain with the first."""
     for name, way, combination in product(chains, estimators, list(combinations(axes))):
         chain, estimator = CHAINS.create(name), ESTIMATORS.create(way)
+        if name != chains[0] and not estimator.filtered:
+            continue
         for setting in whole_first(combination):
             chain, estimator = setting.chain(chain), setting.estimator(estimator)
         yield Method(name, way, chain, estimator, combination)

@@ -8,16 +8,23 @@ from typing import Any
 
 import numpy as np
 
+from experiments.identification.simulators import RobotPlant, ScenarioLoop
 from experiments.study.bound import bound_of
 from experiments.study.method import Method
 from experiments.study.study import Study
-from identify import Array, Estimate, ExplicitModel, IdentificationError, Problem, Status, attempt_each
+from identify import Array, Estimate, ExplicitModel, IdentificationError, Problem, Simulation, Status, attempt_each
 from identify.estimators.settle import settled
 from sim.engine.run import Run
 from sim.engine.simulation import Progress, simulate
 from sim.errors import BenchError
 from sim.scenario.scenario import Scenario
 from sim.trajectories import Reference
+
+START = 5
+"""Stream of random numbers of where estimators begin."""
+
+FARTHEST = 3.0
+"""Standard deviations at most by which a start is off."""
 
 PARTS = ("", ".sigma", ".paper_sigma", ".truth")
 """Of every parameter: the estimate, its corrected sigma, that of the paper's formula, and the truth."""
@@ -67,7 +74,8 @@ def run_shard(study: Study, runs: range, *, threads: int = 1, progress: Progress
         done += len(together)
         for method in study.methods:
             start = time.perf_counter()
-            shard.rows += _identify(study, method, simulated, list(together), truth, bound)
+            simulation = _simulation(study, method, simulated, together, truth)
+            shard.rows += _identify(study, method, simulated, list(together), truth, bound, simulation)
             shard.seconds[f"{method.chain_name} {method.estimator_name}"] += time.perf_counter() - start
     shard.rows.sort(key=lambda row: row["run"])
     return shard
@@ -103,12 +111,18 @@ def _part(progress: Progress | None, done: int, part: int, runs: int) -> Progres
 
 
 def _identify(
-    study: Study, method: Method, simulated: Run, runs: Sequence[int], truth: Mapping[str, float], bound: Array | None
+    study: Study,
+    method: Method,
+    simulated: Run,
+    runs: Sequence[int],
+    truth: Mapping[str, float],
+    bound: Array | None,
+    simulation: Simulation,
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for every run and model."""
     found: dict[str, Estimate | IdentificationError]
     try:
-        problem = settled(Problem((simulated.log,), study.subject.basis, ExplicitModel(), method.chain))
+        problem = settled(Problem((simulated.log,), study.subject.basis, ExplicitModel(), method.chain, simulation))
         found = attempt_each(problem, study.created_models, method.estimator, throw=False)
     except IdentificationError as error:
         found = dict.fromkeys(study.models, error)
@@ -123,10 +137,25 @@ def _identify(
                 yield common | {name: values[i] for name, values in columns.items()}
 
 
+def _simulation(
+    study: Study, method: Method, simulated: Run, together: Mapping[int, Reference | None], truth: Mapping[str, float]
+) -> Simulation:
+    """Return how the robots of runs are simulated anew, by estimators that need it, and where these begin."""
+    motions = tuple(motion for motion in together.values() if motion is not None)
+    needs, subject, start = method.estimator.needs, study.subject, None
+    loop = ScenarioLoop(subject, (simulated.scenario,), (simulated.log,), motions) if "loop" in needs else None
+    if study.start:
+        drawn = np.stack([np.random.default_rng([seed, START]).standard_normal(len(truth)) for seed in simulated.seeds])
+        start = np.array(list(truth.values())) * (1 + study.start * np.clip(drawn, -FARTHEST, FARTHEST))
+    return Simulation(loop, RobotPlant(subject) if "plant" in needs else None, start)
+
+
 def _failure(outcome: Estimate | IdentificationError, i: int) -> str:
     """Return why a run has no estimate; empty if it has one."""
     if isinstance(outcome, IdentificationError):
         return str(outcome)
+    if (i,) in outcome.failures:
+        return outcome.failures[(i,)]
     if outcome.status[i] != Status.OK:
         return outcome.problem.factors.together.explain((i,))
     return "" if np.isfinite(outcome.X[i]).all() else "the estimator finds no finite value"
@@ -142,6 +171,7 @@ def _columns(estimate: Estimate, truth: Mapping[str, float], bound: Array | None
         "condition_number": estimate.condition_number.tolist(),
         "rows": estimate.row_count.tolist(),
         "residual_rms": estimate.residual_rms.tolist(),
+        "simulations": [0] * runs if estimate.simulations is None else estimate.simulations.tolist(),
     }
     for p, name in enumerate(estimate.names):
         columns |= {name + part: x[:, p].tolist() for part, x in zip(names, parts, strict=True)}

@@ -96,6 +96,6 @@ def _schema(study: Study) -> pa.Schema:
         kind: Any = pa.float64() if axis.numeric else pa.string()
         fields.append(pa.field(axis.field, kind))
     fields += [pa.field(name, pa.string()) for name in ("chain", "estimator", "model", "failure")]
-    quality = {"condition_number": pa.float64(), "rows": pa.int64(), "residual_rms": pa.float64()}
+    quality = {"condition_number": pa.float64(), "rows": pa.int64(), "residual_rms": pa.float64(), "simulations": pa.int64()}
     fields += [pa.field(name, kind) for name, kind in quality.items()]
     return pa.schema(fields + [pa.field(name + part, pa.float64()) for name in study.parameters for part in parts_of(study)])

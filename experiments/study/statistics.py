@@ -50,6 +50,8 @@ class Cell:
         are one.
     bound : Array, shape (runs, p), optional
         The least standard deviations that noise allows, of a study that asks for them.
+    simulations : Array, shape (runs,), optional
+        How often the estimator simulated each run.
     """
 
     settings: Mapping[str, Any]
@@ -62,6 +64,7 @@ class Cell:
     truth: Array
     failures: Mapping[str, np.typing.NDArray[np.int64]]
     bound: Array | None = None
+    simulations: Array | None = None
 
     @property
     def runs(self) -> int:
@@ -119,6 +122,11 @@ class Cell:
         if self.bound is None:
             return np.full(len(self.parameters), np.nan)
         return np.sqrt(np.mean((self.bound / np.where(self.truth == 0, np.nan, self.truth)) ** 2, axis=0))
+
+    @property
+    def mean_simulations(self) -> float:
+        """Mean number of simulations that the estimator made of a run; 0 for one that makes none."""
+        return 0.0 if self.simulations is None or not self.runs else float(np.nan_to_num(self.simulations).mean())
 
     @property
     def typical_least(self) -> float:
@@ -184,6 +192,7 @@ def _cell(
         paper_sigma=of(".paper_sigma"),
         truth=of(".truth"),
         bound=of(".bound") if parameters[0] + ".bound" in rows else None,
+        simulations=rows["simulations"][ok].astype(np.float64) if "simulations" in rows else None,
         failures=_grouped(rows["failure"][index[failed]], rows["run"][index[failed]]),
     )
 

@@ -20,7 +20,7 @@ from experiments.study.method import Method, combinations, methods_of, whole_fir
 from identify import MODELS, AbstractModel
 from sim.scenario.scenario import Scenario
 from sim.scenario.scenario_file import from_dict
-from sim.settings import Seed, Whole, settings
+from sim.settings import NotNegative, Seed, Whole, settings
 from sim.trajectories import RandomMoves
 
 MOST_POINTS = 1_000_000
@@ -67,6 +67,9 @@ class Study:
     """Names of estimators."""
     friction: Names = ("standard",)
     """Laws of friction that are identified: standard, or a sum such as standard+stribeck."""
+    start: NotNegative = 0.0
+    """Standard deviation of the relative error of the parameters at which estimators begin that simulate or filter, drawn for
+    each run; 0: they begin at the least-squares estimate."""
     bound: bool = False
     """Whether the least error that encoders and torque noise allow is computed beside (Cramer-Rao)."""
 
@@ -194,7 +197,7 @@ class Study:
             spaced = {k: getattr(axis, k) for k in ("lowest", "highest", "count", "spacing")} if not axis.values else {}
             listed = {"values": list(axis.values)} if axis.values else {}
             axes.append({"field": axis.field, **listed, **spaced, **({"also": list(axis.also)} if axis.also else {})})
-        plain = {key: getattr(self, key) for key in ("name", "question", "seeds", "seed", "motion")}
+        plain = {key: getattr(self, key) for key in ("name", "question", "seeds", "seed", "motion", "start", "bound")}
         lists = {key: list(getattr(self, key)) for key in ("models", "chains", "estimators", "friction")}
         return {**plain, **lists, "axes": axes, "scenario": self.scenario}
 

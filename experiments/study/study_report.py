@@ -12,7 +12,7 @@ from experiments.html_report import rendered
 from experiments.study.answer import answer, grouped, headline, method, percent, short, value, where
 from experiments.study.axis import Axis
 from experiments.study.comparison import differences
-from experiments.study.figures import cost_figure, coverage_figure, error_figure, typical_figure
+from experiments.study.figures import bars_figure, cost_figure, coverage_figure, error_figure, typical_figure
 from experiments.study.statistics import Cell
 from experiments.study.study import Study
 from experiments.study.versions import versions
@@ -36,6 +36,7 @@ def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folde
         axes=[short(name) for name in cells[0].settings],
         overview=[_overview(cell) for cell in cells],
         families=[_family(title, group, main_axis(study)) for title, group in families(study, solved)],
+        bars=[(title, bars_figure(group)) for title, group in _comparisons(study, solved)],
         differences=list(_differences(solved)),
         details=[row for cell in solved for row in _details(cell, where(cell, cells))],
         failed=[
@@ -62,6 +63,12 @@ def families(study: Study, cells: Sequence[Cell]) -> Iterator[tuple[str, list[Ce
         fixed = [f"{short(name)} {value(x)}" for name, x in cell.settings.items() if name != main]
         groups.setdefault(", ".join([*fixed, f"chain {cell.names[0]}", cell.names[1]]), []).append(cell)
     yield from groups.items()
+
+
+def _comparisons(study: Study, cells: Sequence[Cell]) -> Iterator[tuple[str, list[Cell]]]:
+    """Yield the cells of each combination of settings, of studies that compare estimators."""
+    if len(study.estimators) > 1:
+        yield from grouped(cells).items()
 
 
 def worst_runs(cells: Sequence[Cell]) -> list[tuple[Cell, str, float, int]]:
@@ -92,14 +99,15 @@ def _overview(cell: Cell) -> list[str]:
     settings = [value(x) for x in cell.settings.values()]
     head = [*settings, *cell.names, f"{cell.runs}", f"{cell.failed or ''}"]
     if not cell.runs:
-        return [*head, *[""] * 5]
+        return [*head, *[""] * 6]
     worst = int(np.nan_to_num(cell.rmse).argmax())
     shares = []
     for sigma in (cell.sigma, cell.paper_sigma):
         share = 100 * cell.coverage(sigma)
         shares.append(f"{share.mean():.0f} % ({share.min():.0f} to {share.max():.0f})" if np.isfinite(share).all() else "")
     least = percent(cell.typical_least) if np.isfinite(cell.typical_least) else ""
-    return [*head, percent(cell.typical), least, f"{percent(cell.rmse[worst])} {cell.parameters[worst]}", *shares]
+    often = f"{cell.mean_simulations:.3g}" if cell.mean_simulations else ""
+    return [*head, percent(cell.typical), least, f"{percent(cell.rmse[worst])} {cell.parameters[worst]}", *shares, often]
 
 
 def _details(cell: Cell, title: str) -> Iterator[list[str]]:

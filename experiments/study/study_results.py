@@ -44,7 +44,8 @@ def write_results(page: Console, store: Store, recording: "StudyRecording | None
 def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:
     axes = [short(field) for field in store.study.varied]
     least = ["bound"] if store.study.bound else []
-    columns = [*axes[1:], "identified by", "runs", "failed", "typical error", *least, "within 2 sigma"]
+    often = ["simulations"] if any(cell.mean_simulations for cell in found) else []
+    columns = [*axes[1:], "identified by", "runs", "failed", "typical error", *least, "within 2 sigma", *often]
     grid = new_table(store.study.question, columns)
     for cell in found:
         settings = [value(x) for x in cell.settings.values()]
@@ -52,7 +53,7 @@ def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:
         errors = (
             [percent(cell.typical), *([percent(cell.typical_least)] if least else [])] if cell.runs else [""] * (1 + len(least))
         )
-        judged = *errors, f"{100 * cell.coverage(cell.sigma).mean():.0f} %" if cell.runs else ""
+        judged = *errors, f"{100 * cell.coverage(cell.sigma).mean():.0f} %" if cell.runs else "", *_often(cell, often)
         grid.add_row(*settings, method(cell, found), *numbers, *judged)
     grid.columns[0].header = axes[0]
     print_table(page, grid, len(axes) + 1)
@@ -60,6 +61,10 @@ def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:
     for reason in _reasons(found)[:MOST_REASONS]:
         page.print(Text(f"failed: {reason}"), soft_wrap=True)
     page.print(Text(f"\nwritten to {store.folder}: open {store.folder / 'report.html'}"), soft_wrap=True)
+
+
+def _often(cell: Cell, shown: Sequence[str]) -> list[str]:
+    return [f"{cell.mean_simulations:.3g}" if cell.mean_simulations else ""] if shown else []
 
 
 def _reasons(found: Sequence[Cell]) -> list[str]:
@@ -87,7 +92,8 @@ def _summary(store: Store, found: Sequence[Cell], seconds: dict[str, float]) -> 
 def _cell(cell: Cell) -> dict[str, Any]:
     chain, estimator, model = cell.names
     summary: dict[str, Any] = {"settings": dict(cell.settings), "chain": chain, "estimator": estimator, "model": model}
-    summary |= {"runs": cell.runs, "failures": {reason: len(runs) for reason, runs in cell.failures.items()}}
+    summary |= {"runs": cell.runs, "simulations": cell.mean_simulations}
+    summary |= {"failures": {reason: len(runs) for reason, runs in cell.failures.items()}}
     if cell.runs:
         numbers = {
             "truth": cell.truth.mean(axis=0),

@@ -35,6 +35,7 @@ class ClosedLoopOutputError(AbstractEstimator):
     """
 
     needs: ClassVar[frozenset[Need]] = frozenset({"rows", "loop"})
+    filtered: ClassVar[bool] = False
 
     rounds: int = 10
     settled: float = 0.05

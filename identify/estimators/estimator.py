@@ -25,6 +25,9 @@ class AbstractEstimator(ABC):
     full_rank: ClassVar[bool] = True
     """Whether it needs a motion that shows every parameter; one with a prior or a penalty does not."""
 
+    filtered: ClassVar[bool] = True
+    """Whether it sees logs through the chain; one that does not gives the same with every chain."""
+
     @abstractmethod
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate of `problem`, every run by itself."""

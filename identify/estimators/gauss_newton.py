@@ -20,8 +20,8 @@ Output = Callable[[tuple[MotionLog, ...]], Array]
 def gauss_newton(problem: Problem, rounds: Rounds, output: Output, kinds: Kinds) -> Solved:
     """Return the parameters with which simulated logs have the output of those of the problem, in the least squares.
 
-    Each round simulates all p + 1 robots at once. A step that makes the residuals grow is halved. From a start that was given
-    the first step is one of least squares of the torques on the simulated rows, for which the robot need not know its motion.
+    Each round simulates all p + 1 robots at once. A step that makes the residuals grow is halved. The first is one of least
+    squares of the torques on the simulated rows, for which a start may be far off.
 
     Parameters
     ----------
@@ -36,10 +36,9 @@ def gauss_newton(problem: Problem, rounds: Rounds, output: Output, kinds: Kinds)
     """
     measured, h = output(problem.logs), small_steps(problem)
     X = rounds.start()
-    if problem.simulation.start is not None:
-        W = problem.at(rounds.simulated(X).logs).W
-        X = solve_with(Kinds.of_rows(problem), problem.rows.Y, W, W).X
-        rounds.path.append(X)
+    W = problem.at(rounds.simulated(X).logs).W
+    X = solve_with(Kinds.of_rows(problem), problem.rows.Y, W, W).X
+    rounds.path.append(X)
     line, p = _Line(), X.shape[-1]
     unit = np.eye(p).reshape(p, *[1] * (X.ndim - 1), p)
 

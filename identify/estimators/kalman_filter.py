@@ -25,7 +25,7 @@ ALPHA, BETA = 0.1, 2.0
 """Spread of the sigma points, and 2 for normal distributions (E. A. Wan and R. van der Merwe, "The unscented Kalman filter for
 nonlinear estimation", Proc. IEEE AS-SPCC 2000, 153-158)."""
 
-TUNINGS = 0.3, 1.0, 3.0, 10.0, 30.0
+TUNINGS = 1.0, 3.0, 10.0
 """Process noise that is tried, over the torque noise of the log."""
 
 LEAST = 1e-9
@@ -54,6 +54,7 @@ class UnscentedKalmanFilter(AbstractEstimator):
     """
 
     needs: ClassVar[frozenset[Need]] = frozenset({"logs"})
+    filtered: ClassVar[bool] = False
 
     spread: float = 0.15
 

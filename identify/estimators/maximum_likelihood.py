@@ -47,6 +47,7 @@ class MaximumLikelihood(AbstractEstimator):
     """
 
     needs: ClassVar[frozenset[Need]] = frozenset({"logs"})
+    filtered: ClassVar[bool] = False
 
     find_delay: bool = False
 

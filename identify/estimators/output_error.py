@@ -44,6 +44,7 @@ class OutputError(AbstractEstimator):
     """
 
     needs: ClassVar[frozenset[Need]] = frozenset({"rows", "plant"})
+    filtered: ClassVar[bool] = False
 
     length: float = 0.3
     rounds: int = 15

@@ -102,9 +102,9 @@ class Rounds:
     def simulated(self, X: Array) -> Simulated:
         """Return the logs of robots with these parameters, shape (..., run, p); those of runs that failed mean nothing.
 
-        In the first round of a start that was given the controller knows the robot, so that it follows the motion.
+        In the first round the controller knows the robot, so that it follows the motion, however far off the start is.
         """
-        informed = self.problem.simulation.start is not None and not self.simulations.any()
+        informed = not self.simulations.any()
         found = loop_of(self.problem).repeat(np.nan_to_num(X), informed=informed)
         extra = X.ndim - 1 - self.simulations.ndim
         for place, why in found.failures.items():

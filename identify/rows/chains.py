@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from identify.plugins import PluginTable
 from identify.rows.chain import Chain
-from identify.rows.operators import FirLowPass, IirLowPass
+from identify.rows.operators import FirLowPass, IirLowPass, Samples
 from identify.signals.differentiators import CentralDifference
 from identify.signals.masks import NoMask, ReversalMask
 from identify.signals.prefilters import ButterworthPrefilter, NoPrefilter
@@ -26,6 +26,11 @@ def paper_masked_chain() -> Chain:
     return replace(paper_chain(), mask=ReversalMask())
 
 
+def unfiltered_chain() -> Chain:
+    """As idbench, without a filter: every sample is a row."""
+    return replace(idbench_chain(), operator=Samples())
+
+
 CHAINS: PluginTable[Chain] = PluginTable(
     "chains",
     Chain,
@@ -33,5 +38,6 @@ CHAINS: PluginTable[Chain] = PluginTable(
         "paper": paper_chain,
         "paper_masked": paper_masked_chain,
         "idbench": idbench_chain,
+        "unfiltered": unfiltered_chain,
     },
 )

@@ -12,6 +12,9 @@ from sim.robot.motors import Array
 from sim.robot.robot import Robot
 from sim.scenario.scenario import Physics
 
+STEP = 0.002
+"""Longest physics step [s]: of half a second nothing is lost by it."""
+
 
 def shoot(
     robot: Robot, vary: Mapping[str, npt.ArrayLike], q: Array, qd: Array, log: MotionLog, first: npt.ArrayLike, count: int
@@ -34,7 +37,7 @@ def shoot(
         Number of samples, the first included.
     """
     start, nsim = np.asarray(first), len(q)
-    physics = Physics()
+    physics = Physics(step=STEP)
     h, per_sample = physics_steps(log.fs, physics.step)
     plant = Plant(robot, nsim, physics, h, vary, 0)
     plant.q[:], plant.qd[:] = q, qd

@@ -140,7 +140,7 @@ def test_every_estimator_finds_what_didim_finds_from_the_same_torques(sixteen, t
         for name in ("CLIE", "DIDIM")
     )
     assert np.abs((input_error.X - direct.X) / direct.best_sigma).max() < 2
-    assert (input_error.simulations % 9 == 0).all()
+    assert input_error.simulations % 9 == 1  # p + 1 a round, after one of DIDIM
 
 
 @dataclass(frozen=True)

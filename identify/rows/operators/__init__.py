@@ -5,6 +5,7 @@ from identify.rows.operators.fir_low_pass import FirLowPass as FirLowPass
 from identify.rows.operators.iir_low_pass import IirLowPass as IirLowPass
 from identify.rows.operators.modulating import ModulatingFunctions as ModulatingFunctions
 from identify.rows.operators.operator import AbstractOperator as AbstractOperator
+from identify.rows.operators.samples import Samples as Samples
 from identify.rows.operators.windows import Windows as Windows
 
 OPERATORS: PluginTable[AbstractOperator] = PluginTable(
@@ -15,5 +16,6 @@ OPERATORS: PluginTable[AbstractOperator] = PluginTable(
         "iir": IirLowPass,
         "windows": Windows,
         "modulating": ModulatingFunctions,
+        "samples": Samples,
     },
 )
