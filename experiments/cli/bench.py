@@ -9,6 +9,7 @@ import tyro
 from experiments.cli.app import APP
 from experiments.cli.interruption import importing
 from experiments.cli.options import Asked, Count, File, Folder, Json, Number, Robot, Scenario, Watched, Window
+from experiments.identification.consistent_estimate import Consistency
 from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.parameters import Parameters
 from experiments.identification.start import Start
@@ -33,6 +34,9 @@ class Run:
     """GLS, ML, OLS, WLS, IRLS, TLS, RLS, IV, DIDIM, CLIE, CLOE, OE, UKF, ML-delay, or of a plug-in: docs/estimators.md."""
     start: Start = "least-squares"
     """Where estimators begin that simulate or filter: at the least-squares estimate, or at the robot's file."""
+    consistent: Consistency = "no"
+    """Move estimates to the nearest at which bodies can exist, in the metric of their own sigma (extra `consistent`); what no
+    motion shows is held near the file by the constant pull-back or the entropic distance."""
     study: Annotated[Path | None, tyro.conf.arg(name="from", metavar="DIR", help_behavior_hint="")] = None
     """Instead of a scenario: the folder of a study, one run of which is made again."""
     index: Number = None

@@ -59,7 +59,7 @@ def identify(asked: Identify) -> None:
         place.check()
     named = Identified(  # complains of names first
         (), subject, models=models, chain=asked.chain, estimator=asked.estimator, name=asked.label, loops=_loops(asked),
-        start=asked.start,
+        start=asked.start, consistent=asked.consistent,
     )  # fmt: skip
     named = with_chain(asked, named)
     with ExitStack() as stack:

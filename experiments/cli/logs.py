@@ -25,6 +25,7 @@ from experiments.cli.options import (
     Torque,
     Watched,
 )
+from experiments.identification.consistent_estimate import Consistency
 from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.parameters import Parameters
 from experiments.identification.start import Start
@@ -69,6 +70,9 @@ class Identify:
     drive. Of a run's folder its own."""
     start: Start = "least-squares"
     """Where estimators begin that simulate or filter: at the least-squares estimate, or at the robot's file."""
+    consistent: Consistency = "no"
+    """Move estimates to the nearest at which bodies can exist, in the metric of their own sigma (extra `consistent`); what no
+    motion shows is held near the file by the constant pull-back or the entropic distance."""
     follow: Annotated[float | None, tyro.conf.arg(metavar="SECONDS", help_behavior_hint="")] = None
     """Identify a CSV log while it is being written, until it has not grown for so long; then as a whole. With --live or
     --serve estimates and residuals are seen to grow."""

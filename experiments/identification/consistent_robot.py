@@ -5,17 +5,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import final
 
-import numpy as np
-
+from experiments.identification.consistent_estimate import consistent_of
 from experiments.identification.identified import Identified
 from experiments.identification.results import write_whole
-from identify import Array, Consistent, consistent_parameters, transfer
+from identify import Consistent
 from sim.robot.rewrite import compiled, rewritten
 from sim.robot.robot import Robot
 from sim.robot.tree import standard_parameters
-
-SURE = 0.1
-"""Sigma of what was left out, as a share of the least of the others."""
 
 SIGMAS = 3.0
 """Departures from the estimate beyond this many sigma are messages."""
@@ -40,22 +36,7 @@ class Written:
     @cached_property
     def consistent(self) -> Consistent:
         """Its standard parameters."""
-        subject = self.found.subject
-        given, grouping = standard_parameters(subject.robot), subject.grouping
-        values = np.array([given.get(name, 0.0) for name in grouping.standard.names])
-        T = np.eye(len(grouping.names)) if subject.base else transfer(subject.tree, subject.whole, grouping.basis)
-        X, C = self._of_all()
-        return consistent_parameters(grouping, T @ X, T @ C @ T.T, values)
-
-    def _of_all(self) -> tuple[Array, Array]:
-        """Return estimate and covariance with the parameters that were left out: they are zero, and known to be."""
-        estimate, names = self.found.estimates[self.model], self.found.subject.whole.names
-        C = estimate.best_covariance
-        place = [names.index(name) for name in estimate.names]
-        X, sure = np.zeros(len(names)), SURE * np.sqrt(np.diagonal(C).min())
-        whole = sure**2 * np.eye(len(names))
-        X[place], whole[np.ix_(place, place)] = estimate.X, C
-        return X, whole
+        return consistent_of(self.found.subject, self.found.estimates[self.model])
 
     @cached_property
     def text(self) -> str:

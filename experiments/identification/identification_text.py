@@ -6,6 +6,7 @@ from math import isfinite, log2, pi
 from rich.console import Console
 from rich.text import Text
 
+from experiments.identification.consistent_estimate import words_of_consistency
 from experiments.identification.identified import Identified
 from experiments.identification.iterations import words_of_iterations
 from experiments.identification.validated import Validated
@@ -58,6 +59,10 @@ def print_identified(console: Console, found: Identified, title: str) -> None:
     console.print(Text(_noise(found)), soft_wrap=True)
     for words in words_of_iterations(found):
         console.print(Text(words), soft_wrap=True)
+    if found.consistent != "no" and found.known is None:
+        before = {name: e for name, e in found.unconstrained.items() if isinstance(e, Estimate)}
+        for words in words_of_consistency(before, found.estimates):
+            console.print(Text(words), soft_wrap=True)
     if len(found.logs) > 1 and found.torque_errors:
         _print_logs(console, found)
     console.print()

@@ -8,6 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from experiments.identification.consistent_estimate import Consistency, made_consistent
 from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.results import summarize
 from experiments.identification.simulators import RobotPlant, ScenarioLoop
@@ -32,6 +33,7 @@ from identify import (
 )
 from identify.blame import blamed
 from identify.estimators.settle import settled
+from identify.parameters.priors import Prior
 from identify.rows.rows import Rows
 from identify.signals.masks import ReversalMask
 from sim.scenario.scenario import Scenario
@@ -65,6 +67,8 @@ class Identified:
         The closed loops in which the logs were recorded, for estimators that simulate them: one for each log.
     start : {"least-squares", "file"}
         Where estimators begin that simulate or filter: at the least-squares estimate, or at the parameters of the robot's file.
+    consistent : {"no", "pullback", "entropic"}
+        Whether estimates are moved to where bodies can exist.
     known : mapping of str to Estimate, optional
         Estimates that were made from other logs, to be looked at on these.
     """
@@ -81,6 +85,7 @@ class Identified:
     log_names: tuple[str, ...] = ()
     loops: tuple[Scenario, ...] = ()
     start: Start = "least-squares"
+    consistent: Consistency = "no"
     known: Mapping[str, Estimate | IdentificationError] | None = None
 
     def __post_init__(self) -> None:
@@ -137,8 +142,24 @@ class Identified:
         """The estimate of every model, or why it has none."""
         if self.known is not None:
             return dict(self.known)
-        models = {name: MODELS.create(name) for name in self.models}
-        return attempt_each(self.problem, models, self.solver)
+        found, consistent = self.unconstrained, self.consistent
+        if consistent == "no":
+            return found
+        return {
+            name: self._moved(outcome, consistent) if isinstance(outcome, Estimate) else outcome
+            for name, outcome in found.items()
+        }
+
+    @cached_property
+    def unconstrained(self) -> dict[str, Estimate | IdentificationError]:
+        """The estimate of every model, or why it has none, whether bodies with it can exist or not."""
+        return attempt_each(self.problem, {name: MODELS.create(name) for name in self.models}, self.solver)
+
+    def _moved(self, estimate: Estimate, prior: Prior) -> Estimate | IdentificationError:
+        try:
+            return made_consistent(self.subject, estimate, prior)
+        except IdentificationError as error:
+            return error
 
     def on(self, k: int) -> Self:
         """Return the identification as it looks on one of its logs: parameters and sigma of all, rows of that one."""
@@ -231,6 +252,7 @@ class Identified:
             "robot": self.subject.name,
             "chain": self.chain,
             "estimator": self.estimator,
+            "consistent": self.consistent,
             "torque": {"meaning": channel.meaning, "delay": channel.delay, "gain": channel.gain},
             "found_delay": None if delay is None else {"delay": delay[0], "sigma": delay[1]},
             "noise": self.noise,

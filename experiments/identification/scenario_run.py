@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from experiments.errors import ExperimentError
+from experiments.identification.consistent_estimate import Consistency
 from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.friction_choice import with_suitable_friction
 from experiments.identification.identified import Identified
@@ -44,6 +45,8 @@ class ScenarioRun:
         Which parameters are identified.
     start : {"least-squares", "file"}
         Where estimators begin that simulate or filter.
+    consistent : {"no", "pullback", "entropic"}
+        Whether estimates are moved to where bodies can exist.
     """
 
     scenario: Scenario
@@ -54,6 +57,7 @@ class ScenarioRun:
     watch: Watch | None = None
     parameters: Parameters = Parameters()  # noqa: RUF009  # frozen
     start: Start = "least-squares"
+    consistent: Consistency = "no"
 
     def __post_init__(self) -> None:
         # What is wrong with names, or a robot that is no SCARA, is reported before the simulation.
@@ -85,7 +89,7 @@ class ScenarioRun:
         """What the models make of its log."""
         log, name = (self.run.alone(),), f"{self.chain}-{self.estimator}-study" if self.method else ""
         found = Identified(log, self.subject, chain=self.chain, estimator=self.estimator, method=self.method, name=name)
-        found = replace(found, loops=(self.scenario,), start=self.start)
+        found = replace(found, loops=(self.scenario,), start=self.start, consistent=self.consistent)
         if self.subject.laws.auto:
             found, _ = with_suitable_friction(found)
         return replace(found, truth=found.subject.truth(self.run.robots[0], self.scenario.friction))

@@ -26,6 +26,9 @@ from identify.signals.signals import Signals
 
 Weights = Literal["measured", "own"]
 
+ROUNDING = 1e-9
+"""Share by which frequencies may differ that are the same: of a file they are the mean of its steps."""
+
 SAMPLED = 8
 """Pieces of long logs from which noise is estimated and propagated."""
 
@@ -200,7 +203,8 @@ class Problem:
         self.require_rows("rows at another log need those of this one, and ")
         logs = [log] if isinstance(log, MotionLog) else list(log)
         _require_logs(logs)
-        if [(one.q.shape[-2:], one.fs) for one in logs] != [(one.q.shape[-2:], one.fs) for one in self.logs]:
+        alike = len(logs) == len(self.logs) and all(map(_alike, logs, self.logs))
+        if not alike:
             raise LogError(
                 "rows at other logs need one log for each of the problem's, of the same length, frequency and joints"
             )
@@ -255,6 +259,11 @@ class Problem:
 
     def _scaled(self, rows: Rows) -> Factors:
         return rows.factors if self.row_weights is None else rows.factors_of(self.row_weights.of(rows))
+
+
+def _alike(one: MotionLog, other: MotionLog) -> bool:
+    """Return whether two logs have the same samples, joints and, but for rounding, frequency."""
+    return one.q.shape[-2:] == other.q.shape[-2:] and abs(one.fs / other.fs - 1) < ROUNDING
 
 
 def _require_logs(logs: Sequence[object]) -> None:

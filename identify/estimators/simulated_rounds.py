@@ -24,8 +24,9 @@ NOTHING = 1e-2
 UNSETTLED = 1.0
 """A last step of this many sigma is none of an estimate that has settled."""
 
-STRAYS = 0.1
-"""Rms by which a simulated motion may differ from the logged one, as a share of that motion's own rms about its mean."""
+STRAYS, ELSEWHERE = 0.1, 0.3
+"""Rms by which a simulated motion may differ from the logged one in the end, and in the first round, as a share of that motion's
+own rms about its mean."""
 
 
 @dataclass(eq=False)
@@ -87,7 +88,7 @@ class Rounds:
             self.active &= ~(np.max(move, axis=-1) < self.settled)
             if not self.active.any():
                 break
-        self._require_same_motion()
+        self._require_same_motion(STRAYS)
         for run in map(tuple, np.argwhere(self.active & (np.max(move, axis=-1) > UNSETTLED)).tolist()):
             k = int(np.argmax(move[run]))
             self.fail(
@@ -111,14 +112,16 @@ class Rounds:
             self.fail(place[extra:], why)
         self.simulations += self.active * int(np.prod(X.shape[:extra], dtype=np.intp))
         self._last = tuple(replace(log, q=log.q[(0,) * extra], tau=log.tau[(0,) * extra], conditions={}) for log in found.logs)
+        if informed:
+            self._require_same_motion(ELSEWHERE)
         return found
 
-    def _require_same_motion(self) -> None:
+    def _require_same_motion(self, most: float) -> None:
         """Let runs fail whose simulated motion, if a loop was simulated, is not that of their log."""
         for measured, simulated in zip(self.problem.logs, self._last, strict=False):
             moved = np.sqrt(np.mean((measured.q - np.mean(measured.q, axis=-2, keepdims=True)) ** 2, axis=-2))
             off = np.sqrt(np.mean((simulated.q - measured.q) ** 2, axis=-2))
-            for *run, j in np.argwhere(off > STRAYS * moved.max(axis=-1, keepdims=True)).tolist():
+            for *run, j in np.argwhere(off > most * moved.max(axis=-1, keepdims=True)).tolist():
                 self.fail(
                     tuple(run),
                     f"the simulated motion of joint {j + 1} strays by {off[(*run, j)]:.2g} rad (rms) from that of the log, "

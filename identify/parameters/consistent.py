@@ -13,6 +13,7 @@ from identify.basis.parameter import NOT_NEGATIVE, Parameter
 from identify.data.kinematics import INERTIAL
 from identify.errors import IdentificationError
 from identify.parameters.base_parameters import BaseParameters
+from identify.parameters.priors import Prior, entropic_terms
 from identify.parameters.pseudo_inertia import PSEUDO, inertial, pseudo_inertia
 
 NEAR = 1e-4
@@ -64,19 +65,27 @@ class Consistent:
         return bool(self.distance**2 <= scipy.stats.chi2.ppf(CONFIDENCE, len(self.base)))
 
 
-def consistent_parameters(grouping: BaseParameters, X: Array, covariance: Array, given: Array) -> Consistent:
+def consistent_parameters(
+    grouping: BaseParameters,
+    X: Array,
+    covariance: Array,
+    given: Array,
+    *,
+    prior: Prior = "pullback",
+    weight: float = NEAR,
+) -> Consistent:
     """Return the standard parameters with positive pseudo-inertias that agree best with an estimate.
 
-    They minimise (K x - X)' C^-1 (K x - X) + `NEAR` d(x, given) over all x for which every link's pseudo-inertia
+    They minimise (K x - X)' C^-1 (K x - X) + weight d(x, given) over all x for which every link's pseudo-inertia
 
         [ tr(I)/2 1 - I    MS ]
         [ MS'              M  ]
 
     is positive definite (P. M. Wensing, S. Kim and J.-J. Slotine, "Linear matrix inequalities for physically consistent
-    inertial parameter identification", IEEE RA-L 3 (2018) 60-67), and armatures and frictions are not negative. d, the squared
-    distance to the given model, is tr((S^-1 dS)^2) of each link's pseudo-inertia S, which depends on no frame (T. Lee,
-    P. M. Wensing and F. C. Park, "Geometric robot dynamic identification: a convex programming approach", IEEE T-RO 36 (2020)
-    348-365). So base values are the estimate's where bodies can have them, and what no motion shows stays as it was given.
+    inertial parameter identification", IEEE RA-L 3 (2018) 60-67), and armatures and frictions are not negative. d, the
+    distance to the given model, depends on no frame (`Prior`: T. Lee, P. M. Wensing and F. C. Park, "Geometric robot dynamic
+    identification: a convex programming approach", IEEE T-RO 36 (2020) 348-365). So base values are the estimate's where
+    bodies can have them, and what no motion shows stays as it was given.
 
     Parameters
     ----------
@@ -88,6 +97,10 @@ def consistent_parameters(grouping: BaseParameters, X: Array, covariance: Array,
         C.
     given : Array, shape (p,)
         Standard parameters of the given model, consistent themselves.
+    prior : {"pullback", "entropic"}
+        d of the links; of armatures and frictions it is the square of their relative change.
+    weight : float
+        What a step to twice the given model costs [squared sigma of the estimate].
 
     Raises
     ------
@@ -104,26 +117,42 @@ def consistent_parameters(grouping: BaseParameters, X: Array, covariance: Array,
     J = problem.scale[:, None] * np.linalg.pinv(grouping.K * problem.scale) @ root
     N = problem.scale[:, None] * scipy.linalg.null_space(grouping.K * problem.scale)
     T = np.concatenate([J, N], axis=1)
+    x = _solved(clarabel, problem, (start, T, len(X)), prior, weight)
+    standard = problem.projected(start + T @ x)
+    base = grouping.base(standard)
+    distance = float(np.linalg.norm(np.linalg.solve(root, base - X)))
+    return Consistent(names, standard, base, (base - X) / np.sqrt(np.diagonal(covariance)), distance)
+
+
+def _solved(clarabel: ModuleType, problem: "_Problem", way: tuple[Array, Array, int], prior: Prior, weight: float) -> Array:
+    """Return v of x = start + T v with the least sum of the squares of its first b and of weight d(x, given).
+
+    `way` is start, T and b.
+    """
+    start, T, b = way
     steps, away = T / problem.scale[:, None], (start - problem.given) / problem.scale
-    quadratic = NEAR * steps.T @ problem.metric @ steps + np.diag(np.r_[np.ones(len(X)), np.zeros(N.shape[1])])
+    metric = problem.metric if prior == "pullback" else problem.metric_of_drives
+    quadratic = weight * steps.T @ metric @ steps + np.diag(np.r_[np.ones(b), np.zeros(T.shape[1] - b)])
+    linear = 2 * weight * steps.T @ metric @ away
     G, h, (signs, links) = problem.cones()
+    cones = [clarabel.NonnegativeConeT(signs), *(clarabel.PSDTriangleConeT(4) for _ in range(links))]
+    G, h = G @ T, h - G @ start
+    if prior == "entropic":
+        terms = entropic_terms(problem.links, problem.inertias, len(start), weight, clarabel)
+        x_of = scipy.linalg.block_diag(T, np.eye(terms.own))
+        linear = np.r_[linear, np.zeros(terms.own)] + terms.linear @ x_of
+        G = np.concatenate([np.pad(G, ((0, 0), (0, terms.own))), terms.G @ x_of])
+        h, cones = np.r_[h, terms.h - terms.G[:, : len(start)] @ start], [*cones, *terms.cones]
+        quadratic = np.pad(quadratic, (0, terms.own))
     found = clarabel.DefaultSolver(
-        scipy.sparse.csc_matrix(np.triu(2 * quadratic)),
-        2 * NEAR * steps.T @ problem.metric @ away,
-        scipy.sparse.csc_matrix(G @ T),
-        h - G @ start,
-        [clarabel.NonnegativeConeT(signs), *(clarabel.PSDTriangleConeT(4) for _ in range(links))],
-        _quiet(clarabel),
+        scipy.sparse.csc_matrix(np.triu(2 * quadratic)), linear, scipy.sparse.csc_matrix(G), h, cones, _quiet(clarabel)
     ).solve()
     if str(found.status) not in ("Solved", "AlmostSolved"):
         raise IdentificationError(
             f"bodies that can exist come nowhere near these parameters (the solver ends with {found.status}): is the torque's "
             "sign, unit and delay right?"
         )
-    standard = problem.projected(start + T @ np.array(found.x))
-    base = grouping.base(standard)
-    distance = float(np.linalg.norm(np.linalg.solve(root, base - X)))
-    return Consistent(names, standard, base, (base - X) / np.sqrt(np.diagonal(covariance)), distance)
+    return np.array(found.x)[: T.shape[1]]
 
 
 class _Problem:
@@ -133,21 +162,29 @@ class _Problem:
         self._p, self.given = len(parameters), given
         links = sorted({p.joint for p in parameters if p.kind == "mass" and p.joint is not None})
         place = {(p.symbol, p.joint): i for i, p in enumerate(parameters)}
-        self._links = [[place[x, joint] for x in INERTIAL] for joint in links]
+        self.links = [[place[x, joint] for x in INERTIAL] for joint in links]
         self._signed = [i for i, parameter in enumerate(parameters) if parameter.kind in NOT_NEGATIVE]
-        self._inertias = [_thick(pseudo_inertia(given[link]), j + 1) for j, link in zip(links, self._links, strict=True)]
+        self.inertias = [_thick(pseudo_inertia(given[link]), j + 1) for j, link in zip(links, self.links, strict=True)]
         self.scale, self.metric = np.where(given == 0, 1.0, np.abs(given)), np.eye(self._p)
-        for S, link in zip(self._inertias, self._links, strict=True):
+        for S, link in zip(self.inertias, self.links, strict=True):
             self.scale[link] = _spread(S)
             steps = [np.linalg.solve(S, PSEUDO[k] * self.scale[i]) for k, i in enumerate(link)]
             self.metric[np.ix_(link, link)] = [[np.trace(a @ b) for b in steps] for a in steps]
+
+    @property
+    def metric_of_drives(self) -> Array:
+        """The metric of what is no inertia of a link."""
+        metric = self.metric.copy()
+        for link in self.links:
+            metric[np.ix_(link, link)] = 0.0
+        return metric
 
     def cones(self) -> tuple[Array, Array, tuple[int, int]]:
         """Return G, h of h - G x in the cones, and the numbers of signs and of matrices among them."""
         rows = [-np.eye(self._p)[self._signed]]
         limits = [np.zeros(len(self._signed))]
         lower = [(i, j) for j in range(4) for i in range(j + 1)]  # of the upper triangle, column by column
-        for S_given, link in zip(self._inertias, self._links, strict=True):
+        for S_given, link in zip(self.inertias, self.links, strict=True):
             weights = np.array([[S[i, j] * (1.0 if i == j else _ROOT2) for S in PSEUDO] for i, j in lower])
             block = np.zeros((len(lower), self._p))
             size = np.trace(S_given)  # a gram of a wrist and a ton of a base are solved to the same share
@@ -155,13 +192,13 @@ class _Problem:
             rows.append(block)
             smallest = max(MARGIN * np.linalg.eigvalsh(S_given)[0] / size, SOLVED)
             limits.append(np.array([-smallest if i == j else 0.0 for i, j in lower]))
-        return np.concatenate(rows), np.concatenate(limits), (len(self._signed), len(self._links))
+        return np.concatenate(rows), np.concatenate(limits), (len(self._signed), len(self.links))
 
     def projected(self, standard: Array) -> Array:
         """Return parameters whose cones are kept exactly: what the solver leaves outside is moved to their edge."""
         inside = standard.copy()
         inside[self._signed] = np.maximum(inside[self._signed], 0.0)
-        for link in self._links:
+        for link in self.links:
             S = pseudo_inertia(inside[link])
             values, axes = np.linalg.eigh(S)
             least = SOLVED / 2 * np.trace(S)

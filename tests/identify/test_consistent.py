@@ -135,3 +135,28 @@ def test_a_plate_is_given_some_thickness():
     found = consistent_parameters(grouping, grouping.base(X), 1e-6 * np.eye(8), X)
     assert found.agrees
     assert min(np.linalg.eigvalsh(S)[0] for S in links(grouping, found.standard)) > -1e-9
+
+
+def test_both_priors_agree_near_the_given_model(arm):
+    """A step of 1 %: the same base values to a few per cent of the step."""
+    grouping, X = arm
+    base = grouping.base(X)
+    C, near = np.diag((0.1 * np.maximum(np.abs(base), 0.01)) ** 2), X * 1.01
+    ways = [consistent_parameters(grouping, base, C, near, prior=prior, weight=1.0) for prior in ("pullback", "entropic")]
+    assert np.abs(ways[0].base - ways[1].base).max() < 0.05 * np.abs(ways[0].base - base).max() + 1e-6 * np.abs(base).max()
+
+
+def test_the_entropic_prior_keeps_a_link_from_becoming_thin():
+    """An estimate of ZZ2 that takes a slender link: which of all such links it is, the prior says."""
+    robot = Robot.load("scara")
+    tree = kinematic_tree(robot)
+    grouping = BaseParameters.of(tree, tree_basis(tree))
+    truth = standard_parameters(robot)
+    X = np.array([truth[name] for name in grouping.standard.names])
+    base = grouping.base(X)
+    base[grouping.names.index("ZZ2")] = 0.005
+    C = np.diag(np.full(8, 1e-3) ** 2)
+    thin, thick = (consistent_parameters(grouping, base, C, X, prior=prior) for prior in ("pullback", "entropic"))
+    least = [min(np.linalg.eigvalsh(S)[0] for S in links(grouping, found.standard)) for found in (thin, thick)]
+    assert least[1] > 3 * least[0] > 0
+    assert max(thin.distance, thick.distance) < 1

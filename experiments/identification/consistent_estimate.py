@@ -1,0 +1,71 @@
+"""Estimates moved to where bodies can exist."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from experiments.identification.subject import Subject
+from identify import Array, Consistent, Estimate, consistent_parameters, transfer
+from identify.parameters.consistent import NEAR
+from identify.parameters.priors import Prior
+from sim.robot.tree import standard_parameters
+
+Consistency = Literal["no", "pullback", "entropic"]
+"""Whether estimates are moved to where bodies can exist, and by which distance what no motion shows is held."""
+
+SURE = 0.1
+"""Sigma of what was left out, as a share of the least of the others."""
+
+
+def consistent_of(subject: Subject, estimate: Estimate, prior: Prior = "pullback", weight: float = NEAR) -> Consistent:
+    """Return the physically consistent standard parameters that agree best with an estimate."""
+    given, grouping = standard_parameters(subject.robot), subject.grouping
+    values = np.array([given.get(name, 0.0) for name in grouping.standard.names])
+    T = _to_base(subject)
+    X, C = _of_all(subject, estimate)
+    return consistent_parameters(grouping, T @ X, T @ C @ T.T, values, prior=prior, weight=weight)
+
+
+def made_consistent(subject: Subject, estimate: Estimate, prior: Prior) -> Estimate:
+    """Return an estimate with the parameters of bodies that can exist, nearest in the metric of its own covariance.
+
+    Its covariance stays: where the estimate is consistent already nothing moves, and elsewhere it is too large, not too small.
+    """
+    found = consistent_of(subject, estimate, prior)
+    whole = np.linalg.lstsq(_to_base(subject), found.base)[0]
+    names = subject.whole.names
+    X = np.array([whole[names.index(name)] for name in estimate.names])
+    return replace(estimate, X=X, honest=estimate.best_covariance, whiten=None)
+
+
+def words_of_consistency(before: dict[str, Estimate], after: dict[str, Estimate]) -> Iterator[str]:
+    """Yield by how much estimates were moved, model by model."""
+    for model, estimate in after.items():
+        sigma = before[model].best_sigma
+        moved = np.abs(estimate.X - before[model].X) / np.where(sigma > 0, sigma, 1.0)
+        k = int(np.argmax(moved))
+        most = f"{estimate.names[k]} most, by {moved[k]:.2g} sigma" if moved[k] >= LITTLE else "nothing by a tenth of a sigma"
+        yield f"{model}: moved to where bodies can exist: {most}"
+
+
+LITTLE = 0.1
+"""Moves of less than this many sigma are not named."""
+
+
+def _to_base(subject: Subject) -> Array:
+    """Return what makes base parameters of those that could be identified."""
+    if subject.base is not None:
+        return np.eye(len(subject.grouping.names))
+    return transfer(subject.tree, subject.whole, subject.grouping.basis)
+
+
+def _of_all(subject: Subject, estimate: Estimate) -> tuple[Array, Array]:
+    """Return estimate and covariance with the parameters that were left out: they are zero, and known to be."""
+    names, C = subject.whole.names, estimate.best_covariance
+    place = [names.index(name) for name in estimate.names]
+    X, sure = np.zeros(len(names)), SURE * np.sqrt(np.diagonal(C).min())
+    whole = sure**2 * np.eye(len(names))
+    X[place], whole[np.ix_(place, place)] = estimate.X, C
+    return X, whole

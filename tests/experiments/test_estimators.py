@@ -1,0 +1,86 @@
+"""Estimators that simulate, and estimates of bodies that can exist, on the command line."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identify.files.log_file import read_log, write_log
+from sim.scenario.scenario_file import load, to_toml
+from sim.trajectories import RandomMoves
+
+MOVES = RandomMoves(moves=8, durations=(1.3, 1.3), rest=0.7, seed=1)
+
+
+@pytest.fixture(scope="module")
+def scenario(tmp_path_factory):
+    path = tmp_path_factory.mktemp("loop") / "quantized.toml"
+    path.write_text(to_toml(replace(load("quantization"), trajectory=MOVES)))
+    return path
+
+
+@pytest.fixture
+def ran(idbench, scenario, tmp_path):
+    assert idbench("run", scenario, "--out", "run", "--no-rerun", "--estimator", "IV")[0] == 0
+    return tmp_path / "run"
+
+
+def test_a_run_knows_its_own_loop_and_says_whether_noise_in_W_matters(idbench, ran):
+    summary = json.loads((ran / "summary.json").read_text())
+    rounds = summary["iterations"]["explicit"]
+    assert rounds["simulations"] <= 5
+    assert rounds["noise_in_W"]["matters"] is False
+    assert len(rounds["path"][0]) == 8
+    code, out, _ = idbench("identify", ran, "--estimator", "DIDIM", "--start", "file", "--model", "explicit", "--no-rerun")
+    assert code == 0
+    assert "explicit: settled after" in out
+    assert "explicit: good" in out
+
+
+def test_a_log_alone_needs_its_loop(idbench, ran, scenario, tmp_path):
+    write_log(read_log(ran / "log.parquet"), tmp_path / "log.parquet")
+    words = ("identify", tmp_path / "log.parquet", "--estimator", "DIDIM", "--model", "explicit")
+    code, out, _ = idbench(*words, "--loop", scenario)
+    assert code == 0
+    assert "settled after" in out
+    wrong = {
+        (): "--loop scenario.toml",
+        ("--loop", scenario, scenario): "2 loops are given for 1 logs",
+        ("--loop", "arm"): "it is none of scara",
+        ("--loop", "ideal"): "the simulated motion of joint",
+    }
+    for more, message in wrong.items():
+        code, _, err = idbench(*words, *more)
+        assert code == 2
+        assert message in err
+        assert len(err.strip().splitlines()) == 1
+
+
+def test_one_model_that_cannot_takes_nothing_from_the_others(idbench, ran):
+    """CLIE compares torques: implicit and power models have no estimate, and say so."""
+    code, out, _ = idbench("identify", ran, "--estimator", "UKF", "--no-rerun")
+    assert code == 0
+    assert "power: no estimate: UKF has the robot's equation" in " ".join(out.split())
+    assert "ZZR1" in out
+
+
+@pytest.mark.parametrize("prior", ["pullback", "entropic"])
+def test_any_estimate_can_be_followed_by_what_bodies_allow(idbench, ran, tmp_path, prior):
+    """Torques of two joints exchanged in size: friction comes out below zero, and is moved to zero."""
+    log = read_log(ran / "log.parquet")
+    qd = np.gradient(log.q, 1 / log.fs, axis=0)
+    wrong = replace(log, tau=log.tau - [0.3, 0.05] * qd)
+    write_log(wrong, tmp_path / "wrong.parquet")
+    words = ("identify", "wrong.parquet", "--estimator", "WLS", "--model", "explicit", "--no-rerun")
+    assert idbench(*words, "--out", "free")[0] == 0
+    code, out, _ = idbench(*words, "--consistent", prior, "--out", "held")
+    assert code == 0
+    assert "explicit: moved to where bodies can exist: Fv" in out
+    free, held = (json.loads((tmp_path / name / "summary.json").read_text()) for name in ("free", "held"))
+    before, after = (np.array(x["models"]["explicit"]["estimate"]) for x in (free, held))
+    names = free["parameters"]
+    assert before[names.index("Fv1")] < -0.1
+    assert abs(after[names.index("Fv1")]) < 1e-4
+    assert after[names.index("ZZR1")] == pytest.approx(before[names.index("ZZR1")], rel=0.05)
+    assert held["consistent"] == prior
