@@ -36,7 +36,7 @@ class View:
     folders: tyro.conf.Positional[Annotated[tuple[Path, ...], tyro.conf.arg(metavar="DIR|FILE")]] = ()
     """Results folders, or a recording (.rrd); the latest of runs/ if none is named."""
     tab: str = ""
-    """What is in front: overview, friction, drive, filters, noise, excitation, parameters,
+    """What is in front: overview, friction, drive, filters, noise, excitation, parameters, iterations,
     torques, compare, study or table2, if it has it."""
     save: File = None
     """Write the recording and its layers to one file (.rrd) instead, to be taken elsewhere."""

@@ -9,6 +9,7 @@ from experiments.identification.identified import Identified
 from experiments.recording.audience import Audience
 from experiments.recording.chart import send_keys
 from experiments.recording.columns import part, parts, seconds, time_columns
+from experiments.recording.iteration_charts import send_iterations
 from experiments.recording.lanes import Lanes, mask_states
 from experiments.recording.layouts import tabs
 from experiments.recording.parameter_charts import send_parameters
@@ -74,6 +75,7 @@ class Layer:
         self._truth()
         ResidualCharts(self.stream, self._at, self._found, self._joints, self._shade).send()
         send_parameters(self.stream, self._at, self._found, self._shade)
+        send_iterations(self.stream, self._at, self._found)
         keys = {f"{self._found.label}:": GREY, **{form: self._color(form) for form in self._found.estimates}}
         send_keys(self.stream, f"legend/{self._found.label}", keys)
         for name, text in (

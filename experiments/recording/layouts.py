@@ -12,6 +12,7 @@ from experiments.recording.run_layouts import (
     excitation,
     filters,
     friction,
+    iterations,
     noise,
     overview,
     parameters,
@@ -108,6 +109,7 @@ LAYOUTS: dict[str, Callable[[Shelf], Part]] = {
     "noise": noise,
     "excitation": excitation,
     "parameters": parameters,
+    "iterations": iterations,
 }
 """Layouts by what they are for; a recording opens with the first for which it has something to show."""
 

@@ -152,6 +152,12 @@ def excitation(shelf: Shelf) -> Part:
     return side_by_side("excitation", _in_grid("columns", W), values, shares=[2, 1]) if rows else None
 
 
+def iterations(shelf: Shelf) -> Part:
+    """Return the way that the parameters take from round to round, of estimators that simulate or filter."""
+    found = charts(shelf, "{1}: {3} model, round by round", "identify/*/iterations/*/*", NARROW)
+    return grid("iterations", found, min(2, len(found))) if found else None
+
+
 def parameters(shelf: Shelf) -> Part:
     """Return every parameter with its interval beside the truth, and how every estimate comes about."""
     found = charts(shelf, "{1}: parameters {3}", "identify/*/parameters/*", SQUARE)

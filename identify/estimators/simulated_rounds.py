@@ -25,8 +25,8 @@ UNSETTLED = 1.0
 """A last step of this many sigma is none of an estimate that has settled."""
 
 STRAYS, ELSEWHERE = 0.1, 0.3
-"""Rms by which a simulated motion may differ from the logged one in the end, and in the first round, as a share of that motion's
-own rms about its mean."""
+"""Rms by which a simulated motion may differ from the logged one in the end, and in the first round, as a share of the rms of
+the logged motion about its mean."""
 
 
 @dataclass(eq=False)

@@ -1,0 +1,48 @@
+"""Charts of iterations: the way that parameters take from where an estimator begins to where it ends."""
+
+from math import ceil
+
+import numpy as np
+
+from experiments.identification.identified import Identified
+from experiments.recording.chart import NARROW, Chart
+from experiments.recording.columns import part
+from experiments.recording.scales import Signed, Words
+from experiments.recording.stream import Stream
+from experiments.recording.style import JOINTS
+from identify import Estimate
+
+MOST = 13
+"""Parameters of a chart."""
+
+LEAST = 1e-3
+"""Difference [sigma] up to which the axis is linear."""
+
+
+def send_iterations(stream: Stream, at: str, found: Identified) -> None:
+    """Send, of estimators that go on from round to round, how far each parameter is from the last, in its sigma."""
+    for model, estimate in found.estimates.items():
+        if len(estimate.path) > 1:
+            _send(stream, f"{at}/iterations/{model}", estimate)
+
+
+def _send(stream: Stream, at: str, estimate: Estimate) -> None:
+    path = np.array(estimate.path)
+    sigma = np.where(estimate.best_sigma > 0, estimate.best_sigma, 1.0)
+    off, rounds = (path - estimate.X) / sigma, np.arange(float(len(path)))
+    high = max(float(np.nanmax(np.abs(off))), 10 * LEAST)
+    scale = Signed("distance from the estimate [sigma], in decades", -1.3 * high, 1.3 * high, LEAST)
+    axis = Words("round", -0.5, len(path) - 0.5, tuple(map(str, range(len(path)))))
+    names = np.array_split(np.arange(len(estimate.names)), ceil(len(estimate.names) / MOST))
+    for k, members in enumerate(names):
+        chart = Chart(
+            stream,
+            f"{at}/{k}_{part(estimate.names[members[0]])}",
+            listed("round", [str(k) for k in range(len(path))]),
+            scale,
+            NARROW,
+        )
+        for place, p in enumerate(members):
+            color = JOINTS[place % len(JOINTS)]
+            chart.line(estimate.names[p], rounds, off[:, p], color)
+            chart.marks(f"{estimate.names[p]} ", rounds, off[:, p], color)
