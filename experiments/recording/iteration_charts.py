@@ -35,14 +35,9 @@ def _send(stream: Stream, at: str, estimate: Estimate) -> None:
     axis = Words("round", -0.5, len(path) - 0.5, tuple(map(str, range(len(path)))))
     names = np.array_split(np.arange(len(estimate.names)), ceil(len(estimate.names) / MOST))
     for k, members in enumerate(names):
-        chart = Chart(
-            stream,
-            f"{at}/{k}_{part(estimate.names[members[0]])}",
-            listed("round", [str(k) for k in range(len(path))]),
-            scale,
-            NARROW,
-        )
-        for place, p in enumerate(members):
-            color = JOINTS[place % len(JOINTS)]
+        place = f"{at}/{k}_{part(estimate.names[members[0]])}"
+        chart = Chart(stream, place, axis, scale, NARROW)
+        for number, p in enumerate(members):
+            color = JOINTS[number % len(JOINTS)]
             chart.line(estimate.names[p], rounds, off[:, p], color)
             chart.marks(f"{estimate.names[p]} ", rounds, off[:, p], color)
