@@ -9,7 +9,7 @@ that were kept in docs/results are written into the pages anew. A test holds tha
 import json
 import re
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from math import exp, log, log2
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,11 @@ from typing import Any
 DOCS = Path(__file__).absolute().parent.parent
 sys.path.insert(0, str(DOCS.parent))
 RESULTS = DOCS / "results"
-PAGES = ("answers.md", "excitation.md", "noise.md", "table2.md")
+PAGES = ("answers.md", "estimators.md", "excitation.md", "noise.md", "table2.md")
 KEPT = ("settings", "chain", "estimator", "model", "runs", "rmse_percent", "coverage", "paper_coverage", "bound_percent")
+COMPARED = ("bias_percent", "bias_margin_percent", "failures", "simulations")
+"""What is kept, too, of a cell of a study that compares estimators."""
+
 """What is kept of a cell."""
 
 MARK = re.compile(r"<!-- table: ([\w-]+) -->\n.*?<!-- end -->", re.DOTALL)
@@ -39,7 +42,8 @@ def keep(folder: Path) -> None:
             kept = {name: summary[name] for name in ("parameters", "attribution_percent")}
             (RESULTS / f"{path.parent.name}.json").write_text(json.dumps(kept, indent=1) + "\n")
             continue
-        cells = [{key: _short(cell.get(key)) for key in KEPT if key in cell} for cell in summary["cells"]]
+        kept_of = (*KEPT, *COMPARED) if path.parent.name.startswith("estimators") else KEPT
+        cells = [{key: _short(cell.get(key)) for key in kept_of if key in cell} for cell in summary["cells"]]
         text = "[\n" + ",\n".join(json.dumps(cell) for cell in cells) + "\n]\n"
         (RESULTS / f"{path.parent.name}.json").write_text(text)
 
@@ -149,6 +153,43 @@ def _bound(study: str, name: str, label: Callable[[dict[str, Any]], str]) -> Cal
             yield [label(json.loads(settings)), *errors, bound, *shares]
 
     return lambda: _table([name, *methods, "bound", "coverage: WLS", "GLS", "ML"], rows())
+
+
+NOISES = {"0.0": 0.0, "[0.01, 0.001]": 0.01, "[0.1, 0.01]": 0.1}
+"""Torque noise of joint 1 in the study of estimators, as its cells have it."""
+
+
+def _compared(chain: str) -> Callable[[], Iterator[str]]:
+    """Return what makes the table of estimators behind a chain, over encoders and noises of the torque."""
+
+    def rows() -> Iterator[Sequence[str]]:
+        mine: dict[str, dict[tuple[float, float], Cell]] = {}
+        for cell in cells("estimators"):
+            if cell["chain"] == chain:
+                key = log2(4 * cell["settings"]["encoder.lines"]), NOISES[str(cell["settings"]["torque.noise"])]
+                mine.setdefault(cell["estimator"], {})[key] = cell
+        bound = [typical({"rmse_percent": _some(mine.values(), key)["bound_percent"]}) for key in COLUMNS]
+        yield ["bound", *bound, "", "", ""]
+        for name, group in mine.items():
+            solved = [cell for cell in group.values() if cell["runs"]]
+            shares = [100 * x for cell in solved for x in cell["coverage"]]
+            failed = sum(sum(cell["failures"].values()) for cell in group.values())
+            every = failed + sum(cell["runs"] for cell in group.values())
+            often = max((cell["simulations"] for cell in solved), default=0.0)
+            errors = [typical(group[key]) if group[key]["runs"] else "-" for key in COLUMNS]
+            yield [name, *errors, f"{sum(shares) / len(shares):.0f}", f"{failed} of {every}", f"{often:.0f}" if often else ""]
+
+    heads = [f"{bits:.0f} bits, {noise:g} N m" for bits, noise in COLUMNS]
+    return lambda: _table(["", *heads, "within 2 sigma [%]", "failed", "simulations"], rows())
+
+
+COLUMNS = ((10, 0.01), (12, 0.01), (14, 0.01), (16, 0.0), (16, 0.01), (16, 0.1), (18, 0.0))
+"""Encoder bits and torque noise that the tables of estimators have."""
+
+
+def _some(groups: Iterable[dict[tuple[float, float], Cell]], key: tuple[float, float]) -> Cell:
+    """Return the first cell of a setting that has an estimate: the bound is that of all."""
+    return next(group[key] for group in groups if group[key]["runs"])
 
 
 def _causes(form: str) -> Callable[[], Iterator[str]]:
@@ -287,6 +328,8 @@ TABLES: dict[str, Callable[[], Iterator[str]]] = {
     ),
     "excitation-coarse": _coarse,
     "excitation-predicted": _foretold,
+    "estimators-idbench": _compared("idbench"),
+    "estimators-unfiltered": _compared("unfiltered"),
 }
 
 if __name__ == "__main__":

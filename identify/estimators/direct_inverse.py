@@ -48,5 +48,5 @@ class DirectInverse(AbstractEstimator):
             W = problem.at(rounds.simulated(X).logs).W
             return solve_with(kinds, rows.Y, W, W)
 
-        found = rounds.until_settled(step, rounds.start())
+        found = rounds.until_settled(step, rounds.start(), least=2)
         return rounds.estimate(found, honest=scatter(found, kinds, rates(problem)))

@@ -46,5 +46,5 @@ class InstrumentalVariables(AbstractEstimator):
         def step(X: Array) -> Solved:
             return solve_with(kinds, rows.Y, rows.W, problem.at(rounds.simulated(X).logs).W)
 
-        found = rounds.until_settled(step, rounds.start())
+        found = rounds.until_settled(step, rounds.start(), least=2)
         return rounds.estimate(found, influence=lambda _: found.G)

@@ -66,8 +66,17 @@ class Rounds:
         self.path.append(X)
         return X
 
-    def until_settled(self, step: Callable[[Array], Solved], X: Array) -> Solved:
+    def until_settled(self, step: Callable[[Array], Solved], X: Array, least: int = 1) -> Solved:
         """Return the solution of `step` that does not move any more; runs that have settled are left as they are.
+
+        Parameters
+        ----------
+        step : callable
+            Makes a round from parameters, shape (..., p).
+        X : Array, shape (..., p)
+            Where it begins.
+        least : int
+            Rounds at least: 2 if the first has another controller.
 
         Raises
         ------
@@ -76,7 +85,7 @@ class Rounds:
         """
         found: Solved | None = None
         move = np.full(X.shape, np.inf)
-        for _ in range(self.most):
+        for number in range(1, self.most + 1):
             new = step(X)
             self._require_finite(new.X, "the simulated motion does not determine the parameters")
             found = new.where(self.active, found)
@@ -85,7 +94,7 @@ class Rounds:
                 move = np.where(self.active[..., None], np.abs(new.X - X) / unit, move)
             X = found.X
             self.path.append(X)
-            self.active &= ~(np.max(move, axis=-1) < self.settled)
+            self.active &= ~((np.max(move, axis=-1) < self.settled) & (number >= least))
             if not self.active.any():
                 break
         self._require_same_motion(STRAYS)

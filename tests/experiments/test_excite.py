@@ -23,6 +23,13 @@ TORQUES = (68.0, 104.0, 46.0, 6.0, 5.2, 4.4)
 SHORT = ["--duration", "4", "--no-rerun"]
 
 
+@pytest.fixture(autouse=True)
+def hasty(monkeypatch):
+    """Search a quarter as long: limits hold, and files are written, however far a search has come."""
+    few = tuple(stage._replace(keep=1, steps=stage.steps // 4) for stage in STAGES)
+    monkeypatch.setattr("experiments.excite.stages.STAGES", few)
+
+
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     out = tmp_path_factory.mktemp("excite") / "scara"
@@ -73,10 +80,8 @@ def test_its_scenario_runs_and_its_errors_are_as_predicted(written, tmp_path):
 
 
 @pytest.mark.parametrize("kind", EXCITATIONS.builtin)
-def test_limits_hold_at_a_thousand_hertz_by_mujocos_own_torques(kind, monkeypatch):
+def test_limits_hold_at_a_thousand_hertz_by_mujocos_own_torques(kind):
     """Also with the parameters of the file off by 30 %: all of them larger, or each at random."""
-    few = tuple(stage._replace(keep=1, steps=stage.steps // 4) for stage in STAGES)
-    monkeypatch.setattr("experiments.excite.stages.STAGES", few)  # limits hold, however far the search has come
     noisy = replace(load("arm"), torque=TorqueMeasurement(noise=(0.05,)))
     found = Excited.of(Design("puma560", noisy, kind, 4.0, 1.0, MotionLimits(torque=TORQUES)))
     robot, motion = Robot.load("puma560"), found.design.trajectory(found.c).plan(Robot.load("puma560")).sample(1000.0)
@@ -217,6 +222,7 @@ def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
             raise KeyboardInterrupt
         return value(self, c)
 
+    monkeypatch.setattr("experiments.excite.stages.STAGES", STAGES)
     monkeypatch.setattr(Plan, "value", interrupted)
     assert main(["excite", "scara", *SHORT, "--out", str(tmp_path / "out")]) == 0
     assert "interrupted: this is the best motion so far" in capsys.readouterr().out

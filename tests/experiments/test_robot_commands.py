@@ -49,9 +49,9 @@ def test_without_a_second_log_the_end_of_the_first_is_held_out(idbench, logs):
 
 def test_run_takes_any_robot(idbench, tmp_path):
     arm = load("arm")
-    scenario = replace(arm, name="short", fs=250.0, trajectory=replace(arm.trajectory, moves=10))
+    scenario = replace(arm, name="short", fs=250.0, trajectory=replace(arm.trajectory, moves=8))
     (tmp_path / "short.toml").write_text(to_toml(scenario))
-    code, out, err = idbench("run", "short.toml", "--robot", "puma560", "--out", "mine")
+    code, out, err = idbench("run", "short.toml", "--robot", "puma560", "--out", "mine", "--estimator", "WLS")
     assert code == 0, err
     summary = json.loads((tmp_path / "mine" / "summary.json").read_text())
     assert summary["robot"] == "puma560"
@@ -63,7 +63,7 @@ def test_run_takes_any_robot(idbench, tmp_path):
 
 def test_a_fixed_trajectory_of_another_robot_is_replaced(idbench, tmp_path):
     (tmp_path / "two.toml").write_text(to_toml(replace(load("ideal"), name="two", fs=100.0)))
-    code, out, err = idbench("run", "two.toml", "--robot", "panda", "--no-rerun")
+    code, out, err = idbench("run", "two.toml", "--robot", "panda", "--no-rerun", "--estimator", "WLS")
     assert code == 0, err
     assert "is none for robot panda: it makes the random moves of scenario arm" in out
     assert (tmp_path / "runs" / "two-panda" / "summary.json").exists()
