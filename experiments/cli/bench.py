@@ -9,10 +9,9 @@ import tyro
 from experiments.cli.app import APP
 from experiments.cli.interruption import importing
 from experiments.cli.options import Asked, Count, File, Folder, Json, Number, Robot, Scenario, Watched, Window
-from experiments.identification.consistent_estimate import Consistency
+from experiments.identification.choices import Consistency, Start
 from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.parameters import Parameters
-from experiments.identification.start import Start
 from experiments.recording.audience import Watching
 
 

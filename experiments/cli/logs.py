@@ -25,10 +25,9 @@ from experiments.cli.options import (
     Torque,
     Watched,
 )
-from experiments.identification.consistent_estimate import Consistency
+from experiments.identification.choices import Consistency, Start
 from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.parameters import Parameters
-from experiments.identification.start import Start
 from experiments.recording.audience import Watching
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 
@@ -11,9 +10,6 @@ from identify import Array, Consistent, Estimate, consistent_parameters, transfe
 from identify.parameters.consistent import NEAR
 from identify.parameters.priors import Prior
 from sim.robot.tree import standard_parameters
-
-Consistency = Literal["no", "pullback", "entropic"]
-"""Whether estimates are moved to where bodies can exist, and by which distance what no motion shows is held."""
 
 SURE = 0.1
 """Sigma of what was left out, as a share of the least of the others."""

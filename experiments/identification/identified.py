@@ -8,11 +8,11 @@ from typing import Any, Self
 
 import numpy as np
 
-from experiments.identification.consistent_estimate import Consistency, made_consistent
+from experiments.identification.choices import Consistency, Start
+from experiments.identification.consistent_estimate import made_consistent
 from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.results import summarize
 from experiments.identification.simulators import RobotPlant, ScenarioLoop
-from experiments.identification.start import Start
 from experiments.identification.subject import Subject
 from identify import (
     CHAINS,
@@ -131,7 +131,9 @@ class Identified:
 
     @property
     def simulation(self) -> Simulation:
-        """How the robot is simulated, for estimators that need it."""
+        """How the robot is simulated, for estimators that need it; not for what was estimated from other logs."""
+        if self.known is not None:
+            return Simulation()
         start = None if self.start == "least-squares" else np.array(list(self.subject.truth(self.subject.robot).values()))
         needs = self.solver.needs
         loop = ScenarioLoop.of(self.subject, self.loops, self.logs) if "loop" in needs and self.loops else None
@@ -165,7 +167,7 @@ class Identified:
         """Return the identification as it looks on one of its logs: parameters and sigma of all, rows of that one."""
         if len(self.logs) == 1:
             return self
-        alone = replace(self, logs=(self.logs[k],), log_names=self.log_names[k : k + 1], known={})
+        alone = replace(self, logs=(self.logs[k],), log_names=self.log_names[k : k + 1], loops=(), known={})
         problem = alone.problem
         known = {
             name: replace(e, problem=problem.with_model(e.problem.model), honest=e.best_covariance, whiten=None, fits={})

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 
 from experiments.identification.identified import Identified
-from identify import InstrumentalVariables, noise_in_rows
+from identify import Estimate, InstrumentalVariables, noise_in_rows
 from identify.judge.noise_in_rows import LEVEL
 
 
 def words_of_iterations(found: Identified) -> Iterator[str]:
     """Yield what is said of the estimates, model by model."""
-    for model, estimate in found.estimates.items():
+    for model, estimate in _unmoved(found).items():
         if estimate.simulations is None:
             continue
         yield f"{model}: settled after {int(estimate.simulations)} simulations"
@@ -30,7 +30,7 @@ def words_of_iterations(found: Identified) -> Iterator[str]:
 
 def iterations(found: Identified) -> dict[str, Any]:
     """Return what a summary.json says of it."""
-    every = {model: e for model, e in found.estimates.items() if e.path}
+    every = {model: e for model, e in _unmoved(found).items() if e.path}
     return {
         model: {
             "simulations": None if e.simulations is None else int(e.simulations),
@@ -41,8 +41,14 @@ def iterations(found: Identified) -> dict[str, Any]:
     }
 
 
+def _unmoved(found: Identified) -> dict[str, Estimate]:
+    """Return the estimates as they came, before bodies that can exist were asked for."""
+    outcomes = found.unconstrained if found.known is None else found.outcomes
+    return {model: outcome for model, outcome in outcomes.items() if isinstance(outcome, Estimate)}
+
+
 def _test(found: Identified, model: str) -> dict[str, Any]:
-    test = noise_in_rows(found.estimates[model])
+    test = noise_in_rows(_unmoved(found)[model])
     return {
         "noise_in_W": {
             "matters": bool(test.matters),

@@ -6,13 +6,12 @@ from functools import cached_property
 from typing import Any
 
 from experiments.errors import ExperimentError
-from experiments.identification.consistent_estimate import Consistency
+from experiments.identification.choices import Consistency, Start
 from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.friction_choice import with_suitable_friction
 from experiments.identification.identified import Identified
 from experiments.identification.iterations import iterations
 from experiments.identification.parameters import Parameters
-from experiments.identification.start import Start
 from experiments.identification.subject import Subject
 from identify import AbstractEstimator, Chain
 from sim.engine.run import Run

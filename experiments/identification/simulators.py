@@ -67,7 +67,10 @@ class Fields:
         # Robot by robot: a product of all of them at once would have other bits for other numbers of robots.
         base = np.matmul(self._to_base, whole[..., None])
         standard = given + np.matmul(self._back, base - grouping.base(given)[:, None])[..., 0]
-        return model_fields(self.robot, dict(zip(grouping.standard.names, standard.T, strict=True)))
+        try:
+            return model_fields(self.robot, dict(zip(grouping.standard.names, standard.T, strict=True)))
+        except BenchError as error:
+            raise IdentificationError(f"a robot with these parameters cannot be simulated: {error}") from error
 
     @cached_property
     def _given(self) -> dict[str, float]:
@@ -117,12 +120,15 @@ class ScenarioLoop(AbstractLoop):
         Raises
         ------
         IdentificationError
-            If scenarios are not as many as logs, or one has another robot, frequency or motion than its log.
+            If scenarios are not as many as logs, or one has another robot or frequency than its log, or a shorter motion.
         """
         if len(scenarios) != len(logs):
             raise IdentificationError(f"{len(scenarios)} loops are given for {len(logs)} logs: one scenario is needed for each")
-        for scenario, log in zip(scenarios, logs, strict=True):
-            _require_matching(scenario, log, subject)
+        try:
+            for scenario, log in zip(scenarios, logs, strict=True):
+                _require_matching(scenario, log, subject)
+        except BenchError as error:
+            raise IdentificationError(f"the loop cannot be simulated: {error}") from error
         return cls(subject, scenarios, logs)
 
     def repeat(self, X: Array, *, informed: bool = False) -> Simulated:
@@ -169,7 +175,10 @@ class RobotPlant(AbstractPlant):
 
     def shoot(self, X: Array, q: Array, qd: Array, log: MotionLog, first: npt.NDArray[np.intp], count: int) -> Array:
         """Return the positions of robots that start somewhere in a log."""
-        return shoot(self._fields.robot, self._fields.of(X), q, qd, log, first, count)
+        try:
+            return shoot(self._fields.robot, self._fields.of(X), q, qd, log, first, count)
+        except BenchError as error:
+            raise IdentificationError(f"the robot cannot be simulated: {error}") from error
 
     @cached_property
     def _fields(self) -> Fields:

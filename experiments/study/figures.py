@@ -107,7 +107,8 @@ def bars_figure(cells: Sequence[Cell]) -> str:
         mean = 100 * np.array([cell.bias[p] for cell in cells])
         spread = np.nan_to_num(100 * np.array([cell.deviation[p] for cell in cells]))
         least = np.array([100 * cell.least[p] for cell in cells])
-        limit = REACH * float(np.nanmedian(np.abs(mean) + spread)) or 1.0
+        sizes = (np.abs(mean) + spread)[np.isfinite(mean)]
+        limit = REACH * float(np.median(sizes)) if len(sizes) and np.median(sizes) > 0 else 1.0
         panel.axhline(0.0, color="black", lw=0.6)
         if np.isfinite(least).any():
             panel.axhspan(-np.nanmean(least), np.nanmean(least), color="0.8", lw=0, label="bound")

@@ -26,7 +26,7 @@ class AbstractEstimator(ABC):
     """Whether it needs a motion that shows every parameter; one with a prior or a penalty does not."""
 
     filtered: ClassVar[bool] = True
-    """Whether it sees logs through the chain; one that does not gives the same with every chain."""
+    """Whether what it minimises is the chain's; others take from it no more than where they begin and how large noise is."""
 
     @abstractmethod
     def solve(self, problem: Problem) -> Estimate:

@@ -28,8 +28,8 @@ nonlinear estimation", Proc. IEEE AS-SPCC 2000, 153-158)."""
 TUNINGS = 1.0, 3.0, 10.0
 """Process noise that is tried, over the torque noise of the log."""
 
-LEAST = 1e-9
-"""Noise of positions [rad] at least."""
+LEAST = 1e-7
+"""Noise of positions [rad] and torques [N m] at least: of exact ones covariances would be those of rounding."""
 
 UNSURE = 10.0
 """Uncertainty of a parameter at the beginning at least, in steps that make 0.1 % of the torque: those that begin at zero."""
@@ -45,7 +45,8 @@ class UnscentedKalmanFilter(AbstractEstimator):
 
     The state moves by the robot's equation, driven by the logged torques, and its parameters not at all. Noise of the torques
     is process noise; where the sign of a velocity says nothing of friction, it is as large as that. Its size is what makes the
-    innovations most likely, among some multiples of the noise that the log shows. Filter and mask of the chain take no part.
+    innovations most likely, among some multiples of the noise that the log shows. The chain says where it begins, and how large
+    noise is; the filter of rows takes no part.
 
     Parameters
     ----------
@@ -53,7 +54,7 @@ class UnscentedKalmanFilter(AbstractEstimator):
         Standard deviation of every parameter at the beginning, as a share of its value.
     """
 
-    needs: ClassVar[frozenset[Need]] = frozenset({"logs"})
+    needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
     filtered: ClassVar[bool] = False
 
     spread: float = 0.15
@@ -71,6 +72,8 @@ class UnscentedKalmanFilter(AbstractEstimator):
         """
         if not isinstance(problem.model, ExplicitModel):
             raise IdentificationError("UKF has the robot's equation, not rows of a model: take --model explicit")
+        if problem.basis.adaptive or any(log.conditions for log in problem.logs):
+            raise IdentificationError("UKF knows friction of the velocity alone: take GLS for laws of load or temperature")
         start, h = starting_point(problem), small_steps(problem)
         sigma = np.maximum(self.spread * np.abs(start), UNSURE * h)
         runs, p = start.shape[:-1], start.shape[-1]
@@ -81,9 +84,8 @@ class UnscentedKalmanFilter(AbstractEstimator):
             if problem.factors.together.status[run] != Status.OK or not np.isfinite(start[run]).all():
                 continue
             own = NoiseLevels(np.maximum(np.nan_to_num(levels.torque[run]), LEAST), problem.position_noise[run])
-            try:
-                found = [_filtered(problem, run, start[run], sigma[run], own, tuning) for tuning in TUNINGS]
-            except np.linalg.LinAlgError:
+            found = [way for tuning in TUNINGS if (way := _tried(problem, run, (start[run], sigma[run]), own, tuning))]
+            if not found:
                 failures[run] = "the filter diverges from this start: begin nearer to the truth, or with less spread"
                 continue
             best = max(found, key=lambda each: each[0])
@@ -93,6 +95,16 @@ class UnscentedKalmanFilter(AbstractEstimator):
         honest = frozen(covariance)
         noise = NoiseLevels(torque, problem.position_noise)
         return Estimate(problem, frozen(X), honest, honest=honest, levels=noise, failures=failures, path=(start, X))
+
+
+def _tried(
+    problem: Problem, run: tuple[int, ...], begin: tuple[Array, Array], noise: NoiseLevels, tuning: float
+) -> tuple[float, Array, Array, Array] | None:
+    """Return what `_filtered` does, None if it diverges."""
+    try:
+        return _filtered(problem, run, *begin, noise, tuning)
+    except np.linalg.LinAlgError:
+        return None
 
 
 def _filtered(
@@ -186,7 +198,7 @@ class _Filter:
         turned = np.broadcast_to(q, (n, *q.shape))
         M = np.zeros((n, n, q.shape[-1]))
         for (row, name), column in self.basis.momentum(State(turned, unit + np.zeros_like(turned), lambda x: x)).items():
-            M[:, row] += column * X[names.index(name)]
+            M[:, row] += column * (1.0 if name == HELD else X[names.index(name)])
         M = np.moveaxis(M, -1, 0)
         found = np.linalg.solve(M, (self.tau[:, k, None] - bias).T[..., None])[..., 0].T
         return np.asarray(found, dtype=np.float64), np.linalg.inv(M[0])

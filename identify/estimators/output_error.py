@@ -157,7 +157,7 @@ class _Shots:
         back = np.linalg.solve(np.where(good[:, None, None], R, np.eye(2 * n)), inside)
         self._of_X, self._rest = back[..., :p], back[..., p]
         free = both - Q @ inside
-        return free[..., p].reshape(e.shape), free[..., :p].reshape(*e.shape, p)
+        return free[..., p].reshape(e.shape)[good], free[..., :p].reshape(*e.shape, p)[good]
 
     def move(self, step: Array) -> None:
         """Let the initial states follow a step of the parameters."""

@@ -43,12 +43,13 @@ class RecursiveLeastSquares(AbstractEstimator):
             ages.insert(0, np.repeat(part.time[-1] - part.time, rows.kinds) + later)
             later += float(part.time[-1] - part.time[0])
         every = solve_with(kinds, rows.Y, rows.W, rows.W)
-        weight = kinds.weights(every.residual) * np.exp(-np.concatenate(ages) / (2 * self.memory))
+        even = kinds.weights(every.residual)
+        weight = even * np.exp(-np.concatenate(ages) / (2 * self.memory))
         found = with_weights(rows.Y, rows.W, weight)
         return Estimate(
             problem,
             frozen(found.X),
-            frozen(found.covariance),
+            frozen(found.covariance_by(even)),
             lambda _: found.G,
             whiten=lambda given: given.joined * weight[..., None],
         )

@@ -32,8 +32,9 @@ def scatter(found: Solved, kinds: Kinds, logs: Sequence[tuple[slice, float]]) ->
     freedom = np.sum(own, axis=-1)
     share = freedom / np.maximum(freedom - found.X.shape[-1], 1)
     for part, rate in logs:
-        e = np.swapaxes(kinds.by_kind((found.residual * own)[..., part]), -1, -2)
-        G = found.G[..., part, :]
+        weight = kinds.own[..., part]
+        e = np.swapaxes(kinds.by_kind(found.residual[..., part] * weight), -1, -2)
+        G = found.G[..., part, :] / np.where(weight > 0, weight, np.inf)[..., None]
         G = G.reshape(*G.shape[:-2], -1, kinds.count, G.shape[-1])
         total = total + _through(e, np.moveaxis(G, -3, -1), np.swapaxes(kinds.by_kind(own[..., part]), -1, -2), rate)
     return total * share[..., None, None]
@@ -50,6 +51,6 @@ def _through(e: Array, G: Array, own: Array, rate: float) -> Array:
     C = np.fft.rfft(cross * np.maximum(1 - lag / lags, 0.0), size)
     of_G = np.fft.rfft(G, size)
     twice = np.where((np.arange(size // 2 + 1) == 0) | (np.arange(size // 2 + 1) == size // 2), 1.0, 2.0)
-    left = np.einsum("...abf,...bpf->...apf", C * twice, of_G)
+    left = np.einsum("...abf,...bpf->...apf", np.conj(C) * twice, of_G)
     found: Array = np.einsum("...apf,...aqf->...pq", np.conj(of_G), left).real / size
     return (found + np.swapaxes(found, -1, -2)) / 2

@@ -77,6 +77,10 @@ class Solved:
         """Standard deviations of X, shape (..., p)."""
         return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
 
+    def covariance_by(self, weight: Array) -> Array:
+        """Return the covariance of X if residuals times these weights, shape (..., r), are independent and alike."""
+        return _covariance(self.G, self.residual, weight)
+
     def moved(self, X: Array) -> Self:
         """Return the solution of which X is the step from somewhere."""
         return replace(self, X=X + self.X)
@@ -118,11 +122,15 @@ def _solved(Y: Array, W: Array, Z: Array, weight: Array) -> Solved:
     G = np.matmul(weighted, np.swapaxes(inverse, -1, -2))
     X = np.sum(G * Y[..., None], axis=-2)
     residual = Y - np.matmul(W, X[..., None])[..., 0]
-    freedom = np.maximum(np.sum(weight > 0, axis=-1) - X.shape[-1], 1)
+    return Solved(X, G, residual, _covariance(G, residual, weight))
+
+
+def _covariance(G: Array, residual: Array, weight: Array) -> Array:
+    freedom = np.maximum(np.sum(weight > 0, axis=-1) - G.shape[-1], 1)
     variance = np.sum((residual * weight) ** 2, axis=-1) / freedom
     white = G / np.where(weight > 0, weight, np.inf)[..., None]
-    covariance = variance[..., None, None] * np.matmul(np.swapaxes(white, -1, -2), white)
-    return Solved(X, G, residual, covariance)
+    found: Array = variance[..., None, None] * np.matmul(np.swapaxes(white, -1, -2), white)
+    return found
 
 
 def _inverse(product: Array) -> Array:

@@ -118,7 +118,8 @@ class Rounds:
         found = loop_of(self.problem).repeat(np.nan_to_num(X), informed=informed)
         extra = X.ndim - 1 - self.simulations.ndim
         for place, why in found.failures.items():
-            self.fail(place[extra:], why)
+            if self.active[place[extra:]]:  # one that has settled stays
+                self.fail(place[extra:], why)
         self.simulations += self.active * int(np.prod(X.shape[:extra], dtype=np.intp))
         self._last = tuple(replace(log, q=log.q[(0,) * extra], tau=log.tau[(0,) * extra], conditions={}) for log in found.logs)
         if informed:
@@ -127,10 +128,11 @@ class Rounds:
 
     def _require_same_motion(self, most: float) -> None:
         """Let runs fail whose simulated motion, if a loop was simulated, is not that of their log."""
-        for measured, simulated in zip(self.problem.logs, self._last, strict=False):
-            moved = np.sqrt(np.mean((measured.q - np.mean(measured.q, axis=-2, keepdims=True)) ** 2, axis=-2))
+        spreads = [np.std(measured.q, axis=-2) for measured in self.problem.logs]
+        widest = np.max([spread.max(axis=-1) for spread in spreads], axis=0)[..., None]  # a log may hold a pose
+        for measured, simulated, moved in zip(self.problem.logs, self._last, spreads, strict=False):
             off = np.sqrt(np.mean((simulated.q - measured.q) ** 2, axis=-2))
-            for *run, j in np.argwhere(off > most * moved.max(axis=-1, keepdims=True)).tolist():
+            for *run, j in np.argwhere(off > most * widest).tolist():
                 self.fail(
                     tuple(run),
                     f"the simulated motion of joint {j + 1} strays by {off[(*run, j)]:.2g} rad (rms) from that of the log, "

@@ -73,4 +73,5 @@ def noise_in_rows(estimate: Estimate) -> NoiseInRows:
     statistic = np.sum(np.where(told, along**2 / np.where(told, values, 1.0), 0.0), axis=-1)
     freedom = np.sum(told, axis=-1)
     probability = scipy.stats.chi2.sf(statistic, np.maximum(freedom, 1))
-    return NoiseInRows(statistic, freedom, probability, (plain.X - estimate.X) / np.where(size > 0, estimate.best_sigma, 1.0))
+    best = np.where(estimate.best_sigma > 0, estimate.best_sigma, 1.0)
+    return NoiseInRows(statistic, freedom, probability, (plain.X - estimate.X) / best)

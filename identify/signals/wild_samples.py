@@ -16,8 +16,7 @@ PASSES = 50
 """Times at most that wild samples are sought: neighbours of one look wild until it is replaced."""
 
 SHARE, SIGMA = 0.8, 1 / 1.2816
-"""Quantile of the absolute differences from which their standard deviation follows, and its ratio to that: joints may stand for
-more than half of a log, where counts do not change."""
+"""Quantile of the absolute differences from which their standard deviation follows, and its ratio to that."""
 
 CUBIC = np.array([-1.0, 4.0, 0.0, 4.0, -1.0]) / 6.0
 """Weights with which neighbours say a sample."""
@@ -40,8 +39,7 @@ def without_wild_samples(x: Array, least: float) -> tuple[Array, npt.NDArray[np.
     wild = np.zeros(x.shape, dtype=bool)
     if x.shape[-1] <= 2 * REACH:
         return x.copy(), wild
-    found = SIGMA * np.quantile(_off(x)[..., REACH:-REACH], SHARE, axis=-1, keepdims=True)
-    scale = np.maximum(found, least * np.std(x, axis=-1, keepdims=True))
+    scale = np.maximum(_scale(_off(x)[..., REACH:-REACH]), least * np.std(x, axis=-1, keepdims=True))
     found = x
     for _ in range(PASSES):
         size = _off(found)
@@ -52,6 +50,13 @@ def without_wild_samples(x: Array, least: float) -> tuple[Array, npt.NDArray[np.
         wild |= now
         found = _interpolated(x, wild)
     return found, wild
+
+
+def _scale(off: Array) -> Array:
+    """Return the standard deviation of differences, shape (..., 1), from those that are not zero: standing counts are."""
+    some = np.where(off > 0, off, np.nan)
+    some = np.where(np.isnan(some).all(axis=-1, keepdims=True), 0.0, some)
+    return np.asarray(SIGMA * np.nanquantile(some, SHARE, axis=-1, keepdims=True))
 
 
 def _off(x: Array) -> Array:

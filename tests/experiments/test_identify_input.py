@@ -85,10 +85,10 @@ def test_one_models_failure_takes_nothing_from_the_others(idbench, logs, tmp_pat
 def test_a_file_that_cannot_be_written_costs_nothing_else(idbench, logs, monkeypatch):
     from identify import IdentificationError
 
-    def impossible(*args):
+    def impossible(*args, **settings):
         raise IdentificationError("link 2 cannot exist")
 
-    monkeypatch.setattr("experiments.identification.consistent_robot.consistent_parameters", impossible)
+    monkeypatch.setattr("experiments.identification.consistent_estimate.consistent_parameters", impossible)
     words = "--write-mjcf", "out.xml", "--out", "found", "--no-rerun"
     code, out, err = idbench("identify", logs / "first.parquet", *NEEDED, *words)
     assert code == 2

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy
 
+from experiments.identification.identified import Identified
 from experiments.identification.simulators import RobotPlant, ScenarioLoop
 from experiments.identification.subject import Subject
 from identify import (
@@ -131,6 +132,15 @@ def test_a_wrong_loop_makes_didim_wrong_and_iv_not(part, sixteen, truth):
     assert didim.max() > 5 * iv.max()
 
 
+def test_several_logs_with_a_loop_each_are_one_fit_and_looked_at_one_by_one(sixteen):
+    scenario, log = sixteen
+    second = replace(scenario, trajectory=replace(MOVES, seed=4, moves=6))
+    other = simulate(second).alone()
+    found = Identified((log, other), estimator="IV", models=("explicit",), loops=(scenario, second), log_names=("a", "b"))
+    assert (found.estimates["explicit"].corrected_sigma < found.on(1).problem.noise.levels.torque.max() + 1).all()
+    assert found.on(1).estimates["explicit"].X is found.estimates["explicit"].X
+
+
 def test_every_estimator_finds_what_didim_finds_from_the_same_torques(sixteen, truth):
     """CLIE minimises what DIDIM has the fixed point of; their difference is below both sigmas."""
     scenario, log = closed(16, trajectory=replace(MOVES, moves=6))
@@ -254,6 +264,15 @@ def test_total_least_squares_is_that_of_the_textbook(rng):
     np.testing.assert_allclose(_solved(np.linalg.qr(A, mode="r"), exact)[0], np.linalg.lstsq(A[:, :3], A[:, 3])[0], rtol=1e-9)
 
 
+def test_a_joint_that_stands_most_of_the_time_has_no_wild_samples():
+    """One move of 1.3 s in 12 s, in counts of 12 bits: where it moves counts jump, as they must."""
+    t = np.arange(1200) / 100
+    s = np.clip((t - 5) / 1.3, 0, 1)
+    step = 2 * np.pi / 2**12
+    counts = np.round((10 * s**3 - 15 * s**4 + 6 * s**5) / step) * step
+    assert without_wild_samples(counts, 1e-5)[1].sum() == 0
+
+
 def test_endless_memory_is_weighted_least_squares_and_a_short_one_knows_less(sixteen):
     problem = Problem((sixteen[1],), scara(), ExplicitModel(), idbench_chain())
     every, endless, short = (
@@ -290,4 +309,13 @@ def test_the_scatter_of_correlated_residuals(rng):
     found = with_weights(e, W, np.ones((60, N)))
     sigma = np.sqrt(scatter(found, Kinds(1, np.ones((60, N))), [(slice(0, N), 100.0)])[:, 0, 0])
     assert np.mean(sigma) == pytest.approx(1 / (1 - a) / np.sqrt(N), rel=0.15)
+    # A second kind that repeats the first three instants later: its G does so, too, or the other way round.
+    late = np.stack([e, np.roll(e, 3, axis=-1)], axis=-1).reshape(60, -1)
+    for lag in (3, -3):
+        g = rng.standard_normal(N)
+        G = np.stack([g, np.roll(g, lag)], axis=-1).reshape(-1, 1)
+        one = replace(found, G=np.broadcast_to(G, (60, 2 * N, 1)), residual=late)
+        made = np.sum(late * G[:, 0], axis=-1)
+        variance = scatter(one, Kinds(2, np.ones((60, 2 * N))), [(slice(0, 2 * N), 100.0)])[:, 0, 0].mean()
+        assert np.sqrt(variance) == pytest.approx(np.sqrt(np.mean(made**2)), rel=0.3)
     assert found.sigma.mean() < 0.4 * sigma.mean()
