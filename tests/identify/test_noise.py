@@ -37,13 +37,15 @@ DRAWS = 150
 STAGES = [("fir", channel) for channel in CHANNELS] + [(name, CHANNELS[1]) for name in OPERATORS.builtin if name != "fir"]
 """Operators and torques follow each other: every one of both, not all pairs."""
 
+WAYS = [(*stage, "explicit") for stage in STAGES] + [(*STAGES[1], model) for model in MODELS.builtin if model != "explicit"]
+"""So do models."""
+
 
 def rows_of(log, model, chain):
     return Problem((log,), scara(), EVERY[model], chain).rows
 
 
-@pytest.mark.parametrize(("operator", "channel"), STAGES, ids=lambda stage: getattr(stage, "meaning", stage))
-@pytest.mark.parametrize("model", MODELS.builtin)
+@pytest.mark.parametrize(("operator", "channel", "model"), WAYS, ids=lambda way: getattr(way, "meaning", way))
 def test_noise_of_the_torque_in_rows_out(operator, model, channel, log, rng):
     """Sums of rows that noise makes, noise by noise: Y is linear in tau, so its covariance is that of the linear map.
 
@@ -63,8 +65,7 @@ def test_noise_of_the_torque_in_rows_out(operator, model, channel, log, rng):
     assert np.mean(np.var(noisy.Y - plain.Y, axis=0)[seen] / variance[seen]) == pytest.approx(1, abs=0.05)
 
 
-@pytest.mark.parametrize(("operator", "channel"), STAGES, ids=lambda stage: getattr(stage, "meaning", stage))
-@pytest.mark.parametrize("model", MODELS.builtin)
+@pytest.mark.parametrize(("operator", "channel", "model"), WAYS, ids=lambda way: getattr(way, "meaning", way))
 def test_noise_of_the_positions_in_rows_out(operator, model, channel, log, truth, rng):
     """Noise of 1e-7 rad, small enough to be linear, put into the log: sums of the rows' errors, and each row's variance.
 
