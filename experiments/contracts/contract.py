@@ -50,7 +50,7 @@ class Example:
     @cached_property
     def run(self) -> Run:
         """A closed loop of the SCARA without noise."""
-        moves = RandomMoves(moves=3, durations=(0.9, 1.3), rest=0.5)
+        moves = RandomMoves(moves=3, durations=(0.9, 0.9), rest=0.3)
         return simulate(replace(load("ideal"), trajectory=moves))
 
     @property

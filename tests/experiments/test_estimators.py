@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from experiments.cli import main
 from identify.files.log_file import read_log, write_log
 from sim.scenario.scenario_file import load, to_toml
 from sim.trajectories import RandomMoves
@@ -20,10 +21,11 @@ def scenario(tmp_path_factory):
     return path
 
 
-@pytest.fixture
-def ran(idbench, scenario, tmp_path):
-    assert idbench("run", scenario, "--out", "run", "--no-rerun", "--estimator", "IV")[0] == 0
-    return tmp_path / "run"
+@pytest.fixture(scope="module")
+def ran(scenario):
+    out = scenario.parent / "run"
+    assert main(["run", str(scenario), "--out", str(out), "--no-rerun", "--estimator", "IV"]) == 0
+    return out
 
 
 def test_a_run_knows_its_own_loop_and_says_whether_noise_in_W_matters(idbench, ran):

@@ -143,7 +143,7 @@ def test_several_logs_with_a_loop_each_are_one_fit_and_looked_at_one_by_one(sixt
 
 def test_every_estimator_finds_what_didim_finds_from_the_same_torques(sixteen, truth):
     """CLIE minimises what DIDIM has the fixed point of; their difference is below both sigmas."""
-    scenario, log = closed(16, trajectory=replace(MOVES, moves=6))
+    scenario, log = closed(16, trajectory=replace(MOVES, moves=5))
     simulation = loop_of(scenario, log)
     input_error, direct = (
         identify(log, scara(), ExplicitModel(), estimator=ESTIMATORS.create(name), simulation=simulation)
