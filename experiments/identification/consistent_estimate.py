@@ -14,6 +14,9 @@ from sim.robot.tree import standard_parameters
 SURE = 0.1
 """Sigma of what was left out, as a share of the least of the others."""
 
+LITTLE = 0.1
+"""Moves of less than this many sigma are not named."""
+
 
 def consistent_of(subject: Subject, estimate: Estimate, prior: Prior = "pullback", weight: float = NEAR) -> Consistent:
     """Return the physically consistent standard parameters that agree best with an estimate."""
@@ -44,10 +47,6 @@ def words_of_consistency(before: dict[str, Estimate], after: dict[str, Estimate]
         k = int(np.argmax(moved))
         most = f"{estimate.names[k]} most, by {moved[k]:.2g} sigma" if moved[k] >= LITTLE else "nothing by a tenth of a sigma"
         yield f"{model}: moved to where bodies can exist: {most}"
-
-
-LITTLE = 0.1
-"""Moves of less than this many sigma are not named."""
 
 
 def _to_base(subject: Subject) -> Array:

@@ -7,13 +7,11 @@ import numpy as np
 from experiments.identification.identified import Identified
 from experiments.recording.chart import NARROW, Chart
 from experiments.recording.columns import part
+from experiments.recording.parameter_charts import MOST
 from experiments.recording.scales import Signed, Words
 from experiments.recording.stream import Stream
 from experiments.recording.style import JOINTS
 from identify import Estimate
-
-MOST = 13
-"""Parameters of a chart."""
 
 LEAST = 1e-3
 """Difference [sigma] up to which the axis is linear."""

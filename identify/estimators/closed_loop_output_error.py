@@ -7,49 +7,32 @@ import numpy as np
 
 from identify.arrays import Array
 from identify.data.motion_log import MotionLog
-from identify.errors import IdentificationError, require_positive, require_whole
 from identify.estimators.estimate import Estimate
-from identify.estimators.estimator import AbstractEstimator, Need
+from identify.estimators.estimator import Need
 from identify.estimators.gauss_newton import gauss_newton
 from identify.estimators.problem import Problem
 from identify.estimators.residual_scatter import scatter
 from identify.estimators.row_products import Kinds
-from identify.estimators.simulated_rounds import Rounds
-from identify.models.explicit import ExplicitModel
+from identify.estimators.simulated_rounds import AbstractSimulating, require_explicit
 
 
 @final
 @dataclass(frozen=True)
-class ClosedLoopOutputError(AbstractEstimator):
+class ClosedLoopOutputError(AbstractSimulating):
     """Closed-loop output error (CLOE), X = argmin |q - q_s(X)|^2, with q_s the positions of the robot in its closed loop.
 
     By Gauss-Newton, p + 1 simulations a round. The loop hides the parameters: it makes positions what they should be, whatever
     the robot. Neither filter nor mask take part. A wrong controller in the simulation makes it wrong.
-
-    Parameters
-    ----------
-    rounds : int
-        Gauss-Newton steps at most.
-    settled : float
-        Step, in sigma, below which parameters count as settled.
     """
 
     needs: ClassVar[frozenset[Need]] = frozenset({"rows", "loop"})
     filtered: ClassVar[bool] = False
 
-    rounds: int = 10
-    settled: float = 0.05
-
-    def __post_init__(self) -> None:
-        require_whole(1, rounds=self.rounds)
-        require_positive(settled=self.settled)
-
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate of every run; raise IdentificationError if the model is not the explicit one."""
-        if not isinstance(problem.model, ExplicitModel):
-            raise IdentificationError("CLOE compares positions, not rows of a model: take --model explicit")
+        require_explicit(problem, "CLOE", "positions")
         measured = positions(problem.logs)
-        rounds, kinds = Rounds(problem, self.rounds, self.settled), Kinds(problem.basis.n, np.ones(measured.shape))
+        rounds, kinds = self.begun(problem), Kinds(problem.basis.n, np.ones(measured.shape))
         found = gauss_newton(problem, rounds, positions, kinds)
         ends = np.cumsum([0, *(log.samples * log.n for log in problem.logs)]).tolist()
         parts = [(slice(ends[k], ends[k + 1]), log.fs) for k, log in enumerate(problem.logs)]

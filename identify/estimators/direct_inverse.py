@@ -4,49 +4,34 @@ from dataclasses import dataclass
 from typing import ClassVar, final
 
 from identify.arrays import Array
-from identify.errors import require_positive, require_whole
 from identify.estimators.estimate import Estimate
-from identify.estimators.estimator import AbstractEstimator, Need
+from identify.estimators.estimator import Need
 from identify.estimators.problem import Problem
 from identify.estimators.residual_scatter import scatter
 from identify.estimators.row_products import Kinds, Solved, solve_with
-from identify.estimators.simulated_rounds import Rounds, rates
+from identify.estimators.simulated_rounds import AbstractSimulating, rates
 
 
 @final
 @dataclass(frozen=True)
-class DirectInverse(AbstractEstimator):
+class DirectInverse(AbstractSimulating):
     """Direct and inverse dynamic identification (DIDIM): least squares of the measured torques on the simulated robot's rows.
 
     The robot with the parameters of the round before is simulated in its closed loop; measured positions take no part. The rows
     of both have the mask of the log. It makes the simulated torques those of the log, as CLIE does, with one simulation a round
     (M. Gautier, A. Janot and P.-O. Vandanjon, "A new closed-loop output error method for parameter identification of robot
     dynamics", IEEE Trans. Control Systems Technology 21 (2013) 428-444). A wrong controller in the simulation makes it wrong.
-
-    Parameters
-    ----------
-    rounds : int
-        Simulations at most.
-    settled : float
-        Step, in sigma, below which parameters count as settled.
     """
 
     needs: ClassVar[frozenset[Need]] = frozenset({"rows", "loop"})
 
-    rounds: int = 10
-    settled: float = 0.05
-
-    def __post_init__(self) -> None:
-        require_whole(1, rounds=self.rounds)
-        require_positive(settled=self.settled)
-
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate of every run."""
-        rounds, rows, kinds = Rounds(problem, self.rounds, self.settled), problem.rows, Kinds.of_rows(problem)
+        rounds, rows, kinds = self.begun(problem), problem.rows, Kinds.of_rows(problem)
 
         def step(X: Array) -> Solved:
             W = problem.at(rounds.simulated(X).logs).W
             return solve_with(kinds, rows.Y, W, W)
 
-        found = rounds.until_settled(step, rounds.start(), least=2)
+        found = rounds.until_settled(step, rounds.start())
         return rounds.estimate(found, honest=scatter(found, kinds, rates(problem)))

@@ -4,47 +4,32 @@ from dataclasses import dataclass
 from typing import ClassVar, final
 
 from identify.arrays import Array
-from identify.errors import require_positive, require_whole
 from identify.estimators.estimate import Estimate
-from identify.estimators.estimator import AbstractEstimator, Need
+from identify.estimators.estimator import Need
 from identify.estimators.problem import Problem
 from identify.estimators.row_products import Kinds, Solved, solve_with
-from identify.estimators.simulated_rounds import Rounds
+from identify.estimators.simulated_rounds import AbstractSimulating
 
 
 @final
 @dataclass(frozen=True)
-class InstrumentalVariables(AbstractEstimator):
+class InstrumentalVariables(AbstractSimulating):
     """Instrumental variables (IDIM-IV), X = (Z' w^2 W)^-1 Z' w^2 Y, with Z the rows of the simulated robot.
 
     The robot with the parameters of the round before is simulated in its closed loop, without noise: the rows Z of its motion
     are those of the log, but for the log's noise. So noise of the positions in W leaves no bias (A. Janot, P.-O. Vandanjon and
     M. Gautier, "A generic instrumental variable approach for industrial robot identification", IEEE Trans. Control Systems
     Technology 22 (2014) 132-145). A wrong controller in the simulation makes the estimate less sure, not wrong.
-
-    Parameters
-    ----------
-    rounds : int
-        Simulations at most.
-    settled : float
-        Step, in sigma, below which parameters count as settled.
     """
 
     needs: ClassVar[frozenset[Need]] = frozenset({"rows", "loop"})
 
-    rounds: int = 10
-    settled: float = 0.05
-
-    def __post_init__(self) -> None:
-        require_whole(1, rounds=self.rounds)
-        require_positive(settled=self.settled)
-
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate of every run."""
-        rounds, rows, kinds = Rounds(problem, self.rounds, self.settled), problem.rows, Kinds.of_rows(problem)
+        rounds, rows, kinds = self.begun(problem), problem.rows, Kinds.of_rows(problem)
 
         def step(X: Array) -> Solved:
             return solve_with(kinds, rows.Y, rows.W, problem.at(rounds.simulated(X).logs).W)
 
-        found = rounds.until_settled(step, rounds.start(), least=2)
+        found = rounds.until_settled(step, rounds.start())
         return rounds.estimate(found, influence=lambda _: found.G)

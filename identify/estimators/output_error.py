@@ -8,14 +8,13 @@ import numpy.typing as npt
 
 from identify.arrays import Array
 from identify.data.motion_log import MotionLog
-from identify.errors import IdentificationError, require_positive, require_whole
+from identify.errors import IdentificationError, require_positive
 from identify.estimators.estimate import Estimate
-from identify.estimators.estimator import AbstractEstimator, Need
+from identify.estimators.estimator import Need
 from identify.estimators.problem import Problem
 from identify.estimators.row_products import Solved
-from identify.estimators.simulated_rounds import Rounds, small_steps
+from identify.estimators.simulated_rounds import AbstractSimulating, Rounds, require_explicit, small_steps
 from identify.estimators.simulator import AbstractPlant
-from identify.models.explicit import ExplicitModel
 
 STEP_Q, STEP_QD = 1e-5, 1e-4
 """Changes of a state at the beginning of a segment [rad, rad/s]."""
@@ -26,7 +25,7 @@ LOST = 0.5
 
 @final
 @dataclass(frozen=True)
-class OutputError(AbstractEstimator):
+class OutputError(AbstractSimulating):
     """Output error (OE) by multiple shooting: the robot driven by the logged torques, X = argmin |q - q_s(X)|^2.
 
     The log is cut into segments, each with an initial state of its own, which is an unknown that is eliminated; in between the
@@ -37,22 +36,16 @@ class OutputError(AbstractEstimator):
     ----------
     length : float
         Of a segment [s].
-    rounds : int
-        Gauss-Newton steps at most.
-    settled : float
-        Step, in sigma, below which parameters count as settled.
     """
 
     needs: ClassVar[frozenset[Need]] = frozenset({"rows", "plant"})
     filtered: ClassVar[bool] = False
 
     length: float = 0.3
-    rounds: int = 15
-    settled: float = 0.05
 
     def __post_init__(self) -> None:
-        require_positive(length=self.length, settled=self.settled)
-        require_whole(1, rounds=self.rounds)
+        super().__post_init__()
+        require_positive(length=self.length)
 
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate of every run.
@@ -62,11 +55,10 @@ class OutputError(AbstractEstimator):
         IdentificationError
             If the model is not the explicit one, a log has no two segments, or the simulated robots run away in every run.
         """
-        if not isinstance(problem.model, ExplicitModel):
-            raise IdentificationError("OE compares positions, not rows of a model: take --model explicit")
+        require_explicit(problem, "OE", "positions")
         plant = problem.simulation.plant
         assert plant is not None
-        rounds, h = Rounds(problem, self.rounds, self.settled), small_steps(problem)
+        rounds, h = self.begun(problem), small_steps(problem)
         shots = {run: [_Shots.of(problem, plant, k, run, self.length) for k in range(len(problem.logs))]
                  for run in np.ndindex(rounds.simulations.shape)}  # fmt: skip
 

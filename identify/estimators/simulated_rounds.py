@@ -2,18 +2,21 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import final
 
 import numpy as np
 import numpy.typing as npt
 
 from identify.arrays import Array, frozen
 from identify.data.motion_log import MotionLog
-from identify.errors import IdentificationError
+from identify.errors import IdentificationError, require_positive, require_whole
 from identify.estimators.estimate import Estimate
+from identify.estimators.estimator import AbstractEstimator
 from identify.estimators.problem import Problem
 from identify.estimators.propagated import Influence
 from identify.estimators.row_products import Solved
 from identify.estimators.simulator import AbstractLoop, Simulated
+from identify.models.explicit import ExplicitModel
 
 SMALL = 1e-3
 """Change of a parameter, as a share of what makes the whole torque of a joint."""
@@ -50,6 +53,7 @@ class Rounds:
     failures: dict[tuple[int, ...], str] = field(default_factory=dict)
     simulations: npt.NDArray[np.intp] = field(init=False)
     _last: tuple[MotionLog, ...] = ()
+    _informed: bool = False
     _small: Array = field(init=False)
     active: npt.NDArray[np.bool_] = field(init=False)
 
@@ -66,8 +70,10 @@ class Rounds:
         self.path.append(X)
         return X
 
-    def until_settled(self, step: Callable[[Array], Solved], X: Array, least: int = 1) -> Solved:
+    def until_settled(self, step: Callable[[Array], Solved], X: Array) -> Solved:
         """Return the solution of `step` that does not move any more; runs that have settled are left as they are.
+
+        A round whose controller was made for the simulated robot is not the last: the real one was not.
 
         Parameters
         ----------
@@ -75,8 +81,6 @@ class Rounds:
             Makes a round from parameters, shape (..., p).
         X : Array, shape (..., p)
             Where it begins.
-        least : int
-            Rounds at least: 2 if the first has another controller.
 
         Raises
         ------
@@ -85,7 +89,7 @@ class Rounds:
         """
         found: Solved | None = None
         move = np.full(X.shape, np.inf)
-        for number in range(1, self.most + 1):
+        for _ in range(self.most):
             new = step(X)
             self._require_finite(new.X, "the simulated motion does not determine the parameters")
             found = new.where(self.active, found)
@@ -94,7 +98,7 @@ class Rounds:
                 move = np.where(self.active[..., None], np.abs(new.X - X) / unit, move)
             X = found.X
             self.path.append(X)
-            self.active &= ~((np.max(move, axis=-1) < self.settled) & (number >= least))
+            self.active &= ~((np.max(move, axis=-1) < self.settled) & (not self._informed))
             if not self.active.any():
                 break
         self._require_same_motion(STRAYS)
@@ -105,8 +109,7 @@ class Rounds:
                 f"{self.problem.names[k]} still moves by {move[run][k]:.2g} sigma after {self.most} rounds: does the simulated "
                 "loop have the controller and the motion of the log? If it does, begin nearer to the truth",
             )
-        if found is None:
-            raise IdentificationError(f"{self.most} rounds are none: give at least 1")
+        assert found is not None  # there is a round at least
         return found
 
     def simulated(self, X: Array) -> Simulated:
@@ -114,15 +117,15 @@ class Rounds:
 
         In the first round the controller knows the robot, so that it follows the motion, however far off the start is.
         """
-        informed = not self.simulations.any()
-        found = loop_of(self.problem).repeat(np.nan_to_num(X), informed=informed)
+        self._informed = not self.simulations.any()
+        found = loop_of(self.problem).repeat(np.nan_to_num(X), informed=self._informed)
         extra = X.ndim - 1 - self.simulations.ndim
         for place, why in found.failures.items():
             if self.active[place[extra:]]:  # one that has settled stays
                 self.fail(place[extra:], why)
         self.simulations += self.active * int(np.prod(X.shape[:extra], dtype=np.intp))
         self._last = tuple(replace(log, q=log.q[(0,) * extra], tau=log.tau[(0,) * extra], conditions={}) for log in found.logs)
-        if informed:
+        if self._informed:
             self._require_same_motion(ELSEWHERE)
         return found
 
@@ -165,6 +168,37 @@ class Rounds:
     def _require_finite(self, X: Array, why: str) -> None:
         for run in map(tuple, np.argwhere(self.active & ~np.isfinite(X).all(axis=-1)).tolist()):
             self.fail(run, why)
+
+
+@dataclass(frozen=True)
+class AbstractSimulating(AbstractEstimator):
+    """An estimator that simulates the robot in rounds.
+
+    Parameters
+    ----------
+    rounds : int
+        Rounds at most.
+    settled : float
+        Step, in sigma, below which parameters count as settled.
+    """
+
+    rounds: int = 15
+    settled: float = 0.05
+
+    def __post_init__(self) -> None:
+        require_whole(1, rounds=self.rounds)
+        require_positive(settled=self.settled)
+
+    @final
+    def begun(self, problem: Problem) -> Rounds:
+        """Return the rounds of a problem, before the first."""
+        return Rounds(problem, self.rounds, self.settled)
+
+
+def require_explicit(problem: Problem, name: str, what: str, other: str = "") -> None:
+    """Raise IdentificationError unless the model is the explicit one, for an estimator that does not compare rows."""
+    if not isinstance(problem.model, ExplicitModel):
+        raise IdentificationError(f"{name} compares {what}, not rows of a model: take --model explicit{other}")
 
 
 def starting_point(problem: Problem) -> Array:

@@ -119,26 +119,30 @@ def test_noise_in_W_does_not_matter_with_16_bits(sixteen):
 
 @pytest.mark.parametrize("part", [{"controller": PDFeedforward(bandwidth=18.0)}, {"timing": Timing(delay=0.01)}])
 def test_a_wrong_loop_makes_didim_wrong_and_iv_not(part, sixteen, truth):
-    """Gains 44 % higher, or a sample of delay: instruments that are a little off stay instruments."""
+    """Gains 44 % higher, or a sample of delay: instruments that are a little off leave no more than chance, four sigma."""
     scenario, log = sixteen
-    simulation = loop_of(replace(scenario, **part), log)
-    by = {
-        e: identify(log, scara(), ExplicitModel(), estimator=e, simulation=simulation)
-        for e in (InstrumentalVariables(), DirectInverse())
-    }
-    iv, didim = (np.abs(found.X / truth - 1) for found in by.values())
-    assert iv.max() < 0.02
-    assert np.abs((next(iter(by.values())).X - truth) / next(iter(by.values())).corrected_sigma).max() < 4
-    assert didim.max() > 5 * iv.max()
+    problem = Problem((log,), scara(), ExplicitModel(), idbench_chain(), loop_of(replace(scenario, **part), log))
+    iv, didim = (estimate(problem, way) for way in (InstrumentalVariables(), DirectInverse()))
+    assert np.abs((iv.X - truth) / iv.corrected_sigma).max() < 4
+    assert np.abs(iv.X / truth - 1).max() < 0.02
+    assert np.abs((didim.X - truth) / didim.best_sigma).max() > 6
+    assert np.abs(didim.X / truth - 1).max() > 5 * np.abs(iv.X / truth - 1).max()
 
 
 def test_several_logs_with_a_loop_each_are_one_fit_and_looked_at_one_by_one(sixteen):
+    """Two logs know more than each; each alone has the parameters and the sigma of both, and needs no loop."""
     scenario, log = sixteen
     second = replace(scenario, trajectory=replace(MOVES, seed=4, moves=6))
-    other = simulate(second).alone()
-    found = Identified((log, other), estimator="IV", models=("explicit",), loops=(scenario, second), log_names=("a", "b"))
-    assert (found.estimates["explicit"].corrected_sigma < found.on(1).problem.noise.levels.torque.max() + 1).all()
-    assert found.on(1).estimates["explicit"].X is found.estimates["explicit"].X
+    both = (log, scenario), (simulate(second).alone(), second)
+    whole, *alone = (
+        Identified(tuple(log for log, _ in some), estimator="IV", models=("explicit",), loops=tuple(loop for _, loop in some))
+        for some in (both, both[:1], both[1:])
+    )
+    sigma, *each = (found.estimates["explicit"].corrected_sigma for found in (whole, *alone))
+    assert all((sigma < one).all() for one in each)
+    seen = whole.on(1)
+    np.testing.assert_array_equal(seen.estimates["explicit"].best_sigma, sigma)
+    assert len(seen.problem.rows.time) == len(alone[1].problem.rows.time)
 
 
 def test_every_estimator_finds_what_didim_finds_from_the_same_torques(sixteen, truth):
