@@ -28,7 +28,7 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 os.environ.setdefault("PYTHONPYCACHEPREFIX", str(Path(__file__).parent.parent / ".pytest_cache" / "compiled"))
 
 if (worker := os.environ.get("PYTEST_XDIST_WORKER")) and hasattr(os, "sched_setaffinity"):
-    # A processor for each process of tests, and for what it starts: threads of MuJoCo of two processes hinder each other.
+    # One processor at a time for each process of tests, and for what it starts: threads of MuJoCo hinder each other.
     every = sorted(os.sched_getaffinity(0))
     os.sched_setaffinity(0, {every[int(worker.removeprefix("gw")) % len(every)]})
 
@@ -43,6 +43,11 @@ from sim.scenario.scenario_file import load
 
 X = np.array([3.5, 0.05, 0.5, 0.06, 0.12, 0.005, 0.01, 0.1])
 """The paper's supposed true values (section 7.2), typed here and nowhere else: ZZR1 Fv1 Fs1 ZZ2 LMX2 LMY2 Fv2 Fs2."""
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """Return one process more than processors: one of them waits, for a viewer or a process that it started."""
+    return len(os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)) + 1
 
 
 @pytest.fixture(scope="session")

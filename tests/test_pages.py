@@ -61,8 +61,8 @@ def logs(tmp_path_factory, table1):
         (folder / place).mkdir(parents=True)
     write_log(table1.log, folder / "runs/table1/log.parquet")
     write_log(simulate(load("quantization")).alone(), folder / "log.csv")
-    arm = replace(load("arm"), robot="puma560", fs=500.0)
-    short = replace(arm, trajectory=replace(arm.trajectory, moves=15))
+    arm = replace(load("arm"), robot="puma560", fs=250.0)
+    short = replace(arm, trajectory=replace(arm.trajectory, moves=12))
     write_log(simulate(short).alone(), folder / "runs/arm-puma560/log.parquet")
     return folder
 

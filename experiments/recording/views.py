@@ -33,6 +33,11 @@ class Shelf:
         numbered = sorted(path.split("/")[1:] for path in stripped if path.startswith("joints/"))
         self.joints = [joint for _, joint in numbered]
         self.paths = sorted(stripped, key=self._place)
+        self._ending: dict[tuple[int, str], list[tuple[str, list[str]]]] = {}
+        for path in self.paths:  # an arm of seven joints has thousands of paths, and layouts ask a thousand times
+            parts = path.split("/")
+            for end in (parts[-1], "*"):
+                self._ending.setdefault((len(parts), end), []).append((path, parts))
 
     def _place(self, path: str) -> list[str]:
         """Return what paths are sorted by: their names, but joints by their order in the robot."""
@@ -41,7 +46,12 @@ class Shelf:
 
     def of(self, *patterns: str) -> list[str]:
         """Return the entities that match one of the patterns, in which * stands for one part of a path."""
-        return [path for pattern in patterns for path in self.paths if _matches(path.split("/"), pattern.split("/"))]
+        return [path for pattern in patterns for path in self._matching(pattern.split("/"))]
+
+    def _matching(self, pattern: Sequence[str]) -> list[str]:
+        fixed = [(at, part) for at, part in enumerate(pattern[:-1]) if part != "*"]
+        same = self._ending.get((len(pattern), pattern[-1]), [])
+        return [path for path, parts in same if all(parts[at] == part for at, part in fixed)]
 
     def parents(self, pattern: str) -> list[str]:
         """Return what the parts before the last of the matching entities are, each once."""
@@ -55,10 +65,6 @@ class Shelf:
     def last(self, pattern: str) -> list[str]:
         """Return what the last parts of the matching entities are, each once."""
         return list(dict.fromkeys(path.rsplit("/", 1)[-1] for path in self.of(pattern)))
-
-
-def _matches(path: Sequence[str], pattern: Sequence[str]) -> bool:
-    return len(path) == len(pattern) and all(p in ("*", part) for part, p in zip(path, pattern, strict=True))
 
 
 def plot(shelf: Shelf, name: str, *patterns: str) -> Part:

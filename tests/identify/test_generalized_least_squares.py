@@ -149,7 +149,7 @@ def problem_rows(problem):
 @pytest.mark.parametrize("operator", OPERATORS.builtin)
 def test_every_operator_has_a_covariance_to_solve_with(operator, log, truth):
     chain = replace(idbench_chain(), operator=OPERATORS.create(operator))
-    found = identify(noisy(log, BITS16, (0.01, 0.001), 20), scara(), EVERY["explicit"], chain, GLS)
+    found = identify(noisy(log, BITS16, (0.01, 0.001), 8), scara(), EVERY["explicit"], chain, GLS)
     assert np.sqrt(np.mean(((found.X - truth) / found.sigma) ** 2)) < 1.5
 
 

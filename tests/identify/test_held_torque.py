@@ -9,7 +9,7 @@ from sim.engine.simulation import simulate
 from sim.scenario.scenario import Timing
 from sim.scenario.scenario_file import load
 
-DELAYS = [0.0, 0.003, 0.0052, 0.007, 0.010, 0.013]
+DELAYS = [0.0, 0.0052, 0.010, 0.013]
 
 
 @pytest.fixture(scope="module", params=DELAYS)

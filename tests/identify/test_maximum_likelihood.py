@@ -105,9 +105,7 @@ def test_the_right_hand_side_is_the_slope_of_the_cost(exact, truth):
         assert -2 * found.b_nodes.reshape(*z.shape, -1)[(*index, 0)] == pytest.approx(slope, rel=2e-2)
 
 
-@pytest.mark.parametrize(
-    ("position", "torque", "most"), [(BITS16, 0.0, 0.25), (16 * BITS16, 0.0, 0.2), (BITS16, 0.01, 0.9), (BITS16, 0.1, 1.1)]
-)
+@pytest.mark.parametrize(("position", "torque", "most"), [(BITS16, 0.0, 0.25), (16 * BITS16, 0.0, 0.2), (BITS16, 0.1, 1.1)])
 def test_errors_against_weighted_least_squares(position, torque, most, exact, truth):
     """Typical errors of 12 motions, each known to a fifth, and sigma: the table of docs/noise.md has 64."""
     log = noisy(exact, position, torque)

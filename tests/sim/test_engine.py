@@ -189,18 +189,17 @@ def test_a_held_torque_moves_the_arm_by_newtons_law(short):
     np.testing.assert_allclose(np.diff(momentum), 0.01 * run.tau[0, :-1, 0], atol=1e-9)
 
 
-@pytest.mark.parametrize("delay", [0.00105, 0.0134])
 @pytest.mark.parametrize(
-    "parts",
+    ("parts", "delay"),
     [
-        {},
-        {"drive": AveragedDrive()},
-        {"drive": SwitchedDrive(dead_time=0.0)},
-        {"ripple": Ripple(cogging=0.01), "physics": Physics(step=1e-4)},
-        {"physics": Physics(step=1e-3, integrator="implicitfast")},
-        {"torque": TorqueMeasurement(source="current")},
-        {"torque": TorqueMeasurement(source="current", cutoff=100.0), "physics": Physics(integrator="implicitfast")},
-        {"drive": AveragedDrive(bandwidth=300.0), "torque": TorqueMeasurement(source="current")},
+        ({}, 0.00105),
+        ({"drive": AveragedDrive()}, 0.0134),
+        ({"drive": SwitchedDrive(dead_time=0.0)}, 0.00105),
+        ({"ripple": Ripple(cogging=0.01), "physics": Physics(step=1e-4)}, 0.0134),
+        ({"physics": Physics(step=1e-3, integrator="implicitfast")}, 0.0134),
+        ({"torque": TorqueMeasurement(source="current")}, 0.00105),
+        ({"torque": TorqueMeasurement(source="current", cutoff=100.0), "physics": Physics(integrator="implicitfast")}, 0.0134),
+        ({"drive": AveragedDrive(bandwidth=300.0), "torque": TorqueMeasurement(source="current")}, 0.00105),
     ],
     ids=["ideal", "averaged", "switched", "ripple", "early", "current", "filtered", "slow loop"],
 )

@@ -6,6 +6,7 @@ import socket
 import subprocess
 import time
 import warnings
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -96,8 +97,12 @@ def test_the_arm_moves_in_the_viewer_before_the_run_has_ended(viewer, tmp_path, 
 
 
 def picture(client):
-    (arm,) = [view for view in client.get_state().views if view.name == "arm"]
-    return client.take_screenshot(arm.view_id)
+    """Return how the arm is drawn; views get other names with each new layout, of which one may come in between."""
+    for _ in range(10):
+        (arm,) = [view for view in client.get_state().views if view.name == "arm"]
+        with suppress(ConnectionError):
+            return client.take_screenshot(arm.view_id)
+    return pytest.fail("the arm is not drawn")
 
 
 def test_a_viewer_closed_while_the_run_goes_on_is_told_once(viewer, tmp_path, reading, start):

@@ -42,9 +42,9 @@ def content():
     return tomllib.loads(TOML)
 
 
-@pytest.fixture
-def small(content):
-    return study_from(content, "study")
+@pytest.fixture(scope="session")
+def small():
+    return study_from(tomllib.loads(TOML), "study")
 
 
 @pytest.fixture

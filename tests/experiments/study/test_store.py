@@ -9,13 +9,19 @@ from experiments.study.shard import Shard, run_shard
 from experiments.study.store import Store
 
 
+@pytest.fixture(scope="module")
+def some(small):
+    """Its runs 3 to 5 and 9 to 17."""
+    return {runs: run_shard(small, runs) for runs in (range(3, 6), range(9, 18))}
+
+
 @pytest.fixture
-def begun(small, tmp_path):
-    """A study with its runs 3 to 5 and 9 to 17."""
+def begun(small, some, tmp_path):
+    """A study with these runs."""
     store = Store.new(small, tmp_path / "out")
     with store.held():
-        for runs in (range(3, 6), range(9, 18)):
-            store.write(runs, run_shard(small, runs))
+        for runs, shard in some.items():
+            store.write(runs, shard)
     return store
 
 
