@@ -30,6 +30,7 @@ ALLOWED_IN = {
     "identify/files/ros_bag.py": {"rosbags"},
     "identify/parameters/consistent.py": {"clarabel"},
     "sim/scenario/scenario_file.py": {"tomli_w"},
+    "sim/trajectories/recorded.py": {"scipy"},
     "experiments/recording/columns.py": {"pyarrow"},
     "experiments/recording/scales.py": {"matplotlib"},
     "experiments/recording/comparison_recording.py": {"pyarrow"},

@@ -24,6 +24,9 @@ from sim.scenario.ripple import Ripple
 from sim.scenario.scenario import Scenario
 from sim.trajectories import Reference
 
+IMPOSSIBLE = "; if the loop is right, the parameters are none that bodies can have: begin at a robot of --write-mjcf (--robot)"
+"""What else it may be."""
+
 SAME = 1e-6
 """Share by which frequencies that are the same differ at most."""
 
@@ -46,8 +49,10 @@ class Fields:
         """The robot as its file describes it."""
         return self.subject.robot
 
-    def of(self, X: Array) -> dict[str, Array]:
+    def of(self, X: Array, *, exact: bool = True) -> dict[str, Array]:
         """Return the fields of robots with parameters X, shape (nsim, p): those nearest to the file's standard parameters.
+
+        Parameters that these robots do not have are an error if they must be exact, and left out otherwise.
 
         Raises
         ------
@@ -59,16 +64,18 @@ class Fields:
         whole = np.zeros((len(X), len(names)))
         whole[:, place] = X
         given = np.array([self._given.get(name, 0.0) for name in grouping.standard.names])
-        if unknown := [name for name in grouping.standard.names if name not in self._given]:
+        unknown = [name for name in grouping.standard.names if name not in self._given]
+        if unknown and exact:
             raise IdentificationError(
-                f"{', '.join(unknown)} cannot be simulated: robots of MuJoCo have viscous and Coulomb friction alone; take an "
-                "estimator that does not simulate, or leave these laws out"
+                f"{', '.join(unknown)} cannot be simulated: robots of MuJoCo have viscous and Coulomb friction alone; take IV, "
+                "which does without them, an estimator that does not simulate, or leave these laws out"
             )
         # Robot by robot: a product of all of them at once would have other bits for other numbers of robots.
         base = np.matmul(self._to_base, whole[..., None])
         standard = given + np.matmul(self._back, base - grouping.base(given)[:, None])[..., 0]
         try:
-            return model_fields(self.robot, dict(zip(grouping.standard.names, standard.T, strict=True)))
+            values = dict(zip(grouping.standard.names, standard.T, strict=True))
+            return model_fields(self.robot, {name: x for name, x in values.items() if name in self._given})
         except BenchError as error:
             raise IdentificationError(f"a robot with these parameters cannot be simulated: {error}") from error
 
@@ -131,10 +138,10 @@ class ScenarioLoop(AbstractLoop):
             raise IdentificationError(f"the loop cannot be simulated: {error}") from error
         return cls(subject, scenarios, logs)
 
-    def repeat(self, X: Array, *, informed: bool = False) -> Simulated:
+    def repeat(self, X: Array, *, informed: bool = False, exact: bool = True) -> Simulated:
         """Return the logs that robots with these parameters give."""
         flat = X.reshape(-1, X.shape[-1])
-        vary, failures = self._fields.of(flat), dict[tuple[int, ...], str]()
+        vary, failures = self._fields.of(flat, exact=exact), dict[tuple[int, ...], str]()
         made = [self._log(k, X.shape[:-1], vary, failures, informed=informed) for k in range(len(self.logs))]
         return Simulated(tuple(made), failures)
 
@@ -150,7 +157,7 @@ class ScenarioLoop(AbstractLoop):
             raise IdentificationError(f"the loop cannot be simulated: {error}") from error
         for sim, why in run.failures.items():
             place = tuple(int(i) for i in np.unravel_index(sim, shape)) if shape else ()
-            failures.setdefault(place, f"the robot with the parameters of a round cannot be simulated: {why}")
+            failures.setdefault(place, f"the robot with the parameters of a round cannot be simulated: {why}{IMPOSSIBLE}")
         samples = self.logs[k].samples
         q, tau = (x[:, :samples].reshape(*shape, samples, x.shape[-1]) for x in (run.log.q, run.log.tau))
         return replace(run.log, q=q, tau=tau, conditions={})

@@ -44,11 +44,14 @@ class Rounds:
         Rounds at most.
     settled : float
         Step, in sigma, below which parameters count as settled.
+    exact : bool
+        Whether the simulated robot must have all parameters of the problem.
     """
 
     problem: Problem
     most: int
     settled: float
+    exact: bool = True
     path: list[Array] = field(default_factory=list)
     failures: dict[tuple[int, ...], str] = field(default_factory=dict)
     simulations: npt.NDArray[np.intp] = field(init=False)
@@ -118,7 +121,7 @@ class Rounds:
         In the first round the controller knows the robot, so that it follows the motion, however far off the start is.
         """
         self._informed = not self.simulations.any()
-        found = loop_of(self.problem).repeat(np.nan_to_num(X), informed=self._informed)
+        found = loop_of(self.problem).repeat(np.nan_to_num(X), informed=self._informed, exact=self.exact)
         extra = X.ndim - 1 - self.simulations.ndim
         for place, why in found.failures.items():
             if self.active[place[extra:]]:  # one that has settled stays
@@ -190,9 +193,9 @@ class AbstractSimulating(AbstractEstimator):
         require_positive(settled=self.settled)
 
     @final
-    def begun(self, problem: Problem) -> Rounds:
+    def begun(self, problem: Problem, *, exact: bool = True) -> Rounds:
         """Return the rounds of a problem, before the first."""
-        return Rounds(problem, self.rounds, self.settled)
+        return Rounds(problem, self.rounds, self.settled, exact)
 
 
 def require_explicit(problem: Problem, name: str, what: str, other: str = "") -> None:

@@ -31,7 +31,7 @@ class AbstractLoop(ABC):
     """The closed loops in which the logs of a problem were recorded, without noise."""
 
     @abstractmethod
-    def repeat(self, X: Array, *, informed: bool = False) -> Simulated:
+    def repeat(self, X: Array, *, informed: bool = False, exact: bool = True) -> Simulated:
         """Return the logs that robots with these parameters give on the motions of the problem's logs.
 
         Parameters
@@ -43,6 +43,14 @@ class AbstractLoop(ABC):
             would have been given, so that it follows the motion, however wrong X is (the update of gains of M. Gautier,
             A. Janot and P.-O. Vandanjon, "A new closed-loop output error method for parameter identification of robot
             dynamics", IEEE Trans. Control Systems Technology 21 (2013) 428-444).
+        exact : bool
+            Whether parameters that the simulated robot does not have, such as those of some laws of friction, are an error.
+            Otherwise they are left out: the motion is nearly that of the log all the same.
+
+        Raises
+        ------
+        IdentificationError
+            If the loop cannot be simulated, or such a parameter is an error.
         """
 
 

@@ -5,6 +5,7 @@ from sim.trajectories.fourier import Fourier as Fourier
 from sim.trajectories.point_to_point import PointToPoint as PointToPoint
 from sim.trajectories.quintic import Quintic as Quintic
 from sim.trajectories.random_moves import RandomMoves as RandomMoves
+from sim.trajectories.recorded import Recorded as Recorded
 from sim.trajectories.reference import Reference as Reference
 from sim.trajectories.time_optimal import TimeOptimal as TimeOptimal
 from sim.trajectories.trajectory import AbstractTrajectory as AbstractTrajectory
@@ -16,6 +17,7 @@ TRAJECTORIES: PluginTable[AbstractTrajectory] = PluginTable(
         "fourier": Fourier,
         "quintic": Quintic,
         "random": RandomMoves,
+        "recorded": Recorded,
         "time_optimal": TimeOptimal,
     },
 )

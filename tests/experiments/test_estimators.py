@@ -59,6 +59,29 @@ def test_a_log_alone_needs_its_loop(idbench, ran, scenario, tmp_path):
         assert len(err.strip().splitlines()) == 1
 
 
+def test_a_log_whose_loop_is_known_only_roughly_is_identified_by_instruments(idbench, ran, tmp_path):
+    """As of a real robot: the motion is that of the measured positions, the gains are anybody's, one law is not simulated."""
+    log, own = read_log(ran / "log.parquet"), json.loads((ran / "summary.json").read_text())
+    columns = np.column_stack([log.t, log.q])
+    np.savetxt(tmp_path / "measured.csv", columns, delimiter=",", header="t,q1,q2", comments="")
+    write_log(log, tmp_path / "log.parquet")
+    (tmp_path / "loop.toml").write_text(
+        f'name = "rough"\nrobot = "scara"\nfs = {log.fs}\n[trajectory]\nkind = "recorded"\nfile = "measured.csv"\n'
+        'cutoff = 8.0\n[controller]\nkind = "pd"\nbandwidth = 12.0\n'
+    )
+    words = ("identify", "log.parquet", "--loop", "loop.toml", "--model", "explicit", "--add", "offset", "--no-rerun")
+    code, _, err = idbench(*words, "--estimator", "IV", "--out", "found")
+    assert code == 0, err
+    found = json.loads((tmp_path / "found" / "summary.json").read_text())
+    X = dict(zip(found["parameters"], found["models"]["explicit"]["estimate"], strict=True))
+    sigma = dict(zip(found["parameters"], found["models"]["explicit"]["corrected_sigma"], strict=True))
+    assert "off1" in X
+    assert all(abs(X[name] - true) < 4 * sigma[name] for name, true in zip(own["parameters"], own["truth"], strict=True))
+    code, _, err = idbench(*words, "--estimator", "DIDIM")
+    assert code == 2
+    assert "off1, off2 cannot be simulated" in err
+
+
 def test_one_model_that_cannot_takes_nothing_from_the_others(idbench, ran):
     """CLIE compares torques: implicit and power models have no estimate, and say so."""
     code, out, _ = idbench("identify", ran, "--estimator", "UKF", "--no-rerun")
