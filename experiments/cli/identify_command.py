@@ -2,7 +2,7 @@
 
 import re
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -46,39 +46,25 @@ from sim.scenario.scenario_file import load
 
 def identify(asked: Identify) -> None:
     """Identify logs, judge the result, write it."""
-    page, models, out = new_page(machine=asked.json), tuple(MODELS) if asked.model == "all" else (asked.model,), asked.out
+    page, out = new_page(machine=asked.json), asked.out
     _require_logs(asked)
     first = asked.log[0]
-    path, stated = file_of(first), stated_by(first)
-    _require_label(asked.label)
-    robot = stated.get("robot", CLOSED_FORM) if asked.robot is None else absolute(asked.robot)
-    subject = Subject(robot, asked.parameters, mounting_of(asked.mounting))
-    require_targets(asked, subject)
+    stated = stated_by(first)
+    named = _named(asked, stated)
     place = None if out is None else Place(out, "identify", str(first.absolute()), asked.force)
     if place:
         place.check()
-    named = Identified(  # complains of names first
-        (), subject, models=models, chain=asked.chain, estimator=asked.estimator, name=asked.label, loops=_loops(asked),
-        start=asked.start, consistent=asked.consistent,
-    )  # fmt: skip
-    named = with_chain(asked, named)
     with ExitStack() as stack:
-        audience, path = _followed(stack, asked, path, question_of(asked), named)
+        audience, path = _followed(stack, asked, file_of(first), question_of(asked), named)
         fit = fit_logs(replace(asked, log=(path, *asked.log[1:])), named)
         whole = replace(fit.named, logs=fit.logs, log_names=fit.names, truth=_truth(stated, named))
         whole, choice = with_friction(whole)
-        friction = words(choice, whole.subject.laws.names, whole.subject.robot.joints) if choice else []
         found, hidden = _shown(whole)
         judged, said = judged_on(asked, found, fit)
-        of_file = [*warnings_of_robot(found.subject.robot), *plugin_conflicts()]
-        warnings = {LOG: _warnings(judged, fit), FILE: of_file, MOTION: hidden}
         audience = audience or stack.enter_context(asked.watching.audience())
         stack.enter_context(shown(page))
-        with _explained([warning for group in warnings.values() for warning in group]):
-            print_identified(page, found, titles(asked.log))
-            for validated in judged:
-                print_validated(page, validated)
-        warned = warn(page, warnings, warnings_of_result(found), _advice(judged[0], asked))
+        warned = _printed(page, asked, judged, fit, hidden)
+        friction = words(choice, found.subject.laws.names, found.subject.robot.joints) if choice else []
         notes = [*_notes(fit), *fit.notes, *friction, *said]
         for note in notes:
             page.print(Text(note), soft_wrap=True)
@@ -92,6 +78,33 @@ def identify(asked: Identify) -> None:
         elif audience and not is_long(found.logs):
             _show(found, audience)
         results.export()
+
+
+def _named(asked: Identify, stated: Mapping[str, Any]) -> Identified:
+    """Return what is asked for, of no log yet: it complains of names before anything is computed."""
+    _require_label(asked.label)
+    robot = stated.get("robot", CLOSED_FORM) if asked.robot is None else absolute(asked.robot)
+    subject = Subject(robot, asked.parameters, mounting_of(asked.mounting))
+    require_targets(asked, subject)
+    named = Identified(
+        (), subject, models=tuple(MODELS) if asked.model == "all" else (asked.model,), chain=asked.chain,
+        estimator=asked.estimator, name=asked.label, loops=_loops(asked), start=asked.start, consistent=asked.consistent,
+    )  # fmt: skip
+    return with_chain(asked, named)
+
+
+def _printed(
+    page: Page, asked: Identify, judged: Sequence[Validated], fit: FitLogs, hidden: Sequence[str]
+) -> Mapping[str, Sequence[str]]:
+    """Print estimates, verdicts and warnings; return the warnings."""
+    found = judged[0].found
+    of_file = [*warnings_of_robot(found.subject.robot), *plugin_conflicts()]
+    warnings = {LOG: _warnings(judged, fit), FILE: of_file, MOTION: [*hidden]}
+    with _explained([warning for group in warnings.values() for warning in group]):
+        print_identified(page, found, titles(asked.log))
+        for validated in judged:
+            print_validated(page, validated)
+    return warn(page, warnings, warnings_of_result(found), _advice(judged[0], asked))
 
 
 def _loops(asked: Identify) -> tuple[Scenario, ...]:

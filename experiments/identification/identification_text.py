@@ -1,9 +1,10 @@
 """Identifications as text."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite, log2, pi
 
 from rich.console import Console
+from rich.table import Table
 from rich.text import Text
 
 from experiments.identification.consistent_estimate import words_of_consistency
@@ -21,51 +22,60 @@ def print_identified(console: Console, found: Identified, title: str) -> None:
 
     Sigma is the corrected one; the paper's is in the summary.
     """
-    known = found.truth is not None
-    what = ("X", "%e" if known else "sigma", "%sigma")
-    heads = [f"{model}\n{w}" for model in found.estimates for w in what]
-    grid, marks = new_table("", [*(["true\nX"] if known else []), *heads]), doubtful(found)
+    marks = doubtful(found)
     flags = used(marks)
-    for i, name in enumerate(found.basis.names):
-        true = [f"{list(found.truth.values())[i]:g}"] if found.truth is not None else []
-        cells = (
-            cell
-            for model, e in found.estimates.items()
-            for cell in _flagged(_cells(e, found, i), marks[model][i] if flags else ("", "", ""))
-        )
-        grid.add_row(name, *true, *cells)
-    grid.add_section()
-    lead = [""] if known else []
-    grid.add_row("Cond(W)", *lead, *(c for e in found.estimates.values() for c in (f"{e.condition_number:.1f}", "", "")))
-    grid.add_row("rows", *lead, *(c for e in found.estimates.values() for c in (f"{e.row_count}", "", "")))
-    for j in range(found.basis.n):
-        shares = [_explained(share[j]) for share in found.explained.values()]
-        grid.add_row(f"tau{j + 1} explained", *lead, *(c for share in shares for c in (share, "", "")))
-    print_titled(console, f"{title}: chain {found.chain}, {found.estimator}", grid, 1 + known)
+    print_titled(
+        console, f"{title}: chain {found.chain}, {found.estimator}", _table(found, marks, flags), 1 + (found.truth is not None)
+    )
     if flags:
         console.print(Text("; ".join(f"{flag} {FLAGS[flag]}" for flag in flags)))
-    channel = found.logs[0].torque
-    read = f"{channel.meaning}, delay {1e3 * channel.delay:.4g} ms"
-    logged = isinstance(found.processing.alignment, AsLogged)
+    for words in _told(found):
+        console.print(Text(words), soft_wrap=True)
+    if len(found.logs) > 1 and found.torque_errors:
+        _print_logs(console, found)
+    console.print()
+
+
+def _table(found: Identified, marks: Mapping[str, Sequence[Sequence[str]]], flags: Sequence[str]) -> Table:
+    """Return the table of the parameters, with marks of those that are doubtful, and of the fit as a whole."""
+    known, estimates = found.truth is not None, found.estimates
+    what = ("X", "%e" if known else "sigma", "%sigma")
+    grid = new_table("", [*(["true\nX"] if known else []), *(f"{model}\n{w}" for model in estimates for w in what)])
+    for i, name in enumerate(found.basis.names):
+        true = [f"{list(found.truth.values())[i]:g}"] if found.truth is not None else []
+        each = (_flagged(_cells(e, found, i), marks[m][i] if flags else ("", "", "")) for m, e in estimates.items())
+        grid.add_row(name, *true, *(cell for cells in each for cell in cells))
+    grid.add_section()
+    whole = {
+        "Cond(W)": [f"{e.condition_number:.1f}" for e in estimates.values()],
+        "rows": [f"{e.row_count}" for e in estimates.values()],
+    }
+    for j in range(found.basis.n):
+        whole[f"tau{j + 1} explained"] = [_explained(share[j]) for share in found.explained.values()]
+    for name, cells in whole.items():
+        grid.add_row(name, *([""] if known else []), *(cell for first in cells for cell in (first, "", "")))
+    return grid
+
+
+def _told(found: Identified) -> Iterator[str]:
+    """Yield what else is to be known: models that failed, torque and delay, noise, rounds, what was moved."""
     for model, why in found.failures.items():
-        console.print(Text(f"{model}: no estimate: {why}"), soft_wrap=True)
-    console.print(Text(f"torque: {read}" + (f", which chain {found.chain} ignores: it takes it as logged" if logged else "")))
+        yield f"{model}: no estimate: {why}"
+    channel = found.logs[0].torque
+    ignored = f", which chain {found.chain} ignores: it takes it as logged"
+    logged = isinstance(found.processing.alignment, AsLogged)
+    yield f"torque: {channel.meaning}, delay {1e3 * channel.delay:.4g} ms{ignored if logged else ''}"
     if found.delay is not None:
         delay, sigma = (1e3 * x for x in found.delay)
         words = f"delay found with the parameters: {delay:.4g} ms, sigma {sigma:.2g} ms"
         if abs(delay - 1e3 * channel.delay) > SURE * sigma:
             words += f"; what follows judges them at {1e3 * channel.delay:.4g} ms: give --torque-delay {1e-3 * delay:.4g}"
-        console.print(Text(words), soft_wrap=True)
-    console.print(Text(_noise(found)), soft_wrap=True)
-    for words in words_of_iterations(found):
-        console.print(Text(words), soft_wrap=True)
+        yield words
+    yield _noise(found)
+    yield from words_of_iterations(found)
     if found.consistent != "no" and found.known is None:
         before = {name: e for name, e in found.unconstrained.items() if isinstance(e, Estimate)}
-        for words in words_of_consistency(before, found.estimates):
-            console.print(Text(words), soft_wrap=True)
-    if len(found.logs) > 1 and found.torque_errors:
-        _print_logs(console, found)
-    console.print()
+        yield from words_of_consistency(before, found.estimates)
 
 
 def _print_logs(console: Console, found: Identified) -> None:

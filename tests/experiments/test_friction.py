@@ -68,34 +68,30 @@ def test_the_log_says_which_law(tmp_path, monkeypatch, capsys):
     assert main(["run", "slow.toml", "--out", "run", "--no-rerun", "--friction", "auto"]) == 0
     found = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert {"Fst1", "vs1"} <= set(found["parameters"])
-    values = {
-        name: (x, s, true)
-        for name, x, s, true in zip(
-            found["parameters"],
-            found["models"]["explicit"]["estimate"],
-            found["models"]["explicit"]["corrected_sigma"],
-            found["truth"],
-            strict=True,
-        )
-    }
+    explicit = found["models"]["explicit"]
     for name in ("Fst1", "vs1"):
-        x, sigma, true = values[name]
+        k = found["parameters"].index(name)
+        x, sigma, true = explicit["estimate"][k], explicit["corrected_sigma"][k], found["truth"][k]
         assert abs(x - true) < 4 * sigma < 0.3 * true
     capsys.readouterr()
-    words = [
-        "identify",
-        "run",
-        "--friction",
-        "auto",
-        "--model",
-        "explicit",
-        "--out",
-        "found",
-        "--no-rerun",
-        "--write",
-        "arm.py",
-    ]
-    assert main(words) == 0
+    assert (
+        main(
+            [
+                "identify",
+                "run",
+                "--friction",
+                "auto",
+                "--model",
+                "explicit",
+                "--out",
+                "found",
+                "--no-rerun",
+                "--write",
+                "arm.py",
+            ]
+        )
+        == 0
+    )
     out = capsys.readouterr().out
     assert re.search(r"friction of joint1: viscous \+ coulomb \+ stribeck \(stribeck takes \d+ %", out)
     compared = json.loads((tmp_path / "found" / "summary.json").read_text())["friction"]
