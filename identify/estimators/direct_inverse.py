@@ -10,6 +10,7 @@ from identify.estimators.problem import Problem
 from identify.estimators.residual_scatter import scatter
 from identify.estimators.row_products import Kinds, Solved, solve_with
 from identify.estimators.simulated_rounds import AbstractSimulating, rates
+from identify.estimators.steps import SecantSteps
 
 
 @final
@@ -23,6 +24,7 @@ class DirectInverse(AbstractSimulating):
     dynamics", IEEE Trans. Control Systems Technology 21 (2013) 428-444). A wrong controller in the simulation makes it wrong.
     """
 
+    settled: float = 0.1
     needs: ClassVar[frozenset[Need]] = frozenset({"rows", "loop"})
 
     def solve(self, problem: Problem) -> Estimate:
@@ -33,5 +35,5 @@ class DirectInverse(AbstractSimulating):
             W = problem.at(rounds.simulated(X).logs).W
             return solve_with(kinds, rows.Y, W, W)
 
-        found = rounds.until_settled(step, rounds.start())
+        found = rounds.until_settled(step, rounds.start(), SecantSteps())
         return rounds.estimate(found, honest=scatter(found, kinds, rates(problem)))

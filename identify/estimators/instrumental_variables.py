@@ -9,6 +9,7 @@ from identify.estimators.estimator import Need
 from identify.estimators.problem import Problem
 from identify.estimators.row_products import Kinds, Solved, solve_with
 from identify.estimators.simulated_rounds import AbstractSimulating
+from identify.estimators.steps import SecantSteps
 
 
 @final
@@ -23,6 +24,7 @@ class InstrumentalVariables(AbstractSimulating):
     friction that the simulated robot does not have.
     """
 
+    settled: float = 0.1
     needs: ClassVar[frozenset[Need]] = frozenset({"rows", "loop"})
 
     def solve(self, problem: Problem) -> Estimate:
@@ -32,5 +34,5 @@ class InstrumentalVariables(AbstractSimulating):
         def step(X: Array) -> Solved:
             return solve_with(kinds, rows.Y, rows.W, problem.at(rounds.simulated(X).logs).W)
 
-        found = rounds.until_settled(step, rounds.start())
+        found = rounds.until_settled(step, rounds.start(), SecantSteps())
         return rounds.estimate(found, influence=lambda _: found.G)

@@ -16,6 +16,7 @@ from identify.estimators.problem import Problem
 from identify.estimators.propagated import Influence
 from identify.estimators.row_products import Solved
 from identify.estimators.simulator import AbstractLoop, Simulated
+from identify.estimators.steps import Steps
 from identify.models.explicit import ExplicitModel
 
 SMALL = 1e-3
@@ -43,7 +44,7 @@ class Rounds:
     most : int
         Rounds at most.
     settled : float
-        Step, in sigma, below which parameters count as settled.
+        What is left, in sigma, below which parameters count as settled.
     exact : bool
         Whether the simulated robot must have all parameters of the problem.
     """
@@ -73,7 +74,7 @@ class Rounds:
         self.path.append(X)
         return X
 
-    def until_settled(self, step: Callable[[Array], Solved], X: Array) -> Solved:
+    def until_settled(self, step: Callable[[Array], Solved], X: Array, steps: Steps | None = None) -> Solved:
         """Return the solution of `step` that does not move any more; runs that have settled are left as they are.
 
         A round whose controller was made for the simulated robot is not the last: the real one was not.
@@ -84,6 +85,8 @@ class Rounds:
             Makes a round from parameters, shape (..., p).
         X : Array, shape (..., p)
             Where it begins.
+        steps : Steps, optional
+            What is left, and where the next round begins; by default what the last has moved, and where it has led.
 
         Raises
         ------
@@ -91,20 +94,27 @@ class Rounds:
             If every run fails; the reason of the first.
         """
         found: Solved | None = None
-        move = np.full(X.shape, np.inf)
+        steps, move = steps or Steps(), np.full(X.shape, np.inf)
         for _ in range(self.most):
             new = step(X)
             self._require_finite(new.X, "the simulated motion does not determine the parameters")
             found = new.where(self.active, found)
+            unit = np.maximum(new.sigma, NOTHING * self._small)
             with np.errstate(invalid="ignore", divide="ignore"):
-                unit = np.maximum(new.sigma, NOTHING * self._small)
                 move = np.where(self.active[..., None], np.abs(new.X - X) / unit, move)
-            X = found.X
-            self.path.append(X)
-            self.active &= ~((np.max(move, axis=-1) < self.settled) & (not self._informed))
+                left, after = steps.taken(X, new.X, unit, comparable=not self._informed)
+            X = np.where(self.active[..., None], after, X)
+            self.path.append(found.X)
+            self.active &= ~((left < self.settled) & (not self._informed))
             if not self.active.any():
                 break
         self._require_same_motion(STRAYS)
+        self._require_settled(move)
+        assert found is not None  # there is a round at least
+        return found
+
+    def _require_settled(self, move: Array) -> None:
+        """Let runs fail that have neither settled nor come near to it."""
         for run in map(tuple, np.argwhere(self.active & (np.max(move, axis=-1) > UNSETTLED)).tolist()):
             k = int(np.argmax(move[run]))
             self.fail(
@@ -112,8 +122,6 @@ class Rounds:
                 f"{self.problem.names[k]} still moves by {move[run][k]:.2g} sigma after {self.most} rounds: does the simulated "
                 "loop have the controller and the motion of the log? If it does, begin nearer to the truth",
             )
-        assert found is not None  # there is a round at least
-        return found
 
     def simulated(self, X: Array) -> Simulated:
         """Return the logs of robots with these parameters, shape (..., run, p); those of runs that failed mean nothing.
@@ -182,7 +190,7 @@ class AbstractSimulating(AbstractEstimator):
     rounds : int
         Rounds at most.
     settled : float
-        Step, in sigma, below which parameters count as settled.
+        What is left, in sigma, below which parameters count as settled.
     """
 
     rounds: int = 15

@@ -1,5 +1,6 @@
 """Every estimator that the field uses, on closed loops whose truth is known."""
 
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,6 +35,8 @@ from identify.estimators import (
 from sim.controllers import PDFeedforward
 from sim.encoders import IncrementalEncoder
 from sim.engine.simulation import simulate
+from sim.robot.tree import standard_parameters
+from sim.scenario.measurement import TorqueMeasurement
 from sim.scenario.scenario import Timing
 from sim.scenario.scenario_file import load
 from sim.trajectories import RandomMoves
@@ -80,6 +83,23 @@ def test_five_simulations_are_enough_from_inertias_that_are_half(name, sixteen, 
     assert np.abs((found.X - truth) / found.best_sigma).max() < 4
     assert np.abs(found.X / truth - 1)[[0, 3, 4]].max() < 1e-3
     np.testing.assert_array_equal(found.path[0], off)
+
+
+@pytest.mark.parametrize("name", ["IV", "DIDIM"])
+def test_so_they_are_of_six_joints(name):
+    """Positions to 1.75e-5 rad, torques to 0.05 N m: errors are then those of the noise."""
+    birdy = load("excited/puma560-birdy")
+    scenario = replace(birdy, encoder=IncrementalEncoder(lines=2**22, noise=1.75e-5), torque=TorqueMeasurement(noise=0.05))
+    subject, log = Subject("puma560"), simulate(scenario).alone()
+    standard, grouping = standard_parameters(subject.robot), subject.grouping
+    values = np.array([standard[name] for name in grouping.standard.names])
+    inertia = np.array([re.fullmatch(r"([XYZ]{2}|Ia)\d", name) is not None for name in grouping.standard.names])
+    truth, start = grouping.base(values), grouping.base(np.where(inertia, 0.5, 1.0) * values)
+    simulation = Simulation(ScenarioLoop.of(subject, (scenario,), (log,)), start=start)
+    found = identify(log, subject.basis, ExplicitModel(), estimator=ESTIMATORS.create(name), simulation=simulation)
+    assert found.simulations <= 5
+    assert np.sqrt(np.mean(((start - truth) / found.best_sigma) ** 2)) > 10
+    assert np.sqrt(np.mean(((found.X - truth) / found.best_sigma) ** 2)) < 2
 
 
 def test_instrumental_variables_take_the_noise_out_of_W(twelve, truth):
