@@ -45,7 +45,7 @@ class Estimate:
     failures : mapping of tuple of int to str
         Why runs have no estimate, beside rows that do not determine it.
     path : tuple of Array, shape (..., p)
-        Of estimators that go on from one round to the next: where each began, and the last ended.
+        Of estimators that go on from one round to the next: where the first began, and what each found.
     simulations : int array, shape (...), optional
         How often the robot was simulated.
     """

@@ -11,7 +11,7 @@ from identify.estimators.row_products import Kinds, Solved, solve_with
 from identify.estimators.simulated_rounds import Rounds, small_steps
 
 WORSE = 1.2
-"""Growth of the squared residuals at which a step counts as too long."""
+"""Growth of the rms of the residuals at which a step counts as too long."""
 
 Output = Callable[[tuple[MotionLog, ...]], Array]
 """Logs of shape (..., time, joint) -> what is compared, shape (..., r)."""

@@ -58,6 +58,9 @@ class OutputError(AbstractSimulating):
         require_explicit(problem, "OE", "positions")
         plant = problem.simulation.plant
         assert plant is not None
+        if len({log.fs for log in problem.logs}) > 1:
+            each = ", ".join(f"{log.fs:g}" for log in problem.logs)
+            raise IdentificationError(f"OE takes logs of one frequency, these have {each} Hz: resample them, or take DIDIM")
         rounds, h = self.begun(problem), small_steps(problem)
         shots = {run: [_Shots.of(problem, plant, k, run, self.length) for k in range(len(problem.logs))]
                  for run in np.ndindex(rounds.simulations.shape)}  # fmt: skip

@@ -26,7 +26,7 @@ NOTHING = 1e-2
 """Steps that make less than this share of 0.1 % of the torque count as none, however sure the estimate is of itself."""
 
 UNSETTLED = 1.0
-"""A last step of this many sigma is none of an estimate that has settled."""
+"""What is left, in sigma, of an estimate that has not settled, but is kept after the last round all the same."""
 
 STRAYS, ELSEWHERE = 0.1, 0.3
 """Rms by which a simulated motion may differ from the logged one in the end, and in the first round, as a share of the rms of
@@ -94,7 +94,7 @@ class Rounds:
             If every run fails; the reason of the first.
         """
         found: Solved | None = None
-        steps, move = steps or Steps(), np.full(X.shape, np.inf)
+        steps, move, left = steps or Steps(), np.full(X.shape, np.inf), np.full(X.shape[:-1], np.inf)
         for _ in range(self.most):
             new = step(X)
             self._require_finite(new.X, "the simulated motion does not determine the parameters")
@@ -102,20 +102,21 @@ class Rounds:
             unit = np.maximum(new.sigma, NOTHING * self._small)
             with np.errstate(invalid="ignore", divide="ignore"):
                 move = np.where(self.active[..., None], np.abs(new.X - X) / unit, move)
-                left, after = steps.taken(X, new.X, unit, comparable=not self._informed)
-            X = np.where(self.active[..., None], after, X)
+                now, after = steps.taken(X, new.X, unit, comparable=not self._informed)
+            left = np.where(self.active, np.inf if self._informed else now, left)
             self.path.append(found.X)
-            self.active &= ~((left < self.settled) & (not self._informed))
+            self.active &= ~(left < self.settled)
+            X = np.where(self.active[..., None], after, X)
             if not self.active.any():
                 break
         self._require_same_motion(STRAYS)
-        self._require_settled(move)
+        self._require_settled(move, left)
         assert found is not None  # there is a round at least
         return found
 
-    def _require_settled(self, move: Array) -> None:
+    def _require_settled(self, move: Array, left: Array) -> None:
         """Let runs fail that have neither settled nor come near to it."""
-        for run in map(tuple, np.argwhere(self.active & (np.max(move, axis=-1) > UNSETTLED)).tolist()):
+        for run in map(tuple, np.argwhere(self.active & ~(left < UNSETTLED)).tolist()):
             k = int(np.argmax(move[run]))
             self.fail(
                 run,
@@ -149,8 +150,8 @@ class Rounds:
             for *run, j in np.argwhere(off > most * widest).tolist():
                 self.fail(
                     tuple(run),
-                    f"the simulated motion of joint {j + 1} strays by {off[(*run, j)]:.2g} rad (rms) from that of the log, "
-                    f"which moves by {moved[(*run, j)]:.2g}: the loop has another motion, controller or sampling instant",
+                    f"the simulated motion of joint {j + 1} strays by {off[(*run, j)]:.2g} (rms; rad or m) from that of the "
+                    f"log, which moves by {moved[(*run, j)]:.2g}: the loop has another motion, controller or sampling instant",
                 )
 
     def fail(self, run: tuple[int, ...], why: str) -> None:

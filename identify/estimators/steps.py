@@ -31,11 +31,11 @@ class Steps:
 
 @final
 class SecantSteps(Steps):
-    """Rounds each of which leaves the same share, about, of what was left.
+    """Rounds that leave a share of what was left, each direction its own.
 
-    That share is how much two answers differ for how much their beginnings differed. The next round begins where the last two
-    cross, in the least squares of their steps (D. G. Anderson, "Iterative procedures for nonlinear integral equations",
-    J. ACM 12 (1965) 547-560, with a memory of one).
+    How much of its beginning an answer keeps is known along the line through the last two rounds. The next round begins where
+    their steps along it cross zero (D. G. Anderson, "Iterative procedures for nonlinear integral equations", J. ACM 12 (1965)
+    547-560, with a memory of one). Of the rest of a step half is taken to be left, at most.
     """
 
     def __init__(self) -> None:
@@ -44,24 +44,17 @@ class SecantSteps(Steps):
     def taken(self, X: Array, G: Array, unit: Array, *, comparable: bool) -> tuple[Array, Array]:
         """Return what is left at most [units], and where the next round begins."""
         before, self._before = self._before, (X, G) if comparable else None
-        size = _largest((G - X) / unit)
+        step = (G - X) / unit
         if before is None or not comparable:
-            return size, G
-        began, answered = X - before[0], G - before[1]
-        share = _divided(_largest(answered / unit), _largest(began / unit), 1.0)
-        left = np.where(share < 1, size * _divided(share, 1 - share, 1.0), size)
-        change, step = (answered - began) / unit, (G - X) / unit
-        c = _divided(np.sum(change * step, axis=-1), np.sum(change**2, axis=-1), 0.0)
-        return np.minimum(left, size), G - np.where(np.abs(c) <= FARTHEST, c, 0.0)[..., None] * answered
+            return _largest(step), G
+        answered = G - before[1]
+        change = (answered - (X - before[0])) / unit
+        square = np.sum(change**2, axis=-1, keepdims=True)
+        c = np.divide(np.sum(change * step, axis=-1, keepdims=True), square, out=np.zeros_like(square), where=square > 0)
+        left = _largest(c * answered / unit) + _largest(step - c * change)
+        return left, G - np.where(np.abs(c) <= FARTHEST, c, 0.0) * answered
 
 
 def _largest(steps: Array) -> Array:
     found: Array = np.max(np.abs(steps), axis=-1)
     return found
-
-
-def _divided(a: Array, b: Array, otherwise: float) -> Array:
-    """Return a / b, or something else where that is no number."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        found = a / b
-    return np.where(np.isfinite(found), found, otherwise)

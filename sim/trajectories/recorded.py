@@ -7,7 +7,7 @@ from typing import Annotated, final
 
 import numpy as np
 import scipy
-from pydantic import Field
+from pydantic import AfterValidator
 
 from sim.errors import ScenarioError
 from sim.robot.motors import Array
@@ -23,7 +23,7 @@ ORDER = 4
 """Order of the low-pass, which is applied forwards and backwards."""
 
 RESTS = 0.05
-"""Speed at an end, as a share of a joint's largest, up to which an arm counts as at rest there."""
+"""Speed at an end, as a share of the largest of all joints, up to which a joint counts as at rest there."""
 
 EXAMPLE = Path(__file__).parent / "example.csv"
 """A short motion of the SCARA."""
@@ -57,9 +57,9 @@ class RecordedMotion(AbstractMotion):
 
     @cached_property
     def moving(self) -> Array:
-        """Speed at the first and the last instant, as a share of each joint's largest, shape (2, joint)."""
+        """Speed at the first and the last instant, as a share of the largest of all joints, shape (2, joint)."""
         speed = np.abs(self._free.derivative()(self.t))
-        return speed[[0, -1]] / np.maximum(speed.max(axis=0), np.finfo(float).tiny)
+        return speed[[0, -1]] / max(speed.max(), np.finfo(float).tiny)
 
     @cached_property
     def _free(self) -> "scipy.interpolate.BSpline":
@@ -78,12 +78,17 @@ class RecordedMotion(AbstractMotion):
         return spline, spline.derivative(1), spline.derivative(2)
 
 
+def _absolute(file: str) -> str:
+    """Return the path of a file from the root: scenarios are kept with runs, which are read from other folders."""
+    return file if file == "example" else str(Path(file).absolute())
+
+
 @final
 @settings
 class Recorded(AbstractTrajectory):
     """The motion of a CSV file: planned positions that a controller has logged, or measured ones without their noise."""
 
-    file: Annotated[str, Field(min_length=1)] = "example"
+    file: Annotated[str, AfterValidator(_absolute)] = "example"
     """The file: a line of names, then columns t [s] and q1, q2, ... [rad], in the order of the robot's joints; others do not
     matter. example is a short motion of the SCARA."""
     cutoff: Positive | None = None
@@ -101,7 +106,7 @@ class Recorded(AbstractTrajectory):
         motion = motion if self.cutoff is None else self._smoothed(motion, self.cutoff)
         if (fast := np.flatnonzero(motion.moving[0] > RESTS)).size:
             raise ScenarioError(
-                f"{self.file} begins while {robot.joints[fast[0]]} moves at {100 * motion.moving[0, fast[0]]:.0f} % of its top "
+                f"{self.file} begins while {robot.joints[fast[0]]} moves at {100 * motion.moving[0, fast[0]]:.0f} % of the top "
                 "speed, and simulated robots start at rest: begin the file earlier"
                 + ("" if self.cutoff else ", or give trajectory.cutoff if its positions were measured")
             )
@@ -111,9 +116,12 @@ class Recorded(AbstractTrajectory):
         fs = 1 / float(np.median(np.diff(motion.t)))
         if not cutoff < fs / 2:
             raise ScenarioError(f"trajectory.cutoff = {cutoff:g} Hz must be below {fs / 2:g} Hz, half the rate of {self.file}")
+        low_pass = scipy.signal.butter(ORDER, cutoff, fs=fs, output="sos")
+        least = 6 * len(low_pass) + 4  # what sosfiltfilt reflects at the ends
+        if len(motion.t) < least:
+            raise ScenarioError(f"{self.file} has {len(motion.t)} instants; with trajectory.cutoff it needs at least {least}")
         even = np.arange(int(motion.t[-1] * fs + 1e-6) + 1) / fs
         q = scipy.interpolate.make_interp_spline(motion.t, motion.q, k=1)(np.minimum(even, motion.t[-1]))
-        low_pass = scipy.signal.butter(ORDER, cutoff, fs=fs, output="sos")
         return RecordedMotion(even, scipy.signal.sosfiltfilt(low_pass, q, axis=0))
 
 
@@ -121,18 +129,18 @@ def _read(path: Path, n: int) -> tuple[Array, Array]:
     """Return instants, from 0, and positions of the robot's joints; raise ScenarioError if a file does not have them."""
     wanted = ["t", *(f"q{j + 1}" for j in range(n))]
     try:
-        head, *lines = path.read_text(encoding="utf-8").splitlines() or [""]
-    except (OSError, UnicodeDecodeError) as error:
+        lines = [line for line in path.read_text(encoding="utf-8-sig").splitlines() if line.strip()]
+    except (OSError, ValueError) as error:
         raise ScenarioError(f"cannot read the motion {path}: {getattr(error, 'strerror', None) or 'it is no text'}") from None
-    names = [name.strip() for name in head.split(",")]
+    names = [name.strip(" \t'\"#") for name in "".join(lines[:1]).split(",")]
     if missing := [name for name in wanted if name not in names]:
         raise ScenarioError(f"{path} has no column {', '.join(missing)}; its columns are {', '.join(names):.200}")
-    if len(lines) <= DEGREE:
-        raise ScenarioError(f"{path} has {len(lines)} instants; a motion needs at least {DEGREE + 1}")
     try:
-        table = np.loadtxt(lines, delimiter=",", usecols=[names.index(name) for name in wanted], ndmin=2)
+        table = np.loadtxt(lines[1:] or ["nan," * len(names)], delimiter=",", usecols=[*map(names.index, wanted)], ndmin=2)
     except ValueError as error:
         raise ScenarioError(f"cannot read the motion {path}: {error}") from None
+    if len(table) <= DEGREE:
+        raise ScenarioError(f"{path} has too few instants: a motion needs at least {DEGREE + 1}")
     t, q = table[:, 0], table[:, 1:]
     if not np.isfinite(table).all() or not (np.diff(t) > 0).all():
         raise ScenarioError(f"{path} holds instants that do not rise, or numbers that are not finite")

@@ -85,8 +85,8 @@ def test_five_simulations_are_enough_from_inertias_that_are_half(name, sixteen, 
     np.testing.assert_array_equal(found.path[0], off)
 
 
-@pytest.mark.parametrize("name", ["IV", "DIDIM"])
-def test_so_they_are_of_six_joints(name):
+@pytest.mark.parametrize(("name", "most"), [("IV", 3), ("DIDIM", 6)])
+def test_six_joints_take_no_more_than_six(name, most):
     """Positions to 1.75e-5 rad, torques to 0.05 N m: errors are then those of the noise."""
     birdy = load("excited/puma560-birdy")
     scenario = replace(birdy, encoder=IncrementalEncoder(lines=2**22, noise=1.75e-5), torque=TorqueMeasurement(noise=0.05))
@@ -97,7 +97,7 @@ def test_so_they_are_of_six_joints(name):
     truth, start = grouping.base(values), grouping.base(np.where(inertia, 0.5, 1.0) * values)
     simulation = Simulation(ScenarioLoop.of(subject, (scenario,), (log,)), start=start)
     found = identify(log, subject.basis, ExplicitModel(), estimator=ESTIMATORS.create(name), simulation=simulation)
-    assert found.simulations <= 5
+    assert found.simulations <= most
     assert np.sqrt(np.mean(((start - truth) / found.best_sigma) ** 2)) > 10
     assert np.sqrt(np.mean(((found.X - truth) / found.best_sigma) ** 2)) < 2
 

@@ -53,11 +53,18 @@ def test_measured_positions_leave_their_noise_in_the_file(tmp_path, robot, rng):
     [
         ("", {}, "has no column t, q1, q2; its columns are "),
         ("t,q1,qd1\n0,0,0", {}, "has no column q2; its columns are t, q1, qd1"),
-        ("t,q1,q2\n0,0,0\n0.1,0,0", {}, "has 2 instants; a motion needs at least 6"),
+        ("t,q1,q2\n0,0,0\n0.1,0,0", {}, "has too few instants: a motion needs at least 6"),
+        ("t,q1,q2\n\n\n", {}, "has too few instants"),
+        ("t,q1,q2\n0,0,0\n\n\n\n\n\n\n1,0,0\n2,0,0", {}, "has too few instants"),
         ("t,q1,q2\n" + "0,0,0\n" * 9, {}, "instants that do not rise"),
+        (
+            "t,q1,q2\n" + "".join(f"{k},0,0\n" for k in range(15)),
+            {"cutoff": 0.2},
+            "with trajectory.cutoff it needs at least 16",
+        ),
         ("t,q1,q2\n" + "".join(f"{k},nan,0\n" for k in range(9)), {}, "numbers that are not finite"),
         ("t,q1,q2\n" + "".join(f"{k},x,0\n" for k in range(9)), {}, "cannot read the motion"),
-        ("t,q1,q2\n" + "".join(f"{k},{k},0\n" for k in range(9)), {}, "begins while joint1 moves at 100 % of its top speed"),
+        ("t,q1,q2\n" + "".join(f"{k},{k},0\n" for k in range(9)), {}, "begins while joint1 moves at 100 % of the top speed"),
         ("t,q1,q2\n" + "".join(f"{k},0,0\n" for k in range(9)), {"cutoff": 0.6}, "must be below 0.5 Hz, half the rate"),
     ],
 )
@@ -67,6 +74,18 @@ def test_files_that_are_no_motion_are_told(rows, options, message, tmp_path, rob
         Recorded(file=str(tmp_path / "motion.csv"), **options).plan(robot)
 
 
-def test_a_file_that_is_not_there_is_told(robot):
-    with pytest.raises(ScenarioError, match=r"cannot read the motion nowhere\.csv: No such file or directory"):
-        Recorded(file="nowhere.csv").plan(robot)
+@pytest.mark.parametrize(("file", "why"), [("nowhere.csv", "No such file or directory"), (".", "Is a directory")])
+def test_a_file_that_is_not_there_is_told(file, why, robot):
+    with pytest.raises(ScenarioError, match=f"cannot read the motion .*: {why}"):
+        Recorded(file=file).plan(robot)
+
+
+def test_a_file_is_found_from_any_folder(planned, robot, tmp_path, monkeypatch):
+    """A joint that is held, names in quotation marks, the mark of a file's encoding, and a blank line are no trouble."""
+    monkeypatch.chdir(tmp_path)
+    t = np.arange(0, PLANNED.duration, 0.01)
+    q = PLANNED.at(t, 100.0).q * [1, 0] + [0, 0.3]
+    written(tmp_path / "held.csv", t, q + 1e-6 * np.sin(40 * t)[:, None], '\ufeff"t","q1","q2","current"\n')
+    held = Recorded(file="held.csv")
+    monkeypatch.chdir("/")
+    assert np.abs(held.plan(robot).at(t, 100.0).q - q).max() < 1e-5
