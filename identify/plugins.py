@@ -59,6 +59,11 @@ class PluginTable(Mapping[str, Callable[[], T]], Generic[T]):
         """Names of the plug-ins of this package."""
         return tuple(self._builtin)
 
+    def name_of(self, made: object) -> str:
+        """Return what a plug-in is called: its name in this table, or that of its class."""
+        known = (name for name, make in self._builtin.items() if make is type(made))
+        return next(known, type(made).__name__)
+
     def __iter__(self) -> Iterator[str]:
         yield from self._builtin
         yield from sorted(self._foreign)

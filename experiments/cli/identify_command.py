@@ -37,7 +37,7 @@ from experiments.identification.warnings import (
 )
 from experiments.plugin_tables import plugin_conflicts
 from experiments.recording.audience import Audience, Watching
-from identify import MODELS, ExcitationError, IdentificationError
+from identify import MODELS, AbstractEstimator, ExcitationError, IdentificationError
 from identify.judge.friction_choice import FrictionChoice
 from identify.rows.long_logs import is_long
 from sim.scenario.scenario import Scenario
@@ -90,7 +90,16 @@ def _named(asked: Identify, stated: Mapping[str, Any]) -> Identified:
         (), subject, models=tuple(MODELS) if asked.model == "all" else (asked.model,), chain=asked.chain,
         estimator=asked.estimator, name=asked.label, loops=_loops(asked), start=asked.start, consistent=asked.consistent,
     )  # fmt: skip
+    _require_used(asked, named.solver)
     return with_chain(asked, named)
+
+
+def _require_used(asked: Identify, solver: AbstractEstimator) -> None:
+    """Raise ExperimentError if a loop or a start is given that would not be used."""
+    if asked.loop and "loop" not in solver.needs:
+        raise ExperimentError(f"--loop: {asked.estimator} simulates no loop; leave it out, or take IV, DIDIM, CLIE or CLOE")
+    if asked.start != "least-squares" and not solver.begins:
+        raise ExperimentError(f"--start {asked.start}: {asked.estimator} needs no start; leave it out, or take IV or DIDIM")
 
 
 def _printed(

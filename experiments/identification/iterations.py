@@ -6,8 +6,12 @@ from typing import Any
 import numpy as np
 
 from experiments.identification.identified import Identified
-from identify import Estimate, InstrumentalVariables, noise_in_rows
+from identify import Estimate, InstrumentalVariables, WeightedLeastSquares, noise_in_rows
+from identify import estimate as fit
 from identify.judge.noise_in_rows import LEVEL
+
+FAR = 5.0
+"""Difference from least squares, in its sigma, that is none of chance."""
 
 
 def words_of_iterations(found: Identified) -> Iterator[str]:
@@ -26,6 +30,21 @@ def words_of_iterations(found: Identified) -> Iterator[str]:
                 + f" (Durbin-Wu-Hausman: chi2 = {test.statistic:.3g}, {int(test.freedom)} degrees of freedom, "
                 f"p = {test.probability:.2g})"
             )
+        elif "loop" in found.solver.needs:
+            yield from _far_from_least_squares(found, model, estimate)
+
+
+def _far_from_least_squares(found: Identified, model: str, estimate: Estimate) -> Iterator[str]:
+    """Yield what it means if an estimator that believes the simulated loop does not agree with the measured motion."""
+    plain = fit(estimate.problem, WeightedLeastSquares(), throw=False)
+    # Its own sigma would be as large as the loop is wrong.
+    off = np.abs(estimate.X - plain.X) / plain.corrected_sigma
+    if not np.nanmax(off) < FAR:
+        k = int(np.nanargmax(off))
+        yield (
+            f"{model}: {found.basis.names[k]} is {off[k]:.2g} sigma away from least squares of the measured motion: either "
+            f"noise in W matters, or the loop is not that of the log, which {found.estimator} does not stand; IV stands both"
+        )
 
 
 def iterations(found: Identified) -> dict[str, Any]:

@@ -7,7 +7,6 @@ import numpy as np
 from experiments.identification.identified import Identified
 from experiments.recording.chart import NARROW, Chart
 from experiments.recording.columns import part
-from experiments.recording.parameter_charts import MOST
 from experiments.recording.scales import Signed, Words
 from experiments.recording.stream import Stream
 from experiments.recording.style import JOINTS
@@ -29,13 +28,12 @@ def _send(stream: Stream, at: str, estimate: Estimate) -> None:
     sigma = np.where(estimate.best_sigma > 0, estimate.best_sigma, 1.0)
     off, rounds = (path - estimate.X) / sigma, np.arange(float(len(path)))
     high = max(float(np.nanmax(np.abs(off))), 10 * LEAST)
-    scale = Signed("distance from the estimate [sigma], in decades", -1.3 * high, 1.3 * high, LEAST)
+    scale = Signed("away from the last [sigma]", -1.3 * high, 1.3 * high, LEAST)
     axis = Words("round", -0.5, len(path) - 0.5, tuple(map(str, range(len(path)))))
-    names = np.array_split(np.arange(len(estimate.names)), ceil(len(estimate.names) / MOST))
+    names = np.array_split(np.arange(len(estimate.names)), ceil(len(estimate.names) / len(JOINTS)))  # a colour each
     for k, members in enumerate(names):
-        place = f"{at}/{k}_{part(estimate.names[members[0]])}"
+        place = f"{at}/{k}_{part(estimate.names[members[0]])}_to_{part(estimate.names[members[-1]])}"
         chart = Chart(stream, place, axis, scale, NARROW)
-        for number, p in enumerate(members):
-            color = JOINTS[number % len(JOINTS)]
+        for color, p in zip(JOINTS, members, strict=False):
             chart.line(estimate.names[p], rounds, off[:, p], color)
             chart.marks(f"{estimate.names[p]} ", rounds, off[:, p], color)

@@ -154,8 +154,8 @@ def excitation(shelf: Shelf) -> Part:
 
 def iterations(shelf: Shelf) -> Part:
     """Return the way that the parameters take from round to round, of estimators that simulate or filter."""
-    found = charts(shelf, "{1}: {3} model, round by round", "identify/*/iterations/*/*", NARROW)
-    return grid("iterations", found, min(2, len(found))) if found else None
+    found = charts(shelf, "{4} ({3}, {1})", "identify/*/iterations/*/*", NARROW)
+    return grid("iterations", found, 1 if len(found) == 1 else 2 if len(found) <= 2 * FEW else 3) if found else None
 
 
 def parameters(shelf: Shelf) -> Part:

@@ -58,25 +58,27 @@ def run_shard(study: Study, runs: range, *, threads: int = 1, progress: Progress
     threads : int
         Native threads of the simulation.
     progress : callable, optional
-        Receives the share of the simulation that is done.
+        Receives the share that is done: the simulation and each method count alike.
     """
     shard, scenarios, done = Shard(), {run: study.scenario_of(run) for run in runs}, 0
+    steps = 1 + len(study.methods)
     for together in _groups(study, scenarios, shard):
-        start = time.perf_counter()
+        start, tell = time.perf_counter(), _part(progress, done, len(together), steps * len(runs))
         try:
-            simulated = _simulate(scenarios, together, threads, _part(progress, done, len(together), len(runs)))
+            simulated = _simulate(scenarios, together, threads, tell)
             truth = study.subject.truth(simulated.robots[0], simulated.scenario.friction)
             bound = bound_of(study, simulated, truth) if study.bound else None
         except BenchError as error:
             _fail(shard, study, scenarios, list(together), str(error))
             continue
         shard.seconds["simulation"] += time.perf_counter() - start
-        done += len(together)
-        for method in study.methods:
+        done += len(together) * steps
+        for k, method in enumerate(study.methods):
             start = time.perf_counter()
             simulation = _simulation(study, method, simulated, together, truth)
             shard.rows += _identify(study, method, simulated, list(together), truth, bound, simulation)
             shard.seconds[f"{method.chain_name} {method.estimator_name}"] += time.perf_counter() - start
+            tell(2.0 + k)
     shard.rows.sort(key=lambda row: row["run"])
     return shard
 
@@ -105,9 +107,14 @@ def _simulate(
     return simulate(first, seeds, motions=motions, threads=threads, progress=progress, throw=False)
 
 
-def _part(progress: Progress | None, done: int, part: int, runs: int) -> Progress | None:
-    """Return what receives the share of `part` runs, and tells the share of all."""
-    return None if progress is None else lambda share: progress((done + share * part) / runs)
+def _part(progress: Progress | None, done: int, part: int, whole: int) -> Progress:
+    """Return what receives how many steps `part` runs have done, and tells the share of the whole."""
+
+    def tell(steps: float) -> None:
+        if progress is not None:
+            progress((done + steps * part) / whole)
+
+    return tell
 
 
 def _identify(

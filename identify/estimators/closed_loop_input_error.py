@@ -29,7 +29,7 @@ class ClosedLoopInputError(AbstractSimulating):
 
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate of every run; raise IdentificationError if the model is not the explicit one."""
-        require_explicit(problem, "CLIE", "torques", ", or DIDIM")
+        require_explicit(problem, "CLIE", "torques", "; DIDIM has all")
 
         def torques(logs: tuple[MotionLog, ...]) -> Array:
             maps = problem.rows.maps

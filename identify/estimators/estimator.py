@@ -25,6 +25,9 @@ class AbstractEstimator(ABC):
     full_rank: ClassVar[bool] = True
     """Whether it needs a motion that shows every parameter; one with a prior or a penalty does not."""
 
+    begins: ClassVar[bool] = False
+    """Whether it goes on from a start, which the caller may give."""
+
     filtered: ClassVar[bool] = True
     """Whether what it minimises is the chain's; others take from it no more than where they begin and how large noise is."""
 
@@ -54,19 +57,25 @@ class AbstractEstimator(ABC):
         if throw and lost.any():
             names = ", ".join(np.array(problem.names)[lost.reshape(-1, len(problem.names)).any(axis=0)])
             raise IdentificationError(
-                f"{type(self).__name__} finds no finite value for {names}: use a longer log, in which all joints move"
+                f"{self._called} finds no finite value for {names}: use a longer log, in which all joints move"
             )
         return estimate
 
     def _require(self, problem: Problem) -> None:
         if "loop" in self.needs and problem.simulation.loop is None:
             raise IdentificationError(
-                f"{type(self).__name__} simulates the closed loop in which a log was recorded, which is not known: name the "
+                f"{self._called} simulates the closed loop in which a log was recorded, which is not known: name the "
                 "scenario that describes it (--loop scenario.toml)"
             )
         if "plant" in self.needs and problem.simulation.plant is None:
             raise IdentificationError(
-                f"{type(self).__name__} simulates the robot from the torques of the log, and the caller gave no simulator"
+                f"{self._called} simulates the robot from the torques of the log, and the caller gave no simulator"
             )
         if "rows" in self.needs:
-            problem.require_rows(f"{type(self).__name__} needs rows, and ")
+            problem.require_rows(f"{self._called} needs rows, and ")
+
+    @property
+    def _called(self) -> str:
+        from identify.estimators import ESTIMATORS  # whose table this class is the kind of
+
+        return ESTIMATORS.name_of(self)

@@ -55,6 +55,7 @@ class UnscentedKalmanFilter(AbstractEstimator):
     """
 
     needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
+    begins: ClassVar[bool] = True
     filtered: ClassVar[bool] = False
 
     spread: float = 0.15
@@ -71,7 +72,9 @@ class UnscentedKalmanFilter(AbstractEstimator):
             If the model is not the explicit one, or the filter diverges in every run.
         """
         if not isinstance(problem.model, ExplicitModel):
-            raise IdentificationError("UKF has the robot's equation, not rows of a model: take --model explicit")
+            raise IdentificationError(
+                "UKF has the robot's equation, not rows: it has the explicit model alone (--model explicit)"
+            )
         if problem.basis.adaptive or any(log.conditions for log in problem.logs):
             raise IdentificationError("UKF knows friction of the velocity alone: take GLS for laws of load or temperature")
         start, h = starting_point(problem), small_steps(problem)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import final
+from typing import ClassVar, final
 
 import numpy as np
 import numpy.typing as npt
@@ -194,6 +194,8 @@ class AbstractSimulating(AbstractEstimator):
         What is left, in sigma, below which parameters count as settled.
     """
 
+    begins: ClassVar[bool] = True
+
     rounds: int = 15
     settled: float = 0.05
 
@@ -210,7 +212,9 @@ class AbstractSimulating(AbstractEstimator):
 def require_explicit(problem: Problem, name: str, what: str, other: str = "") -> None:
     """Raise IdentificationError unless the model is the explicit one, for an estimator that does not compare rows."""
     if not isinstance(problem.model, ExplicitModel):
-        raise IdentificationError(f"{name} compares {what}, not rows of a model: take --model explicit{other}")
+        raise IdentificationError(
+            f"{name} compares {what}, not rows: it has the explicit model alone (--model explicit){other}"
+        )
 
 
 def starting_point(problem: Problem) -> Array:

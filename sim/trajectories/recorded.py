@@ -25,8 +25,8 @@ ORDER = 4
 RESTS = 0.05
 """Speed at an end, as a share of the largest of all joints, up to which a joint counts as at rest there."""
 
-EXAMPLE = Path(__file__).parent / "example.csv"
-"""A short motion of the SCARA."""
+EXAMPLE, EXAMPLES = Path(__file__).parent / "example.csv", 2
+"""A short motion of the SCARA, and its joints."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +102,11 @@ class Recorded(AbstractTrajectory):
         ScenarioError
             If the file cannot be read, lacks a joint, or does not begin at rest.
         """
+        if self.file == "example" and robot.n != EXAMPLES:
+            raise ScenarioError(
+                f"trajectory.file is the example, which moves {EXAMPLES} joints; robot {robot.name!r} has {robot.n}: name "
+                "the CSV file of its motion"
+            )
         motion = RecordedMotion(*_read(EXAMPLE if self.file == "example" else Path(self.file), robot.n))
         motion = motion if self.cutoff is None else self._smoothed(motion, self.cutoff)
         if (fast := np.flatnonzero(motion.moving[0] > RESTS)).size:

@@ -47,7 +47,9 @@ def test_a_log_alone_needs_its_loop(idbench, ran, scenario, tmp_path):
     assert code == 0
     assert "settled after" in out
     wrong = {
-        (): "--loop scenario.toml",
+        (): "DIDIM simulates the closed loop in which a log was recorded, which is not known",
+        ("--loop", scenario, "--estimator", "GLS"): "--loop: GLS simulates no loop",
+        ("--start", "file", "--estimator", "WLS"): "--start file: WLS needs no start",
         ("--loop", scenario, scenario): "2 loops are given for 1 logs",
         ("--loop", "arm"): "it is none of scara",
         ("--loop", "ideal"): "the simulated motion of joint",
@@ -80,6 +82,18 @@ def test_a_log_whose_loop_is_known_only_roughly_is_identified_by_instruments(idb
     code, _, err = idbench(*words, "--estimator", "DIDIM")
     assert code == 2
     assert "off1, off2 cannot be simulated" in err
+
+
+def test_a_loop_that_is_believed_and_wrong_is_told(idbench, ran, scenario, tmp_path):
+    """A controller twice as stiff: DIDIM says that least squares does not agree. Of the true loop it says nothing."""
+    wrong = tmp_path / "wrong.toml"
+    wrong.write_text(scenario.read_text().replace("bandwidth = 15.0", "bandwidth = 30.0"))
+    assert wrong.read_text() != scenario.read_text()
+    words = ("identify", ran / "log.parquet", "--estimator", "DIDIM", "--model", "explicit", "--no-rerun")
+    code, out, err = idbench(*words, "--loop", wrong)
+    assert code == 0, err
+    assert "sigma away from least squares of the measured motion" in " ".join(out.split())
+    assert "away from least squares" not in idbench(*words, "--loop", scenario)[1]
 
 
 def test_one_model_that_cannot_takes_nothing_from_the_others(idbench, ran):

@@ -213,7 +213,7 @@ def test_what_an_estimator_needs_is_asked_for(name, message, log):
 
 @pytest.mark.parametrize("name", ["CLIE", "CLOE", "OE", "UKF"])
 def test_what_compares_signals_takes_the_explicit_model(name, sixteen):
-    with pytest.raises(IdentificationError, match="take --model explicit"):
+    with pytest.raises(IdentificationError, match="it has the explicit model alone"):
         identify(sixteen[1], scara(), PowerModel(), estimator=ESTIMATORS.create(name), simulation=loop_of(*sixteen))
 
 
