@@ -26,6 +26,9 @@ TEXT: Color = (170, 170, 170)
 LINE = 0.11
 """Height of a line of the legend."""
 
+LINES, BESIDE = 11, 0.75
+"""Lines of the legend, and how far beside them the next ones stand, if there are more."""
+
 GRID_ORDER, DOT_ORDER, LINE_ORDER, MARK_ORDER = -3.0, -2.0, 1.0, 2.0
 """What is drawn over what."""
 
@@ -129,7 +132,8 @@ class Chart:
 
     def list_entry(self, name: str, color: Color) -> None:
         """Add a line to the legend, which stands beside the frame."""
-        at = (self._width + 0.26, LINE * (0.5 + len(self._listed)))
+        aside, down = divmod(len(self._listed), LINES)
+        at = (self._width + 0.26 + BESIDE * aside, LINE * (0.5 + down))
         self._listed.append(name)
         self._texts(f"legend/{part(name)}", [at], [name], color)
 

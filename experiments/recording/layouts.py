@@ -27,6 +27,9 @@ HIGHER = 26
 FEW = 2
 """Parameters of a study up to which two stand in a row."""
 
+PAGE = 8
+"""Parameters of a study that are seen at once."""
+
 
 def table2(shelf: Shelf) -> Part:
     """Return Table 2: the twin's errors by both processings, and what each imperfection does alone."""
@@ -93,7 +96,10 @@ def study(shelf: Shelf) -> Part:
 def _over_axis(shelf: Shelf, axis: str) -> Part:
     typical = charts(shelf, "typical error", f"study/{axis}/typical")
     each = charts(shelf, "{4}", f"study/{axis}/parameters/*/*", NARROW)
-    return column(*typical, grid("parameters", each, 2 if len(each) <= FEW else 4), shares=[2, 3], name=axis)
+    pages = [each[k : k + PAGE] for k in range(0, len(each), PAGE)]
+    grids = [grid(f"parameters {1 + PAGE * k} to {PAGE * k + len(page)}", page, 4) for k, page in enumerate(pages)]
+    shown = tabbed(grids, "parameters") if len(pages) > 1 else grid("parameters", each, 2 if len(each) <= FEW else 4)
+    return column(*typical, shown, shares=[2, 3], name=axis)
 
 
 LAYOUTS: dict[str, Callable[[Shelf], Part]] = {

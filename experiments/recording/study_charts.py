@@ -1,4 +1,7 @@
-"""Charts of a study: errors over the values of an axis, a colour a model, a symbol a way of identification."""
+"""Charts of a study: errors over the values of an axis, a colour a model, a symbol a way of identification.
+
+Of one model alone ways of identification have colours, too.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +15,7 @@ from experiments.recording.chart import NARROW, SYMBOLS, Chart, Symbol
 from experiments.recording.columns import part
 from experiments.recording.scales import Words, decades, named
 from experiments.recording.stream import Stream
-from experiments.recording.style import FORMS, GREY, Color, lighter
+from experiments.recording.style import FORMS, GREY, JOINTS, Color, lighter
 from experiments.study.answer import short, value
 from experiments.study.axis import Axis
 from experiments.study.statistics import LEAST, Cell
@@ -89,8 +92,19 @@ class AxisCharts:
 
     @property
     def _legend(self) -> Mapping[str, Color]:
-        ways = {f"{_SIGNS[self._symbol(way)]} {' '.join(way)}": GREY for way in self._ways}
-        return {model: FORMS.get(model, GREY) for model in self._models} | (ways if len(ways) > 1 else {})
+        model = self._models[0]
+        alone = len(self._models) == 1 and len(self._ways) > 1
+        ways = {
+            f"{_SIGNS[self._symbol(way)]} {' '.join(way)}": self._color((*way, model)) if alone else GREY for way in self._ways
+        }
+        models = {} if alone else {model: FORMS.get(model, GREY) for model in self._models}
+        return models | (ways if len(ways) > 1 else {})
+
+    def _color(self, names: tuple[str, str, str]) -> Color:
+        """Return the colour of what has a chain, an estimator and a model."""
+        if len(self._models) == 1 and len(self._ways) > 1:
+            return JOINTS[self._ways.index(names[:2]) % len(JOINTS)]
+        return FORMS.get(names[2], GREY)
 
     def _symbol(self, way: tuple[str, str]) -> Symbol:
         return SYMBOLS[self._ways.index(way) % len(SYMBOLS)]
@@ -103,7 +117,7 @@ class AxisCharts:
         return values.index(cell.settings[self.axis.field]) + BESIDE * ((mine + 0.5) / places - 0.5)
 
     def _draw(self, chart: Chart, line: Sequence[Cell], y: Array) -> None:
-        x, color = np.array([self._place(cell) for cell in line]), FORMS.get(line[0].names[2], GREY)
+        x, color = np.array([self._place(cell) for cell in line]), self._color(line[0].names)
         name = "_".join([*line[0].names, *(value(v) for k, v in line[0].settings.items() if k != self.axis.field)])
         chart.line(name, x, y, color, listed=False)
         chart.marks(name, x, y, color, self._symbol(line[0].names[:2]))
@@ -124,7 +138,7 @@ class AxisCharts:
         for cell, size in zip(self.cells, sizes, strict=True):
             some = size[:: max(1, len(size) // DOTS)]
             name = "_".join([*cell.names, *map(value, cell.settings.values())])
-            chart.dots(name, np.full(len(some), self._place(cell)), some, lighter(FORMS.get(cell.names[2], GREY), 1))
+            chart.dots(name, np.full(len(some), self._place(cell)), some, lighter(self._color(cell.names), 1))
         for line in self._lines.values():
             self._draw(chart, line, np.array([PERCENT * cell.rmse[p] for cell in line]))
         self._worst(chart, path, worst)
