@@ -49,13 +49,13 @@ def identify(asked: Identify) -> None:
     page, out = new_page(machine=asked.json), asked.out
     _require_logs(asked)
     first = asked.log[0]
-    stated = stated_by(first)
+    path, stated = file_of(first), stated_by(first)
     named = _named(asked, stated)
     place = None if out is None else Place(out, "identify", str(first.absolute()), asked.force)
     if place:
         place.check()
     with ExitStack() as stack:
-        audience, path = _followed(stack, asked, file_of(first), question_of(asked), named)
+        audience, path = _followed(stack, asked, path, question_of(asked), named)
         fit = fit_logs(replace(asked, log=(path, *asked.log[1:])), named)
         whole = replace(fit.named, logs=fit.logs, log_names=fit.names, truth=_truth(stated, named))
         whole, choice = with_friction(whole)

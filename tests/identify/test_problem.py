@@ -91,7 +91,7 @@ def test_an_estimator_that_needs_rows_is_refused_a_log_too_long_for_them(log, mo
     """It would have been handed triangular factors, and would have returned another X without a word."""
     monkeypatch.setattr(long_logs, "LONG", 1000)
     problem = Problem((log,), scara(), ExplicitModel(), idbench_chain())
-    with pytest.raises(IdentificationError, match="IterativelyReweighted needs rows, and the rows of 4600 samples"):
+    with pytest.raises(IdentificationError, match="IRLS needs rows, and the rows of 4600 samples"):
         estimate(problem, ESTIMATORS.create("IRLS"))
     assert np.isfinite(estimate(problem, WeightedLeastSquares()).corrected_sigma).all()
 
