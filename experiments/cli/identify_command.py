@@ -22,6 +22,7 @@ from experiments.identification.identification_text import print_identified, pri
 from experiments.identification.identified import Identified
 from experiments.identification.log_warnings import warnings_of_log
 from experiments.identification.results import Place, beside, tell_of, write_recording
+from experiments.identification.simulators import require_start
 from experiments.identification.subject import CLOSED_FORM, Subject, absolute
 from experiments.identification.validated import Validated
 from experiments.identification.verdict import Remedies, Verdict
@@ -98,8 +99,7 @@ def _require_used(asked: Identify, solver: AbstractEstimator) -> None:
     """Raise ExperimentError if a loop or a start is given that would not be used."""
     if asked.loop and "loop" not in solver.needs:
         raise ExperimentError(f"--loop: {asked.estimator} simulates no loop; leave it out, or take IV, DIDIM, CLIE or CLOE")
-    if asked.start != "least-squares" and not solver.begins:
-        raise ExperimentError(f"--start {asked.start}: {asked.estimator} needs no start; leave it out, or take IV or DIDIM")
+    require_start(asked.start, asked.estimator, solver)
 
 
 def _printed(

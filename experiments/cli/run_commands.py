@@ -42,11 +42,11 @@ def run(asked: Run) -> None:
         if asked.robot is not None:
             raise ExperimentError(f"--robot {asked.robot}: a run of a study is of the study's robot")
         made = _again(page, asked.study, asked.index, asked.method)
-        made = replace(made, parameters=asked.parameters, start=asked.start, consistent=asked.consistent)
+        made = replace(made, parameters=asked.parameters)
     else:
         described = _with_robot(page, load(_alone(asked.scenario, asked.study, asked.index)), asked.robot)
         made = ScenarioRun(described, asked.chain, asked.estimator, parameters=asked.parameters)
-        made = replace(made, start=asked.start, consistent=asked.consistent)
+    made = replace(made, start=asked.start, consistent=asked.consistent)
     _require_window(inner, watching)
     described, lost = made.scenario, ""
     place = Place(asked.out or Path("runs") / described.name, "run", described.name, asked.force)

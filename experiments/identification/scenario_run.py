@@ -12,6 +12,7 @@ from experiments.identification.friction_choice import with_suitable_friction
 from experiments.identification.identified import Identified
 from experiments.identification.iterations import iterations
 from experiments.identification.parameters import Parameters
+from experiments.identification.simulators import require_start
 from experiments.identification.subject import Subject
 from identify import AbstractEstimator, Chain
 from sim.engine.run import Run
@@ -60,7 +61,8 @@ class ScenarioRun:
 
     def __post_init__(self) -> None:
         # What is wrong with names, or a robot that is no SCARA, is reported before the simulation.
-        Identified((), self.subject, chain=self.chain, estimator=self.estimator)
+        found = Identified((), self.subject, chain=self.chain, estimator=self.estimator)
+        require_start(self.start, self.estimator, self.method[1] if self.method else found.solver)
         self.subject.truth(self.scenario.real_robot, self.scenario.friction)
 
     def require_bearable(self, yes: bool) -> None:
