@@ -93,16 +93,21 @@ class AxisCharts:
     @property
     def _legend(self) -> Mapping[str, Color]:
         model = self._models[0]
-        alone = len(self._models) == 1 and len(self._ways) > 1
+        alone = self._alone
         ways = {
             f"{_SIGNS[self._symbol(way)]} {' '.join(way)}": self._color((*way, model)) if alone else GREY for way in self._ways
         }
         models = {} if alone else {model: FORMS.get(model, GREY) for model in self._models}
         return models | (ways if len(ways) > 1 else {})
 
+    @property
+    def _alone(self) -> bool:
+        """Whether there is one model, so that colours can tell ways of identification apart."""
+        return len(self._models) == 1 and len(self._ways) > 1
+
     def _color(self, names: tuple[str, str, str]) -> Color:
         """Return the colour of what has a chain, an estimator and a model."""
-        if len(self._models) == 1 and len(self._ways) > 1:
+        if self._alone:
             return JOINTS[self._ways.index(names[:2]) % len(JOINTS)]
         return FORMS.get(names[2], GREY)
 

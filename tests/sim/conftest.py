@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from sim.robot.robot import Robot
 from sim.scenario.scenario import Scenario
 from sim.scenario.scenario_file import load
 from sim.trajectories import Quintic
@@ -20,3 +21,14 @@ def ideal() -> Scenario:
 def short(ideal: Scenario) -> Scenario:
     """The ideal loop on three moves, 3.3 s."""
     return replace(ideal, trajectory=MOVE)
+
+
+@pytest.fixture
+def load_robot(tmp_path):
+    """Return what reads a robot out of the text of a file."""
+
+    def read(text, *edits, name="arm.urdf"):
+        (tmp_path / name).write_text(text)
+        return Robot.load(str(tmp_path / name), *edits)
+
+    return read
