@@ -76,3 +76,8 @@ def percent(share: float) -> str:
 def percentage(x: float) -> str:
     """Return a percentage without a sign, to two digits; empty if it is not known."""
     return f"{x:.2g}" if x < 100 else f"{x:.0f}" if x < WORTHLESS else f">{WORTHLESS:g}" if x >= WORTHLESS else ""
+
+
+def error_percentage(share: float) -> str:
+    """Return a percentage to two digits with its sign, to none from ten on; beyond a thousand it says no more."""
+    return f"{share:.2g} %" if share < 10 else f"{share:.0f} %" if share < 1000 else "more than 1000 %"

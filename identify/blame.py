@@ -17,6 +17,12 @@ LIBRARIES = frozenset({"numpy", "scipy", "mujoco", "pyarrow", "ruckig", "pydanti
 """Packages that this project calls itself."""
 
 
+def is_mistake(error: BaseException) -> bool:
+    """Return whether an error is no interruption or termination: those are meant, and a plug-in has no say in them."""
+    meant = isinstance(error, (KeyboardInterrupt, GeneratorExit)) or _root(type(error).__module__) in OURS
+    return isinstance(error, Exception) or not meant
+
+
 @contextmanager
 def blamed() -> Iterator[None]:
     """Turn what the code of another package raises by mistake into a PluginError that names function, file and line.
@@ -25,8 +31,9 @@ def blamed() -> Iterator[None]:
     """
     try:
         yield
-    except Exception as error:
-        frame = None if _root(type(error).__module__) in OURS else _foreign(error)
+    except BaseException as error:
+        ours = _root(type(error).__module__) in OURS
+        frame = None if ours or not is_mistake(error) else _foreign(error)
         if frame is None:
             raise
         message = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

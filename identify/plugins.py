@@ -6,6 +6,7 @@ from functools import cached_property
 from importlib.metadata import EntryPoint, entry_points
 from typing import Generic, TypeVar
 
+from identify.blame import is_mistake
 from identify.errors import PluginError, UnknownNameError
 
 T = TypeVar("T")
@@ -91,8 +92,11 @@ class PluginTable(Mapping[str, Callable[[], T]], Generic[T]):
         factory = self[name]
         try:
             made = factory()
-        except Exception as error:
-            raise PluginError(f"{self.point} plug-in {name!r} cannot be made without arguments: {error}") from error
+        except BaseException as error:
+            if not is_mistake(error):
+                raise
+            why = f"{type(error).__name__}: {error}"
+            raise PluginError(f"{self.point} plug-in {name!r} cannot be made without arguments: {why}") from error
         if not isinstance(made, self.kind):
             raise PluginError(f"{self.point} plug-in {name!r} makes {type(made).__name__}, not {self.kind.__name__}")
         return made
@@ -111,8 +115,11 @@ class PluginTable(Mapping[str, Callable[[], T]], Generic[T]):
         (entry,) = entries
         try:
             factory: Callable[[], T] = entry.load()
-        except Exception as error:
-            raise PluginError(f"plug-in {entry.name!r} ({entry.value}) cannot be loaded: {error}") from error
+        except BaseException as error:
+            if not is_mistake(error):
+                raise
+            why = f"{type(error).__name__}: {error}"
+            raise PluginError(f"plug-in {entry.name!r} ({entry.value}) cannot be loaded: {why}") from error
         return factory
 
 

@@ -44,13 +44,13 @@ ALLOWED_IN = {
     "experiments/study/cluster.py": {"threadpoolctl", "dask", "distributed"},
     "experiments/study/statistics.py": {"scipy"},
     "experiments/study/comparison.py": {"scipy"},
-    "experiments/identification/identify_figures.py": {"matplotlib"},
-    "experiments/identification/log_picture.py": {"matplotlib", "scipy"},
+    "experiments/reports/figures.py": {"matplotlib"},
+    "experiments/reports/log_picture.py": {"matplotlib", "scipy"},
     "experiments/study/figures.py": {"matplotlib"},
     "experiments/paper/motions_report.py": {"matplotlib"},
-    "experiments/excite/excite_report.py": {"matplotlib"},
+    "experiments.reports.excite.py": {"matplotlib"},
     "experiments/study/study_report.py": {"tomli_w"},
-    "experiments/html_report.py": {"jinja2", "matplotlib"},
+    "experiments/reports/html.py": {"jinja2", "matplotlib"},
 }
 """Libraries that one file alone may use."""
 

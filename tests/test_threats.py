@@ -168,7 +168,7 @@ def test_no_file_is_unpickled(root):
 
 def test_the_summary_is_json_without_surprises(tmp_path):
     """NaN has no place in it: other readers stop there."""
-    from experiments.identification.results import write_summary
+    from experiments.results.summaries import write_summary
 
     with pytest.raises(ValueError, match="not JSON compliant"):
         write_summary(tmp_path / "summary.json", {"x": float("nan")})

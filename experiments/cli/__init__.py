@@ -13,7 +13,7 @@ from experiments.cli.interruption import importing
 def main(args: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit code: 0, 2 for wrong input, 130 when interrupted."""
     with importing():
-        from experiments.cli import authors, bench, excite, loads, logs, looking, paper  # noqa: F401  # all register their commands
+        import experiments.cli.options  # noqa: F401  # all commands register
         from experiments.cli.app import run
     return run(args)
 

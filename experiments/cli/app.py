@@ -2,12 +2,14 @@
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from tyro.extras import SubcommandApp
 
-from experiments.cli.interruption import INTERRUPTED, Notice, importing, noticing, terminating
+from experiments.cli.interruption import INTERRUPTED, Notice, TerminatedError, importing, noticing, terminating
+from experiments.control import visible
 from experiments.errors import ExperimentError
+from experiments.faults import is_told, reason, report
 
 DESCRIPTION = "A MuJoCo testbench for the dynamic identification of robots."
 
@@ -40,7 +42,7 @@ for name, value in ENVIRONMENT.items():
 
 
 def run(args: Sequence[str] | None = None) -> int:
-    """Run a command; return its exit code: 0, 2 for wrong input, 130 when interrupted."""
+    """Run a command; return its exit code: 0, 1 for a fault of idbench, 2 for wrong input, 130 when interrupted."""
     words = sys.argv[1:] if args is None else list(args)
     notice = Notice()
     try:
@@ -52,27 +54,29 @@ def run(args: Sequence[str] | None = None) -> int:
             else:
                 with importing():
                     command = APP.cli(prog="idbench", description=DESCRIPTION, args=words)
-                command()
+                _do(command)
     except KeyboardInterrupt:
         return _complain("interrupted", INTERRUPTED)
-    except BrokenPipeError:  # the reader of our output has gone, as `head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except Exception as error:
-        if notice.pressed and not _on_purpose(error):
+        if is_told(error):
+            return _complain(reason(error), 2)
+        if notice.pressed:
             return _complain("interrupted", INTERRUPTED)
-        if not _on_purpose(error):
-            raise
-        return _complain(str(error), 2)
+        return _complain(f"{reason(error)}; its traceback is in {report(error)}", 1)
     return 0
 
 
-def _on_purpose(error: Exception) -> bool:
-    """Return whether an error is one of ours; packages that are not loaded have raised none."""
-    roots = [(ExperimentError,)]
-    for module, name in (("identify.errors", "IdentificationError"), ("sim.errors", "BenchError")):
-        if module in sys.modules:
-            roots.append((getattr(sys.modules[module], name),))
-    return any(isinstance(error, root) for root in roots)
+def _do(command: Callable[[], None]) -> None:
+    """Run a command, which ends by returning or by an error."""
+    try:
+        command()
+    except TerminatedError:
+        raise
+    except SystemExit as ended:
+        raise ExperimentError(
+            f"what was called ended the process (SystemExit, code {ended.code}) before the command was done: a plug-in must "
+            "return, or raise an error; what is printed above is complete, and nothing else"
+        ) from ended
 
 
 def _version() -> str:
@@ -82,13 +86,14 @@ def _version() -> str:
 
 
 def _print(text: str) -> None:
-    from experiments.cli.page import new_page, show
+    from experiments.cli.page import new_page
 
     page = new_page()
     page.print(text)
-    show(page)
+    page.end()
 
 
 def _complain(what: str, code: int) -> int:
-    sys.stderr.write(f"idbench: {what}\n")
+    """Say what is wrong in one line."""
+    sys.stderr.write(f"idbench: {visible(' '.join(what.split()))}\n")
     return code

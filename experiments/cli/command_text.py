@@ -2,27 +2,55 @@
 
 from collections.abc import Iterator
 from dataclasses import MISSING, fields, is_dataclass
+from pathlib import Path
 from shlex import quote
-from typing import Any
+from typing import Any, get_type_hints
 
 
-def command_of(name: str, asked: Any, positional: str, left_out: tuple[str, ...]) -> str:
-    """Return what was asked as a command: all that differs from the defaults, but for fields that are left out."""
-    given = getattr(asked, positional)
-    values = given if isinstance(given, tuple) else (given,)
-    words = ["uv run idbench", name, *(quote(str(x)) for x in values), *_options(asked, (positional, *left_out))]
-    return " ".join(words)
+def command_of(name: str, options: Any, positional: str, left_out: tuple[str, ...], *, absolute: bool = False) -> str:
+    """Return what was asked as a command: all that differs from the defaults, but for fields that are left out.
+
+    Parameters
+    ----------
+    name : str
+        The command's name.
+    options : dataclass
+        Its options.
+    positional : str
+        The field that is typed without its name; empty if there is none.
+    left_out : tuple of str
+        Fields that are left out.
+    absolute : bool
+        Whether files are named from the root: then the same command reads the same files.
+    """
+    given = getattr(options, positional) if positional else ()
+    values = given if isinstance(given, tuple) else () if given is None else (given,)
+    words = [_word(x, absolute) for x in values]
+    return " ".join(["uv run idbench", name, *words, *_options(options, (positional, *left_out), absolute)])
 
 
-def _options(part: Any, left_out: tuple[str, ...]) -> Iterator[str]:
+def _options(part: Any, left_out: tuple[str, ...], absolute: bool) -> Iterator[str]:
+    hints = get_type_hints(type(part), include_extras=True)
     for field in fields(part):
         value = getattr(part, field.name)
         if field.name in left_out or (field.default is not MISSING and value == field.default):
             continue
+        names = [mark.name for mark in getattr(hints[field.name], "__metadata__", ()) if getattr(mark, "name", None)]
+        option = f"--{names[0] if names else field.name.replace('_', '-')}"
         if is_dataclass(value):
-            yield from _options(value, left_out)
-        elif value is True:
-            yield f"--{field.name.replace('_', '-')}"
+            yield from _options(value, left_out, absolute)
+        elif isinstance(value, bool):
+            yield option if value else f"--no-{option[2:]}"
         else:
             several = value if isinstance(value, tuple) else (value,)
-            yield " ".join([f"--{field.name.replace('_', '-')}", *(quote(str(x)) for x in several)])
+            yield " ".join([option, *(_word(x, absolute) for x in several)])
+
+
+def _word(value: object, absolute: bool) -> str:
+    """Return a value as it is typed."""
+    text = str(value)
+    try:
+        there = absolute and Path(text).exists()
+    except (OSError, ValueError):  # too long for a name
+        there = False
+    return quote(str(Path(text).absolute()) if there else text)

@@ -32,6 +32,10 @@ def terminating() -> Iterator[None]:
             signal.signal(number, handler)
 
 
+class TerminatedError(SystemExit):
+    """The process was told to end; of our own, so that no plug-in is blamed for it."""
+
+
 class Notice:
     """Whether Ctrl-C was pressed."""
 
@@ -62,4 +66,4 @@ def _leave(number: int, frame: FrameType | None) -> None:
 
 def _unwind(number: int, frame: FrameType | None) -> None:
     del frame
-    raise SystemExit(128 + number)
+    raise TerminatedError(128 + number)

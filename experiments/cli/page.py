@@ -1,16 +1,18 @@
-"""What a command prints: kept until everything has gone well, whatever the terminal does."""
+"""What a command prints: shown as soon as it is complete, whatever becomes of the rest."""
 
 import json
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import StringIO
-from typing import Any, final
+from typing import Any, TextIO, final
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
 from rich.text import Text
 
-from experiments.errors import ExperimentError, ResultsError
+from experiments.control import visible
+from experiments.errors import ExperimentError
 
 WIDTH = 144
 """Characters of a line where no terminal says how many it has."""
@@ -18,7 +20,7 @@ WIDTH = 144
 
 @final
 class Page(Console):
-    """A console that keeps what is printed.
+    """A console that keeps what is printed until it is shown; what cannot be shown is told at the end.
 
     Parameters
     ----------
@@ -37,18 +39,62 @@ class Page(Console):
             emoji=False,
         )
         self.machine, self.found = machine, dict[str, Any]()
+        self._failure, self._gone, self._ended = "", False, False
+
+    @property
+    def encoding(self) -> str:
+        """The encoding of what people read: tables have plain lines where it lacks others."""
+        return getattr(self._people, "encoding", None) or "utf-8"
+
+    @property
+    def _people(self) -> TextIO | None:
+        return sys.stderr if self.machine else sys.stdout
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Return segments without control characters: names come from files of others."""
+        for text, style, control in super().render(renderable, options):
+            yield Segment(text if control else visible(text), style, control)
 
     def warn(self, groups: Mapping[str, Sequence[str]]) -> None:
-        """Print warnings by what they are about, in the order in which to see to them."""
+        """Print warnings by what they are about, in the order in which to check them."""
         there = {about: warnings for about, warnings in groups.items() if warnings}
         if len(there) > 1:
-            self.print(Text("what to see to, in this order", style="bold"))
+            self.print(Text("Check these first, in this order:", style="bold"))
         for number, (about, warnings) in enumerate(there.items(), 1):
             if len(there) > 1:
                 self.print(Text(f"{number}. {about}"))
             for warning in warnings:
                 self.print(Text(f"warning: {warning}"), soft_wrap=True)
         self.found["warnings"] = {**self.found.get("warnings", {}), **there}
+
+    def show(self) -> None:
+        """Show what has been printed since the last time."""
+        assert isinstance(self.file, StringIO)
+        text = self.file.getvalue()
+        self.file.seek(0)
+        self.file.truncate()
+        self._write(self._people, text)
+
+    def end(self) -> None:
+        """Show the rest, and what a program reads; raise ExperimentError if something could not be shown."""
+        self.show()
+        if self.machine and self.found and not self._ended:
+            self._write(sys.stdout, json.dumps(self.found, indent=2, default=str) + "\n")
+        self._ended = True
+        if self._failure:
+            failure, self._failure = self._failure, ""
+            raise ExperimentError(f"cannot print: {failure}")
+
+    def _write(self, stream: TextIO | None, text: str) -> None:
+        if stream is None or self._gone or not text:  # None where it was closed before we began
+            return
+        try:
+            stream.write(text)
+            stream.flush()
+        except BrokenPipeError:  # its reader has had enough, as `head` has: nobody is to be told
+            self._gone = True
+        except OSError as error:
+            self._failure = str(error.strerror)
 
 
 def new_page(*, machine: bool = False) -> Page:
@@ -58,26 +104,8 @@ def new_page(*, machine: bool = False) -> Page:
 
 @contextmanager
 def shown(page: Page) -> Iterator[None]:
-    """Print what the page holds at the end of the block, also if results cannot be written: it is worth keeping."""
+    """Show what the page holds at the end of the block, however that ends: it is worth keeping."""
     try:
         yield
-    except ResultsError:
-        show(page)
-        raise
-    show(page)
-
-
-def show(page: Page) -> None:
-    """Print what a page holds; raise ExperimentError if that fails."""
-    text = page.file.getvalue() if isinstance(page.file, StringIO) else ""
-    if page.machine:
-        sys.stderr.write(text)
-        text = json.dumps(page.found, indent=2, default=str) + "\n"
-    if sys.stdout is not None:  # None where it was closed before we began
-        try:
-            sys.stdout.write(text)
-            sys.stdout.flush()
-        except BrokenPipeError:
-            raise
-        except OSError as error:
-            raise ExperimentError(f"cannot print: {error.strerror}") from error
+    finally:
+        page.end()

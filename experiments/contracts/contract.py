@@ -12,6 +12,7 @@ from experiments.identification.simulators import RobotPlant, ScenarioLoop
 from experiments.identification.subject import Subject
 from experiments.paper.table1 import SCENARIO, Table1
 from identify import Array, MotionLog, Simulation
+from identify.blame import is_mistake
 from sim.engine.run import Run
 from sim.engine.simulation import simulate
 from sim.robot.robot import Robot
@@ -116,7 +117,9 @@ def checked(plugin: Any, clauses: tuple[Clause, ...], example: Example) -> Itera
         asked = (clause.__doc__ or "").splitlines()[0]
         try:
             clause(plugin, example)
-        except Exception as error:  # whatever a plug-in raises
+        except BaseException as error:  # whatever a plug-in raises
+            if not is_mistake(error):
+                raise
             yield asked, f"{type(error).__name__}: {error}" if not isinstance(error, ContractError) else str(error)
         else:
             yield asked, ""

@@ -9,6 +9,7 @@ from experiments.contracts import simulation_contracts as simulation
 from experiments.contracts.contract import Clause, Example, checked
 from experiments.errors import ExperimentError
 from experiments.plugin_tables import TABLES
+from identify.blame import is_mistake
 from identify.plugins import PluginTable, did_you_mean
 
 CONTRACTS: Mapping[str, tuple[Clause, ...]] = {
@@ -69,7 +70,9 @@ def _loaded(name: str) -> tuple[PluginTable[Any], Any]:
     module, _, attribute = name.partition(":")
     try:
         made = getattr(importlib.import_module(module), attribute)()
-    except Exception as error:  # whatever another package raises
+    except BaseException as error:  # whatever another package raises
+        if not is_mistake(error):
+            raise
         raise ExperimentError(f"{name} cannot be made without arguments: {type(error).__name__}: {error}") from error
     there = [table for table in TABLES if isinstance(made, table.kind)]
     if not there:

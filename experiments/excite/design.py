@@ -19,7 +19,7 @@ from identify.design.plan import Plan
 from identify.design.predicted import predicted_information
 from identify.plugins import did_you_mean
 from sim.limits.clearance import Clearance
-from sim.limits.motion_limits import BOX, FLOOR, MotionLimits, home_of, limits_of, surroundings
+from sim.limits.motion_limits import BOX, CLEARANCE, FLOOR, MotionLimits, home_of, limits_of, surroundings
 from sim.scenario.scenario import Scenario
 from sim.trajectories.approach import approach
 from sim.trajectories.reference import Reference
@@ -140,12 +140,26 @@ class Design:
                     f"{thing}: {other} is inside it, or nearer than {1000 * self.asked.clearance:.0f} mm, whatever the "
                     "posture: move it, or make it smaller"
                 )
+        self._require_reachable(found)
         if touch := found.nearest(self.home[None], 0 * self.home[None], FS):
             raise ExperimentError(
                 f"home = {np.round(self.home, 3).tolist()}: {touch}; give another home, or a smaller clearance, in a file of "
                 "--limits"
             )
         return found
+
+    def _require_reachable(self, found: Clearance) -> None:
+        """Raise ExperimentError if a distance is asked for that some shapes never have: what touches anyway is left out."""
+        if self.asked.clearance <= CLEARANCE:
+            return
+        short = [(far, pair) for far, pair in zip(found.farthest, found.left_out, strict=True) if far > CLEARANCE]
+        if short:
+            far, (one, other) = min(short)
+            more = f" (and {len(short) - 1} more pairs are too near)" if len(short) > 1 else ""
+            raise ExperimentError(
+                f"clearance = {self.asked.clearance:g} m: {one} and {other} are never more than {far:.2g} m apart, whatever "
+                f"the posture{more}: give at most {far:.2g} in the file of --limits; {CLEARANCE:g} is the default"
+            )
 
     def require_home(self) -> None:
         """Raise ExperimentError if limits are broken where the arm comes from, at rest."""

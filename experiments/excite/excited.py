@@ -238,9 +238,13 @@ class Excited:
     def unchecked(self) -> str:
         """What could not be checked, in words; empty if there is nothing."""
         clearance = self.design.clearance
+        pairs = "; ".join(" and ".join(pair) for pair in clearance.left_out)
+        if not clearance.checks and pairs:
+            return (
+                f"all shapes are too near whatever the posture, and were left out: nothing was checked for collisions: {pairs}"
+            )
         if not clearance.checks:
             return "nothing is known of the robot's shapes: whether it hits itself or the floor was not checked"
-        pairs = "; ".join(" and ".join(pair) for pair in clearance.left_out)
         found = [f"left out, since they are too near whatever the posture: {pairs}"] if pairs else []
         found += [f"not checked, since they have no shape that MuJoCo can measure: {', '.join(clearance.bare)}"] * bool(
             clearance.bare

@@ -5,7 +5,7 @@ from importlib.metadata import version
 
 import numpy as np
 
-from experiments.identification.identified import Identified
+from experiments.identification.fit import Fit
 from identify.data.kinematics import INERTIAL
 
 ABOUT = (
@@ -15,9 +15,9 @@ ABOUT = (
 )
 
 
-def json_text(found: Identified, model: str) -> str:
+def json_text(fit: Fit, model: str) -> str:
     """Return the text: parameters, sigma, covariance, the tree of links, and which columns the regressor has."""
-    subject, estimate = found.subject, found.estimates[model]
+    subject, estimate = fit.subject, fit.estimates[model]
     base, standard = subject.base, subject.grouping.standard.names
     columns = {} if base is None else {n: standard[k] for n, k in zip(base.names, base.kept, strict=True)}
     parameters = [
@@ -29,9 +29,9 @@ def json_text(found: Identified, model: str) -> str:
             "kind": p.kind,
             "joint": p.joint,
             "column": columns.get(p.name),
-            "made_of": _made_of(found, p.name),
+            "made_of": _made_of(fit, p.name),
         }
-        for p, x, s in zip(found.basis.parameters, estimate.X, estimate.best_sigma, strict=True)
+        for p, x, s in zip(fit.basis.parameters, estimate.X, estimate.best_sigma, strict=True)
     ]
     content = {
         "format": "idbench base parameters 1",
@@ -39,8 +39,8 @@ def json_text(found: Identified, model: str) -> str:
         "about": ABOUT if base else "parameters of the paper's closed form of the SCARA (Eq. 5)",
         "robot": subject.tree.name,
         "model": model,
-        "estimator": found.estimator,
-        "logs": list(found.log_names),
+        "estimator": fit.request.estimator,
+        "logs": list(fit.logs.names),
         "parameters": parameters,
         "covariance": np.asarray(estimate.best_covariance).tolist(),
         "letters_of_links": list(INERTIAL),
@@ -62,9 +62,9 @@ def json_text(found: Identified, model: str) -> str:
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
-def _made_of(found: Identified, name: str) -> dict[str, float] | None:
+def _made_of(fit: Fit, name: str) -> dict[str, float] | None:
     """Return the standard parameters of a base parameter, and their factors."""
-    base = found.subject.base
+    base = fit.subject.base
     if base is None:
         return None
     row = base.K[base.names.index(name)]

@@ -7,11 +7,11 @@ from pprint import pformat
 
 from experiments.exports.friction_terms import lines_of
 from experiments.exports.standard import require_known, standard_of
-from experiments.identification.identified import Identified
+from experiments.identification.fit import Fit
 from identify.data.kinematics import INERTIAL, Joint
 
 
-def python_text(found: Identified, model: str, target: Path) -> str:
+def python_text(fit: Fit, model: str, target: Path) -> str:
     """Return the module: recursive Newton and Euler, with the parameters of a model's estimate.
 
     Raises
@@ -19,20 +19,20 @@ def python_text(found: Identified, model: str, target: Path) -> str:
     ExperimentError
         If the estimate has a law of friction that the function does not have.
     """
-    require_known(found, target)
-    tree, values = found.subject.tree, standard_of(found, model)
+    require_known(fit, target)
+    tree, values = fit.subject.tree, standard_of(fit, model)
     n = tree.n
     each = {x: [values.get(f"{x}{j + 1}", 0.0) for j in range(n)] for x in ("Ia", "Fv", "Fs", "off")}
     text = files("experiments.exports").joinpath("inverse_dynamics.py.txt").read_text(encoding="utf-8")
     words = {
-        "{laws}": "".join(f"    {line}\n" for line in lines_of(found, values)),
+        "{laws}": "".join(f"    {line}\n" for line in lines_of(fit, values)),
         "{name}": tree.name,
         "{version}": version("idbench"),
-        "{logs}": ", ".join(found.log_names) or "a log",
+        "{logs}": ", ".join(fit.logs.names) or "a log",
         "{n}": str(n),
         "{joints}": pformat(tuple(joint.name for joint in tree.joints), width=110),
         "{model!r}": repr(model),
-        "{estimator!r}": repr(found.estimator),
+        "{estimator!r}": repr(fit.request.estimator),
         "{gravity}": repr([float(x) for x in tree.gravity]),
         "{tree}": pformat([_joint(joint) for joint in tree.joints], width=110),
         "{links}": pformat([[values.get(f"{x}{j + 1}", 0.0) for x in INERTIAL] for j in range(n)], width=110),

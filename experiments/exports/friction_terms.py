@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.identification.identified import Identified
+from experiments.identification.fit import Fit
 from identify import AbstractBlock, ShapedFriction
 from identify.basis import LoadFriction
 from identify.basis.of_joints import inner_of
@@ -21,10 +21,10 @@ TERMS: Mapping[str, tuple[str, Mapping[str, str]]] = {
 """Letters of a law -> its torque of a unit parameter, and the letters of its settings."""
 
 
-def lines_of(found: Identified, values: Mapping[str, float]) -> list[str]:
+def lines_of(fit: Fit, values: Mapping[str, float]) -> list[str]:
     """Return the lines that add the laws to `tau`, whose torque without friction is `load`."""
-    n, lines = found.basis.n, list[str]()
-    for block in found.basis.blocks:
+    n, lines = fit.basis.n, list[str]()
+    for block in fit.basis.blocks:
         law = _law(block)
         letters = getattr(law, "symbol", "Fl" if isinstance(law, LoadFriction) else "")
         if letters not in TERMS or not any(f"{letters}{j + 1}" in values for j in range(n)):

@@ -4,20 +4,20 @@ import numpy as np
 
 from experiments.errors import ExperimentError
 from experiments.exports.friction_terms import TERMS
-from experiments.identification.identified import Identified
+from experiments.identification.fit import Fit
 from identify import Array, transfer
 
 KNOWN = ("Ia", "Fv", "Fs", "off", *TERMS, *(letters for _, settings in TERMS.values() for letters in settings.values()))
 """Beginnings of the names of the laws that a controller's function has, beside the links."""
 
 
-def standard_of(found: Identified, model: str) -> dict[str, float]:
+def standard_of(fit: Fit, model: str) -> dict[str, float]:
     """Return standard parameters with the torques of a model's estimate, by name.
 
     Base parameters stand for themselves, what is grouped with them is zero: no body need have them, but the torques are those
     of the estimate to the last digit.
     """
-    subject, estimate = found.subject, found.estimates[model]
+    subject, estimate = fit.subject, fit.estimates[model]
     grouping = subject.grouping
     X = np.zeros(len(subject.whole.names))
     X[[subject.whole.names.index(name) for name in estimate.names]] = estimate.X
@@ -27,9 +27,9 @@ def standard_of(found: Identified, model: str) -> dict[str, float]:
     return dict(zip(grouping.standard.names, map(float, values), strict=True))
 
 
-def require_known(found: Identified, target: object) -> None:
+def require_known(fit: Fit, target: object) -> None:
     """Raise ExperimentError if the estimate has a law of friction that a controller's function does not."""
-    kinds = {p.name for p in found.subject.grouping.standard.parameters if p.kind not in LINKS}
+    kinds = {p.name for p in fit.subject.grouping.standard.parameters if p.kind not in LINKS}
     strange = sorted(name for name in kinds if name.rstrip("0123456789") not in KNOWN)
     if strange:
         raise ExperimentError(

@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import final
 
 from experiments.identification.consistent_estimate import consistent_of
-from experiments.identification.identified import Identified
-from experiments.identification.results import write_whole
+from experiments.identification.fit import Fit
 from identify import Consistent
 from sim.robot.rewrite import compiled, rewritten
 from sim.robot.robot import Robot
@@ -24,55 +23,49 @@ class Written:
 
     Parameters
     ----------
-    found : Identified
+    fit : Fit
         The identification.
     model : str
         Name of the model whose estimate is taken.
     """
 
-    found: Identified
+    fit: Fit
     model: str
 
     @cached_property
     def consistent(self) -> Consistent:
         """Its standard parameters."""
-        return consistent_of(self.found.subject, self.found.estimates[self.model])
-
-    @cached_property
-    def text(self) -> str:
-        """The file."""
-        subject = self.found.subject
-        return rewritten(subject.name, self.values, mounting=subject.mounting)
+        return consistent_of(self.fit.subject, self.fit.estimates[self.model])
 
     @cached_property
     def robot(self) -> Robot:
         """The robot of the file."""
-        return compiled(self.found.subject.name, self.text)
+        return compiled(self.fit.subject.name, self.text())
 
     @cached_property
     def values(self) -> dict[str, float]:
         """The standard parameters by name; those that were not asked for are zero."""
-        found, subject = self.consistent, self.found.subject
+        found, subject = self.consistent, self.fit.subject
         without = {f"Ia{j + 1}": 0.0 for j in range(subject.basis.n)} if subject.asked.armature == "none" else {}
         for letters, law in (("Fv", "viscous"), ("Fs", "coulomb")):
             without |= {f"{letters}{j + 1}": 0.0 for j, own in enumerate(subject.laws.names) if law not in own}
         return without | dict(zip(found.names, map(float, found.standard), strict=True))
 
-    def write(self, path: Path) -> None:
-        """Write the file, whole or not at all."""
-        subject = self.found.subject
-        write_whole(path, rewritten(subject.name, self.values, path.absolute().parent, subject.mounting))
+    def text(self, folder: Path | None = None) -> str:
+        """Return the file, to stand in a folder; in that of the robot's own file by default."""
+        subject = self.fit.subject
+        return rewritten(subject.name, self.values, folder, subject.mounting)
 
     @property
     def warnings(self) -> list[str]:
         """What is wrong about it."""
-        found, names = self.consistent, self.found.subject.grouping.names
+        found, names = self.consistent, self.fit.subject.grouping.names
         messages = []
         if not found.agrees:
             far = [f"{n} by {abs(d):.1f}" for n, d in zip(names, found.departure, strict=True) if abs(d) > SIGMAS]
             messages.append(
-                f"no bodies that can exist have the estimate of the {self.model} model: the nearest are {found.distance:.1f} "
-                f"sigma off{', ' + ', '.join(far) + ' sigma' if far else ''}"
+                f"the estimate of the {self.model} model is not physically consistent: the nearest consistent parameters are "
+                f"{found.distance:.1f} sigma off{', ' + ', '.join(far) + ' sigma' if far else ''}"
             )
         if self.lost:
             messages.append(f"{', '.join(self.lost)} have no place in an MJCF file and are left out")
@@ -81,5 +74,5 @@ class Written:
     @property
     def lost(self) -> dict[str, float]:
         """Standard parameters that have no place in the file, and their values."""
-        known = standard_parameters(self.found.subject.robot)
+        known = standard_parameters(self.fit.subject.robot)
         return {name: value for name, value in self.values.items() if name not in known}

@@ -6,31 +6,25 @@ from math import isfinite
 from typing import Any
 
 from experiments.identification.friction_laws import COMPARED, law_of
-from experiments.identification.identified import Identified
-from identify import Problem
+from experiments.identification.request import Request
+from identify import MotionLog, Problem
 from identify.blame import blamed
 from identify.judge.friction_choice import FrictionChoice, choose_friction
 from identify.models.explicit import ExplicitModel
 
 
-def with_suitable_friction(found: Identified, most: int | None = None) -> tuple[Identified, FrictionChoice]:
-    """Return the identification with the laws of friction that predict motion best that was not fitted, joint by joint.
+def chosen_friction(request: Request, logs: tuple[MotionLog, ...], most: int | None = None) -> tuple[Request, FrictionChoice]:
+    """Return a request with the laws of friction that predict held-out motion best, joint by joint, and what was compared.
 
     At most so many are added to a joint.
     """
-    subject = found.subject
-    candidates = {name: law_of(name) for name in COMPARED if name != "temperature" or "temperature" in found.logs[0].conditions}
+    subject = request.subject
+    candidates = {name: law_of(name) for name in COMPARED if name != "temperature" or "temperature" in logs[0].conditions}
     with blamed():
-        problem = Problem(found.logs, subject.basis, ExplicitModel(), found.processing)
+        problem = Problem(logs, subject.basis, ExplicitModel(), request.processing)
         choice = choose_friction(problem, candidates, most=most)
-    laws = subject.laws.with_more(choice.laws)
-    asked = replace(subject.asked, friction=laws.texts)
-    truth = (
-        None
-        if found.truth is None
-        else {name: found.truth.get(name, 0.0) for name in replace(subject, asked=asked).basis.names}
-    )
-    return replace(found, subject=replace(subject, asked=asked), truth=truth), choice
+    asked = replace(subject.asked, friction=subject.laws.with_more(choice.laws).texts)
+    return replace(request, subject=replace(subject, asked=asked)), choice
 
 
 def words(choice: FrictionChoice, laws: Sequence[Sequence[str]], joints: Sequence[str]) -> list[str]:

@@ -50,16 +50,15 @@ class FrictionLaws:
         ExperimentError
             If a law or a joint is unknown.
         """
-        n, auto = len(joints), False
-        names: list[tuple[str, ...]] = [STANDARD] * n
+        given = dict[int | str | None, tuple[str, tuple[str, ...]]]()  # by joint; None: of all
         for text in texts:
             where, mark, laws = text.rpartition("=")
-            if laws == AUTO and not mark:
-                auto = True
-                continue
-            found = _laws(text, laws)
-            names = [found if j in (_joint(text, where, joints) if mark else range(n)) else names[j] for j in range(n)]
-        return cls(tuple(names), auto)
+            place = _joint(text, where, joints) if mark else AUTO if laws == AUTO else None
+            if place in given:
+                raise ExperimentError(_twice(given[place][0], text, mark))
+            given[place] = text, () if place == AUTO else _laws(text, laws)
+        every = given.get(None, ("", STANDARD))[1]
+        return cls(tuple(given.get(j, ("", every))[1] for j in range(len(joints))), AUTO in given)
 
     @property
     def standard(self) -> bool:
@@ -87,8 +86,30 @@ class FrictionLaws:
         return block if len(joints) == len(self.names) else OfJoints(block, joints)
 
 
+def _twice(first: str, second: str, mark: str) -> str:
+    """Return how to say that two texts give the laws of the same joints, and what may have been meant."""
+    if first == second:
+        return f"--friction {first} {second}: the same stands twice: leave one out"
+    whose = "that joint" if mark else "all joints"
+    both = f"{first}+{second.rpartition('=')[2]}"
+    return (
+        f"--friction {first} {second}: both give the laws of {whose}, and only one can hold: write {both} (with +, no blank) "
+        "for the sum, or name a joint, as in 1=standard+load"
+    )
+
+
 def _laws(text: str, laws: str) -> tuple[str, ...]:
-    """Return the names of a sum of laws."""
+    """Return the names of a sum of laws; raise ExperimentError if one contradicts another or stands twice."""
+    terms = laws.split("+")
+    if AUTO in terms:
+        raise ExperimentError(
+            f"--friction {text}: auto is no term of a sum: write it apart, as in --friction {AUTO} standard+load"
+        )
+    if "none" in terms and len(terms) > 1:
+        raise ExperimentError(f"--friction {text}: none is no friction at all: leave out none, or the others")
+    kinds = [term.partition(":")[0] for term in terms]
+    if again := next((kind for kind in kinds if kind and kinds.count(kind) > 1), ""):
+        raise ExperimentError(f"--friction {text}: {again} stands twice in the sum: leave one out")
     found = tuple(dict.fromkeys(chain(*(GROUPS.get(name, (name,)) for name in laws.split("+")))))
     for name in found:
         try:
@@ -123,10 +144,10 @@ def law_of(name: str) -> AbstractBlock:
         raise ExperimentError(f"--friction {name}: {value!r} is no setting of {kind}, which takes a number: {error}") from error
 
 
-def _joint(text: str, where: str, joints: Sequence[str]) -> set[int]:
+def _joint(text: str, where: str, joints: Sequence[str]) -> int:
     """Return the number of a joint by its number, from 1, or its name."""
     if where in joints:
-        return {joints.index(where)}
-    if where.isdigit() and 1 <= int(where) <= len(joints):
-        return {int(where) - 1}
+        return joints.index(where)
+    if where.isdecimal() and 1 <= int(where) <= len(joints):
+        return int(where) - 1
     raise ExperimentError(f"--friction {text}: there is no joint {where!r}; there are 1 to {len(joints)}: {', '.join(joints)}")

@@ -1,8 +1,11 @@
 """What is suspicious about a log before anything is made of it."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from identify import Array, Joint, KinematicTree, MotionLog
+from identify.data.jumps import Jump, jumps
 from identify.data.kinematics import GROUND
 
 SLACK = 0.05
@@ -11,20 +14,56 @@ SLACK = 0.05
 MOST_TURNS = 2.0
 """Turns of a hinge between the ends of a log beyond which degrees are suspected, where the robot gives it no range."""
 
+HARDLY = 0.02
+"""Share of its range below which a joint hardly moves."""
+
+MOST_JUMPS = 3
+"""Jumps of a log that are named."""
+
 STILL = 1e-3
 """A joint that travels less than this share of what the busiest does stands still, and trembles."""
 
 
 def warnings_of_log(log: MotionLog, tree: KinematicTree) -> list[str]:
-    """Return what is suspicious about the positions of a log: degrees, millimetres, places that a joint cannot reach."""
-    found = []
-    for joint, q in zip(tree.joints, log.q.reshape(-1, log.n).T, strict=True):
+    """Return what is suspicious about a log: jumps, degrees, millimetres, places that a joint cannot reach, joints at rest."""
+    found, jumping = list(_of_jumps(log, tree)), {jump.joint for jump in _jumps(log)}
+    for j, (joint, q) in enumerate(zip(tree.joints, log.q.reshape(-1, log.n).T, strict=True)):
         ends = np.array([q.min(), q.max()])
-        reason = _reason(joint, ends)
+        reason = "" if j in jumping else _reason(joint, ends)
         if reason:
             found.append(f"{joint.name} goes from {ends[0]:.4g} to {ends[1]:.4g}{reason}")
     dead = [joint.name for joint, tau in zip(tree.joints, log.tau.reshape(-1, log.n).T, strict=True) if not np.ptp(tau)]
     return found + ([f"the torque of {', '.join(dead)} never changes: is it logged?"] if dead else [])
+
+
+def unusable(log: MotionLog) -> bool:
+    """Return whether positions of a log jump, so that no advice can be drawn from it."""
+    return bool(_jumps(log))
+
+
+def _jumps(log: MotionLog) -> list[Jump]:
+    return jumps(log.q, log.fs) if log.q.ndim == 2 else []
+
+
+def _of_jumps(log: MotionLog, tree: KinematicTree) -> Iterator[str]:
+    """Yield the first jumps of a log, by joint, sample and speed."""
+    every = _jumps(log)
+    for jump in every[:MOST_JUMPS]:
+        slide = tree.joints[jump.joint].kind == "slide"
+        unit, k = "m" if slide else "rad", jump.sample
+        how = (
+            "and back: a wild sample; correct it or cut it out"
+            if jump.back
+            else f"and stays there: did its encoder slip, or was it homed anew? Identify samples 0 to {k - 1}, or those after"
+        )
+        yield (
+            f"{tree.joints[jump.joint].name} jumps by {jump.size:.3g} {unit} at sample {k} ({k / log.fs:.4g} s), "
+            f"{jump.speed:.3g} {unit}/s where 99 % of the log is slower than {jump.usual:.3g}, {how}"
+        )
+    if len(every) > MOST_JUMPS:
+        yield f"and {len(every) - MOST_JUMPS} more such jumps"
+    if every:
+        yield "no advice is drawn from a log with jumps: the rest rests on them"
 
 
 def _reason(joint: Joint, ends: Array) -> str:
@@ -38,6 +77,11 @@ def _reason(joint: Joint, ends: Array) -> str:
     if ends[0] < low - slack or ends[1] > high + slack:
         order = "are joints in the order of the robot's file, and counted from its zero in its direction?"
         return f", out of its range, {low:.4g} to {high:.4g}: {order}"
+    if span < HARDLY * room and np.isfinite(room):
+        return (
+            f", by {span:.2g} {unit} in all: it hardly moves, so that little of it can be identified; move it more, or correct "
+            f"the unit if its positions are in {unit} already where {other} are stated"
+        )
     return ""
 
 

@@ -6,15 +6,10 @@ from functools import cached_property
 from typing import Any
 
 from experiments.errors import ExperimentError
-from experiments.identification.choices import Consistency, Start
-from experiments.identification.defaults import CHAIN, ESTIMATOR
-from experiments.identification.friction_choice import with_suitable_friction
-from experiments.identification.identified import Identified
+from experiments.identification.fit import Fit, Told, fit
 from experiments.identification.iterations import iterations
-from experiments.identification.parameters import Parameters
-from experiments.identification.simulators import require_start
-from experiments.identification.subject import Subject
-from identify import AbstractEstimator, Chain
+from experiments.identification.logs import Logs
+from experiments.identification.request import Request
 from sim.engine.run import Run
 from sim.engine.simulation import Progress, simulate
 from sim.engine.watch import Watch
@@ -33,37 +28,25 @@ class ScenarioRun:
     ----------
     scenario : Scenario
         What to run.
-    chain, estimator : str
-        Their names.
-    method : tuple of Chain and AbstractEstimator, optional
-        Both with settings of their own, instead of those that have the names.
+    request : Request
+        How its log is identified.
     progress : callable, optional
         Receives how much of the simulation is done.
     watch : Watch, optional
         Receives what happens in it.
-    parameters : Parameters
-        Which parameters are identified.
-    start : {"least-squares", "file"}
-        Where estimators begin that simulate or filter.
-    consistent : {"no", "pullback", "entropic"}
-        Whether estimates are moved to where bodies can exist.
+    told : callable, optional
+        Receives what is being identified.
     """
 
     scenario: Scenario
-    chain: str = CHAIN
-    estimator: str = ESTIMATOR
-    method: tuple[Chain, AbstractEstimator] | None = None
+    request: Request
     progress: Progress | None = None
     watch: Watch | None = None
-    parameters: Parameters = Parameters()  # noqa: RUF009  # frozen
-    start: Start = "least-squares"
-    consistent: Consistency = "no"
+    told: Told | None = None
 
     def __post_init__(self) -> None:
-        # What is wrong with names, or a robot that is no SCARA, is reported before the simulation.
-        found = Identified((), self.subject, chain=self.chain, estimator=self.estimator)
-        require_start(self.start, self.estimator, self.method[1] if self.method else found.solver)
-        self.subject.truth(self.scenario.real_robot, self.scenario.friction)
+        # A robot that does not fit is reported before the simulation.
+        self.request.subject.truth(self.scenario.real_robot, self.scenario.friction)
 
     def require_bearable(self, yes: bool) -> None:
         """Say how long a simulation is that takes long; raise ExperimentError if it would hardly end, unless that is wanted."""
@@ -76,24 +59,16 @@ class ScenarioRun:
             sys.stderr.write(f"idbench: {size} are to be simulated, some tens of thousands a second\n")
 
     @cached_property
-    def subject(self) -> Subject:
-        """The robot."""
-        return Subject(self.scenario.robot, self.parameters)
-
-    @cached_property
     def run(self) -> Run:
         """The simulation."""
         return simulate(self.scenario, progress=self.progress, watch=self.watch)
 
     @cached_property
-    def identified(self) -> Identified:
+    def fit(self) -> Fit:
         """What the models make of its log."""
-        log, name = (self.run.alone(),), f"{self.chain}-{self.estimator}-study" if self.method else ""
-        found = Identified(log, self.subject, chain=self.chain, estimator=self.estimator, method=self.method, name=name)
-        found = replace(found, loops=(self.scenario,), start=self.start, consistent=self.consistent)
-        if self.subject.laws.auto:
-            found, _ = with_suitable_friction(found)
-        return replace(found, truth=found.subject.truth(self.run.robots[0], self.scenario.friction))
+        robot, friction = self.run.robots[0], self.scenario.friction
+        truth = friction.truth(robot) | self.request.subject.truth(robot, friction)
+        return fit(replace(self.request, loops=(self.scenario,)), Logs((self.run.alone(),), truth=truth), self.told)
 
     def summary(self) -> dict[str, Any]:
         """Return summary.json."""
@@ -101,6 +76,6 @@ class ScenarioRun:
             "experiment": "run",
             "seed": self.scenario.seed,
             "scenario": to_dict(self.scenario),
-            **self.identified.summary(),
-            "iterations": iterations(self.identified),
+            **self.fit.summary(),
+            "iterations": iterations(self.fit),
         }

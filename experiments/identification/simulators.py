@@ -8,9 +8,8 @@ from typing import Self, final
 import numpy as np
 import numpy.typing as npt
 
-from experiments.errors import ExperimentError
 from experiments.identification.subject import Subject
-from identify import AbstractEstimator, AbstractLoop, AbstractPlant, Array, IdentificationError, MotionLog, Simulated, transfer
+from identify import AbstractLoop, AbstractPlant, Array, IdentificationError, MotionLog, Simulated, transfer
 from sim.encoders import ExactEncoder
 from sim.engine.shooting import shoot
 from sim.engine.simulation import simulate
@@ -191,12 +190,6 @@ class RobotPlant(AbstractPlant):
     @cached_property
     def _fields(self) -> Fields:
         return Fields(self.subject)
-
-
-def require_start(start: str, name: str, estimator: AbstractEstimator) -> None:
-    """Raise ExperimentError if a start is given that the estimator of a name would not use."""
-    if start != "least-squares" and not estimator.begins:
-        raise ExperimentError(f"--start {start}: {name} needs no start; leave it out, or take IV or DIDIM")
 
 
 def noiseless(scenario: Scenario) -> Scenario:

@@ -1,9 +1,10 @@
 """The robot that is identified: its basis, its joints, and what is true of it where it is simulated."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import final
+from typing import Self, final
 
 import numpy as np
 
@@ -59,6 +60,10 @@ class Subject:
     def grouping(self) -> BaseParameters:
         """How its standard parameters are grouped."""
         return BaseParameters.of(self.tree, self._with_laws(tree_basis(self.tree, self.laws.blocks())))
+
+    def without(self, names: Sequence[str]) -> Self:
+        """Return the robot with more parameters left out, as if they were zero."""
+        return replace(self, asked=replace(self.asked, without=(*self.asked.without, *names)))
 
     def require_laws(self) -> None:
         """Raise ExperimentError if its laws of friction are those that suit a log, where there is none."""

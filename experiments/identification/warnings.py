@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from experiments.identification.identified import Identified
+from experiments.identification.fit import Fit
 from experiments.identification.log_warnings import resting, warnings_of_base
 from experiments.identification.subject import Subject
 from identify import MotionLog, brisk_shares, showing_moves
@@ -45,11 +45,11 @@ LOG, DELAY, FILE, MOTION, MODEL = "the log", "the torque's delay", "the robot's 
 """What warnings are about, in the order in which to see to them: what comes first may be what makes the others."""
 
 
-def warnings_of_result(found: Identified) -> dict[str, list[str]]:
+def warnings_of_result(fit: Fit) -> dict[str, list[str]]:
     """Return what no healthy identification shows, and what the log leaves open, by what it is about."""
-    log, motion, model = [*wrong_sign(found), *wrong_unit(found)], list[str](), list[str]()
-    negative = {name: _negative(found, name) for name in found.estimates}
-    linked = list(_link_side(found)) if not log else []
+    log, motion, model = [*wrong_sign(fit), *wrong_unit(fit)], list[str](), list[str]()
+    negative = {name: _negative(fit, name) for name in fit.estimates}
+    linked = list(_link_side(fit)) if not log else []
     model += linked
     if any(negative.values()) and not log and not linked:
         models: dict[tuple[str, ...], list[str]] = {}
@@ -57,21 +57,21 @@ def warnings_of_result(found: Identified) -> dict[str, list[str]]:
             models.setdefault(tuple(names), []).append(name)
         each = (f"{', '.join(names)} below zero in the {' and the '.join(of)} model" for names, of in models.items() if names)
         model.append(f"{'; '.join(each)}: is the torque's meaning or delay wrong?")
-    for name in found.estimates:
-        little = list(_too_little(found, name))
+    for name in fit.estimates:
+        little = list(_too_little(fit, name))
         motion += little
-        model += [] if little else list(_badly_explained(found, name))
+        model += [] if little else list(_badly_explained(fit, name))
     if not (log or motion or model):
-        motion = _left_open(found)
+        motion = _left_open(fit)
     return {LOG: log, MOTION: motion, MODEL: model}
 
 
-def _link_side(found: Identified) -> Iterator[str]:
+def _link_side(fit: Fit) -> Iterator[str]:
     """Yield whether torques look like those of the links, behind gears and rotors: these take rotors out, as it were."""
-    estimate = next(iter(found.estimates.values()))
+    estimate = next(iter(fit.estimates.values()))
     rotors = [
         name
-        for p, name, x, sigma in zip(found.basis.parameters, estimate.names, estimate.X, estimate.best_sigma, strict=True)
+        for p, name, x, sigma in zip(fit.basis.parameters, estimate.names, estimate.X, estimate.best_sigma, strict=True)
         if p.kind == "rotor inertia" and x < -LINK_SIDE * sigma
     ]
     if rotors:
@@ -89,12 +89,12 @@ FLAGS = {
 """What is doubtful of a parameter."""
 
 
-def doubtful(found: Identified) -> dict[str, list[tuple[str, str, str]]]:
+def doubtful(fit: Fit) -> dict[str, list[tuple[str, str, str]]]:
     """Return, of each model, a mark for every parameter's estimate, its error and its sigma; blank where nothing is wrong."""
     marks = {}
-    for model, estimate in found.estimates.items():
-        negative, sigma = _negative(found, model), estimate.best_sigma
-        off = np.zeros(len(sigma)) if found.truth is None else np.abs(estimate.X - list(found.truth.values()))
+    for model, estimate in fit.estimates.items():
+        negative, sigma = _negative(fit, model), estimate.best_sigma
+        off = np.zeros(len(sigma)) if fit.truth is None else np.abs(estimate.X - list(fit.truth.values()))
         marks[model] = [
             ("!" if name in negative else " ", "*" if error > FAR * s > 0 else " ", "?" if s > WEAK * abs(x) else " ")
             for name, x, error, s in zip(estimate.names, estimate.X, off, sigma, strict=True)
@@ -108,38 +108,38 @@ def used(marks: Mapping[str, Sequence[Sequence[str]]]) -> list[str]:
     return [flag for flag in FLAGS if flag in there]
 
 
-def _negative(found: Identified, model: str) -> list[str]:
+def _negative(fit: Fit, model: str) -> list[str]:
     """Return what cannot be below zero and surely is."""
-    estimate = found.estimates[model]
-    friction = zip(found.basis.parameters, estimate.X, estimate.best_sigma, strict=True)
+    estimate = fit.estimates[model]
+    friction = zip(fit.basis.parameters, estimate.X, estimate.best_sigma, strict=True)
     return [p.name for p, x, sigma in friction if p.kind in NOT_NEGATIVE and _surely_negative(x, sigma)]
 
 
-def _too_little(found: Identified, name: str) -> Iterator[str]:
+def _too_little(fit: Fit, name: str) -> Iterator[str]:
     """Yield why an estimate says nothing, where its sigma alone makes much of a torque, and what would help."""
-    estimate, shares = found.estimates[name], found.left_open[name]
+    estimate, shares = fit.estimates[name], fit.left_open[name]
     worst = int(np.nan_to_num(shares, nan=np.inf).argmax())
     if shares[worst] < USELESS or estimate.row_count > ENOUGH * len(estimate.names):  # else it is the model that is wrong
         return
-    others = [other for other, open_ in found.left_open.items() if np.nan_to_num(open_, nan=np.inf).max() < USELESS / 5]
+    others = [other for other, open_ in fit.left_open.items() if np.nan_to_num(open_, nan=np.inf).max() < USELESS / 5]
     times = min(1000, int(np.ceil((shares[worst] / (USELESS / 5)) ** 2))) if np.isfinite(shares[worst]) else 1000
     longer = f"a log {times} times as long" if times < MUCH_LONGER else "a log that moves all joints, and longer"
     yield (
         f"the {name} model identifies too little: {int(estimate.row_count)} rows for {len(estimate.names)} parameters, Cond(W) "
         f"{float(estimate.condition_number):.2g}, one sigma of its parameters makes {100 * shares[worst]:.0f} % of the torque "
-        f"of {found.subject.robot.joints[worst]}: take {f'the {others[0]} model' if others else longer}"
+        f"of {fit.subject.robot.joints[worst]}: take {f'the {others[0]} model' if others else longer}"
         + (f", or {longer}" if others else "")
     )
 
 
-def _badly_explained(found: Identified, name: str) -> Iterator[str]:
+def _badly_explained(fit: Fit, name: str) -> Iterator[str]:
     """Yield which torques a model does not explain: the log is suspected, unless another model explains them."""
-    joints = found.subject.robot.joints
-    poor = {j: share for j, share in enumerate(found.explained[name]) if not share >= WELL_EXPLAINED}
+    joints = fit.subject.robot.joints
+    poor = {j: share for j, share in enumerate(fit.explained[name]) if not share >= WELL_EXPLAINED}
     if not poor:
         return
     poorly = ", ".join(f"{_share(share)} of tau{j + 1}" for j, share in poor.items())
-    others = [o for o, shares in found.explained.items() if all(shares[j] >= WELL_EXPLAINED for j in poor)]
+    others = [o for o, shares in fit.explained.items() if all(shares[j] >= WELL_EXPLAINED for j in poor)]
     if others:
         yield (
             f"the {name} model explains {poorly}, where the {others[0]} model explains at least {100 * WELL_EXPLAINED:.0f} %: "
@@ -153,9 +153,9 @@ def _share(share: float) -> str:
     return f"{100 * share:.0f} %" if share > 0 else "nothing"
 
 
-def wrong_unit(found: Identified) -> list[str]:
+def wrong_unit(fit: Fit) -> list[str]:
     """Return whether torques are far from what the robot's file says of the same motion, as those in other units are."""
-    subject, R = found.subject, found.problem.factors.R
+    subject, R = fit.subject, fit.problem.factors.R
     if subject.robot.weightless:
         return []
     filed = R[..., :-1] @ np.array(list(subject.truth(subject.robot).values()))
@@ -166,6 +166,14 @@ def wrong_unit(found: Identified) -> list[str]:
     return [f"the torques are {measured / expected:.2g} times what the robot's file says of this motion: are they in N m?"]
 
 
+def hidden_notes(fit: Fit) -> list[str]:
+    """Return which parameters the logs do not show, and what would show them."""
+    if not fit.hidden:
+        return []
+    moves = helpful_moves(fit.subject, fit.logs.fitted[0], fit.hidden)
+    return [f"this log does not show {', '.join(fit.hidden)}: left out, as if zero{f' ({moves})' if moves else ''}"]
+
+
 def warnings_of_robot(robot: Robot) -> list[str]:
     """Return what of a robot's file no parameter describes."""
     found = unmodelled(robot)
@@ -174,20 +182,20 @@ def warnings_of_robot(robot: Robot) -> list[str]:
     return [*messages, *warnings_of_base(kinematic_tree(robot))]
 
 
-def wrong_sign(found: Identified) -> list[str]:
+def wrong_sign(fit: Fit) -> list[str]:
     """Return which torques have the wrong sign: those that drive their joint by friction."""
-    model, estimate = next(iter(found.estimates.items()))
-    values = zip(found.basis.parameters, estimate.X, estimate.best_sigma, strict=True)
+    model, estimate = next(iter(fit.estimates.items()))
+    values = zip(fit.basis.parameters, estimate.X, estimate.best_sigma, strict=True)
     known = {(p.kind, p.joint): (x, sigma) for p, x, sigma in values}
     nothing = (0.0, 0.0)
     wrong = [
         joint
-        for j, joint in enumerate(found.subject.robot.joints)
+        for j, joint in enumerate(fit.subject.robot.joints)
         if known.get(("viscous friction", j), nothing)[0] < 0 and _surely_negative(*known.get(("Coulomb friction", j), nothing))
     ]
     if not wrong:
         return []
-    work = _work(found.logs[0])
+    work = _work(fit.logs.fitted[0])
     balance = f", and the torques of the log take out {-work:.3g} J in all" if work < 0 else ""
     return [
         f"friction drives {', '.join(wrong)} in the {model} model{balance}: does the torque have the wrong sign (it must be "
@@ -205,13 +213,13 @@ def _work(log: MotionLog) -> float:
     return float(np.sum((tau[1:] + tau[:-1]) / 2 * np.diff(log.q, axis=0)))
 
 
-def _left_open(found: Identified) -> list[str]:
+def _left_open(fit: Fit) -> list[str]:
     """Return which base parameters the log leaves open so far that a brisk motion shows it, and the moves to make."""
-    subject, (model, estimate) = found.subject, next(iter(found.estimates.items()))
+    subject, (model, estimate) = fit.subject, next(iter(fit.estimates.items()))
     if subject.base is None:
         return []
-    shares = brisk_shares(subject.tree, found.basis, estimate.X, estimate.best_sigma)
-    names = [name for name, share in zip(found.basis.names, shares, strict=True) if share > OPEN]
+    shares = brisk_shares(subject.tree, fit.basis, estimate.X, estimate.best_sigma)
+    names = [name for name, share in zip(fit.basis.names, shares, strict=True) if share > OPEN]
     if not names:
         return []
     return [f"one sigma of these parameters is above {100 * OPEN:g} % of a brisk motion's torque ({model} model): "

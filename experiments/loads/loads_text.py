@@ -7,6 +7,7 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
+from experiments.loads.judgement import negative_mass
 from experiments.text import new_table, number, print_titled
 from identify import IdentificationError
 from identify.loads.drive_gains import VAGUE, GainEstimate
@@ -33,12 +34,14 @@ def print_payloads(console: Console, found: Mapping[str, Payload | str], link: s
     if leading.known:
         console.print(Text("known: " + ", ".join(f"{name} = {x:.5g}" for name, x in leading.known.items())))
     body = body_of(leading)
+    if negative_mass(leading):
+        return
     if "mass" in body:
         centre, inertia = (" ".join(f"{x:.4g}" for x in body[key]) for key in ("centre_of_mass", "principal_inertia"))
-        console.print(
-            Text(f"a body that can exist: {body['mass']:.5g} kg at {centre} m, principal inertias {inertia} kg m^2"),
-            soft_wrap=True,
+        words = (
+            f"the nearest physically consistent body: {body['mass']:.5g} kg at {centre} m, principal inertias {inertia} kg m^2"
         )
+        console.print(Text(words), soft_wrap=True)
     else:
         console.print(Text(body["why"]), soft_wrap=True)
 

@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import Any
 
 from experiments.errors import ExperimentError
-from experiments.identification.results import summarize
+from experiments.results.summaries import summarize
 from identify import (
     CHAINS,
     MODELS,

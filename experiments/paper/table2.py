@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 
 from experiments.errors import ExperimentError
-from experiments.identification.identified import Identified
+from experiments.identification.fit import Fit, fit
+from experiments.identification.logs import Logs
+from experiments.identification.request import Request
 from experiments.identification.subject import Subject
 from experiments.paper.attribution import Errors
 from experiments.paper.parallel_attribution import ParallelAttribution
@@ -117,14 +119,15 @@ class Table2:
         return scara_truth(self.run.robots[0])
 
     @cached_property
-    def found(self) -> dict[str, dict[str, Identified]]:
+    def found(self) -> dict[str, dict[str, Fit]]:
         """What each processing makes of each model's realizations."""
         return {name: {model: self._identified(name, model) for model in REALIZATIONS} for name in PROCESSINGS}
 
-    def _identified(self, processing: str, model: str) -> Identified:
+    def _identified(self, processing: str, model: str) -> Fit:
         logs = tuple(self.run.alone(i) for i in range(REALIZATIONS[model]))
         chain, estimator = PROCESSINGS[processing]
-        return Identified(logs, Subject(self.scenario.robot), self.truth, (model,), chain, estimator, trim=self.rest)
+        request = Request(Subject(self.scenario.robot), (model,), chain, estimator, trim=self.rest)
+        return fit(request, Logs(logs, truth=self.truth))
 
     @property
     def rest(self) -> float:

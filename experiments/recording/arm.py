@@ -8,7 +8,7 @@ import rerun as rr
 
 from experiments.recording.columns import Times, part, poses
 from experiments.recording.stream import Stream
-from experiments.recording.style import MEASURED, PLANNED, Color
+from experiments.style import MEASURED, PLANNED, Color
 from identify import Array
 from sim.robot.robot import Robot
 from sim.robot.scene import Mover, Shape, motion, shapes

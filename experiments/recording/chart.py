@@ -10,7 +10,7 @@ import rerun as rr
 from experiments.recording.columns import part
 from experiments.recording.scales import AbstractScale
 from experiments.recording.stream import Stream
-from experiments.recording.style import Color
+from experiments.style import Color
 from identify import Array
 
 HEIGHT = 1.0

@@ -16,7 +16,7 @@ from experiments.recording.compared import Compared, difference, differences, es
 from experiments.recording.folder import BASE, INNER, files
 from experiments.recording.layouts import tabs
 from experiments.recording.stream import Stream
-from experiments.recording.style import FORM_WIDTHS, FORMS, GREY, joint_colors, lighter, model_color
+from experiments.style import FORM_WIDTHS, FORMS, GREY, joint_colors, lighter, model_color
 
 SIGNALS = ("q/measured", "qd/true", "torque/log")
 """Of the second run and of those after it, what is laid over the first one's."""

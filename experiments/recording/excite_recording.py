@@ -6,7 +6,6 @@ import numpy as np
 import numpy.typing as npt
 
 from experiments.excite.excitation import REST
-from experiments.excite.excite_text import lines
 from experiments.excite.excited import STRETCHES, Excited
 from experiments.excite.limit_use import FS
 from experiments.recording.audience import Audience
@@ -17,7 +16,8 @@ from experiments.recording.identification_recording import recording_id
 from experiments.recording.motion_layer import Base
 from experiments.recording.scales import decades, linear, listed
 from experiments.recording.stream import Stream
-from experiments.recording.style import FORMS, GREY, Color, joint_colors
+from experiments.reports.excite_printed import lines
+from experiments.style import FORMS, GREY, Color, joint_colors
 from sim.scenario.scenario_file import to_toml
 
 SHOWN = 50.0

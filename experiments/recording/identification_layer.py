@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import rerun as rr
 
-from experiments.identification.identified import Identified
+from experiments.identification.fit import Fit
 from experiments.recording.audience import Audience
 from experiments.recording.chart import send_keys
 from experiments.recording.columns import part, parts, seconds, time_columns
@@ -16,8 +16,8 @@ from experiments.recording.parameter_charts import send_parameters
 from experiments.recording.residual_charts import ResidualCharts
 from experiments.recording.smoothed_layer import send_smoothed
 from experiments.recording.stream import Stream
-from experiments.recording.style import FORM_WIDTHS, GREY, JOINTS, Color, kind_colors, model_color
 from experiments.recording.texts import estimates_table, noise_table, short_table
+from experiments.style import FORM_WIDTHS, GREY, JOINTS, Color, kind_colors, model_color
 from identify import (
     Estimate,
     filtered,
@@ -39,7 +39,7 @@ class Layer:
     ----------
     name : str
         Recording id of the motion.
-    found : Identified
+    fit : Fit
         The identification of one log.
     joints : sequence of str
         Names of the joints.
@@ -49,21 +49,19 @@ class Layer:
         Who watches.
     """
 
-    def __init__(
-        self, name: str, found: Identified, joints: Sequence[str], known: set[str], audience: Audience | None = None
-    ) -> None:
-        self.stream, self._found, self._known = Stream(name, audience, layer=True), found, known
+    def __init__(self, name: str, fit: Fit, joints: Sequence[str], known: set[str], audience: Audience | None = None) -> None:
+        self.stream, self._fit, self._known = Stream(name, audience, layer=True), fit, known
         self._joints = parts(joints)
-        self._log, self._chain, self._at = found.logs[0], found.processing, f"identify/{found.label}"
+        self._log, self._chain, self._at = fit.logs.fitted[0], fit.processing, f"identify/{fit.request.label}"
         methods = {path.strip("/").split("/")[1] for path in known if path.strip("/").startswith("identify/")}
-        self._shade = len(methods - {found.label})
-        self._signals = found.problem.signals[0]
-        self._called = found.label if self._shade else ""
+        self._shade = len(methods - {fit.request.label})
+        self._signals = fit.problem.signals[0]
+        self._called = fit.request.label if self._shade else ""
 
     def send(self) -> None:
         """Send everything."""
         self._motion()
-        for form, estimate in self._found.estimates.items():
+        for form, estimate in self._fit.estimates.items():
             at, color = f"{self._at}/{form}", self._color(form)
             width = FORM_WIDTHS.get(form, 1.5) / (1 + self._shade)  # so that what lies below shows
             names = row_names(form, estimate.rows.kinds, self._joints)
@@ -73,15 +71,15 @@ class Layer:
             for fit in estimate.fits.values():
                 send_smoothed(self.stream, self._at, fit, self._joints)
         self._truth()
-        ResidualCharts(self.stream, self._at, self._found, self._joints, self._shade).send()
-        send_parameters(self.stream, self._at, self._found, self._shade)
-        send_iterations(self.stream, self._at, self._found)
-        keys = {f"{self._found.label}:": GREY, **{form: self._color(form) for form in self._found.estimates}}
-        send_keys(self.stream, f"legend/{self._found.label}", keys)
+        ResidualCharts(self.stream, self._at, self._fit, self._joints, self._shade).send()
+        send_parameters(self.stream, self._at, self._fit, self._shade)
+        send_iterations(self.stream, self._at, self._fit)
+        keys = {f"{self._fit.request.label}:": GREY, **{form: self._color(form) for form in self._fit.estimates}}
+        send_keys(self.stream, f"legend/{self._fit.request.label}", keys)
         for name, text in (
-            ("report", estimates_table(self._found)),
-            ("estimates", short_table(self._found)),
-            ("noise", noise_table(self._found, self._joints)),
+            ("report", estimates_table(self._fit)),
+            ("estimates", short_table(self._fit)),
+            ("noise", noise_table(self._fit, self._joints)),
         ):
             self.stream.keep(f"{self._at}/{name}", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
         self.stream.arrange(tabs(self._known | self.stream.paths))
@@ -142,7 +140,7 @@ class Layer:
 
     def _truth(self) -> None:
         """Send the true parameters as lines from the beginning to the end."""
-        ends: Mapping[str, float] = self._found.truth or {}
+        ends: Mapping[str, float] = self._fit.truth or {}
         for name, value in ends.items():
             times = time_columns(self._log.t[[0, -1]], self._log.fs)
             self.stream.curve(f"truth/{part(name)}", times, np.array([value, value]), "true", GREY, 3.0)

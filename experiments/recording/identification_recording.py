@@ -8,7 +8,7 @@ from rerun.chunk import RrdReader
 
 from experiments.errors import ResultsError
 from experiments.identification.defaults import CHAIN
-from experiments.identification.identified import Identified
+from experiments.identification.fit import Fit
 from experiments.identification.scenario_run import ScenarioRun
 from experiments.identification.subject import Subject
 from experiments.recording.audience import Audience
@@ -76,22 +76,22 @@ class RunRecording:
         if is_long([ran.run.alone()]):  # of which no rows are kept
             return streams
         there = set().union(*(stream.paths for _, stream in streams))
-        return [*streams, layer(self.base.stream.name, ran.identified, ran.run.robots[0].joints, there, self._audience)]
+        return [*streams, layer(self.base.stream.name, ran.fit, ran.run.robots[0].joints, there, self._audience)]
 
 
-def record_log(found: Identified, audience: Audience | None = None) -> list[tuple[str, Stream]]:
+def record_log(fit: Fit, audience: Audience | None = None) -> list[tuple[str, Stream]]:
     """Return the streams of an identified log's recording, by the name of their file."""
-    log, robot = found.logs[0], found.subject.robot
+    log, robot = fit.logs.fitted[0], fit.subject.robot
     base = Base(recording_id("log", log.q.tobytes() + log.tau.tobytes()), robot, log.fs, ("measured",), audience)
     channel = log.torque
     base.stream.describe(fs_hz=f"{log.fs:g}", torque=channel.meaning, torque_delay_s=f"{channel.delay:g}")
-    base.replay(log, {}, measured_state(log, found.processing).qd.T)
+    base.replay(log, {}, measured_state(log, fit.processing).qd.T)
     base.end(log.q)
     base.finish(about("log", "", ("measured",)))
-    return [(BASE, base.stream), layer(base.stream.name, found, robot.joints, base.stream.paths, audience)]
+    return [(BASE, base.stream), layer(base.stream.name, fit, robot.joints, base.stream.paths, audience)]
 
 
-def add_layer(folder: Path, found: Identified, audience: Audience | None = None) -> list[tuple[str, Stream]]:
+def add_layer(folder: Path, fit: Fit, audience: Audience | None = None) -> list[tuple[str, Stream]]:
     """Return the streams of the layers of the recording in a results folder, that of an identification first.
 
     The layers that are there already come anew with it, to lay out the new one beside them.
@@ -101,13 +101,13 @@ def add_layer(folder: Path, found: Identified, audience: Audience | None = None)
     ResultsError
         If there is no recording, or it cannot be read or written.
     """
-    others = [path for path in files(folder) if path.name != layer_file(found.label)]
+    others = [path for path in files(folder) if path.name != layer_file(fit.request.label)]
     if not (folder / BASE).is_file():
         raise ResultsError(f"there is no {BASE} in {folder} to add a layer to: give --out for a recording of its own")
     name, there = known(others)
     if audience:
         show(name, others, audience)
-    made = layer(name, found, found.subject.robot.joints, there, audience)
+    made = layer(name, fit, fit.subject.robot.joints, there, audience)
     return [made, *rearranged(others, made[1])]
 
 
@@ -119,13 +119,11 @@ def show(name: str, paths: Sequence[Path], audience: Audience) -> None:
     stream.close()
 
 
-def layer(
-    name: str, found: Identified, joints: Sequence[str], there: set[str], audience: Audience | None = None
-) -> tuple[str, Stream]:
+def layer(name: str, fit: Fit, joints: Sequence[str], there: set[str], audience: Audience | None = None) -> tuple[str, Stream]:
     """Return the stream of an identification's layer, and the name of its file."""
-    made = Layer(name, found, joints, there, audience)
+    made = Layer(name, fit, joints, there, audience)
     made.send()
-    return layer_file(found.label), made.stream
+    return layer_file(fit.request.label), made.stream
 
 
 def recording_id(name: str, content: bytes) -> str:

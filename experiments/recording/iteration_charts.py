@@ -4,21 +4,21 @@ from math import ceil
 
 import numpy as np
 
-from experiments.identification.identified import Identified
+from experiments.identification.fit import Fit
 from experiments.recording.chart import NARROW, Chart
 from experiments.recording.columns import part
 from experiments.recording.scales import Signed, Words
 from experiments.recording.stream import Stream
-from experiments.recording.style import JOINTS
+from experiments.style import JOINTS
 from identify import Estimate
 
 LEAST = 1e-3
 """Difference [sigma] up to which the axis is linear."""
 
 
-def send_iterations(stream: Stream, at: str, found: Identified) -> None:
+def send_iterations(stream: Stream, at: str, fit: Fit) -> None:
     """Send, of estimators that go on from round to round, how far each parameter is from the last, in its sigma."""
-    for model, estimate in found.estimates.items():
+    for model, estimate in fit.estimates.items():
         if len(estimate.path) > 1:
             _send(stream, f"{at}/iterations/{model}", estimate)
 

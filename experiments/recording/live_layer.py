@@ -5,12 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 import rerun as rr
 
-from experiments.identification.identified import Identified
+from experiments.identification.fit import Fit, fit
+from experiments.identification.logs import Logs
+from experiments.identification.request import Request
 from experiments.identification.subject import Subject
 from experiments.recording.columns import part, seconds
 from experiments.recording.identification_layer import row_names, send_rows
 from experiments.recording.stream import Stream
-from experiments.recording.style import FORM_WIDTHS, FORMS, GREY
+from experiments.style import FORM_WIDTHS, FORMS, GREY
 from identify import Array, Estimate, IdentificationError, MotionLog, TorqueChannel
 from identify.rows.long_logs import is_long
 
@@ -45,10 +47,11 @@ class LiveIdentification:
     def __init__(
         self, stream: Stream, subject: Subject, chain: str, channel: TorqueChannel, fs: float, joints: Sequence[str]
     ) -> None:
-        self._stream, self._subject, self._chain, self._channel, self._fs = stream, subject, chain, channel, fs
+        self._stream, self._channel, self._fs = stream, channel, fs
+        self._request = Request(subject, chain=chain, estimator=ESTIMATOR, name=LABEL)
         self._joints, self._q, self._tau = joints, list[Array](), list[Array]()
         self._identified, self._shown = 0, dict[str, float]()
-        self.found: Identified | None = None
+        self.fit: Fit | None = None
 
     def grow(self, q: Array, tau: Array) -> bool:
         """Take in positions [rad] and torques [N m], shape (time, joint); return whether the estimates were made anew."""
@@ -60,13 +63,11 @@ class LiveIdentification:
         self._identified = samples
         try:
             log = MotionLog(self._fs, np.concatenate(self._q), np.concatenate(self._tau), self._channel)
-            found = Identified((log,), self._subject, chain=self._chain, estimator=ESTIMATOR, name=LABEL)
-            estimates = found.estimates
+            self.fit = fit(self._request, Logs((log,)))
         except IdentificationError:  # too short yet, or not yet excited
             return False
-        self.found = found
         with self._stream.draft():
-            for form, estimate in estimates.items():
+            for form, estimate in self.fit.estimates.items():
                 self._show(form, estimate, float(log.t[-1]))
         return True
 

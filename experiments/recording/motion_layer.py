@@ -13,7 +13,7 @@ from experiments.recording.columns import Times, parts, seconds, time_columns
 from experiments.recording.lanes import Lanes, joint_states
 from experiments.recording.layouts import tabs
 from experiments.recording.stream import Stream
-from experiments.recording.style import GREY, WIDTHS, joint_colors, kind_colors
+from experiments.style import GREY, WIDTHS, joint_colors, kind_colors
 from identify import Array, MotionLog
 from sim.drives.electric import BetweenEdges
 from sim.engine.watch import Inner, Stretch

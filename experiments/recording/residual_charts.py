@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.identification.friction_curves import FRICTIONS
-from experiments.identification.identified import Identified
+from experiments.identification.fit import Fit
 from experiments.recording.chart import NARROW, Chart
 from experiments.recording.scales import decades, linear
 from experiments.recording.stream import Stream
-from experiments.recording.style import GREY, JOINTS, Color, model_color
+from experiments.reports.friction_curves import FRICTIONS
+from experiments.style import GREY, JOINTS, Color, model_color
 from identify import MODELS, Array, Estimate, Instants, binned, cutoffs, instants, noise_spectra, spectrum
 
 BINS = {"over_velocity": 41, "over_position": 240}
@@ -45,7 +45,7 @@ class ResidualCharts:
         Where they go.
     at : str
         Path of the identification.
-    found : Identified
+    fit : Fit
         The identification.
     joints : sequence of str
         Names of the joints, as parts of paths.
@@ -55,13 +55,13 @@ class ResidualCharts:
 
     stream: Stream
     at: str
-    found: Identified
+    fit: Fit
     joints: Sequence[str]
     number: int = 0
 
     def send(self) -> None:
         """Send them all."""
-        left = {form: self._instants(form, estimate) for form, estimate in self.found.estimates.items()}
+        left = {form: self._instants(form, estimate) for form, estimate in self.fit.estimates.items()}
         of_joints = {form: one for form, one in left.items() if form != "power" and len(one.residual) == len(self.joints)}
         for j in range(len(self.joints)) if of_joints else ():
             self._over("over_velocity", j, of_joints)
@@ -75,11 +75,11 @@ class ResidualCharts:
         return COLORS.get(name) or model_color(name, self.number)
 
     def _instants(self, form: str, estimate: Estimate) -> Instants:
-        return instants(self.found.problem.signals[0], self.found.basis, MODELS.create(form), self.found.processing, estimate.X)
+        return instants(self.fit.problem.signals[0], self.fit.basis, MODELS.create(form), self.fit.processing, estimate.X)
 
     def _units(self, j: int) -> tuple[str, str]:
         """Return the units of a joint's torque and position."""
-        return ("N", "m") if self.found.subject.tree.joints[j].kind == "slide" else ("N m", "rad")
+        return ("N", "m") if self.fit.subject.tree.joints[j].kind == "slide" else ("N m", "rad")
 
     def _state(self, kind: str, j: int, left: Instants) -> Array:
         state = left.equations.signals.state
@@ -112,16 +112,16 @@ class ResidualCharts:
 
     def _friction(self, j: int, left: Mapping[str, Instants]) -> None:
         """Send what is left of the torque without the rigid body, over velocity, the laws that were found, and the true one."""
-        mine = np.array([p.kind in FRICTIONS and p.joint == j for p in self.found.basis.parameters])
+        mine = np.array([p.kind in FRICTIONS and p.joint == j for p in self.fit.basis.parameters])
         if not mine.any():
             return
         force, way = self._units(j)
         form, leading = next(iter(left.items()))
         qd, laws = self._state("over_velocity", j, leading), dict[str, Array]()
         for name, one in left.items():
-            laws[name] = self._law(one, np.where(mine, self.found.estimates[name].X, 0.0), j)
-        if self.found.truth is not None:
-            laws["true"] = self._law(leading, np.where(mine, list(self.found.truth.values()), 0.0), j)
+            laws[name] = self._law(one, np.where(mine, self.fit.estimates[name].X, 0.0), j)
+        if self.fit.truth is not None:
+            laws["true"] = self._law(leading, np.where(mine, list(self.fit.truth.values()), 0.0), j)
         torque, weight = leading.residual[j] + laws[form], leading.weight[j]
         y = linear(f"friction of {self.joints[j]} [{force}]", _around(np.concatenate(list(laws.values()))))
         chart = Chart(self.stream, f"{self.at}/friction/{self.joints[j]}", linear(f"qd [{way}/s]", qd), y, NARROW)
@@ -135,14 +135,14 @@ class ResidualCharts:
 
     def _spectrum(self, row: str, joint: int, left: Mapping[str, Instants]) -> None:
         """Send spectra of what models leave over in a row, what the noise found predicts, and the cut-offs of the chain."""
-        fs, lines, f = self.found.logs[0].fs, dict[str, Array](), np.empty(0)
+        fs, lines, f = self.fit.logs.fitted[0].fs, dict[str, Array](), np.empty(0)
         for form, one in left.items():
             weight = one.weight[joint]
             f, density = spectrum(one.residual[joint] * weight, fs, RESOLUTION)
             lines[form] = density / np.sqrt(max(np.mean(weight**2), 1e-12))  # as if what is masked were like the rest
         highest = max(density[1:].max() for density in lines.values())
         if "explicit" in left:
-            estimate = self.found.estimates["explicit"]
+            estimate = self.fit.estimates["explicit"]
             expected = noise_spectra(estimate.problem, estimate.noise_levels, f)
             lines |= {f"{kind} noise": each[joint] for kind, each in zip(("torque", "position"), expected, strict=True)}
         unit = "W" if row == "power" else self._units(joint)[0]
@@ -151,7 +151,7 @@ class ResidualCharts:
         chart = Chart(self.stream, f"{self.at}/spectrum/{row}", decades("f [Hz]", f[1:]), y)
         for name, density in lines.items():
             chart.line(name, f[1:], density[1:], self._color(name), 2.5 if name == "explicit" else 1.2)
-        for name, cutoff in cutoffs(self.found.processing, fs).items():
+        for name, cutoff in cutoffs(self.fit.processing, fs).items():
             chart.line(f"cut-off {name}", np.full(2, cutoff), np.array([y.low, y.high]), DARK)
 
 

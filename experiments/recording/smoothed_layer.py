@@ -7,7 +7,7 @@ import rerun as rr
 
 from experiments.recording.columns import seconds
 from experiments.recording.stream import Stream
-from experiments.recording.style import GREY, joint_colors
+from experiments.style import GREY, joint_colors
 from identify import Array, JointFit, smoothed_motion
 
 

@@ -11,7 +11,7 @@ from rerun.chunk import Chunk, RrdReader
 from experiments.errors import ResultsError
 from experiments.recording.audience import Audience
 from experiments.recording.columns import Times, scalars
-from experiments.recording.style import STATES, Color
+from experiments.style import STATES, Color
 from identify import Array
 
 APPLICATION = "idbench"

@@ -15,10 +15,10 @@ from experiments.recording.chart import NARROW, SYMBOLS, Chart, Symbol
 from experiments.recording.columns import part
 from experiments.recording.scales import Words, decades, named
 from experiments.recording.stream import Stream
-from experiments.recording.style import FORMS, GREY, JOINTS, Color, lighter
 from experiments.study.answer import short, value
 from experiments.study.axis import Axis
 from experiments.study.statistics import LEAST, Cell
+from experiments.style import FORMS, GREY, JOINTS, Color, lighter
 from identify import Array
 
 PERCENT = 100.0

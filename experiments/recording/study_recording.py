@@ -14,11 +14,11 @@ from experiments.recording.layouts import tabs
 from experiments.recording.scales import linear
 from experiments.recording.stream import Stream
 from experiments.recording.study_charts import AxisCharts
-from experiments.recording.style import FORMS, GREY
 from experiments.study.answer import answer, where
 from experiments.study.statistics import Cell
 from experiments.study.study import Study
 from experiments.study.study_report import command, worst_runs
+from experiments.style import FORMS, GREY
 
 EDGES = np.arange(-6.25, 6.3, 0.5)
 """Bins of errors in sigma; what lies beyond counts in the outermost."""
@@ -77,7 +77,7 @@ class StudyRecording:
         self.stream.keep("answer", written)
         if not solved:
             return
-        for axis in self._study.axes:
+        for axis in self._study.every_axis:
             if len(axis.points) > 1:
                 AxisCharts(self.stream, axis, solved).send([(c, name, e, r, command(self._study, self._folder, c, r))
                                                             for c, name, e, r in worst])  # fmt: skip

@@ -1,6 +1,8 @@
 """The recording of Table 1: the motion, and a layer for each chain."""
 
-from experiments.identification.identified import Identified
+from experiments.identification.fit import fit
+from experiments.identification.logs import Logs
+from experiments.identification.request import Request
 from experiments.paper.table1 import Table1
 from experiments.paper.table1_text import markdown
 from experiments.recording.audience import Audience
@@ -22,7 +24,8 @@ def record_table1(table: Table1, audience: Audience | None = None) -> list[tuple
     base.finish(markdown(table))
     streams = [(BASE, base.stream)]
     for chain in table.chains:
-        found = Identified((log,), truth=table.truth, chain=chain, estimator="OLS", trim=scenario.quintic().rest)
+        request = Request(chain=chain, estimator="OLS", trim=scenario.quintic().rest)
+        result = fit(request, Logs((log,), truth=table.truth))
         known = set().union(*(stream.paths for _, stream in streams))
-        streams.append(layer(base.stream.name, found, table.robot.joints, known, audience))
+        streams.append(layer(base.stream.name, result, table.robot.joints, known, audience))
     return streams

@@ -9,8 +9,8 @@ from experiments.recording.identification_recording import ROLES, RunRecording
 from experiments.recording.layouts import tabs
 from experiments.recording.scales import listed, named, signed
 from experiments.recording.stream import Stream
-from experiments.recording.style import FORMS, Color
 from experiments.recording.texts import about
+from experiments.style import FORMS, Color
 
 BEND = 0.01
 """Error [%] up to which axes are linear, and that has the darkest cell."""

@@ -65,43 +65,44 @@ def _who(cells: Sequence[Cell]) -> str:
     if 2 * 0.5 ** max(cell.runs for cell in cells) * comb(len(groups[0]), 2) >= SURE:
         least = [method(cell, cells) for cell in best]
         winner = max(dict.fromkeys(least), key=least.count)
-        share = f"{least.count(winner)} of {len(groups)} combinations"
-        return f"Least error in {share}: {winner} (too few runs for a test); {span}."
+        share = f"{least.count(winner)} of {len(groups)} settings"
+        return f"Least typical error in {share}: {winner} (too few runs for a test); {span}."
     return f"{_winners(groups, best, cells)}; {span}."
 
 
 def _winners(groups: Sequence[Sequence[Cell]], best: Sequence[Cell], cells: Sequence[Cell]) -> str:
-    """Return which methods are least often surely worse than another, and how often they are surely better than all others.
+    """Return which methods are least often significantly worse than another, and how often better than all others.
 
-    A combination in which another errs less, but not surely, does not count against them.
+    A combination in which another errs less, but not significantly, does not count against them.
     """
     rivals = [_not_worse(group, cell, cells) for group, cell in zip(groups, best, strict=True)]
     counts = Counter(name for names in rivals for name in names)
-    winners = [name for name, count in counts.items() if count == max(counts.values())]
+    first = [method(cell, cells) for cell in best]
+    winners = sorted((name for name, count in counts.items() if count == max(counts.values())), key=first.count, reverse=True)
     unbeaten = max(counts.values())
     lonely = sum(len(group) == 1 for group in groups)
-    words = [f"Least error: {' and '.join(winners)}"]
+    words = [f"Least typical error: {' and '.join(winners)}"]
     if len(groups) > 1 or unbeaten < len(groups):
         alone = f" (in {lonely} nothing else gave an estimate)" if lonely else ""
-        words.append(f"not surely worse than any other in {unbeaten} of {len(groups)} combinations{alone}")
+        words.append(f"not significantly worse than any other in {unbeaten} of {len(groups)} settings{alone}")
     if len({method(c, cells) for c in cells}) > len(winners):
         sure = sum(set(names) <= set(winners) for names in rivals)
-        words.append(f"surely less than all others {f'in {sure} ' if len(groups) > 1 else ''}(p < {SURE:g})" if sure else "")
+        words.append(
+            f"significantly less than all others {f'in {sure} ' if len(groups) > 1 else ''}(p < {SURE:g})" if sure else ""
+        )
     tied = sum(len(set(names) & set(winners)) > 1 for names in rivals)
-    between = f"between them no sure difference{f' in {tied}' if len(groups) > 1 else ''}" if len(winners) > 1 else ""
+    between = f"between them no significant difference{f' in {tied}' if len(groups) > 1 else ''}" if len(winners) > 1 else ""
     return ", ".join(filter(None, words)) + (f"; {between}" if between else "")
 
 
 def _best(group: Sequence[Cell]) -> Cell:
-    """Return the cell that errs least in the sense of the test: that loses fewest of its comparisons with the others."""
-    losses = Counter({id(cell): 0 for cell in group})
-    losses.update(id(d.worse) for d in differences(group) if d.runs)
+    """Return the cell with the least typical error, of those that identified most of the runs."""
     most = max(cell.runs for cell in group)
-    return min((cell for cell in group if cell.runs > most / 2), key=lambda cell: losses[id(cell)])
+    return min((cell for cell in group if cell.runs > most / 2), key=lambda cell: cell.typical)
 
 
 def _not_worse(group: Sequence[Cell], best: Cell, cells: Sequence[Cell]) -> tuple[str, ...]:
-    """Return the best cell of a group, and those that are not surely worse."""
+    """Return the best cell of a group, and those that are not significantly worse."""
     worse = {id(d.worse) for d in differences(group) if d.better is best and d.p < SURE}
     return tuple(method(cell, cells) for cell in group if id(cell) not in worse)
 

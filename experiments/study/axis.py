@@ -13,6 +13,9 @@ from sim.settings import Number, Whole, settings
 
 MOST_VALUES = 10000
 
+FRICTION = "friction"
+"""Field of the axis of friction laws that are identified; those that are simulated have settings, such as friction.viscous."""
+
 
 @final
 @settings
@@ -127,7 +130,7 @@ class Setting:
 
 
 def _of_identification(field: str) -> bool:
-    return field.split(".", maxsplit=1)[0] in ("chain", "estimator")
+    return field == FRICTION or field.split(".", maxsplit=1)[0] in ("chain", "estimator")
 
 
 def _set(part: Any, path: list[str], value: Any, field: str) -> Any:

@@ -7,12 +7,12 @@ import numpy as np
 from matplotlib.axes import Axes as Panel
 from matplotlib.figure import Figure
 
-from experiments.html_report import svg
-from experiments.recording.style import FORMS
+from experiments.reports.html import svg
 from experiments.study.answer import value
 from experiments.study.axis import Axis
 from experiments.study.requirement import in_words
 from experiments.study.statistics import RIGHT, SIGMAS, Cell
+from experiments.style import FORMS
 from identify import Array
 
 OTHER = [90, 90, 90]
@@ -73,7 +73,8 @@ def error_figure(cells: Sequence[Cell], axis: Axis) -> str:
             panel.plot(x, bias, color=color, ls=":", label=f"{model}: |bias|", lw=wide)
             sure = np.array([abs(c.bias[p]) > c.bias_margin[p] for c in group])
             panel.plot(np.array(x)[sure], bias[sure], "o", color=color, ms=3)
-        panel.set_yscale("log")
+        if any((np.asarray(line.get_ydata()) > 0).any() for line in panel.lines):  # a truth of 0 has no relative error
+            panel.set_yscale("log")
         panel.set_title(name)
     return _finished(figure, panels, axis.field, "error [%]")
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
-from experiments.study.axis import Axis, Setting
+from experiments.study.axis import FRICTION, Axis, Setting
 from identify import CHAINS, ESTIMATORS, AbstractEstimator, Chain
 
 
@@ -17,6 +17,7 @@ class Method:
     estimator_name: str
     chain: Chain
     estimator: AbstractEstimator
+    friction: str
     settings: tuple[Setting, ...]
 
     @property
@@ -29,7 +30,7 @@ class Method:
         return all(settings.get(s.axis.field, s.label) == s.label for s in self.settings)
 
 
-def methods_of(chains: Sequence[str], estimators: Sequence[str], axes: Sequence[Axis]) -> Iterator[Method]:
+def methods_of(chains: Sequence[str], estimators: Sequence[str], friction: str, axes: Sequence[Axis]) -> Iterator[Method]:
     """Yield every combination of chains, estimators and the values of axes; estimators that see no chain with the first."""
     for name, way, combination in product(chains, estimators, list(combinations(axes))):
         chain, estimator = CHAINS.create(name), ESTIMATORS.create(way)
@@ -37,7 +38,8 @@ def methods_of(chains: Sequence[str], estimators: Sequence[str], axes: Sequence[
             continue
         for setting in whole_first(combination):
             chain, estimator = setting.chain(chain), setting.estimator(estimator)
-        yield Method(name, way, chain, estimator, combination)
+        laws = next((str(setting.value) for setting in combination if setting.axis.field == FRICTION), friction)
+        yield Method(name, way, chain, estimator, laws, combination)
 
 
 def combinations(axes: Sequence[Axis]) -> Iterator[tuple[Setting, ...]]:

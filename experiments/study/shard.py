@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from experiments.identification.simulators import RobotPlant, ScenarioLoop
+from experiments.identification.subject import Subject
 from experiments.study.bound import bound_of
 from experiments.study.method import Method
 from experiments.study.study import Study
@@ -66,8 +67,7 @@ def run_shard(study: Study, runs: range, *, threads: int = 1, progress: Progress
         start, tell = time.perf_counter(), _part(progress, done, len(together), steps * len(runs))
         try:
             simulated = _simulate(scenarios, together, threads, tell)
-            truth = study.subject.truth(simulated.robots[0], simulated.scenario.friction)
-            bound = bound_of(study, simulated, truth) if study.bound else None
+            known = {laws: _known(study, subject, simulated) for laws, subject in study.subjects.items()}
         except BenchError as error:
             _fail(shard, study, scenarios, list(together), str(error))
             continue
@@ -75,6 +75,7 @@ def run_shard(study: Study, runs: range, *, threads: int = 1, progress: Progress
         done += len(together) * steps
         for k, method in enumerate(study.methods):
             start = time.perf_counter()
+            truth, bound = known[method.friction]
             simulation = _simulation(study, method, simulated, together, truth)
             shard.rows += _identify(study, method, simulated, list(together), truth, bound, simulation)
             shard.seconds[f"{method.chain_name} {method.estimator_name}"] += time.perf_counter() - start
@@ -97,6 +98,12 @@ def _groups(study: Study, scenarios: Mapping[int, Scenario], shard: Shard) -> It
         else:
             groups[len(motion.q)][run] = motion
     yield from groups.values()
+
+
+def _known(study: Study, subject: Subject, simulated: Run) -> tuple[dict[str, float], Array | None]:
+    """Return the truth of a robot's parameters, and the least error that noise allows, if that is asked for."""
+    truth = subject.truth(simulated.robots[0], simulated.scenario.friction)
+    return truth, bound_of(subject.basis, simulated, truth) if study.bound else None
 
 
 def _simulate(
@@ -129,7 +136,9 @@ def _identify(
     """Yield a row for every run and model."""
     found: dict[str, Estimate | IdentificationError]
     try:
-        problem = settled(Problem((simulated.log,), study.subject.basis, ExplicitModel(), method.chain, simulation))
+        problem = settled(
+            Problem((simulated.log,), study.subjects[method.friction].basis, ExplicitModel(), method.chain, simulation)
+        )
         found = attempt_each(problem, study.created_models, method.estimator, throw=False)
     except IdentificationError as error:
         found = dict.fromkeys(study.models, error)
@@ -149,7 +158,7 @@ def _simulation(
 ) -> Simulation:
     """Return how the robots of runs are simulated anew, by estimators that need it, and where these begin."""
     motions = tuple(motion for motion in together.values() if motion is not None)
-    needs, subject, start = method.estimator.needs, study.subject, None
+    needs, subject, start = method.estimator.needs, study.subjects[method.friction], None
     loop = ScenarioLoop(subject, (simulated.scenario,), (simulated.log,), motions) if "loop" in needs else None
     if study.start:
         drawn = np.stack([np.random.default_rng([seed, START]).standard_normal(len(truth)) for seed in simulated.seeds])

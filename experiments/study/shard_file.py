@@ -92,7 +92,7 @@ def _array(column: Any) -> np.typing.NDArray[Any]:
 def _schema(study: Study) -> pa.Schema:
     """Return the columns, the same in every shard."""
     fields: list[Any] = [pa.field("run", pa.int64()), pa.field("seed", pa.int64())]
-    for axis in study.axes:
+    for axis in study.every_axis:
         kind: Any = pa.float64() if axis.numeric else pa.string()
         fields.append(pa.field(axis.field, kind))
     fields += [pa.field(name, pa.string()) for name in ("chain", "estimator", "model", "failure")]

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -52,6 +52,8 @@ class Cell:
         The least standard deviations that noise allows, of a study that asks for them.
     simulations : Array, shape (runs,), optional
         How often the estimator simulated each run.
+    shared : bool array, shape (p,), optional
+        Parameters that all methods of the study identify; all by default.
     """
 
     settings: Mapping[str, Any]
@@ -65,6 +67,7 @@ class Cell:
     failures: Mapping[str, np.typing.NDArray[np.int64]]
     bound: Array | None = None
     simulations: Array | None = None
+    shared: np.typing.NDArray[np.bool_] | None = None
 
     @property
     def runs(self) -> int:
@@ -135,8 +138,9 @@ class Cell:
 
     @property
     def relative(self) -> np.typing.NDArray[np.bool_]:
-        """Parameters whose truth is not 0, so that they have a relative error, shape (p,)."""
-        return (self.truth != 0).all(axis=0)
+        """Parameters that all methods identify and whose truth is not 0: they have a relative error to compare, shape (p,)."""
+        known = np.isfinite(self.truth).all(axis=0) & (self.truth != 0).all(axis=0)
+        return known if self.shared is None else known & self.shared
 
     def coverage(self, sigma: Array) -> Array:
         """Return the share of truths within SIGMAS `sigma` of the estimate, of the runs that have one, shape (p,)."""
@@ -154,18 +158,15 @@ class Cell:
         inside = np.abs(self.X - self.truth) <= SIGMAS * sigma
         return inside.sum(axis=0), np.isfinite(sigma).sum(axis=0)
 
-    def losses(self) -> dict[int, float]:
-        """Return, of each run, the mean over the parameters of log |relative error|."""
-        logs = np.log(np.maximum(np.abs(self.error[:, self.relative]), LEAST)).mean(axis=1)
-        return dict(zip(self.run.tolist(), logs.tolist(), strict=True))
-
 
 def cells(rows: Mapping[str, np.typing.NDArray[Any]], axes: Sequence[str], parameters: tuple[str, ...]) -> list[Cell]:
     """Return the cells of a study's rows, a column each, in the order in which they appear."""
     members: dict[tuple[Any, ...], list[int]] = {}
     for i, key in enumerate(zip(*(rows[name].tolist() for name in (*axes, "chain", "estimator", "model")), strict=True)):
         members.setdefault(key, []).append(i)
-    return [_cell(rows, key, np.array(index), axes, parameters) for key, index in members.items()]
+    found = [_cell(rows, key, np.array(index), axes, parameters) for key, index in members.items()]
+    known = [np.isfinite(cell.truth).any(axis=0) for cell in found if cell.runs]
+    return [replace(cell, shared=np.logical_and.reduce(known)) for cell in found] if known else found
 
 
 def _cell(

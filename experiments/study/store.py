@@ -12,7 +12,7 @@ import pyarrow as pa
 import tomli_w
 
 from experiments.errors import ResultsError, StudyError
-from experiments.identification.results import write_whole
+from experiments.results.writing import replace_own
 from experiments.study.shard import Shard
 from experiments.study.shard_file import read_shard, require_of, runs_of, said_by, write_shard
 from experiments.study.study import Study
@@ -92,7 +92,7 @@ class Store:
             if (self.folder / "study.toml").exists():
                 self._require_same()
             else:
-                write_whole(self.folder / "study.toml", tomli_w.dumps(self.study.content))
+                replace_own(self.folder / "study.toml", tomli_w.dumps(self.study.content))
             for left in (self.folder / "shards").glob(".runs-*"):  # by a process that was killed
                 left.unlink(missing_ok=True)
             yield

@@ -15,7 +15,7 @@ from experiments.errors import StudyError
 from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.parameters import Parameters
 from experiments.identification.subject import Subject
-from experiments.study.axis import Axis, Setting
+from experiments.study.axis import FRICTION, Axis, Setting
 from experiments.study.method import Method, combinations, methods_of, whole_first
 from identify import MODELS, AbstractModel
 from sim.scenario.scenario import Scenario
@@ -66,7 +66,8 @@ class Study:
     estimators: Names = (ESTIMATOR,)
     """Names of estimators."""
     friction: Names = ("standard",)
-    """Laws of friction that are identified: standard, or a sum such as standard+stribeck."""
+    """Laws of friction that are identified: standard, or a sum such as standard+stribeck; several are compared. Blanks part
+    laws of single joints: "standard 2=standard+load"."""
     start: NotNegative = 0.0
     """Standard deviation of the relative error of the parameters at which estimators begin that simulate or filter, drawn for
     each run; 0: they begin at the least-squares estimate."""
@@ -76,21 +77,21 @@ class Study:
     def __post_init__(self) -> None:
         if not self.axes:
             raise StudyError("axes is empty: write [[axes]], with a field and values")
-        every = [field for axis in self.axes for field in axis.all_fields]
+        every = [field for axis in self.every_axis for field in axis.all_fields]
         if twice := {field for field in every if every.count(field) > 1}:
             raise StudyError(f"two axes vary {', '.join(sorted(twice))}")
         if fixed := {"seed", "name", "trajectory.seed"} & set(every):
             raise StudyError(f"an axis varies {', '.join(sorted(fixed))}, which a study draws itself: use seeds")
-        for group in (self.models, self.chains, self.estimators):
+        for group in (self.models, self.chains, self.estimators, self.friction):
             if len(set(group)) < len(group):
                 raise StudyError(f"{', '.join(group)}: a name stands twice")
-        methods = prod(len(axis.points) for axis in self.axes if axis.identification)
+        methods = prod(len(axis.points) for axis in self.every_axis if axis.identification)
         if methods > MOST_METHODS:
             raise StudyError(f"{methods:,} combinations of identification settings are more than {MOST_METHODS:,}")
         points = prod(len(axis.points) for axis in self.axes if not axis.identification)
         if points > MOST_POINTS:
             raise StudyError(f"the grid has {points:,} combinations, more than {MOST_POINTS:,}: give its axes fewer values")
-        _ = self.methods, self.created_models
+        _ = self.methods, self.created_models, self.subjects
         self._require(next(self._points()))  # the whole grid is looked at when it is known not to be endless
 
     @property
@@ -101,7 +102,7 @@ class Study:
     @cached_property
     def points(self) -> tuple[Point, ...]:
         """The grid of simulations; raise ScenarioError or StudyError if a combination makes no sense."""
-        found, _ = tuple(self._points()), self.subject.basis
+        found, _ = tuple(self._points()), self.parameters
         for point in found:
             self._require(point)
         return found
@@ -129,7 +130,14 @@ class Study:
     @cached_property
     def methods(self) -> tuple[Method, ...]:
         """The grid of identifications."""
-        return tuple(methods_of(self.chains, self.estimators, [axis for axis in self.axes if axis.identification]))
+        axes = [axis for axis in self.every_axis if axis.identification]
+        return tuple(methods_of(self.chains, self.estimators, self.friction[0], axes))
+
+    @property
+    def every_axis(self) -> tuple[Axis, ...]:
+        """The axes, and that of the laws of friction where several are compared."""
+        laws = (Axis(field=FRICTION, values=self.friction),) if len(self.friction) > 1 else ()
+        return (*self.axes, *laws)
 
     @cached_property
     def created_models(self) -> dict[str, AbstractModel]:
@@ -139,19 +147,21 @@ class Study:
     @property
     def varied(self) -> tuple[str, ...]:
         """Fields of the axes with more than one value, or of all axes if none has."""
-        return tuple(axis.field for axis in self.axes if len(axis.points) > 1) or tuple(axis.field for axis in self.axes)
+        every = self.every_axis
+        return tuple(axis.field for axis in every if len(axis.points) > 1) or tuple(axis.field for axis in every)
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Names of the parameters that are identified."""
-        return self.subject.basis.names
+        """Names of the parameters that are identified, with any of the laws of friction."""
+        return tuple(dict.fromkeys(name for subject in self.subjects.values() for name in subject.basis.names))
 
     @cached_property
-    def subject(self) -> Subject:
-        """The robot of all its runs."""
-        subject = Subject(self._first.robot, Parameters(friction=self.friction))
-        subject.require_laws()
-        return subject
+    def subjects(self) -> dict[str, Subject]:
+        """The robot of all its runs, by the laws of friction that are identified."""
+        found = {laws: Subject(self._first.robot, Parameters(friction=tuple(laws.split()))) for laws in self.friction}
+        for subject in found.values():
+            subject.require_laws()
+        return found
 
     def with_seeds(self, seeds: int) -> "Study":
         """Return this study with another number of independent runs."""

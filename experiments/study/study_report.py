@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from experiments.html_report import rendered
+from experiments.reports.html import rendered
 from experiments.study.answer import answer, grouped, headline, method, percent, short, value, where
 from experiments.study.axis import Axis
 from experiments.study.comparison import differences
@@ -53,7 +53,7 @@ def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folde
 
 def main_axis(study: Study) -> Axis:
     """Return the axis with the most values: figures are drawn against it."""
-    return max(study.axes, key=lambda axis: len(axis.points))
+    return max(study.every_axis, key=lambda axis: len(axis.points))
 
 
 def families(study: Study, cells: Sequence[Cell]) -> Iterator[tuple[str, list[Cell]]]:
@@ -113,6 +113,8 @@ def _overview(cell: Cell) -> list[str]:
 def _details(cell: Cell, title: str) -> Iterator[list[str]]:
     interval, corrected, paper = cell.coverage_interval(cell.sigma), cell.coverage(cell.sigma), cell.coverage(cell.paper_sigma)
     for p, name in enumerate(cell.parameters):
+        if not np.isfinite(cell.truth[:, p]).any():  # of a law of friction that this method does not identify
+            continue
         bias = f"{signed(100 * cell.bias[p])} ± {100 * cell.bias_margin[p]:.2g}"
         share = f"{100 * corrected[p]:.1f} ({100 * interval[p, 0]:.0f} to {100 * interval[p, 1]:.0f})"
         spread = f"{100 * cell.deviation[p]:.3g}", f"{100 * cell.rmse[p]:.3g}"

@@ -9,11 +9,15 @@ from rich.console import Console
 from rich.text import Text
 
 from experiments.errors import ResultsError
-from experiments.identification.results import beside, tell_of, write_recording, write_summary
+from experiments.results.attempts import Attempts
+from experiments.results.folder import ResultsFolder
+from experiments.results.streams import write_streams
+from experiments.results.summaries import write_summary
 from experiments.study.answer import answer, method, percent, short, value
 from experiments.study.shard_file import arrays
 from experiments.study.statistics import Cell, cells
 from experiments.study.store import Store
+from experiments.study.study import Study
 from experiments.study.study_report import report
 from experiments.study.versions import versions
 from experiments.text import new_table, print_table
@@ -22,23 +26,34 @@ MOST_REASONS = 3
 """Reasons of failures that are printed; the report has all."""
 
 if TYPE_CHECKING:
+    from experiments.cli.page import Page
     from experiments.recording.study_recording import StudyRecording
 
 
-def write_results(page: Console, store: Store, recording: "StudyRecording | None") -> dict[str, Any]:
-    """Write summary.json, report.html and the recording into the folder of a study, and print its answer; return the first."""
+def write_results(page: "Page", store: Store, folder: ResultsFolder, recording: "StudyRecording | None") -> None:
+    """Print the answer of a study, write summary.json into its folder, then report and recording, which may fail alone."""
     study, seconds = store.study, store.seconds()
     found = cells(arrays(store.table()), study.varied, study.parameters)
-    with beside(store.folder) as folder:
-        (folder / "report.html").write_text(report(study, found, seconds, store.folder), encoding="utf-8")
-        summary = _summary(store, found, seconds)
-        write_summary(folder / "summary.json", summary)
-        lost = write_recording(folder, recording.finish(found)) if recording else ""
     _print(page, store, found)
-    tell_of(lost, store.folder)
+    summary = _summary(store, found, seconds)
+    page.found |= summary | {"folder": str(folder.out)}
+    page.show()
+    with folder.complete() as hidden:
+        write_summary(hidden / "summary.json", summary)
+    page.end()
+    attempts = Attempts(f"the answer is printed, and with all runs in {folder.out}", folder)
+    attempts.attempt("report.html", lambda: _report(folder, study, found, seconds))
+    if recording:
+        attempts.attempt("the recording", lambda: write_streams(recording.finish(found), folder))
+    page.print(Text(f"\nwritten to {store.folder}: open {store.folder / 'report.html'}"), soft_wrap=True)
+    attempts.close()
     if not any(cell.runs for cell in found):
         raise ResultsError(f"no run of study {study.name} gave an estimate: {_reasons(found)[0]}")
-    return summary
+
+
+def _report(folder: ResultsFolder, study: Study, found: Sequence[Cell], seconds: dict[str, float]) -> None:
+    with folder.more() as hidden:
+        (hidden / "report.html").write_text(report(study, found, seconds, folder.out), encoding="utf-8")
 
 
 def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:
@@ -60,7 +75,6 @@ def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:
     page.print(Text(answer(found, store.study.edges)))
     for reason in _reasons(found)[:MOST_REASONS]:
         page.print(Text(f"failed: {reason}"), soft_wrap=True)
-    page.print(Text(f"\nwritten to {store.folder}: open {store.folder / 'report.html'}"), soft_wrap=True)
 
 
 def _often(cell: Cell, shown: Sequence[str]) -> list[str]:

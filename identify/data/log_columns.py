@@ -29,6 +29,10 @@ class LogColumns:
         Times of the torques, where they are others than those of the positions [s].
     temperature : Array, shape (time, joint or 1), optional
         [deg C].
+    gain : tuple of float
+        Torque over what the file has, joint by joint: the torques have been multiplied by it.
+    said : str
+        Which file says what the columns are, and in which units; empty if that was the log itself.
     """
 
     t: Array
@@ -39,6 +43,8 @@ class LogColumns:
     qd: Array | None = None
     t_tau: Array | None = None
     temperature: Array | None = None
+    gain: tuple[float, ...] = ()
+    said: str = ""
 
     @property
     def conditions(self) -> dict[str, Array]:

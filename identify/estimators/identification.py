@@ -1,6 +1,6 @@
 """From logs to estimates: what users call."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from identify.basis.basis import Basis
 from identify.blame import blamed
@@ -81,7 +81,12 @@ def identify_each(
 
 
 def attempt_each(
-    problem: Problem, models: Mapping[str, AbstractModel], estimator: AbstractEstimator | None = None, *, throw: bool = True
+    problem: Problem,
+    models: Mapping[str, AbstractModel],
+    estimator: AbstractEstimator | None = None,
+    *,
+    throw: bool = True,
+    told: Callable[[str], None] | None = None,
 ) -> dict[str, Estimate | IdentificationError]:
     """Identify with several models; return the estimate of each, or why it has none: one does not take the others' away.
 
@@ -95,6 +100,8 @@ def attempt_each(
         Generalized least squares by default.
     throw : bool
         Raise if a run cannot be solved; otherwise the estimates' `status` says it.
+    told : callable, optional
+        Receives the name of each model before it is identified.
 
     Raises
     ------
@@ -112,7 +119,12 @@ def attempt_each(
             _ = each.parts
     for signals in problem.signals:
         signals.state.forget()
-    return {name: _outcome(each, estimator, throw) for name, each in problems.items()}
+    found = dict[str, Estimate | IdentificationError]()
+    for name, each in problems.items():
+        if told is not None:
+            told(name)
+        found[name] = _outcome(each, estimator, throw)
+    return found
 
 
 def estimate(problem: Problem, estimator: AbstractEstimator, *, throw: bool = True) -> Estimate:

@@ -137,6 +137,15 @@ class LogLayout:
         changed: Any = {quantity: source}
         return replace(self, **changed)
 
+    def words(self, path: Path) -> str:
+        """Return which file says what columns are, and in which units."""
+        each = [
+            f"{name} from {', '.join(source.columns[:3])}{', ...' * (len(source.columns) > 3)} in {source.unit or SI[name]}"
+            for name in QUANTITIES
+            if (source := getattr(self, name)).columns
+        ]
+        return f"columns are what {path} says: {'; '.join(each)}"
+
     @property
     def text(self) -> str:
         """The layout as the text of a file."""

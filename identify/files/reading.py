@@ -2,7 +2,7 @@
 
 import json
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -45,7 +45,7 @@ def read_columns(path: Path, layout: LogLayout | None = None) -> LogColumns:
         files = [source.file for source in (layout.q, layout.t, layout.tau) if source.file]
         if not files:
             raise LogError(f'{path} names no file of the log: add a line such as file = "run.csv" before the tables')
-        return _Files(path.parent / files[0], path.parent, layout).columns
+        return replace(_Files(path.parent / files[0], path.parent, layout).columns, said=layout.words(path))
     if layout:
         return _Files(path, path.parent, layout).columns
     found, table = LogLayout.beside(path), None
@@ -53,7 +53,7 @@ def read_columns(path: Path, layout: LogLayout | None = None) -> LogColumns:
         table = read_table(path)
         found = None if table.torque is not None else found  # what idbench wrote is no log of that folder's recorder
     if found:
-        return _Files(path, found[1].parent, found[0]).columns
+        return replace(_Files(path, found[1].parent, found[0]).columns, said=found[0].words(found[1]))
     table = table or read_table(path)
     return _Files(path, path.parent, standard_layout(path, table), {path: table}).columns
 
@@ -106,6 +106,7 @@ class _Files:
     def columns(self) -> LogColumns:
         """What they hold."""
         layout = self.layout
+        self._require_once()
         found = {name: self._of(name, getattr(layout, name)) for name in ("q", "tau", *(["qd"] if layout.qd.columns else []))}
         names = layout.joints or next((joints for _, joints in found.values() if joints), ())
         q, tau, *more = (self._ordered(name, *of, names) for name, of in found.items())
@@ -119,10 +120,12 @@ class _Files:
         since = min((times[0] for times in (t, t_tau) if len(times)), default=0.0)
         start = since if other or abs(since) > CLOCKS else 0.0  # since 1970
         channel = layout.torque or self._stated()
-        tau = tau * self._gain(tau.shape[1])
+        gain = np.broadcast_to(self._gain(tau.shape[1]), tau.shape[1:])
+        tau = tau * gain
         q, tau, qd = self._of_joints(q, tau, qd)
         warm = self._of("temperature", layout.temperature)[0] if layout.temperature.columns else None
-        return LogColumns(t - start, q, tau, channel, names, qd, t_tau - start if other else None, warm)
+        gains = tuple(map(float, gain))
+        return LogColumns(t - start, q, tau, channel, names, qd, t_tau - start if other else None, warm, gains)
 
     def _of_joints(self, q: Array, tau: Array, qd: Array | None) -> tuple[Array, Array, Array | None]:
         """Return positions, torques and velocities of joints, where those of motors were logged."""
@@ -205,6 +208,23 @@ class _Files:
             raise LogError(f"{path}: columns {', '.join(source.columns)} of {quantity} differ in length")
         values = np.stack(columns, axis=-1)[self._rows(path)] * source.scale(quantity)
         return values, tuple(joints) if len(joints) == len(columns) else ()
+
+    def _require_once(self) -> None:
+        """Raise LogError if a column is named for two quantities or joints."""
+        used = dict[tuple[Path, str], str]()
+        for quantity in ("t", "q", "qd", "tau", "temperature"):
+            source: Source = getattr(self.layout, quantity)
+            path = self._path(source)
+            names = list(self._table(path).columns) if source.columns else []
+            for pattern in source.columns:
+                for name in [pattern] if pattern in names or "*" not in pattern else [x for x, _ in matching(pattern, names)]:
+                    if other := used.get((path, name)):
+                        of = f"twice as {quantity}" if other == quantity else f"as {other} and as {quantity}"
+                        raise LogError(
+                            f"{path}: column {name!r} is named {of}: a column holds one quantity of one joint; correct the "
+                            f"columns in its log.toml, or with --columns {quantity}=...; its columns: {', '.join(names[:40])}"
+                        )
+                    used[path, name] = quantity
 
     def _times(self, source: Source, count: int) -> Array:
         """Return the times of a quantity [s]."""

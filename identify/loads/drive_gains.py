@@ -24,6 +24,9 @@ SETTLED = 1e-2
 FACTOR = 1.5
 """By which a gain changes at most from one round to the next."""
 
+SURE = 4.0
+"""Standard deviations from which on a gain below zero is no chance."""
+
 VAGUE = 0.1
 """Sigma above this share of a gain is none: the payload says nothing of it."""
 
@@ -76,7 +79,7 @@ def identify_drive_gains(robot: LoadedRobot) -> GainEstimate:
     n, ratio = robot.tree.n, np.ones(robot.tree.n)
     basis = robot.basis
     for _ in range(ROUNDS):
-        logs = tuple(_read_with(log, ratio) for log in robot.of_both)
+        logs = tuple(read_with(log, ratio) for log in robot.of_both)
         problem = settled(Problem(logs, basis, ExplicitModel(), robot.chain))
         basis = problem.basis
         start = np.concatenate([problem.factors.fit(2).X, np.ones(n)])
@@ -87,6 +90,7 @@ def identify_drive_gains(robot: LoadedRobot) -> GainEstimate:
         sigma = np.sqrt(np.diagonal(found.factor.inverse(np.array(True))))[-n:]
         if (np.abs(step - 1) < SETTLED * sigma).all():
             break
+        _require_sign(robot, step, sigma, problem)
         ratio = ratio * np.clip(step, 1 / FACTOR, FACTOR)
     else:
         raise IdentificationError(
@@ -99,7 +103,24 @@ def identify_drive_gains(robot: LoadedRobot) -> GainEstimate:
     return GainEstimate(gains, np.abs(gains) * relative, final)
 
 
-def _read_with(log: MotionLog, ratio: Array) -> MotionLog:
+def _require_sign(robot: LoadedRobot, step: Array, sigma: Array, problem: Problem) -> None:
+    """Raise IdentificationError if gains are surely below zero: kg enters as 2 - 1/kg about 1 (`DriveGains`)."""
+    inverse = 2 - step
+    if not (wrong := inverse < -SURE * sigma).any():
+        return
+    fit = problem.factors.fit(2)
+    friction = [
+        x for p, x in zip(problem.basis.parameters, fit.X, strict=True) if p.kind == "Coulomb friction" and wrong[p.joint]
+    ]
+    why = (
+        "do their currents have the wrong sign (positive must speed up a positive motion)? Read them with a negative --gain"
+        if friction and max(friction) < 0
+        else "are the logs without and with the payload exchanged, or of different signs or units?"
+    )
+    raise IdentificationError(f"the gains of {', '.join(_names(robot, wrong))} come out below zero: {why}")
+
+
+def read_with(log: MotionLog, ratio: Array) -> MotionLog:
     """Return a log with its gains in other multiples."""
     gain = tuple(np.broadcast_to(log.torque.gain, ratio.shape) * ratio)
     return replace(log, torque=replace(log.torque, gain=gain))

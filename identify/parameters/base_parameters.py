@@ -98,6 +98,11 @@ class BaseParameters:
         """Standard parameters that no motion shows."""
         return tuple(name for name, used in zip(self.standard.names, np.any(self.K, axis=0), strict=True) if not used)
 
+    @property
+    def groupings(self) -> dict[str, str]:
+        """What each base parameter is made of, by its name."""
+        return {name: self.grouping(i) for i, name in enumerate(self.names)}
+
     def grouping(self, i: int) -> str:
         """Return what base parameter `i` is made of, such as ZZ1 + Ia1 + 0.25 M2."""
         shown = np.flatnonzero(np.abs(self.K[i]) > SHOWN * np.abs(self.K[i]).max())

@@ -189,6 +189,10 @@ class Factors:
     names: tuple[str, ...]
     _fits: list[Fit] = field(default_factory=list, repr=False)
 
+    def __post_init__(self) -> None:
+        for values in (self.R, self.rows):
+            values.setflags(write=False)
+
     @classmethod
     def of(cls, joined: Array, rows: npt.NDArray[np.intp], names: tuple[str, ...]) -> Self:
         """Return the factors of [W Y], shape (..., kind, count, p + 1)."""

@@ -47,6 +47,10 @@ class Rows:
     names: tuple[str, ...]
     maps: tuple[RowMap, ...]
 
+    def __post_init__(self) -> None:
+        for values in (self.Y, self.W, self.valid, self.time):
+            values.setflags(write=False)  # estimators of others share them with what judges these
+
     @classmethod
     def of(cls, equations: Equations, to_rows: RowMap) -> Self:
         """Return the rows that a map makes of a model's equations; raise SettingError where its columns are not finite."""

@@ -71,6 +71,7 @@ class Clearance:
         most = self.distances(random, least + ROOM).max(axis=0, initial=-np.inf)
         always = most < least
         self.left_out = [self.names(pair) for pair in self.pairs[always]]
+        self.farthest = most[always]
         self.pairs = self.pairs[~always]
         self._margin = least + np.minimum(ROOM, (most[~always] - least) / 2)
 

@@ -21,8 +21,14 @@ Point = tuple[Number, Number, Number]
 RATES = ("velocity", "acceleration", "jerk")
 """Limits that MJCF has no word for: a robot's file gives them as `<custom><numeric name="max_velocity" data="..."/>`."""
 
+DEGREES = 5.0
+"""Times the range of a file beyond which one that is asked for is taken for degrees."""
+
 FLOOR = "the floor"
 """What the floor is called beside the shapes of a file."""
+
+CLEARANCE = 0.01
+"""Least distance between shapes by default [m]; pairs that never get so far apart are made so."""
 
 BOX = "keep_out {}"
 """What a box is called beside them."""
@@ -68,7 +74,7 @@ class MotionLimits:
     """Share of the largest torque that the motion takes; the controller needs the rest."""
     prior_error: Annotated[Number, Field(ge=0, le=1)] = 0.3
     """Share by which every base parameter of the robot may be off, with torques still below the largest."""
-    clearance: Positive = 0.01
+    clearance: Positive = CLEARANCE
     """Least distance between shapes of the robot, and from what stands around it [m]."""
     floor: Number | Literal["none"] | None = None
     """Height of the floor [m], or "none"; by default the lowest point of what is fixed to the world."""
@@ -155,7 +161,13 @@ def home_of(robot: Robot, asked: MotionLimits, limits: Limits) -> Array:
 def looser(robot: Robot, asked: MotionLimits) -> list[str]:
     """Return which limits that are asked for go beyond those of the robot's file, in words."""
     known = {name: robot.most(name) for name in RATES} | {"torque": robot.torque_limits}
-    found = []
+    found = [
+        f"position.{joint} may go from {low:g} to {high:g}, its file says {own[0]:.4g} to {own[1]:.4g}, which holds"
+        for joint, own in zip(robot.joints, robot.ranges, strict=True)
+        if joint in asked.position
+        for low, high in [asked.position[joint]]
+        if low < own[0] or high > own[1]
+    ]
     for name, own in known.items():
         if (values := getattr(asked, name)) is not None:
             given = per_joint(values, robot.n, f"limits: {name}")
@@ -210,6 +222,14 @@ def _positions(robot: Robot, asked: Mapping[str, tuple[float, float]]) -> Array:
         if not low < high:
             raise ScenarioError(f"limits: position.{name} = [{low:g}, {high:g}]: the lowest is not below the highest")
         ranges[j] = max(ranges[j, 0], low), min(ranges[j, 1], high)
+        span, own = high - low, float(np.ptp(robot.ranges[j]))
+        if not robot.slides[j] and np.isfinite(own) and span > DEGREES * own:
+            a, b = np.radians([low, high])
+            raise ScenarioError(
+                f"limits: position.{name} = [{low:g}, {high:g}] rad is {span / own:.0f} times the range of its file, "
+                f"{robot.ranges[j, 0]:.4g} to {robot.ranges[j, 1]:.4g}: are these degrees? Then write [{a:.4g}, "
+                f"{b:.4g}]; a range here can only narrow that of the file"
+            )
         if not ranges[j, 0] < ranges[j, 1]:
             raise ScenarioError(f"limits: position.{name} = [{low:g}, {high:g}] lies outside the range of its file")
     if free := _names(robot, ~np.isfinite(ranges).all(axis=1)):

@@ -15,8 +15,8 @@ from functools import partial
 from pathlib import Path
 
 import rerun as rr
-
 from experiments.identification.results import write_recording
+
 from experiments.identification.scenario_run import ScenarioRun
 from experiments.recording.audience import Audience
 from experiments.recording.identification_recording import RunRecording

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from experiments.identification.consistent_robot import Written
-from experiments.identification.identified import Identified
+from experiments.identification.fit import fit
+from experiments.identification.held_out import on_log
+from experiments.identification.logs import Logs
+from experiments.identification.request import Request
 from experiments.identification.subject import Subject
-from experiments.identification.validated import Validated
-from experiments.identification.verdict import Verdict
 from identify import MODELS
 from sim.engine.simulation import simulate
 from sim.robot.robot import Robot
@@ -30,7 +31,7 @@ def arm(request):
     """Return an identification of all models, and a motion that it has not seen; of the larger arm."""
     subject = Subject(request.param)
     log, unseen = (simulate(scenario(request.param, *how)).alone() for how in ((20, 0), (6, 7)))
-    return Validated(Identified((log,), subject, subject.truth(subject.robot)), unseen, "second")
+    return on_log(fit(Request(subject), Logs((log,), truth=subject.truth(subject.robot))), "second", unseen)
 
 
 @pytest.mark.parametrize("model", MODELS.builtin)
@@ -38,8 +39,8 @@ def test_well_excited_base_parameters_are_true_within_2_percent(arm, model):
     """Well excited: sigma is below 1 % of the value. Of the PUMA's 52, 16 are zero and have no relative error, which leaves six
     in ten; the power model's single row an instant tells fewer.
     """
-    estimate = arm.found.estimates[model]
-    truth = np.array(list(arm.found.truth.values()))
+    estimate = arm.fit.estimates[model]
+    truth = np.array(list(arm.fit.truth.values()))
     well = estimate.corrected_sigma < 0.01 * np.abs(estimate.X)
     assert np.count_nonzero(well) >= len(well) * (0.35 if model == "power" else 0.55)
     assert estimate.relative_error_percent(truth)[well].max() < 2
@@ -55,7 +56,7 @@ def test_torques_of_an_unseen_motion_are_foretold_within_1_percent(arm, model):
     assert found.percent.max() < 1
     assert found.R2.min() > 0.9999
     assert (found.standing > found.rms).all()  # where friction is not determined, and why it is apart
-    verdict = Verdict(arm, model)
+    verdict = arm.verdicts[model]
     assert verdict.word == "good"
     assert "is off by" in verdict.reasons[0]
 
@@ -71,13 +72,13 @@ def test_round_trip_from_file_to_file(arm, tmp_path):
 
     Torques are compared as means over 0.2 s: the noise that encoder counts make through the controller differs at once.
     """
-    subject = arm.found.subject
+    subject = arm.fit.subject
     path = tmp_path / "out.xml"
-    Written(arm.found, "explicit").write(path)
+    path.write_text(Written(arm.fit, "explicit").text(tmp_path))
     made = Robot.load(str(path))
     truth, written = standard_parameters(subject.robot), standard_parameters(made)
     base = [subject.base.base(np.array([x[n] for n in subject.base.standard.names])) for x in (truth, written)]
-    sigma = arm.found.estimates["explicit"].corrected_sigma
+    sigma = arm.fit.estimates["explicit"].corrected_sigma
     assert np.abs((base[1] - base[0]) / sigma).max() < 4
     again = replace(scenario(subject.name, 6, 7), robot=str(path))
     first, second = simulate(scenario(subject.name, 6, 7)), simulate(again)
@@ -90,8 +91,8 @@ def test_round_trip_from_file_to_file(arm, tmp_path):
 
 def test_the_scara_as_a_tree_says_what_its_closed_form_says(log):
     """From the same log, by file and by name: the parameters that mean the same are the same."""
-    by_file = Identified((log,), Subject(str(Robot.path("scara"))))
-    by_name = Identified((log,), Subject("scara"))
+    by_file = fit(Request(Subject(str(Robot.path("scara")))), Logs((log,)))
+    by_name = fit(Request(Subject("scara")), Logs((log,)))
     for model in MODELS.builtin:
         tree = dict(zip(by_file.basis.names, by_file.estimates[model].X, strict=True))
         form = dict(zip(by_name.basis.names, by_name.estimates[model].X, strict=True))

@@ -25,8 +25,8 @@ def test_interruption_is_quiet_and_leaves_nothing(out, capfd, monkeypatch):
 def test_a_real_interrupt_ends_the_process_without_a_traceback(tmp_path, start):
     """Ctrl-C at some instant of a long search."""
     code = "import sys; from experiments.paper.search import Search; from experiments import cli\n"
-    code += "from experiments.cli import table1_command\n"
-    code += "table1_command.Search = lambda seed: print('searching') or Search(seed=seed, tolerance=0.0, rounds=10**6)\n"
+    code += "from experiments.cli.commands import paper\n"
+    code += "paper.Search = lambda seed: print('searching') or Search(seed=seed, tolerance=0.0, rounds=10**6)\n"
     code += "sys.exit(cli.main(['table1', '--seed', '1', '--out', 'results']))"
     process = start("-uc", code, cwd=tmp_path)
     assert process.stdout.readline()  # the search is under way
@@ -43,14 +43,14 @@ def test_an_interrupt_that_comes_out_as_another_error_is_one(tmp_path, start):
     code = """if True:
         import sys, time
         from experiments import cli
-        from experiments.cli import table1_command
+        from experiments.cli.commands import paper
         def half_loaded(seed):
             print("searching")
             try:
                 time.sleep(30)
             except KeyboardInterrupt:
                 raise ImportError("half loaded") from None
-        table1_command.Search = half_loaded
+        paper.Search = half_loaded
         sys.exit(cli.main(["table1", "--seed", "1", "--out", "results"]))
     """
     process = start("-uc", code, cwd=tmp_path)

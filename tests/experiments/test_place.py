@@ -4,10 +4,10 @@ import json
 import os
 
 import pytest
+from experiments.identification.results import HIDDEN, Place, results_folder, write_whole
 
 from experiments.cli import main
 from experiments.errors import ResultsError
-from experiments.identification.results import HIDDEN, Place, results_folder, write_whole
 from identify.files.log_file import read_log, write_log
 
 

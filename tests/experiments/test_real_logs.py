@@ -2,7 +2,6 @@
 
 import json
 import runpy
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -222,7 +221,9 @@ def test_what_is_written_makes_the_torques_that_were_identified(idbench, logs, t
 @pytest.mark.parametrize("robot", ["scara", "puma560", "panda"])
 def test_the_function_of_true_parameters_is_mujocos_inverse_dynamics(robot, tmp_path):
     from experiments.exports.controller import python_text
-    from experiments.identification.identified import Identified
+    from experiments.identification.fit import Fit
+    from experiments.identification.logs import Logs
+    from experiments.identification.request import Request
     from experiments.identification.subject import Subject
     from identify import ExplicitModel, Problem
     from identify.estimators.estimate import Estimate
@@ -230,10 +231,11 @@ def test_the_function_of_true_parameters_is_mujocos_inverse_dynamics(robot, tmp_
     subject = Subject(robot)
     arm, rng = subject.robot, np.random.default_rng(1)
     log = MotionLog(100.0, rng.normal(size=(400, arm.n)), rng.normal(size=(400, arm.n)), TorqueChannel("held"))
-    known = Identified((log,), subject, models=("explicit",))
+    request = Request(subject, models=("explicit",))
     X = np.array(list(subject.truth(arm).values()))
-    estimate = Estimate(Problem((log,), subject.basis, ExplicitModel(), known.processing), X, np.eye(len(X)))
-    text = python_text(replace(known, known={"explicit": estimate}), "explicit", tmp_path)
+    estimate = Estimate(Problem((log,), subject.basis, ExplicitModel(), request.processing), X, np.eye(len(X)))
+    known = Fit(request, Logs((log,)), estimate.problem, {}, {"explicit": estimate})
+    text = python_text(known, "explicit", tmp_path)
     (tmp_path / "arm.py").write_text(text)
     function = runpy.run_path(str(tmp_path / "arm.py"))
     q, qd, qdd = (rng.normal(size=(30, arm.n)) for _ in range(3))

@@ -5,12 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.identification.identified import Identified
+from experiments.identification.fit import fit
+from experiments.identification.held_out import on_log
 from experiments.identification.log_warnings import warnings_of_log
+from experiments.identification.logs import Logs
 from experiments.identification.parameters import Parameters
+from experiments.identification.remedies import Remedies, delay_advice
+from experiments.identification.request import Request
 from experiments.identification.subject import Subject
-from experiments.identification.validated import Validated
-from experiments.identification.verdict import Remedies, Verdict
 from experiments.identification.warnings import warnings_of_result
 from identify import MotionLog
 from identify.files.log_file import read_log
@@ -37,7 +39,7 @@ def pair(logs):
 
 def validated(pair, asked=Parameters(), models=("explicit",)):  # noqa: B008  # frozen
     first, second = pair
-    return Validated(Identified((first,), Subject(PUMA, asked), models=models), second, "second")
+    return on_log(fit(Request(Subject(PUMA, asked), models), Logs((first,))), "second", second)
 
 
 def without(letters):
@@ -46,7 +48,7 @@ def without(letters):
 
 
 def test_the_right_model_is_good_and_noise_explains_all_of_it(pair):
-    verdict = Verdict(validated(pair), "explicit")
+    verdict = validated(pair).verdicts["explicit"]
     assert verdict.word == "good"
     assert (verdict.validation.excess == 0).all()
 
@@ -55,7 +57,7 @@ def test_noise_of_the_log_is_no_fault_of_the_model(pair):
     """White noise of a tenth of each torque: 2 % of it passes the filter."""
     rng = np.random.default_rng(1)
     noisy = [torques(log, lambda tau: tau + 0.1 * level(log) * rng.standard_normal(tau.shape)) for log in pair]  # noqa: B023
-    verdict = Verdict(validated(noisy), "explicit")
+    verdict = validated(noisy).verdicts["explicit"]
     assert verdict.validation.percent.max() > 1
     assert verdict.word == "good"
     assert any("noise and sigma explain all of it" in reason for reason in verdict.reasons)
@@ -63,14 +65,14 @@ def test_noise_of_the_log_is_no_fault_of_the_model(pair):
 
 @pytest.mark.parametrize("letters", ["F", "Ia"])
 def test_models_without_friction_or_rotors_are_poor(pair, letters):
-    verdict = Verdict(validated(pair, without(letters)), "explicit")
+    verdict = validated(pair, without(letters)).verdicts["explicit"]
     assert verdict.word == "poor"
     assert verdict.validation.percent_of_level(verdict.validation.excess).max() > 10
 
 
 def test_a_joint_of_the_wrong_sign_is_poor_by_its_torque(pair):
     wrong = [torques(log, lambda tau: tau * [1, -1, 1, 1, 1, 1]) for log in pair]
-    verdict = Verdict(validated(wrong), "explicit")
+    verdict = validated(wrong).verdicts["explicit"]
     assert verdict.word == "poor"
     assert "joint2" in " ".join(verdict.reasons)
 
@@ -78,17 +80,17 @@ def test_a_joint_of_the_wrong_sign_is_poor_by_its_torque(pair):
 def test_noise_that_could_hide_a_wrong_model_leaves_it_unsure(pair):
     rng = np.random.default_rng(1)
     loud = [torques(log, lambda tau: tau + 2 * level(log) * rng.standard_normal(tau.shape)) for log in pair]  # noqa: B023
-    verdict = Verdict(validated(loud), "explicit")
+    verdict = validated(loud).verdicts["explicit"]
     assert verdict.word == "unsure"
     assert "a wrong model could hide" in " ".join(verdict.reasons)
 
 
 def test_a_wrong_delay_is_named_by_the_log_itself(pair):
     """8 ms too late: small in the torque, not in friction."""
-    (found,) = Remedies(validated([late(log, 8) for log in pair])).delay()
-    assert "where 8.66 ms is taken: --torque-delay estimate" in found
-    assert "the log says a torque delay of 0.6" in found
-    assert not list(Remedies(validated(pair)).delay())
+    (found,) = delay_advice(validated([late(log, 8) for log in pair]).fit)
+    assert "where 8.66 ms is assumed: --torque-delay estimate" in found
+    assert "the log shows a torque delay of 0.6" in found
+    assert not list(delay_advice(validated(pair).fit))
 
 
 def test_options_are_advised_that_help_and_by_how_much(pair):
@@ -101,7 +103,7 @@ def test_options_are_advised_that_help_and_by_how_much(pair):
 def test_a_starved_power_model_is_told_to_be_so_and_the_explicit_one_recommended(pair):
     """A third of a log: hardly more rows than parameters in the power model; the explicit one has six times as many."""
     part = pair[0].part(0, int(0.4 * pair[0].samples))
-    found = Identified((part,), Subject(PUMA), models=("explicit", "power"))
+    found = fit(Request(Subject(PUMA), ("explicit", "power")), Logs((part,)))
     rows, p = int(found.estimates["power"].row_count), len(found.basis.names)
     assert p < rows < 4 * p
     warnings = [warning for warning in warnings_of_result(found)["the motion"] if "identifies too little" in warning]
@@ -111,22 +113,22 @@ def test_a_starved_power_model_is_told_to_be_so_and_the_explicit_one_recommended
 
 def test_torques_in_other_units_are_pointed_out(pair):
     milli = [torques(log, lambda tau: 1000 * tau) for log in pair]
-    warnings = warnings_of_result(validated(milli).found)["the log"]
+    warnings = warnings_of_result(validated(milli).fit)["the log"]
     assert any("are they in N m?" in warning for warning in warnings)
-    assert not any("are they in N m?" in warning for warning in warnings_of_result(validated(pair).found))
+    assert not any("are they in N m?" in warning for warning in warnings_of_result(validated(pair).fit))
 
 
 def test_a_dead_torque_column_is_poor_and_named(pair):
     dead = [torques(log, lambda tau: tau * [1, 0, 1, 1, 1, 1]) for log in pair]
     made = validated(dead)
-    assert Verdict(made, "explicit").word == "poor"
-    assert warnings_of_log(dead[0], made.found.subject.tree) == ["the torque of joint2 never changes: is it logged?"]
+    assert made.verdicts["explicit"].word == "poor"
+    assert warnings_of_log(dead[0], made.fit.subject.tree) == ["the torque of joint2 never changes: is it logged?"]
 
 
 def test_a_delay_beyond_the_range_that_is_looked_at_is_told(pair):
     """Torques logged 80 ms late: the best delay of the range lies at its end, and that is said."""
     shifted = [torques(log, lambda tau: np.roll(tau, 20, axis=0)) for log in pair]
-    (found,) = Remedies(validated(shifted)).delay()
+    (found,) = delay_advice(validated(shifted).fit)
     assert "the torque fits best at an end of the range" in found
 
 
@@ -137,4 +139,4 @@ def test_a_single_wild_sample_does_not_excuse_itself_by_the_sigma_it_makes(pair)
         return wild
 
     hit = [torques(pair[0], struck), pair[1]]
-    assert Verdict(validated(hit), "explicit").word in {"fair", "poor"}
+    assert validated(hit).verdicts["explicit"].word in {"fair", "poor"}

@@ -6,7 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from experiments.identification.identified import Identified
+from experiments.identification.fit import fit
+from experiments.identification.logs import Logs
+from experiments.identification.request import Request
 from experiments.identification.simulators import RobotPlant, ScenarioLoop
 from experiments.identification.subject import Subject
 from identify import (
@@ -144,7 +146,10 @@ def test_several_logs_with_a_loop_each_are_one_fit_and_looked_at_one_by_one(sixt
     second = replace(scenario, trajectory=replace(MOVES, seed=4, moves=6))
     both = (log, scenario), (simulate(second).alone(), second)
     whole, *alone = (
-        Identified(tuple(log for log, _ in some), estimator="IV", models=("explicit",), loops=tuple(loop for _, loop in some))
+        fit(
+            Request(estimator="IV", models=("explicit",), loops=tuple(loop for _, loop in some)),
+            Logs(tuple(log for log, _ in some)),
+        )
         for some in (both, both[:1], both[1:])
     )
     sigma, *each = (found.estimates["explicit"].corrected_sigma for found in (whole, *alone))

@@ -11,6 +11,7 @@ import rerun as rr
 import rerun_cli
 from rerun.chunk import RrdReader
 
+from experiments.identification.request import Request
 from experiments.identification.scenario_run import ScenarioRun
 from experiments.recording.identification_recording import RunRecording
 from sim.scenario.scenario_file import from_dict
@@ -29,7 +30,7 @@ class Recorded:
 
     def __init__(self, folder, audience=None, window=(4.0, 4.1)):
         made = RunRecording(from_dict(SCENARIO), audience, window)
-        self.ran, self.folder = ScenarioRun(from_dict(SCENARIO), watch=made.watch), folder
+        self.ran, self.folder = ScenarioRun(from_dict(SCENARIO), Request(), watch=made.watch), folder
         self.streams = made.finish(self.ran)
         for name, stream in self.streams:
             stream.write(folder / name)

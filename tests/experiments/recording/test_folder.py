@@ -17,20 +17,25 @@ from experiments.recording.views import Shelf
 @pytest.fixture
 def copied(recorded, tmp_path):
     """Return a results folder that may be changed."""
-    folder = shutil.copytree(recorded.folder, tmp_path / "run")
+    from experiments.results.folder import ResultsFolder
+    from experiments.results.summaries import write_summary
     from identify.files.log_file import write_log
 
-    write_log(recorded.ran.run.alone(), folder / "log.parquet")
-    from experiments.identification.results import write_summary
-
-    write_summary(folder / "summary.json", recorded.ran.summary())
-    return folder
+    folder = ResultsFolder(tmp_path / "run", "run", "idbench run short")
+    with folder.held(), folder.complete() as hidden:
+        shutil.copytree(recorded.folder, hidden, dirs_exist_ok=True)
+        write_log(recorded.ran.run.alone(), hidden / "log.parquet")
+        write_summary(hidden / "summary.json", recorded.ran.summary())
+    return folder.out
 
 
 def test_identify_adds_a_layer_to_a_run_and_replaces_one_of_the_same_name(copied, reading, capsys, recorded):
     before = (copied / "recording.rrd").read_bytes()
-    for estimator in ("OLS", "GLS"):
-        assert main(["identify", str(copied), "--estimator", estimator, "--label", "second"]) == 0
+    layer = "identify", str(copied), "--label", "second"
+    assert main([*layer, "--estimator", "OLS"]) == 0
+    assert main([*layer, "--estimator", "GLS"]) == 2
+    assert "holds the layer 'second' of `uv run idbench identify" in capsys.readouterr().err
+    assert main([*layer, "--estimator", "GLS", "--force"]) == 0
     assert "added to the recording" in capsys.readouterr().out
     assert (copied / "recording.rrd").read_bytes() == before
     assert len(files(copied)) == 4

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 import rerun as rr
 
-from experiments.identification.identified import Identified
+from experiments.identification.fit import fit
+from experiments.identification.logs import Logs
+from experiments.identification.request import Request
 from experiments.identification.subject import Subject
 from experiments.recording.live_layer import LiveIdentification
 from experiments.recording.stream import Stream
@@ -25,18 +27,18 @@ def grown(table1):
 def test_the_last_estimate_is_that_of_the_log_so_far(grown, table1):
     live, anew, _ = grown
     assert not anew[0]  # a second at rest tells nothing
-    samples = live.found.logs[0].samples
+    samples = live.fit.logs.fitted[0].samples
     log = table1.log
     part = MotionLog(log.fs, log.q[:samples], log.tau[:samples], log.torque)
-    expected = Identified((part,), estimator="WLS").estimates
-    for form, estimate in live.found.estimates.items():
+    expected = fit(Request(estimator="WLS"), Logs((part,))).estimates
+    for form, estimate in live.fit.estimates.items():
         np.testing.assert_array_equal(estimate.X, expected[form].X)
 
 
 def test_it_is_made_anew_as_the_log_grows_by_a_tenth(grown):
     live, anew, _ = grown
     assert any(anew[-3:])
-    assert live.found.logs[0].samples > 2000 / 1.1 - 100
+    assert live.fit.logs.fitted[0].samples > 2000 / 1.1 - 100
 
 
 def test_nothing_of_it_is_kept(grown, tmp_path, reading):

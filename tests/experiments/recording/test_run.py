@@ -100,7 +100,7 @@ def test_the_drive_is_recorded_at_the_samples_and_inside_the_loop_at_its_own_rat
 
 def test_measured_predicted_and_residual_are_those_of_the_estimate(recorded):
     for form, rows in {"explicit": ("joint1", "joint2"), "implicit": ("joint1", "joint2"), "power": ("power",)}.items():
-        estimate = recorded.ran.identified.estimates[form]
+        estimate = recorded.ran.fit.estimates[form]
         parts = {"measured": estimate.rows.Y, "predicted": estimate.predicted, "residual": estimate.residual}
         for group, row in enumerate(rows):
             mine = (estimate.rows.group == group) & estimate.rows.valid
@@ -115,7 +115,7 @@ def layer(recorded, path, component="Scalars:scalars"):
 
 
 def test_running_estimates_end_at_the_estimate_with_its_sigma(recorded):
-    for form, estimate in recorded.ran.identified.estimates.items():
+    for form, estimate in recorded.ran.fit.estimates.items():
         for p, name in enumerate(estimate.names):
             _, X = layer(recorded, f"{form}/estimate/{name}", "Measurements:values")
             _, variance = layer(recorded, f"{form}/estimate/{name}", "Measurements:variances")
@@ -125,7 +125,7 @@ def test_running_estimates_end_at_the_estimate_with_its_sigma(recorded):
 
 
 def test_velocities_are_shown_as_measured_and_as_the_rows_see_them(recorded):
-    found, log = recorded.ran.identified, recorded.ran.run.alone()
+    found, log = recorded.ran.fit, recorded.ran.run.alone()
     rows = found.processing.grid(log)
     ns, measured = layer(recorded, "qd/measured")
     np.testing.assert_array_equal(measured, measured_state(log, found.processing).qd.T[ns // TICK])
@@ -143,7 +143,7 @@ def static(recorded, path, component):
 
 def test_the_table_and_the_chart_of_parameters_tell_the_errors(recorded):
     """In the chart a mark is as far to the right as its error is large, and on the side of its sign."""
-    found, names = recorded.ran.identified, recorded.ran.identified.basis.names
+    found, names = recorded.ran.fit, recorded.ran.fit.basis.names
     table = static(recorded, "report", "TextDocument:text")[0]
     truth = np.array(list(found.truth.values()))
     for name, true in found.truth.items():

@@ -6,7 +6,6 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from experiments.errors import ResultsError
-from experiments.identification.results import write_recording
 from experiments.recording.table1_recording import record_table1
 
 
@@ -14,7 +13,8 @@ from experiments.recording.table1_recording import record_table1
 def folder(table1, tmp_path_factory):
     rr.set_strict_mode(True)
     folder = tmp_path_factory.mktemp("recording")
-    assert not write_recording(folder, record_table1(table1))
+    for name, stream in record_table1(table1):
+        stream.write(folder / name)
     return folder
 
 

@@ -1,0 +1,28 @@
+"""A command: its options, and the function that does its work, which is loaded when it is called."""
+
+from importlib import import_module
+from typing import ClassVar
+
+from experiments.cli.interruption import importing
+
+
+class Command:
+    """Options of a command; calling them does its work.
+
+    Parameters
+    ----------
+    action : str
+        File of `experiments.cli.commands` and function, as in log:show_log; it receives the options.
+    """
+
+    action: ClassVar[str] = ""
+
+    def __init_subclass__(cls, action: str = "") -> None:
+        cls.action = action or cls.action
+
+    def __call__(self) -> None:
+        """Do the work."""
+        module, _, name = self.action.partition(":")
+        with importing():
+            function = getattr(import_module(f"experiments.cli.commands.{module}"), name)
+        function(self)

@@ -1,0 +1,1 @@
+"""What the commands do, by the names of the files of their options."""

@@ -1,0 +1,44 @@
+"""The commands that authors of scenarios, studies and plug-ins begin with."""
+
+from pathlib import Path
+
+from rich.text import Text
+
+from experiments.cli.options.authors import Check, New
+from experiments.cli.page import new_page
+from experiments.contracts.contract import Example
+from experiments.contracts.contracts import found, keeps
+from experiments.errors import ExperimentError
+from experiments.starters.starters import new_plugin, new_scenario, new_study
+
+
+def begin(options: New) -> None:
+    """Write what to start from."""
+    page, out = new_page(), options.out or Path(options.name if options.what == "plugin" else f"{options.name}.toml")
+    if options.what == "scenario":
+        new_scenario(options.name, options.like, out)
+        how = f"uv run idbench run {out}"
+    elif options.what == "study":
+        new_study(options.name, out)
+        how = f"uv run idbench study {out}"
+    else:
+        new_plugin(options.name, options.kind, out)
+        how = f"uv pip install -e {out}, then: uv run idbench check {options.name}"
+    page.print(Text(f"written to {out}; next: {how}"), soft_wrap=True)
+    page.end()
+
+
+def check(options: Check) -> None:
+    """Print what a plug-in is options, and what of it is kept; raise ExperimentError if something is not."""
+    page, (table, plugin) = new_page(machine=options.json), found(options.plugin)
+    page.print(Text(f"{options.plugin}: {type(plugin).__name__}, of the {table.point}", style="bold"))
+    answers = list(keeps(table, plugin, Example()))
+    for clause, complaint in answers:
+        page.print(Text(f"{'no ' if complaint else 'yes'}  {clause}"), soft_wrap=True)
+        if complaint:
+            page.print(Text(f"     {complaint}"), soft_wrap=True)
+    broken = sum(bool(complaint) for _, complaint in answers)
+    page.found |= {"plugin": options.plugin, "point": table.point, "contract": dict(answers)}
+    page.end()
+    if broken:
+        raise ExperimentError(f"{options.plugin} does not keep {broken} of {len(answers)} parts of its contract")

@@ -1,0 +1,192 @@
+"""The command that designs motions."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from experiments.cli.command_text import command_of
+from experiments.cli.options.excite import Excite
+from experiments.cli.page import new_page, shown
+from experiments.cli.progress import progress_of
+from experiments.errors import ExperimentError
+from experiments.excite.design import Design
+from experiments.excite.excited import Excited
+from experiments.excite.motion_file import write_motion
+from experiments.excite.sequence import MotionSequence
+from experiments.identification.reading import ReadOptions, file_of, read
+from experiments.identification.request import Request
+from experiments.identification.subject import Subject, absolute
+from experiments.identification.warnings import FILE, warnings_of_robot
+from experiments.recording.audience import Audience
+from experiments.reports.excite_printed import print_excited, print_sequence
+from experiments.results.attempts import Attempts
+from experiments.results.folder import ResultsFolder
+from experiments.results.summaries import write_summary
+from identify import MotionLog, TorqueChannel
+from identify.files.log_file import write_log
+from sim.encoders import IncrementalEncoder
+from sim.limits.motion_limits import MotionLimits, looser
+from sim.robot.robot import Robot
+from sim.scenario.measurement import TorqueMeasurement
+from sim.scenario.scenario import Scenario
+from sim.scenario.scenario_file import load, to_toml
+
+LONGEST, FASTEST = 3600.0, 10000.0
+"""Time of a motion, repeated [s], and sampling frequency [Hz] above which they are taken for a slip."""
+
+BITS, TORQUE_NOISE, QUIET = 17.0, (0.05,), 1e-6
+"""Noise without a scenario: resolution of the encoders [bits], rms of the torques [N m]; and the least of that."""
+
+
+LEFT_OUT = ("out", "force", "json", "watching")
+"""Options that make no difference to a motion, or stand elsewhere in the command."""
+
+
+def excite(options: Excite) -> None:
+    """Design a motion, or a sequence of them, save and show it."""
+    design, stem, share = _designed(options), Path(options.robot).stem, _percent(options.until)
+    command = command_of("excite", options, "robot", LEFT_OUT)
+    whole = command_of("excite", options, "robot", LEFT_OUT, absolute=True)
+    read = (Robot.path(options.robot), *options.log, *([options.limits] if options.limits else []))
+    folder = ResultsFolder(options.out or Path("runs") / f"excited-{stem}", "excite", whole, options.force, read)
+    page = new_page(machine=options.json)
+    with options.watching.audience() as audience, shown(page), folder.held():
+        with progress_of(f"designing a motion of {stem}") as progress:
+            sequence = MotionSequence.of(design, share, progress) if share else None
+            found = sequence.last if sequence else Excited.of(design, progress)
+            print_excited(page, found)
+        page.warn({FILE: warnings_of_robot(design.subject.robot), "limits": looser(design.subject.robot, design.asked)})
+        if sequence:
+            print_sequence(page, sequence)
+        page.show()
+        what = command.removeprefix("uv run idbench excite ")
+        summary = found.summary() | {"path": what} | (sequence.summary() if sequence else {})
+        page.found |= summary | {"folder": str(folder.out)}
+        _save(folder, found, sequence, summary)
+        page.end()
+        attempts = Attempts(f"the motion is in {folder.out}", folder)
+        attempts.attempt("report.html", lambda: _report(folder, found, command))
+        if options.watching.rerun:
+            attempts.attempt("the recording", lambda: _record(folder, found, audience))
+        page.print(f"written to {folder.out}{options.watching.hint(folder.out)}", soft_wrap=True)
+        page.print(f"try it on the simulated robot: uv run idbench run {folder.out / 'scenario.toml'}", soft_wrap=True)
+        attempts.close()
+
+
+def _save(folder: ResultsFolder, found: Excited, sequence: MotionSequence | None, summary: dict[str, Any]) -> None:
+    """Write motions, logs, scenario and summary."""
+    with folder.complete() as hidden:
+        for number, each in enumerate(sequence.rounds if sequence else (), 1):
+            write_log(each.log, hidden / f"log{number}.parquet")
+            write_motion(each.excited, hidden / f"motion{number}.csv")
+        write_motion(found, hidden / "motion.csv")
+        (hidden / "scenario.toml").write_text(to_toml(found.scenario), encoding="utf-8")
+        write_summary(hidden / "summary.json", summary)
+
+
+def _report(folder: ResultsFolder, found: Excited, command: str) -> None:
+    from experiments.reports.excite import report
+
+    with folder.more() as hidden:
+        (hidden / "report.html").write_text(report(found, command), encoding="utf-8")
+
+
+def _record(folder: ResultsFolder, found: Excited, audience: Audience | None) -> None:
+    from experiments.recording.excite_recording import record_excited
+    from experiments.results.streams import write_streams
+
+    write_streams(record_excited(found, audience), folder)
+
+
+def _designed(options: Excite) -> Design:
+    """Return what is options, checked."""
+    if options.fs is not None:
+        _require_between("fs", options.fs, 10, FASTEST)
+    scenario = _scenario(options)
+    _require_between("duration", options.duration, 0, LONGEST)
+    _require_between("frequency", options.frequency, 0, scenario.fs / 4)
+    _require_between("repeat", options.repeat, 1, max(1.0, LONGEST // options.duration))
+    if options.seed < 0:
+        raise ExperimentError(f"--seed {options.seed} must be at least 0")
+    if options.until is not None and options.log:
+        raise ExperimentError("--until simulates its own logs: leave --log out")
+    subject = Subject(absolute(options.robot), options.parameters)
+    subject.require_linear()
+    if len(options.torque_noise) not in (0, 1, subject.robot.n):
+        count = len(options.torque_noise)
+        raise ExperimentError(
+            f"--torque-noise has {count} values for {subject.robot.n} joints: give one for all, or one a joint"
+        )
+    return Design(
+        robot=absolute(options.robot),
+        scenario=scenario,
+        kind=options.kind,
+        duration=options.duration,
+        frequency=options.frequency,
+        asked=MotionLimits.read(options.limits),
+        repeat=options.repeat,
+        seed=options.seed,
+        weights=_weights(options.weigh),
+        criterion=options.criterion,
+        logs=tuple(_log(path, subject) for path in options.log),
+        parameters=options.parameters,
+    )
+
+
+def _require_between(name: str, value: float, least: float, most: float) -> None:
+    if not (least <= value <= most and value > 0):
+        above = f"at least {least:g}" if least else "above 0"
+        raise ExperimentError(f"--{name} {value:g} must be {above} and at most {most:g}")
+
+
+def _scenario(options: Excite) -> Scenario:
+    """Return what says how noisy the log will be, and how the motion is simulated: options before the scenario's own."""
+    scenario = load(options.noise or "ideal")
+    bits = options.encoder_bits if options.encoder_bits is not None or options.noise else BITS
+    noise = options.torque_noise or (() if options.noise else TORQUE_NOISE)
+    if bits is not None:
+        _require_between("encoder-bits", bits, 4, 40)
+        scenario = replace(scenario, encoder=IncrementalEncoder(lines=(max(1, round(2**bits / 4)),)))
+    if noise:
+        if not all(isfinite(x) and x >= QUIET for x in noise):
+            raise ExperimentError(f"--torque-noise {' '.join(f'{x:g}' for x in noise)} must be at least {QUIET:g} N m")
+        scenario = replace(scenario, torque=TorqueMeasurement(noise=noise))
+    elif not max(scenario.torque.noise):
+        raise ExperimentError(f"scenario {options.noise} has no noise of its torques: add --torque-noise, such as 0.05")
+    return scenario if options.fs is None else replace(scenario, fs=options.fs)
+
+
+def _weights(given: tuple[str, ...]) -> Mapping[str, float]:
+    """Return weights by the names of parameters; raise ExperimentError if one is no number above 0."""
+    found = dict[str, float]()
+    for text in given:
+        name, _, value = text.partition("=")
+        if name in found:
+            raise ExperimentError(f"--weigh gives {name} twice")
+        try:
+            found[name] = float(value)
+        except ValueError:
+            found[name] = -1.0
+        if not (isfinite(found[name]) and found[name] > 0):
+            raise ExperimentError(f"--weigh {text}: give a parameter and a weight above 0, such as LMY2=4")
+    return found
+
+
+def _percent(text: str | None) -> float | None:
+    """Return a share given in percent."""
+    if text is None:
+        return None
+    try:
+        share = float(text.removesuffix("%")) / 100
+    except ValueError:
+        share = -1.0
+    if not 0 < share < 1:
+        raise ExperimentError(f"--until {text}: give a share between 0 and 100 %, such as 0.1%")
+    return share
+
+
+def _log(path: Path, subject: Subject) -> MotionLog:
+    """Return an earlier log: of its torques nothing counts, so that their meaning is not options for."""
+    return read(file_of(path), ReadOptions(fallback=TorqueChannel("held")), Request(subject)).longest

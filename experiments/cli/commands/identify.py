@@ -1,0 +1,145 @@
+"""The command that identifies logs: request, logs, fit, judgement, printed and saved; then views, each of which may fail."""
+
+import tempfile
+from contextlib import ExitStack, nullcontext
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from rich.text import Text
+
+from experiments.cli.command_text import command_of
+from experiments.cli.commands.follow import Follower
+from experiments.cli.commands.identify_views import Shown, require_layer, require_targets, view_all
+from experiments.cli.commands.requests import chooses_band, read_options, request_of
+from experiments.cli.options.identify import Identify
+from experiments.cli.page import Page, new_page, shown
+from experiments.cli.progress import Told, stages_of
+from experiments.errors import ExperimentError
+from experiments.identification.checks import checks
+from experiments.identification.fit import Fit, fit
+from experiments.identification.friction_choice import summary, words
+from experiments.identification.iterations import iterations
+from experiments.identification.judgement import Judgement, judge
+from experiments.identification.load import load, with_held_out
+from experiments.identification.log_warnings import warnings_of_log
+from experiments.identification.reading import stated_by
+from experiments.identification.request import Request
+from experiments.recording.audience import Audience
+from experiments.reports.printed import print_fit, print_held_out
+from experiments.results.attempts import Attempts
+from experiments.results.folder import ResultsFolder
+from experiments.results.summaries import write_summary
+from identify import IdentificationError
+from identify.files.log_file import write_log
+from sim.robot.robot import Robot
+
+LEFT_OUT = ("out", "force", "json", "watching", "write", "write_mjcf", "follow")
+"""Options that make no difference to an identification."""
+
+
+def identify(options: Identify) -> None:
+    """Identify logs, judge the result, save and show it."""
+    if not options.log:
+        raise ExperimentError("name a log, or several of one fit")
+    page, stated = new_page(machine=options.json), stated_by(options.log[0])
+    request = request_of(options, stated)
+    command, read = command_of("identify", options, "log", LEFT_OUT), _read(options, request)
+    whole = command_of("identify", options, "log", LEFT_OUT, absolute=True)
+    folder = ResultsFolder(options.out, "identify", whole, options.force, read) if options.out else None
+    require_targets(options, folder, read)
+    require_layer(options, request.label, command)
+    with ExitStack() as stack:
+        stack.enter_context(shown(page))
+        stack.enter_context(folder.held() if folder else nullcontext())
+        audience = stack.enter_context(options.watching.audience())
+        options = _followed(stack, options, request, audience)
+        with stages_of("identifying") as told:
+            result = _fitted(options, request, stated, told)
+        _show_fit(page, result, options, read[0])
+        _save(folder, page, result)
+        with stages_of("judging"):
+            judgement = judge(result)
+        _show_judgement(page, judgement)
+        _save(folder, page)
+        kept = f"the estimates are printed{f', and with the logs in {folder.out}' if folder else ''}"
+        attempts = Attempts(kept, folder)
+        for log in judgement.failures:
+            attempts.failed(log.title, log.why, log.traceback)
+        with stages_of("checking"):
+            delay = options.torque_delay != "estimate"
+            warnings = attempts.attempt("the checks", lambda: checks(judgement, delay=delay)) or {}
+        page.warn(warnings)
+        page.end()
+        view_all(Shown(page, options, command, judgement, warnings, folder, audience), attempts)
+        attempts.close()
+
+
+def _read(options: Identify, request: Request) -> tuple[Path, ...]:
+    """Return the files that are read."""
+    robot = Robot.path(request.subject.name)
+    return (*(path.absolute() for path in (*options.log, *options.validate)), robot)
+
+
+def _followed(stack: ExitStack, options: Identify, request: Request, audience: Audience | None) -> Identify:
+    """Follow the log until it is complete, if that is asked for; return the options with the complete log."""
+    if options.follow is None:
+        return options
+    if len(options.log) > 1:
+        raise ExperimentError("--follow takes one log, not several")
+    if not 0 < options.follow < float("inf"):
+        raise ExperimentError(f"--follow {options.follow:g} must be above 0: for how long [s] a complete log has not grown")
+    follower = Follower(options.log[0], read_options(options), request, audience)
+    follower.follow(options.follow)
+    folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="idbench-"))
+    return replace(options, log=(follower.complete(Path(folder)),))
+
+
+def _fitted(options: Identify, request: Request, stated: dict[str, Any], told: Told) -> Fit:
+    """Return the fit; what goes wrong says what is suspicious about the logs, too."""
+    told("reading logs")
+    loaded = load(options.log, read_options(options), request, band=chooses_band(options))
+    logs = with_held_out(loaded, options.validate, read_options(options), _truth(stated, request))
+    try:
+        return fit(loaded.request, logs, told)
+    except IdentificationError as error:
+        doubts = [f"warning: {doubt}" for log in logs.fitted for doubt in warnings_of_log(log, request.subject.tree)]
+        raise ExperimentError("; ".join([str(error), *doubts])) from error
+
+
+def _truth(stated: dict[str, Any], request: Request) -> dict[str, float] | None:
+    """Return the truth that the folder of a run states, if it is of the same parameters."""
+    truth: dict[str, float] | None = stated.get("truth")
+    return truth if truth and tuple(truth) == request.subject.basis.names else None
+
+
+def _show_fit(page: Page, result: Fit, options: Identify, log: Path) -> None:
+    """Show the estimates."""
+    print_fit(page, result, ", ".join(map(str, options.log)))
+    notes, choice, subject = list(result.logs.notes), result.choice, result.subject
+    if choice is not None:
+        notes += words(choice, subject.laws.names, subject.robot.joints)
+        page.found["friction"] = summary(choice)
+    for note in notes:
+        page.print(Text(note), soft_wrap=True)
+    page.show()
+    page.found |= {"experiment": "identify", "log": log.name, "path": str(log), **result.summary()}
+    page.found |= {"iterations": iterations(result), "notes": notes}
+
+
+def _show_judgement(page: Page, judgement: Judgement) -> None:
+    """Show verdicts on the held-out logs."""
+    for one in judgement.on:
+        print_held_out(page, one)
+    page.show()
+    page.found |= judgement.summary()
+
+
+def _save(folder: ResultsFolder | None, page: Page, result: Fit | None = None) -> None:
+    """Write the summary so far; of a new result with its logs, in the place of all earlier files."""
+    if folder is None:
+        return
+    with folder.complete() if result else folder.more() as hidden:
+        for k, log in enumerate(result.logs.fitted if result else ()):
+            write_log(log, hidden / f"log{k + 1 if k else ''}.parquet")
+        write_summary(hidden / "summary.json", page.found)

@@ -1,0 +1,152 @@
+"""What shows an identification: report, recording, files for other software; each may fail alone."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import final
+
+from rich.text import Text
+
+from experiments.cli.options.identify import Identify
+from experiments.cli.page import Page
+from experiments.errors import ExperimentError, ResultsError
+from experiments.exports.exports import EXPORTS
+from experiments.identification.fit import Fit
+from experiments.identification.judgement import Judgement
+from experiments.recording.audience import Audience
+from experiments.results.attempts import Attempts
+from experiments.results.folder import ResultsFolder
+from experiments.results.manifest import Manifest
+from experiments.results.writing import require_free, write_text
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """An identification that is complete, and where it is shown.
+
+    Parameters
+    ----------
+    page : Page
+        Where files that are written are named.
+    options : Identify
+        What was asked for.
+    command : str
+        The same as it is typed.
+    judgement : Judgement
+        The judged fit.
+    warnings : mapping of str to sequence of str
+        What to check, by what it is about.
+    folder : ResultsFolder, optional
+        Where its files go.
+    audience : Audience, optional
+        Who watches.
+    """
+
+    page: Page
+    options: Identify
+    command: str
+    judgement: Judgement
+    warnings: Mapping[str, Sequence[str]]
+    folder: ResultsFolder | None
+    audience: Audience | None
+
+    @property
+    def fit(self) -> Fit:
+        """The fit."""
+        return self.judgement.fit
+
+
+def report(shown: Shown) -> None:
+    """Write the page of the identification."""
+    from experiments.reports.page import report as page_of
+
+    if shown.folder is None or shown.fit.logs.long:
+        return
+    with shown.folder.more() as hidden:
+        text = page_of(shown.judgement, shown.warnings, shown.page.found["notes"], shown.command)
+        (hidden / "report.html").write_text(text, encoding="utf-8")
+
+
+def recording(shown: Shown) -> None:
+    """Write the recording, or show it to who watches."""
+    run, rerun = shown.options.log[0], shown.options.watching.rerun
+    into = shown.folder or (_layered(shown, run) if run.is_dir() else None)
+    if not rerun or (into is None and shown.audience is None):
+        return
+    if shown.fit.logs.long:
+        shown.page.print("not recorded: the rows of so long a log are not kept; identify a part of it to look inside")
+        return
+    from experiments.recording.identification_recording import add_layer, record_log
+    from experiments.results.streams import write_streams
+
+    alone = shown.folder is not None or into is None
+    made = record_log(shown.fit.on(0), shown.audience) if alone else add_layer(run, shown.fit, shown.audience)
+    write_streams(made, into)
+    if len(shown.fit.logs.fitted) > 1:
+        shown.page.print(f"recorded: {shown.fit.logs.name(0)}, by the estimate of all logs")
+    if into and not shown.folder:
+        shown.page.print(f"added to the recording in {run}{shown.options.watching.hint(run)}", soft_wrap=True)
+
+
+def _layered(shown: Shown, run: Path) -> ResultsFolder:
+    """Return the folder of a run whose recording gets a layer."""
+    return ResultsFolder(run, "run", shown.command, shown.options.force)
+
+
+def require_layer(options: Identify, label: str, command: str) -> None:
+    """Raise ExperimentError if the layer of another identification would be replaced in the folder of a run."""
+    name = f"recording.{label}.rrd"
+    if not options.log[0].is_dir() or options.out or options.force or not options.watching.rerun:
+        return
+    there = Manifest.of(options.log[0]).files.get(name)
+    if there is not None and there.command != command and (options.log[0] / name).is_file():
+        raise ExperimentError(
+            f"{options.log[0]} holds the layer {label!r} of `{there.command}`: choose another --label, or replace it with "
+            "--force"
+        )
+
+
+VIEWS: dict[str, Callable[[Shown], None]] = {"report.html": report, "the recording": recording}
+"""What shows an identification, by name."""
+
+
+def view_all(shown: Shown, attempts: Attempts) -> None:
+    """Make every view; those that fail are noted."""
+    for name, view in VIEWS.items():
+        attempts.attempt(name, lambda view=view: view(shown))  # type: ignore[misc]
+    for option, path in _targets(shown.options):
+        attempts.attempt(f"{option} {path}", lambda option=option, path=path: _export(shown, option, path))  # type: ignore[misc]
+    if shown.folder:
+        hint = shown.options.watching.hint(shown.folder.out)
+        shown.page.print(f"written to {shown.folder.out}{hint}", soft_wrap=True)
+    shown.page.show()
+
+
+def _export(shown: Shown, option: str, path: Path) -> None:
+    """Write a file for other software, with the parameters of the first model that has an estimate."""
+    what, render = EXPORTS[path.suffix]
+    text, warnings = render(shown.fit, shown.fit.leading, path)
+    write_text(path, text, option, force=shown.options.force, read=shown.folder.read if shown.folder else ())
+    shown.page.print(Text(f"written to {path}: {what} with the parameters of the {shown.fit.leading} model"), soft_wrap=True)
+    shown.page.warn({"the file that was written": warnings})
+
+
+def _targets(options: Identify) -> list[tuple[str, Path]]:
+    """Return the files for other software, and the options that name them."""
+    own = [("--write-mjcf", options.write_mjcf)] if options.write_mjcf else []
+    return [*own, *(("--write", path) for path in options.write)]
+
+
+def require_targets(options: Identify, folder: ResultsFolder | None, read: Sequence[Path]) -> None:
+    """Raise ExperimentError if what is asked for cannot be written there; before the work, not after it."""
+    for option, path in _targets(options):
+        if option == "--write-mjcf" and path.suffix != ".xml":
+            raise ExperimentError(f"--write-mjcf {path}: its name must end with .xml, or nothing would read it back")
+        if path.suffix not in EXPORTS:
+            raise ExperimentError(f"--write {path}: its name must end with {', '.join(EXPORTS)}")
+        if not (folder and path.absolute().parent == folder.out.absolute() and not folder.out.exists()):  # it will be made
+            require_free(path, option, force=options.force, read=read)
+    targets = [path.absolute() for _, path in _targets(options)]
+    if twice := next((path for k, path in enumerate(targets) if path in targets[:k]), None):
+        raise ResultsError(f"{twice} is to be written twice: give each file a name of its own")

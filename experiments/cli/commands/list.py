@@ -1,0 +1,28 @@
+"""What can be combined."""
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from experiments.cli.options.view import List
+from experiments.cli.page import new_page
+from experiments.plugin_tables import TABLES, plugin_conflicts
+
+
+def list_plugins(options: List) -> None:
+    """List every plug-in."""
+    page = new_page(machine=options.json)
+    print_plugins(page)
+    page.found |= {table.point: {name: table.summary(name) for name in table} for table in TABLES}
+    page.end()
+
+
+def print_plugins(console: Console) -> None:
+    """Print every plug-in with the first line of its documentation."""
+    for table in TABLES:
+        grid = Table.grid(padding=(0, 2))
+        for name in table:
+            grid.add_row(f"  {name}", Text(table.summary(name)))
+        console.print(Text(f"{table.point} (entry points: idbench.{table.point})", style="bold"), grid, sep="\n")
+    for conflict in plugin_conflicts():
+        console.print(Text(f"warning: {conflict}"), soft_wrap=True)

@@ -1,0 +1,140 @@
+"""The command that shows what is understood of a log."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import log2, log10, pi
+from pathlib import Path
+
+from rich.text import Text
+
+from experiments.cli.options.log import ShowLog
+from experiments.cli.page import Page, new_page, shown
+from experiments.errors import ExperimentError
+from experiments.identification.log_facts import LogFacts
+from experiments.identification.reading import columns_of
+from experiments.results.attempts import Attempts
+from experiments.results.writing import new_file, require_free, write_text
+from experiments.text import new_table, print_titled
+from identify import LogError
+from identify.data.log_columns import LogColumns
+from identify.files.guess import Guess, guess
+from identify.files.layout import LAYOUT, LogLayout, Source
+from identify.files.reading import LAYOUT_FILE, layout_of, read_columns
+from identify.files.units import needs_gain
+
+ROUNDED = 1e-4
+"""Departure of a step's logarithm from a whole number up to which it is a file's decimal places, no encoder's."""
+
+
+def show_log(options: ShowLog) -> None:
+    """Show what is understood of a log: columns, units, rate, ranges, noise; write a layout to start from."""
+    page = new_page(machine=options.json)
+    for option, path in (("--write", _target(options) if options.write else None), ("--picture", options.picture)):
+        if path is not None:
+            require_free(path, option, force=options.force, read=[options.log])
+    found, columns = _understood(options)
+    layout, facts = found.layout, LogFacts(columns)
+    with shown(page):
+        _print_layout(page, layout, found.doubts)
+        _print_facts(page, facts)
+        for note in facts.notes():
+            page.print(Text(note), soft_wrap=True)
+        page.found |= {**facts.summary(), "layout": layout.text, "doubts": list(found.doubts)}
+        page.end()
+        attempts = Attempts("the rest is printed")
+        if options.write:
+            attempts.attempt("--write", lambda: _write(page, options, layout))
+        if options.picture is not None:
+            attempts.attempt("--picture", lambda: _draw(page, options, facts))
+        attempts.close()
+
+
+def _draw(page: Page, options: ShowLog, facts: LogFacts) -> None:
+    from experiments.reports.log_picture import figure_of
+
+    if (path := options.picture) is None:
+        return
+    with new_file(path, "--picture", force=options.force, read=[options.log]) as file:
+        try:
+            figure_of(facts).savefig(file, dpi=110)
+        except ValueError as error:
+            raise ExperimentError(f"--picture {path}: {error}") from error
+    page.print(Text(f"picture written to {path}"), soft_wrap=True)
+
+
+def _understood(options: ShowLog) -> tuple[Guess, LogColumns]:
+    """Return what the columns are, stated or guessed, and the columns."""
+    path = options.log
+    if path.suffix.lower() == LAYOUT_FILE:
+        return Guess(LogLayout.read(path)), read_columns(path)
+    if options.reading.stated:
+        return Guess(layout_of(path)), columns_of(path, options.reading)
+    beside = None if options.force else LogLayout.beside(path)
+    if beside:
+        return Guess(beside[0]), read_columns(path, _looked_at(beside[0]))
+    try:
+        found = guess(path)
+    except LogError as error:
+        raise ExperimentError(str(error)) from error
+    layout = found.layout
+    if not layout.t.columns and not layout.t.fs:
+        raise ExperimentError(
+            f"{path} has no column of times that idbench recognises: say which with --columns t=NAME, or state fs in a log.toml"
+        )
+    return found, read_columns(path, _looked_at(layout))
+
+
+def _looked_at(layout: LogLayout) -> LogLayout:
+    """Return a layout whose currents count as torques where their gain is not known yet."""
+    return replace(layout, gain=(1.0,)) if needs_gain(layout.tau.unit) and not layout.gain else layout
+
+
+def _print_layout(page: Page, layout: LogLayout, doubts: Sequence[str]) -> None:
+    grid = new_table("", ["unit", "columns"])
+    for name in ("t", "q", "qd", "tau"):
+        source: Source = getattr(layout, name)
+        if source.columns or source.fs:
+            columns = ", ".join(source.columns) if source.columns else f"{source.fs:g} Hz"
+            grid.add_row(name, source.unit or "", columns)
+    print_titled(page, "what its columns are", grid)
+    for doubt in doubts:
+        page.print(Text(f"look: {doubt}"), soft_wrap=True)
+
+
+def _print_facts(page: Page, facts: LogFacts) -> None:
+    heads = ["from [rad]", "to", "qd max", "stands %", "noise of q", "step", "bits", "torque from", "to", "noise [N m]"]
+    grid = new_table("", heads)
+    for row in facts.rows:
+        step = row["encoder_step"]
+        bits = "" if step is None else "file" if _decimal(step) else f"{log2(2 * pi / step):.1f}"
+        grid.add_row(
+            row["joint"],
+            *(f"{x:.4g}" for x in row["q"]),
+            f"{row['qd_max']:.3g}",
+            f"{100 * row['standing']:.0f}",
+            f"{row['position_noise']:.2g}",
+            "" if step is None else f"{step:.3g}",
+            bits,
+            *(f"{x:.3g}" for x in row["tau"]),
+            f"{row['torque_noise']:.2g}",
+        )
+    t = facts.columns.t
+    print_titled(page, f"{len(t)} rows, {t[-1] - t[0]:.4g} s, {facts.log.fs:.5g} Hz", grid)
+
+
+def _decimal(step: float) -> bool:
+    """Return whether a step is that to which a file rounds."""
+    return abs(log10(step) - round(log10(step))) < ROUNDED
+
+
+def _target(options: ShowLog) -> Path:
+    """Return where the layout of a log goes."""
+    stem = options.log.with_suffix("") if options.log.suffix.lower() == ".gz" else options.log
+    return stem.with_suffix(LAYOUT_FILE)
+
+
+def _write(page: Page, options: ShowLog, layout: LogLayout) -> None:
+    target = _target(options)
+    write_text(target, layout.text, "--write", force=options.force)
+    every = ", and every other log of the folder" if target.name == LAYOUT else ""
+    page.print(Text(f"written to {target}: correct it; this log is read by it from now on{every}"), soft_wrap=True)

@@ -1,0 +1,149 @@
+"""The commands about the paper's tables: the comparison, the search for its trajectory, the experiment repeated."""
+
+from contextlib import closing
+from pathlib import Path
+
+from rich.console import Console
+
+from experiments.cli.command_text import command_of
+from experiments.cli.commands.inner import doubt_window, recording_of, require_window
+from experiments.cli.options.paper import Search as SearchOptions
+from experiments.cli.options.paper import Table1 as Table1Options
+from experiments.cli.options.paper import Table2 as Table2Options
+from experiments.cli.page import new_page, shown
+from experiments.cli.progress import progress_of
+from experiments.errors import ExperimentError
+from experiments.paper.motions import Table1Motions
+from experiments.paper.motions_report import picture, print_motions
+from experiments.paper.search import Search
+from experiments.paper.table1 import CHAINS_COMPARED, SCENARIO, Table1
+from experiments.paper.table1_text import print_table1
+from experiments.paper.table2 import Table2
+from experiments.paper.table2_text import print_table2
+from experiments.results.attempts import Attempts
+from experiments.results.folder import ResultsFolder
+from experiments.results.summaries import write_summary
+from experiments.results.writing import require_free, write_text
+from identify.files.log_file import write_log
+from sim.robot.robot import Robot
+from sim.scenario.scenario import Scenario
+from sim.scenario.scenario_file import load, to_toml
+
+LEFT_OUT = ("out", "force", "json", "watching")
+"""Options that make no difference to a table."""
+
+
+def _folder(options: Table1Options | Table2Options, experiment: str) -> ResultsFolder:
+    """Return the folder of a table's results."""
+    out = options.out or Path("runs") / experiment
+    folder = ResultsFolder(
+        out, experiment, command_of(experiment.partition("-")[0], options, "", LEFT_OUT, absolute=True), options.force
+    )
+    folder.check()
+    return folder
+
+
+def compare(options: Table1Options) -> None:
+    """Reproduce the comparison."""
+    if options.seed is not None and options.scenario is not None:
+        raise ExperimentError(f"--seed {options.seed} and --scenario {options.scenario} name two trajectories: give one")
+    if options.motions is not None:
+        _over_motions(options, options.motions)
+        return
+    chains = CHAINS_COMPARED if options.chain == "all" else (options.chain,)
+    folder, page = _folder(options, "table1"), new_page(machine=options.json)
+    with options.watching.audience() as audience, shown(page), folder.held():
+        table = Table1(load(options.scenario or SCENARIO) if options.seed is None else _searched(options.seed), chains)
+        print_table1(page, table)
+        page.found |= table.summary() | {"folder": str(folder.out)}
+        page.show()
+        with folder.complete() as hidden:
+            write_log(table.log, hidden / "log.parquet")
+            write_summary(hidden / "summary.json", table.summary())
+        page.end()
+        attempts = Attempts(f"the table is printed, and with the log in {folder.out}", folder)
+        if options.watching.rerun:
+            from experiments.recording import table1_recording
+            from experiments.results.streams import write_streams
+
+            attempts.attempt("the recording", lambda: write_streams(table1_recording.record_table1(table, audience), folder))
+        page.print(f"written to {folder.out}{options.watching.hint(folder.out)}", soft_wrap=True)
+        attempts.close()
+
+
+def _over_motions(options: Table1Options, motions: int) -> None:
+    """Lay the distribution of errors over random motions beside the paper's."""
+    if options.scenario is not None or options.chain != "all":
+        raise ExperimentError(
+            "--motions draws motions of its own and compares the paper's chains: leave --scenario and --chain out"
+        )
+    folder, page = _folder(options, "table1-motions"), new_page(machine=options.json)
+    with shown(page), folder.held():
+        with progress_of("drawing and identifying motions") as progress:
+            found = Table1Motions(motions, options.seed or 0, progress=progress)
+            print_motions(page, found)
+        page.found |= found.summary() | {"folder": str(folder.out)}
+        page.show()
+        with folder.complete() as hidden:
+            write_summary(hidden / "summary.json", found.summary())
+        page.end()
+        attempts = Attempts(f"the table is printed, and in {folder.out}", folder)
+        attempts.attempt("motions.png", lambda: _draw(folder, found))
+        page.print(f"written to {folder.out}: the picture is motions.png", soft_wrap=True)
+        attempts.close()
+
+
+def _draw(folder: ResultsFolder, found: Table1Motions) -> None:
+    with folder.more() as hidden:
+        (hidden / "motions.png").write_bytes(picture(found))
+
+
+def search(options: SearchOptions) -> None:
+    """Search a trajectory."""
+    if options.out is not None:
+        require_free(options.out, "--out", force=options.force)
+    scenario, page = _searched(options.seed), new_page()
+    with shown(page):
+        if options.out is None:
+            page.out(to_toml(scenario).rstrip("\n"))
+            return
+        write_text(options.out, to_toml(scenario), "--out", force=options.force)
+        page.out(f"{options.out}: {scenario.origin}")
+
+
+def _searched(seed: int) -> Scenario:
+    with Console(stderr=True).status("searching a trajectory ...") as status:
+        return Search(seed=seed).run(
+            Robot.load("scara"),
+            lambda number, distance: status.update(f"searching: round {number}, {distance:.1%} from the paper's Cond(W)"),
+        )
+
+
+def table2(options: Table2Options) -> None:
+    """Repeat the paper's experiment and attribute its errors."""
+    watching, folder = options.watching, _folder(options, "table2")
+    require_window(options.inner, watching)
+    page, described = new_page(machine=options.json), load(options.scenario)
+    with watching.audience() as audience, shown(page), folder.held():
+        recording = recording_of(described, audience, options.inner) if watching.rerun else None
+        with (
+            progress_of("simulating") as progress,
+            closing(Table2(described, progress, recording.watch if recording else None)) as table,
+        ):
+            print_table2(page, table)
+            page.found |= table.summary() | {"folder": str(folder.out)}
+        page.show()
+        with folder.complete() as hidden:
+            for i in range(len(table.run.seeds)):
+                write_log(table.run.alone(i), hidden / f"log{i}.parquet")
+            write_summary(hidden / "summary.json", table.summary())
+        page.end()
+        attempts = Attempts(f"the table is printed, and with the logs in {folder.out}", folder)
+        if recording:
+            from experiments.recording.table2_recording import finish_table2
+            from experiments.results.streams import write_streams
+
+            attempts.attempt("the recording", lambda: write_streams(finish_table2(recording, table), folder))
+            doubt_window(page, options.inner, recording)
+        page.print(f"written to {folder.out}{watching.hint(folder.out)}", soft_wrap=True)
+        attempts.close()

@@ -1,0 +1,98 @@
+"""The command that shows what can be identified of a robot."""
+
+import sys
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.text import Text
+
+from experiments.cli.options.robot import DescribeRobot
+from experiments.cli.page import new_page
+from experiments.identification.budget import Budget
+from experiments.identification.subject import Subject, absolute
+from experiments.identification.warnings import FILE, warnings_of_robot
+from experiments.text import new_table, print_titled
+from sim.errors import BenchError
+from sim.trajectories import RandomMoves
+
+MANY = 30
+"""Joints from which on a line says that grouping takes its time: it grows with their cube."""
+
+
+def describe(options: DescribeRobot) -> None:
+    """Show what can be identified of a robot."""
+    subject, page = (
+        Subject(absolute(options.name), options.parameters, options.mounting.mounting),
+        new_page(machine=options.json),
+    )
+    subject.require_laws()
+    if subject.robot.n > MANY:
+        sys.stderr.write(f"idbench: grouping the parameters of {subject.robot.n} joints takes a while\n")
+    truth = subject.truth(subject.robot)
+    _print_joints(page, subject)
+    _print_parameters(page, subject, truth)
+    try:
+        moves = RandomMoves(moves=20, durations=(0.8, 1.6), velocity=(2.0,)).sample(subject.robot, 100.0)
+        _print_budget(page, Budget(subject.robot, moves))
+    except BenchError as error:  # the parameters are worth knowing all the same
+        page.print(Text(f"no torque budget: {error}"), soft_wrap=True)
+    page.warn({FILE: warnings_of_robot(subject.robot)})
+    page.found |= _summary(subject, truth)
+    page.end()
+
+
+def _summary(subject: Subject, truth: dict[str, float]) -> dict[str, Any]:
+    """Return what --json says of a robot."""
+    base, tree = subject.base, subject.tree
+    return {
+        "robot": subject.name,
+        "joints": [
+            {"name": joint.name, "kind": joint.kind, "range": [x if isfinite(x) else None for x in joint.range]}
+            for joint in tree.joints
+        ],
+        "parameters": [
+            {"name": p.name, "unit": p.unit, "kind": p.kind, "joint": p.joint, "value": truth[p.name]}
+            for p in subject.basis.parameters
+        ],
+        "made_of": None if base is None else base.groupings,
+    }
+
+
+def _print_joints(page: Console, subject: Subject) -> None:
+    tree, found = subject.tree, subject.robot
+    grid = new_table("", ["kind", "on", "from [rad, m]", "to", "armature", "Fv", "Fs"])
+    model = found.model
+    for j, joint in enumerate(tree.joints):
+        values = model.dof_armature[j], model.dof_damping[j], model.dof_frictionloss[j]
+        parent = tree.joints[joint.parent].name if joint.parent >= 0 else "ground"
+        ends = (f"{x:.4g}" if isfinite(x) else "" for x in joint.range)
+        grid.add_row(f"{j + 1} {joint.name}", joint.kind, parent, *ends, *(f"{x:g}" if x else "" for x in values))
+    print_titled(page, f"robot {tree.name}: {tree.n} joints on a base that is fixed to the ground", grid)
+    if not any(joint.armature for joint in tree.joints):
+        page.print(Text("the file gives no joint an armature; behind gears rotors weigh more than links: --armature all"))
+
+
+def _print_parameters(page: Console, subject: Subject, truth: dict[str, float]) -> None:
+    basis, base = subject.basis, subject.base
+    grid = new_table("", ["of the file", "unit"])
+    if base is not None:
+        grid.add_column("made of")
+    made = base.groupings if base else {}
+    for parameter, unit in zip(basis.names, basis.units, strict=True):
+        grid.add_row(parameter, f"{truth[parameter]:.5g}", unit, *([made[parameter]] if made else []))
+    print_titled(page, f"{len(basis.names)} parameters that a motion can identify", grid)
+    if base is not None and base.without_effect:
+        page.print(Text(f"no motion shows {', '.join(base.without_effect)}"), soft_wrap=True)
+    page.print()
+
+
+def _print_budget(page: Console, budget: Budget) -> None:
+    grid = new_table("", budget.largest)
+    for j, joint in enumerate(budget.robot.joints):
+        values = [value[j] for value in budget.largest.values()]
+        grid.add_row(joint, *(f"{value:.3g}" if np.isfinite(value) else "" for value in values))
+    print_titled(
+        page, "torque budget: largest [N m, N of slides] along 20 random moves of 0.8 to 1.6 s, at most 2 rad/s or m/s", grid
+    )

@@ -1,0 +1,166 @@
+"""The command that simulates a scenario."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from rich.text import Text
+
+from experiments.cli.command_text import command_of
+from experiments.cli.commands.inner import doubt_window, recording_of, require_window
+from experiments.cli.options.run import Run
+from experiments.cli.page import Page, new_page, shown
+from experiments.cli.progress import progress_of, stages_of
+from experiments.errors import ExperimentError
+from experiments.identification.request import Request
+from experiments.identification.scenario_run import ScenarioRun
+from experiments.identification.subject import Subject, absolute
+from experiments.identification.warnings import FILE, warnings_of_robot
+from experiments.plugin_tables import plugin_conflicts
+from experiments.reports.printed import print_fit
+from experiments.results.attempts import Attempts
+from experiments.results.folder import ResultsFolder
+from experiments.results.summaries import write_summary
+from experiments.study.method import Method
+from identify.files.log_file import write_log
+from sim.drives import IdealDrive
+from sim.errors import RobotError
+from sim.robot.robot import Robot
+from sim.scenario.ripple import Ripple
+from sim.scenario.scenario import Scenario
+from sim.scenario.scenario_file import load, to_toml
+from sim.trajectories import Quintic
+
+LEFT_OUT = ("out", "force", "json", "watching", "yes")
+"""Options that make no difference to a run's results."""
+
+
+def run(options: Run) -> None:
+    """Simulate a scenario, identify it, save and record it."""
+    page, watching = new_page(machine=options.json), options.watching
+    made = _described(page, options)
+    require_window(options.inner, watching)
+    name = made.scenario.name
+    command = command_of("run", options, "scenario", LEFT_OUT, absolute=True)
+    folder = ResultsFolder(options.out or Path("runs") / name, "run", command, options.force, _read(options))
+    folder.check()
+    made.require_bearable(options.yes)
+    with watching.audience() as audience, shown(page), folder.held():
+        subject = made.request.subject
+        recording = recording_of(made.scenario, audience, options.inner, subject) if watching.rerun else None
+        with progress_of(f"simulating {name}") as progress:
+            ran = replace(made, progress=progress, watch=recording.watch if recording else None)
+            _ = ran.run
+        with stages_of("identifying") as told:
+            ran = replace(ran, told=told)
+            _show_run(page, ran)
+        _save_run(folder, page, ran)
+        page.end()
+        attempts = Attempts(f"the estimates are printed, and with the log in {folder.out}", folder)
+        if recording:
+            from experiments.results.streams import write_streams
+
+            attempts.attempt("the recording", lambda: write_streams(recording.finish(ran), folder))
+            doubt_window(page, options.inner, recording)
+            if ran.fit.logs.long:
+                page.print("the identification is not recorded: the rows of so long a log are not kept")
+        page.print(f"written to {folder.out}{watching.hint(folder.out)}", soft_wrap=True)
+        attempts.close()
+
+
+def _read(options: Run) -> tuple[Path, ...]:
+    """Return the files that are read."""
+    named = [options.scenario, options.robot]
+    return tuple(Path(name).absolute() for name in named if name is not None)
+
+
+def _described(page: Page, options: Run) -> ScenarioRun:
+    """Return what is to be simulated, and how it is identified."""
+    if options.scenario is None:
+        if options.robot is not None:
+            raise ExperimentError(f"--robot {options.robot}: a run of a study is of the study's robot")
+        scenario, method = _again(page, options.study, options.index, options.method)
+        names, name = method.names, f"{'-'.join(method.names)}-study"
+        chosen = (method.chain, method.estimator)
+    else:
+        scenario = _with_robot(page, load(_alone(options.scenario, options.study, options.index)), options.robot)
+        names, name, chosen = (options.chain, options.estimator), "", None
+    subject = Subject(scenario.robot, options.parameters)
+    request = Request(
+        subject,
+        chain=names[0],
+        estimator=names[1],
+        method=chosen,
+        name=name,
+        start=options.start,
+        consistent=options.consistent,
+    )
+    return ScenarioRun(scenario, request)
+
+
+def _show_run(page: Page, ran: ScenarioRun) -> None:
+    """Show the estimates."""
+    print_fit(page, ran.fit, f"Scenario {ran.scenario.name}")
+    page.warn({FILE: [*warnings_of_robot(ran.run.robots[0]), *plugin_conflicts()]})
+    page.found |= ran.summary()
+    page.show()
+
+
+def _save_run(folder: ResultsFolder, page: Page, ran: ScenarioRun) -> None:
+    """Write log, scenario and summary."""
+    with folder.complete() as hidden:
+        write_log(ran.run.alone(), hidden / "log.parquet")
+        (hidden / "scenario.toml").write_text(to_toml(ran.scenario), encoding="utf-8")
+        write_summary(hidden / "summary.json", ran.summary())
+    page.found["folder"] = str(folder.out)
+
+
+def _with_robot(page: Page, scenario: Scenario, robot: str | None) -> Scenario:
+    """Return a scenario with another robot, and moves that fit it."""
+    if robot is None:
+        return scenario
+    other = replace(scenario, robot=absolute(robot), name=f"{scenario.name}-{Path(robot).stem}")
+    if isinstance(scenario.trajectory, Quintic) and Robot.load(robot).n != Robot.load(scenario.robot).n:
+        page.print(f"the trajectory of {scenario.name} is none for robot {robot}: it makes the random moves of scenario arm")
+        other = replace(other, trajectory=load("arm").trajectory, start=())
+    if not isinstance(other.drive, IdealDrive) and not _has_motors(robot):
+        page.print(f"robot {robot} has no motors (dcmotor elements of MJCF): its drives are ideal, without ripple")
+        other = replace(other, drive=IdealDrive(), ripple=Ripple())
+    return other
+
+
+def _has_motors(robot: str) -> bool:
+    try:
+        return Robot.load(robot).motors is not None
+    except RobotError:
+        return False
+
+
+def _alone(scenario: str, study: Path | None, index: int | None) -> str:
+    if study is not None or index is not None:
+        raise ExperimentError(f"{scenario} and --from or --index: name a scenario, or a run of a study")
+    return scenario
+
+
+def _again(page: Page, folder: Path | None, index: int | None, method: int | None) -> tuple[Scenario, Method]:
+    """Return the scenario of a run of a study, whose rows come out again, and the method by which it is identified."""
+    from experiments.study.again import compare_again
+    from experiments.study.store import Store
+
+    if folder is None or index is None:
+        raise ExperimentError("name a scenario, as idbench scenario lists them, or a run of a study: --from DIR --index N")
+    store = Store.open(folder)
+    number, methods = method or 0, store.study.methods
+    if not 0 <= number < len(methods):
+        raise ExperimentError(f"--method {number} does not exist: the study has methods 0 to {len(methods) - 1}")
+    chosen = methods[number]
+    rows, known = compare_again(store, index)
+    page.print(
+        f"run {index} of {folder}: all {len(rows)} rows come out again, bit for bit"
+        if known
+        else f"run {index} of {folder}, which the study has not finished yet"
+    )
+    words = [*chosen.names, *(f"{s.axis.field} {s.label}" for s in chosen.settings)]
+    page.print(Text(f"shown: method {number} of the study's {len(methods)}: {', '.join(words)}"), soft_wrap=True)
+    for reason in dict.fromkeys(row["failure"] for row in rows if row["failure"]):
+        page.print(Text(f"warning: {reason}"), soft_wrap=True)
+    return replace(store.study.scenario_of(index), name=f"{store.study.name}-{index}"), chosen

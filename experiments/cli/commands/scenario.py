@@ -1,0 +1,21 @@
+"""The command that writes scenarios."""
+
+from experiments.cli.options.scenario import WriteScenario
+from experiments.cli.page import new_page
+from experiments.results.writing import write_text
+from sim.scenario.scenario_file import designed, load, names, to_toml
+
+
+def write(options: WriteScenario) -> None:
+    """Write a scenario out, or list those that ship."""
+    page = new_page()
+    if options.name is None:
+        for known in names():
+            page.out(f"{known:16} {load(known).origin}")
+        page.out(f"{len(designed())} more with motions of idbench excite, for its studies: {', '.join(designed())}")
+    elif options.out is None:
+        page.out(to_toml(load(options.name)).rstrip("\n"))
+    else:
+        write_text(options.out, to_toml(load(options.name)), "--out", force=options.force)
+        page.out(f"written to {options.out}; run it: uv run idbench run {options.out}")
+    page.end()

@@ -1,0 +1,101 @@
+"""Opening a recording in the rerun viewer."""
+
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from experiments.cli.options.view import View
+from experiments.cli.page import new_page
+from experiments.errors import ExperimentError, ResultsError
+from experiments.recording.comparison_recording import compare
+from experiments.recording.folder import BASE, files, merge
+from experiments.recording.viewers import LOOPBACK, require_display, viewer_binary
+from experiments.results.writing import new_file
+
+LATEST = Path("runs")
+"""Where the latest results are looked for."""
+
+
+def view(options: View) -> None:
+    """Open a recording, or write it to one file."""
+    page, folders = new_page(), options.folders or (_latest(),)
+    if not options.folders:
+        page.print(f"the latest of {LATEST}: {folders[0]}", soft_wrap=True)
+    if options.save is None:
+        page.end()
+        open_viewer(folders, options.tab)
+        return
+    save(folders, options.tab, options.save, force=options.force)
+    page.print(f"written to {options.save}", soft_wrap=True)
+    page.end()
+
+
+def open_viewer(folders: Sequence[Path], tab: str = "") -> None:
+    """Open recordings of results folders, or a recording itself; return when the viewer is closed.
+
+    Raises
+    ------
+    ResultsError
+        If there is no recording, no display, or the viewer fails.
+    """
+    paths = [path for folder in folders for path in _paths(folder)]
+    try:
+        require_display()
+    except ExperimentError:
+        raise ResultsError(
+            f"there is no display here: serve it to a browser with `uv run rerun --serve-web --bind {LOOPBACK} "
+            f"{' '.join(map(str, paths))}`, or write it to one file with --save FILE and copy that to a machine with a display"
+        ) from None
+    with tempfile.TemporaryDirectory(prefix="idbench-") as hidden:
+        one = paths
+        if len(folders) > 1 or folders[0].is_dir() or tab:
+            one = [Path(hidden) / BASE]
+            _merge(folders, tab, one[0])
+        _open(one)
+
+
+def save(folders: Sequence[Path], tab: str, out: Path, *, force: bool = False) -> None:
+    """Write the recordings of results folders, layers included, as one file; raise ResultsError if that fails."""
+    if out.suffix != ".rrd":
+        raise ResultsError(f"--save {out} must end with .rrd")
+    if out.name.startswith("recording.") and out.absolute().parent in [folder.absolute() for folder in folders]:
+        raise ResultsError(f"--save {out} would be a part of the recording itself: choose another name")
+    with new_file(out, "--save", force=force) as file:
+        _merge(folders, tab, file)
+
+
+def _merge(folders: Sequence[Path], tab: str, out: Path) -> None:
+    if len(folders) > 1:
+        compare(folders, tab, out)
+    else:
+        merge(_paths(folders[0]), tab, out)
+
+
+def _latest() -> Path:
+    """Return the folder of the recording that was written last."""
+    found = sorted(LATEST.glob(f"*/{BASE}"), key=lambda path: path.stat().st_mtime)
+    if not found:
+        raise ResultsError(
+            f"there is no recording in {LATEST}: name a results folder, or make one, such as `idbench run ripple`"
+        )
+    return found[-1].parent
+
+
+def _paths(folder: Path) -> list[Path]:
+    """Return the files of a recording, in the order in which a viewer should open them."""
+    paths = files(folder) if folder.is_dir() else [folder]
+    if not paths or any(path.suffix != ".rrd" or not path.is_file() for path in paths):
+        missing = folder / BASE if folder.is_dir() else folder
+        raise ResultsError(f"there is no recording {missing}: name a results folder, such as runs/table1, or a .rrd file")
+    return paths
+
+
+def _open(paths: list[Path]) -> None:
+    binary = viewer_binary()
+    try:
+        code = subprocess.run([binary, *paths, "--bind", LOOPBACK], check=False).returncode
+    except OSError as error:
+        raise ResultsError(f"cannot start the rerun viewer {binary}: {error.strerror}") from error
+    if code:
+        raise ResultsError(f"the rerun viewer ended with code {code}")

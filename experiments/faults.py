@@ -1,0 +1,43 @@
+"""Which errors are told in a line, and which are faults of idbench, whose traceback goes into a file."""
+
+import sys
+import tempfile
+import traceback
+from pathlib import Path
+
+from experiments.errors import ExperimentError
+
+REPORT = "fault.txt"
+"""Name of the file of tracebacks in a results folder."""
+
+
+def is_told(error: BaseException) -> bool:
+    """Return whether an error says itself what is wrong and what to try; packages that are not loaded have raised none."""
+    roots: list[type] = [ExperimentError, OSError, MemoryError]
+    for module, name in (("identify.errors", "IdentificationError"), ("sim.errors", "BenchError")):
+        if module in sys.modules:
+            roots.append(getattr(sys.modules[module], name))
+    return isinstance(error, tuple(roots))
+
+
+def reason(error: BaseException) -> str:
+    """Return what an error says; of a fault its kind, too."""
+    if isinstance(error, MemoryError):
+        return f"not enough memory{f': {error}' if str(error) else ''}; take a part of the log, or close other programs"
+    if isinstance(error, OSError) and not isinstance(error, ExperimentError):
+        return ": ".join(filter(None, (error.strerror or str(error), str(error.filename or ""))))
+    if is_told(error):
+        return str(error)
+    return f"a fault of idbench, not of your input ({type(error).__name__}: {' '.join(str(error).split())[:200]})"
+
+
+def trace(error: BaseException) -> str:
+    """Return the traceback of an error."""
+    return "".join(traceback.format_exception(error))
+
+
+def report(error: BaseException) -> Path:
+    """Write the traceback of an error to a file of its own; return where it is."""
+    with tempfile.NamedTemporaryFile("w", prefix="idbench-fault-", suffix=".txt", delete=False, encoding="utf-8") as file:
+        file.write(trace(error))
+    return Path(file.name)

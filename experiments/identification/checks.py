@@ -1,0 +1,52 @@
+"""What to check of an identification, the likely cause first: log, delay, the robot's file, motion, model."""
+
+from collections.abc import Iterator
+
+from experiments.identification.held_out import HeldOut
+from experiments.identification.judgement import Judgement
+from experiments.identification.log_warnings import unusable, warnings_of_log
+from experiments.identification.remedies import Remedies, delay_advice
+from experiments.identification.warnings import (
+    DELAY,
+    FILE,
+    LOG,
+    MODEL,
+    MOTION,
+    hidden_notes,
+    warnings_of_result,
+    warnings_of_robot,
+)
+
+
+def checks(judgement: Judgement, *, delay: bool) -> dict[str, list[str]]:
+    """Return warnings by what they are about.
+
+    Parameters
+    ----------
+    judgement : Judgement
+        The judged fit.
+    delay : bool
+        Whether the delay of the torques was given, so that it is compared with that which the log shows.
+    """
+    result = judgement.fit
+    of_logs = list(warnings_of_logs(judgement))
+    found: dict[str, list[str]] = {LOG: of_logs, DELAY: [], FILE: warnings_of_robot(result.subject.robot)}
+    found |= {MOTION: hidden_notes(result), MODEL: []}
+    for about, warnings in warnings_of_result(result).items():
+        found[about] += warnings
+    broken = any(map(unusable, result.logs.fitted))
+    first = judgement.on[0]
+    if isinstance(first, HeldOut) and not broken and not result.logs.long:
+        # Friction absorbs a wrong delay, and the verdict may be good: the log itself is asked.
+        found[DELAY] += delay_advice(result) if delay else ()
+        found[MODEL] += () if judgement.good else Remedies(first).options()
+    return found
+
+
+def warnings_of_logs(judgement: Judgement) -> Iterator[str]:
+    """Yield what is suspicious about the logs, fitted and held out."""
+    logs, tree = judgement.fit.logs, judgement.fit.subject.tree
+    several = len(logs.fitted) > 1
+    every = [(f"{logs.name(k)}: " if several else "", log) for k, log in enumerate(logs.fitted)]
+    every += [(f"{name}: ", log) for name, log in (logs.held_out or {}).items()]
+    return (before + warning for before, log in every for warning in warnings_of_log(log, tree))

@@ -1,0 +1,254 @@
+"""Logs identified by some models: the estimates, and what follows from them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Self, final
+
+import numpy as np
+
+from experiments.identification.consistent_estimate import made_consistent
+from experiments.identification.friction_choice import chosen_friction
+from experiments.identification.logs import Logs
+from experiments.identification.request import Request
+from experiments.identification.subject import Subject
+from experiments.results.summaries import finite, summarize
+from identify import (
+    MODELS,
+    AbstractEstimator,
+    Array,
+    Basis,
+    Chain,
+    Estimate,
+    ExcitationError,
+    IdentificationError,
+    Problem,
+    attempt_each,
+    encoder_steps,
+)
+from identify.judge.friction_choice import FrictionChoice
+from identify.rows.rows import Rows
+
+Outcomes = dict[str, Estimate | IdentificationError]
+"""The estimate of every model, or why it has none."""
+
+Told = Callable[[str], None]
+"""Receives what is being computed."""
+
+
+def fit(request: Request, logs: Logs, told: Told | None = None) -> "Fit":
+    """Return logs, identified: laws of friction chosen where that is asked for, what the logs do not show left out.
+
+    Raises
+    ------
+    IdentificationError
+        If no model has an estimate.
+    """
+    choice = None
+    if request.subject.laws.auto:
+        request, choice = chosen_friction(request, logs.fitted)
+    found, hidden = _fit(request, logs, told), list[str]()
+    leading = next(iter(found.outcomes.values()))
+    while isinstance(leading, ExcitationError) and leading.hidden and len(leading.hidden) < len(found.basis.names):
+        hidden += leading.hidden
+        found = _fit(replace(found.request, subject=found.subject.without(leading.hidden)), logs, told)
+        leading = next(iter(found.outcomes.values()))
+    if not found.estimates and isinstance(leading, IdentificationError):
+        raise leading
+    return replace(found, choice=choice, hidden=tuple(hidden))
+
+
+def _fit(request: Request, logs: Logs, told: Told | None) -> "Fit":
+    problem = request.problem(logs.fitted)
+    plain = attempt_each(problem, {name: MODELS.create(name) for name in request.models}, request.solver, told=told)
+    return Fit(request, logs, problem, plain, {name: _moved(request, outcome) for name, outcome in plain.items()})
+
+
+def _moved(request: Request, outcome: Estimate | IdentificationError) -> Estimate | IdentificationError:
+    """Return an estimate, moved to physically consistent parameters if that is asked for; or why that cannot be done."""
+    if request.consistent == "no" or isinstance(outcome, IdentificationError):
+        return outcome
+    try:
+        return made_consistent(request.subject, outcome, request.consistent)
+    except IdentificationError as error:
+        return error
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Logs, identified.
+
+    Parameters
+    ----------
+    request : Request
+        What was asked for, with the laws of friction that were chosen, and without parameters that the logs do not show.
+    logs : Logs
+        The logs.
+    problem : Problem
+        Logs, robot and chain, by the explicit model.
+    unconstrained : mapping of str to Estimate or IdentificationError
+        What each model gives, whether it is physically consistent or not.
+    outcomes : mapping of str to Estimate or IdentificationError
+        The same, made consistent where that is asked for.
+    choice : FrictionChoice, optional
+        What was compared, where laws of friction were chosen.
+    hidden : tuple of str
+        Parameters that were left out because the logs do not show them.
+    """
+
+    request: Request
+    logs: Logs
+    problem: Problem
+    unconstrained: Outcomes
+    outcomes: Outcomes
+    choice: FrictionChoice | None = None
+    hidden: tuple[str, ...] = ()
+
+    @property
+    def subject(self) -> Subject:
+        """The robot."""
+        return self.request.subject
+
+    @property
+    def basis(self) -> Basis:
+        """The robot, linear in its parameters; about the estimate, where some of them are not."""
+        return self.problem.basis
+
+    @property
+    def processing(self) -> Chain:
+        """The chain."""
+        return self.problem.chain
+
+    @property
+    def solver(self) -> AbstractEstimator:
+        """The estimator."""
+        return self.request.solver
+
+    @cached_property
+    def truth(self) -> dict[str, float] | None:
+        """The true parameters, where they are known; what the simulated robot does not have is zero."""
+        known = self.logs.truth
+        return None if known is None else {name: known.get(name, 0.0) for name in self.basis.names}
+
+    @cached_property
+    def estimates(self) -> dict[str, Estimate]:
+        """The estimates, of the models that have one."""
+        return {name: outcome for name, outcome in self.outcomes.items() if isinstance(outcome, Estimate)}
+
+    @property
+    def leading(self) -> str:
+        """The first model that has an estimate."""
+        return next(iter(self.estimates))
+
+    @property
+    def failures(self) -> dict[str, str]:
+        """Why models have no estimate."""
+        return {name: str(outcome) for name, outcome in self.outcomes.items() if isinstance(outcome, IdentificationError)}
+
+    def on(self, k: int) -> Self:
+        """Return the estimates as they look on one of the logs: parameters and covariance of all, rows of that one."""
+        logs = self.logs
+        if len(logs.fitted) == 1:
+            return self
+        alone = replace(logs, fitted=logs.fitted[k : k + 1], names=logs.names[k : k + 1])
+        problem = Problem(alone.fitted, self.basis, self.problem.model, self.processing)
+        seen: Outcomes = {
+            name: replace(e, problem=problem.with_model(e.problem.model), honest=e.best_covariance, whiten=None, fits={})
+            for name, e in self.estimates.items()
+        }
+        return replace(self, logs=alone, problem=problem, unconstrained=seen, outcomes=seen)
+
+    @cached_property
+    def torque_errors(self) -> dict[str, Array]:
+        """Rms of measured - predicted torque of every estimate while joints move, shape (log, joint) [N m], or NaN."""
+        if self.problem.long:
+            return {}
+        parts = self.problem.parts
+        return {name: np.array([_rms_by_kind(part, e.X) for part in parts]) for name, e in self.estimates.items()}
+
+    @cached_property
+    def explained(self) -> dict[str, Array]:
+        """How much of each joint's torque every estimate explains, shape (joint,); NaN where there is none to explain.
+
+        A share of its variance; of a log whose rows are not kept, of its squares.
+        """
+        squares = self._torque_squares
+        if not self.problem.long:
+            rows = self.problem.rows
+            squares = squares - np.sum(rows.by_kind(rows.Y), axis=-1) ** 2 / np.maximum(rows.count, 1)
+        factors, there = self.problem.factors, self._torque_squares > 0
+        share = np.divide(1.0, squares, out=np.full(len(squares), np.nan), where=there & (squares > 0))
+        return {name: 1 - factors.squares(e.X) * share for name, e in self.estimates.items()}
+
+    @cached_property
+    def left_open(self) -> dict[str, Array]:
+        """Standard error of the torque that every estimate predicts on its own log, over that torque's rms, shape (joint,)."""
+        W = self.problem.factors.R[..., :-1]
+        spread = {name: np.sum(W @ e.best_covariance * W, axis=(-2, -1)) for name, e in self.estimates.items()}
+        squares = np.maximum(self._torque_squares, 1e-300)
+        return {name: np.sqrt(np.maximum(found, 0.0) / squares) for name, found in spread.items()}
+
+    @property
+    def _torque_squares(self) -> Array:
+        return np.sum(self.problem.factors.R[..., -1] ** 2, axis=-1)
+
+    @cached_property
+    def noise(self) -> dict[str, list[float | None]]:
+        """Noise of the logs as the first estimate has it [N m, rad], and the encoders' steps [rad], joint by joint."""
+        levels = self.estimates[self.leading].noise_levels
+        steps = encoder_steps(self.logs.fitted[0].q)
+        parts = {"torque": levels.torque, "position": levels.position, "encoder_step": steps}
+        return {name: [finite(x) for x in part] for name, part in parts.items()}
+
+    @property
+    def delay(self) -> tuple[float, float] | None:
+        """Delay of the torques, and its standard error [s], that an estimate found beside the parameters, if one did."""
+        joint = [one for e in self.estimates.values() for one in e.fits.values() if one.delay is not None]
+        if not joint:
+            return None
+        return self.logs.fitted[0].torque.delay + (joint[0].delay or 0.0), float(joint[0].covariance[-1, -1]) ** 0.5
+
+    def summary(self) -> dict[str, Any]:
+        """Return what a summary.json says of it."""
+        truth = None if self.truth is None else list(self.truth.values())
+        models = {name: summarize(e, truth) for name, e in self.estimates.items()}
+        for name, share in self.explained.items():
+            models[name]["explained_share"] = [finite(x) for x in share]
+        delay, base, cutoff = self.delay, self.subject.base, getattr(self.processing.operator, "cutoff", None)
+        return {
+            "parameters": list(self.basis.names),
+            "units": list(self.basis.units),
+            "made_of": None if base is None else base.groupings,
+            "truth": truth,
+            "robot": self.subject.name,
+            "chain": self.request.chain,
+            "estimator": self.request.estimator,
+            "consistent": self.request.consistent,
+            "torque": self._channel(0),
+            "found_delay": None if delay is None else {"delay": delay[0], "sigma": delay[1]},
+            "noise": self.noise,
+            "models": models,
+            "failures": self.failures,
+            "hidden": list(self.hidden),
+            "cutoff": cutoff,
+            "logs": [self._of_log(k) for k in range(len(self.logs.fitted))],
+        }
+
+    def _channel(self, k: int) -> dict[str, Any]:
+        channel = self.logs.fitted[k].torque
+        return {"meaning": channel.meaning, "delay": channel.delay, "gain": channel.gain}
+
+    def _of_log(self, k: int) -> dict[str, Any]:
+        """Return what a summary.json says of one of the logs."""
+        log, name = self.logs.fitted[k], self.logs.names[k] if self.logs.names else ""
+        errors = {model: [finite(x) for x in errors[k]] for model, errors in self.torque_errors.items()}
+        known = {"name": name, "samples": log.samples, "fs": log.fs, "torque": self._channel(k)}
+        return {**known, "torque_error_rms": errors}
+
+
+def _rms_by_kind(rows: Rows, X: Array) -> Array:
+    """Return the rms of the valid residuals of each joint, shape (joint,)."""
+    residual, valid = rows.by_kind((rows.Y - rows.predicted(X)) * rows.valid), rows.by_kind(rows.valid)
+    count = valid.sum(axis=-1)
+    return np.sqrt(np.divide(np.sum(residual**2, axis=-1), count, out=np.full(len(count), np.nan), where=count > 0))

@@ -1,0 +1,88 @@
+"""A fit, judged on each held-out log: made once, whatever is shown of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, final
+
+from experiments.faults import is_told, reason, trace
+from experiments.identification.fit import Fit
+from experiments.identification.held_out import HeldOut, on_last_quarter, on_log
+
+
+@final
+@dataclass(frozen=True)
+class Unjudged:
+    """A held-out log on which a fit could not be judged.
+
+    Parameters
+    ----------
+    title : str
+        What to call it.
+    why : str
+        The reason.
+    traceback : str
+        Of a fault of idbench.
+    """
+
+    title: str
+    why: str
+    traceback: str = ""
+
+    def summary(self) -> dict[str, Any]:
+        """Return what a summary.json says of it."""
+        return {"on": self.title, "models": {}, "failure": self.why}
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """A fit, judged.
+
+    Parameters
+    ----------
+    fit : Fit
+        The fit.
+    on : tuple of HeldOut or Unjudged
+        The fit on each held-out log.
+    """
+
+    fit: Fit
+    on: tuple[HeldOut | Unjudged, ...]
+
+    @property
+    def held_out(self) -> list[HeldOut]:
+        """The logs on which it could be judged."""
+        return [one for one in self.on if isinstance(one, HeldOut)]
+
+    @property
+    def failures(self) -> list[Unjudged]:
+        """The logs on which it could not be judged though they were given for that, and faults."""
+        return [one for one in self.on if isinstance(one, Unjudged) and (self.fit.logs.held_out or one.traceback)]
+
+    @property
+    def good(self) -> bool:
+        """Whether a model is good on the first held-out log."""
+        return isinstance(self.on[0], HeldOut) and any(verdict.word == "good" for verdict in self.on[0].verdicts.values())
+
+    def summary(self) -> dict[str, Any]:
+        """Return what a summary.json says of it, beside the fit's own."""
+        each = [one.summary() for one in self.on]
+        return {"validation": each[0], "validations": each}
+
+
+def judge(result: Fit) -> Judgement:
+    """Return a fit, judged on each held-out log, or on the last quarter of its longest; one that fails leaves the others."""
+    given = (result.logs.held_out or {}).items()
+    if not given:
+        title = f"the last quarter of {result.logs.name(result.logs.longest)}"
+        return Judgement(result, (_judged(title, lambda: on_last_quarter(result)),))
+    return Judgement(result, tuple(_judged(f"held-out log {name}", lambda: on_log(result, name, log)) for name, log in given))  # noqa: B023  # called at once
+
+
+def _judged(title: str, make: Callable[[], HeldOut]) -> HeldOut | Unjudged:
+    try:
+        made = make()
+        _ = made.summary()  # torques, the simulated robot, verdicts: whoever shows them later finds them made
+        return made
+    except Exception as error:  # one log takes nothing away from the others
+        return Unjudged(title, reason(error), "" if is_told(error) else trace(error))

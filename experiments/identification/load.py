@@ -1,0 +1,133 @@
+"""From files to logs: those of a fit, with their delays and the band that suits them, and those held out to judge it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from experiments.errors import ExperimentError
+from experiments.identification.chain_settings import with_cutoff
+from experiments.identification.logs import Logs
+from experiments.identification.reading import ReadLog, ReadOptions, file_of, read, with_delays
+from experiments.identification.request import Request
+from identify import LogError, MotionLog
+from identify.judge.band import Band
+
+MOST_STARTS = 1000
+"""Instants of a log that are looked at for the beginning of another."""
+
+
+@dataclass(frozen=True, eq=False)
+class Loaded:
+    """Logs as they were read, and the request with the band that suits them.
+
+    Parameters
+    ----------
+    request : Request
+        What is asked for.
+    read : tuple of ReadLog
+        The logs.
+    notes : tuple of str
+        What was read, done and assumed.
+    """
+
+    request: Request
+    read: tuple[ReadLog, ...]
+    notes: tuple[str, ...]
+
+    def logs(self, some: slice = slice(None)) -> tuple[MotionLog, ...]:
+        """Return some of the logs, or the pieces of those with gaps."""
+        return tuple(log for one in self.read[some] for log in one.logs)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What to call them."""
+        found = []
+        for one in self.read:
+            several = len(one.logs) > 1
+            found += [f"{one.path.name}, piece {k + 1}" if several else one.path.name for k in range(len(one.logs))]
+        return tuple(found)
+
+
+def load(paths: Sequence[Path], options: ReadOptions, request: Request, *, band: bool, more: int = 0) -> Loaded:
+    """Return logs of one fit.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Their files, or folders of runs.
+    options : ReadOptions
+        How they are read.
+    request : Request
+        What is asked for.
+    band : bool
+        Whether the band is to suit short logs.
+    more : int
+        Parameters that are identified beside those of the basis.
+    """
+    require_different(paths)
+    read_ = [read(file_of(path), options, request) for path in paths]
+    _require_other_samples(read_)
+    of_band = list[str]()
+    if band:
+        p, least = len(request.subject.basis.names) + more, request.processing.operator.cutoff  # type: ignore[attr-defined]
+        needed = Band.of([log for one in read_ for log in one.logs], p, least)
+        if needed.cutoff > least:
+            request, of_band = in_band(request, needed.cutoff), [needed.words(p, least)]
+    if options.delay == "estimate":
+        read_ = with_delays(read_, request)
+    several = len(read_) > 1
+    said = [(f"{one.path.name}: " if several else "") + note for one in read_ for note in one.notes]
+    return Loaded(request, tuple(read_), tuple(dict.fromkeys([*said, *of_band])))
+
+
+def in_band(request: Request, cutoff: float) -> Request:
+    """Return a request with the band up to `cutoff` [Hz]."""
+    return replace(request, method=(with_cutoff(request.processing, cutoff), request.solver))
+
+
+def with_held_out(loaded: Loaded, paths: Sequence[Path], options: ReadOptions, truth: Mapping[str, float] | None) -> Logs:
+    """Return logs of a fit with those on which it is judged.
+
+    Where nothing says what the torques of these mean, it is what those of the first log do.
+    """
+    known = loaded.read[0].channel  # as it was logged; its gain is of its own file
+    delay = str(known.delay) if options.delay else None
+    options, held_out, notes = replace(options, delay=delay, fallback=replace(known, gain=1.0)), {}, list(loaded.notes)
+    require_different(paths)
+    for given in paths:
+        path = file_of(given)
+        try:
+            one = read(path, options, loaded.request)
+        except (LogError, ExperimentError) as error:
+            words = f"--validate {error}" if str(path) in str(error) else f"--validate {path}: {error}"
+            raise ExperimentError(words) from error
+        pieces = [f"of its {len(one.logs)} pieces the longest is judged"] if len(one.logs) > 1 else []
+        notes += [f"{path.name}: {note}" for note in (*one.notes, *pieces)]
+        if any(_within(one.longest, log) for log in loaded.logs()):
+            raise ExperimentError(f"--validate {path} holds the motion that is identified: give another motion, or none")
+        held_out[str(given)] = one.longest
+    return Logs(loaded.logs(), loaded.names, held_out, tuple(notes), truth)
+
+
+def require_different(paths: Sequence[Path]) -> None:
+    """Raise ExperimentError if a log is given twice."""
+    twice = [str(path) for k, path in enumerate(paths) if path.absolute() in [p.absolute() for p in paths[:k]]]
+    if twice:
+        raise ExperimentError(f"{', '.join(twice)} is given twice: it would count twice")
+
+
+def _require_other_samples(every: Sequence[ReadLog]) -> None:
+    """Raise ExperimentError if two files hold the same samples."""
+    for one, other in combinations(every, 2):
+        if np.array_equal(one.columns.q, other.columns.q) and np.array_equal(one.columns.tau, other.columns.tau):
+            raise ExperimentError(f"{other.path} holds the same samples as {one.path}: they would count twice; leave one out")
+
+
+def _within(one: MotionLog, other: MotionLog) -> bool:
+    """Return whether a log is a part of another, or the other of it."""
+    short, long = sorted((one, other), key=lambda log: log.samples)
+    starts = np.flatnonzero((long.q[: long.samples - short.samples + 1] == short.q[0]).all(axis=1)) if short.n == long.n else ()
+    return any(np.array_equal(long.q[k : k + short.samples], short.q) for k in starts[:MOST_STARTS])

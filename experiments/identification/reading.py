@@ -1,0 +1,244 @@
+"""Logs, read as options say."""
+
+import json
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.errors import ExperimentError
+from experiments.identification.read_options import ColumnOptions
+from experiments.identification.request import Request
+from experiments.option_types import Meaning
+from identify import Array, LogError, MotionLog, SettingError, TimeError, TorqueChannel
+from identify.data.log_columns import LogColumns
+from identify.data.resample import Repaired
+from identify.files.layout import LogLayout
+from identify.files.reading import LAYOUT_FILE, layout_of, read_columns
+from identify.judge.delay import DelayEstimate
+
+SLOWEST = 0.5
+"""Sampling period [s] that no robot's log has: its times are in another unit."""
+
+TURN = 2 * np.pi
+
+NEARLY = 0.2
+"""Share of a turn by which a jump may differ from one: the joint moves on between two samples."""
+
+
+def file_of(log: Path) -> Path:
+    """Return the log of a results folder, or the log itself."""
+    if not log.is_dir() or (log / "metadata.yaml").is_file():  # of a ROS bag
+        return log
+    if not (log / "log.parquet").is_file():
+        raise ExperimentError(f"there is no log.parquet in {log}: name a log, or the folder of a run")
+    return log / "log.parquet"
+
+
+def stated_by(log: Path) -> dict[str, Any]:
+    """Return what the summary of a results folder says of its run: robot, parameters, truth; nothing of a file."""
+    path = log / "summary.json"
+    if not path.is_file():
+        return {}
+    try:
+        stated = json.loads(path.read_text())
+        names, values = stated["parameters"], stated["truth"]
+        known = None if values is None else dict(zip(names, map(float, values), strict=True))
+        return {"robot": str(stated.get("robot") or stated["scenario"]["robot"]), "truth": known}
+    except (ValueError, KeyError, TypeError, OSError, RecursionError) as error:
+        raise ExperimentError(f"{path} is no summary of a run ({error}): name the log itself, {log / 'log.parquet'}") from error
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """How a log is read.
+
+    Parameters
+    ----------
+    torque, delay : str, optional
+        What its torque means, and its delay, as options say.
+    unwrap : bool
+        Whether 2 pi jumps of the angles are undone.
+    fallback : TorqueChannel, optional
+        What its torque means where the file says nothing.
+    columns : ColumnOptions
+        What the columns are, as options say.
+    """
+
+    torque: Meaning | None = None
+    delay: str | None = None
+    unwrap: bool = False
+    fallback: TorqueChannel | None = None
+    columns: ColumnOptions = ColumnOptions()  # noqa: RUF009  # frozen
+
+
+@dataclass(frozen=True, eq=False)
+class ReadLog:
+    """A log as it was read.
+
+    Parameters
+    ----------
+    path : Path
+        Its file.
+    logs : tuple of MotionLog
+        The log; its pieces, if it has gaps.
+    columns : LogColumns
+        What the file holds.
+    channel : TorqueChannel
+        What its torque means, as it was logged.
+    repaired : Repaired or None
+        What was done to its clock, if that was asked for.
+    notes : tuple of str
+        What was done or assumed.
+    """
+
+    path: Path
+    logs: tuple[MotionLog, ...]
+    columns: LogColumns
+    channel: TorqueChannel
+    repaired: Repaired | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def longest(self) -> MotionLog:
+        """The log, or the longest of its pieces."""
+        return max(self.logs, key=lambda log: log.samples)
+
+
+def read(path: Path, options: ReadOptions, request: Request) -> ReadLog:
+    """Return the log, its torque read as the options say; its delay is that which is stated."""
+    columns, delay, joints = columns_of(path, options.columns), options.delay, request.subject.mounting.joints
+    columns = columns if columns.joints or len(joints) != columns.n else replace(columns, joints=joints)
+    try:
+        columns = columns.ordered(request.subject.robot.joints)
+    except LogError as error:
+        raise ExperimentError(
+            f"{path}: {error}; name the robot of the log with --robot{_joints_of(columns, request)}"
+        ) from error
+    stated = columns.torque or options.fallback
+    meaning = options.torque or (stated.meaning if stated else None)
+    if meaning is None:
+        raise ExperimentError(
+            f"{path} does not say what its torque means: add --torque held (a controller's command), instantaneous (a "
+            "measurement) or averaged, and --torque-delay SECONDS or estimate"
+        )
+    channel = channel_of(stated, meaning, delay)
+    _require_seconds(path, columns.t)
+    if not np.any(columns.tau) and np.ptp(columns.q, axis=0).any():
+        raise ExperimentError(f"{path}: all torques are 0: there is nothing to identify")
+    columns = replace(columns, q=_turned(path, columns.q, request, options.unwrap))
+    assumed = delay is None and stated is None
+    notes = [columns.said] if columns.said else []
+    notes += ["no --torque-delay was given, 0 is assumed: `estimate` finds it"] if assumed else []
+    if options.columns.resample or columns.t_tau is not None:
+        repaired = Repaired.of(columns, channel)
+        words = [*repaired.words(request.subject.robot.joints), *notes]
+        return ReadLog(path, repaired.logs, columns, channel, repaired, tuple(words))
+    try:
+        log = MotionLog.at_times(columns.t, columns.q, columns.tau, channel, columns.conditions)
+    except TimeError as error:
+        late = f" --torque-delay {channel.delay:g}" if channel.delay else ""
+        raise ExperimentError(
+            f"{path}: {error}: add --resample, or write it anew and look: uv run idbench resample {shlex.quote(str(path))} "
+            f"--torque {meaning}{late} --out uniform.parquet"
+        ) from error
+    return ReadLog(path, (log,), columns, channel, None, tuple(notes))
+
+
+def with_delays(every: Sequence[ReadLog], request: Request) -> list[ReadLog]:
+    """Return logs with the delay of their torques, estimated from all that have the same meaning together."""
+    from identify.judge.delay import estimate_delay
+
+    found = {}
+    for meaning in {log.logs[0].torque.meaning for log in every}:
+        alike = [log for read in every for log in read.logs if log.torque.meaning == meaning]
+        found[meaning] = estimate_delay(alike, request.subject.basis, request.processing)
+    return [_delayed(log, found[log.logs[0].torque.meaning]) for log in every]
+
+
+def _delayed(read: ReadLog, found: DelayEstimate) -> ReadLog:
+    logs = tuple(replace(log, torque=replace(log.torque, delay=found.delay)) for log in read.logs)
+    sure = f"{1e3 * found.delay:.4g} ms, sigma {1e3 * found.sigma:.2g} ms (not in the sigmas above)"
+    channel = replace(read.channel, delay=found.delay)
+    return replace(read, logs=logs, channel=channel, notes=(*read.notes, f"torque delay estimated from the log: {sure}"))
+
+
+def columns_of(path: Path, options: ColumnOptions) -> LogColumns:
+    """Return the columns of a log, as the file beside it and the options say."""
+    if not options.stated:
+        return read_columns(path)
+    layout = LogLayout.read(options.layout) if options.layout else None
+    if layout is None:
+        beside = LogLayout.beside(path) if path.suffix.lower() != LAYOUT_FILE else (LogLayout.read(path), path)
+        layout = beside[0] if beside else layout_of(path)
+    for quantity, texts in (("columns", options.columns), ("unit", options.units)):
+        for text in texts:
+            name, mark, value = text.partition("=")
+            if name not in ("t", "q", "qd", "tau") or not mark or not value:
+                raise ExperimentError(f"--{quantity} {text}: give t=..., q=..., qd=... or tau=..., such as q=position_*")
+            given = tuple(value.split(",")) if quantity == "columns" else value
+            layout = layout.where(name, replace(getattr(layout, name), **{quantity: given}))
+    try:
+        _ = [getattr(layout, name).scale(name) for name in ("t", "q", "qd", "tau")]
+    except SettingError as error:
+        raise ExperimentError(f"--units: {error}") from error
+    try:
+        rows = {name: float(value) for name, _, value in (text.partition("=") for text in options.rows)}
+    except ValueError:
+        raise ExperimentError(f"--rows {' '.join(options.rows)}: give columns and numbers, such as episode_index=3") from None
+    return read_columns(path, replace(layout, gain=options.gain or layout.gain, rows={**layout.rows, **rows}))
+
+
+def _joints_of(columns: LogColumns, request: Request) -> str:
+    """Return how to say which joints a log has, where they are fewer than the robot's."""
+    known = request.subject.robot.joints
+    if columns.n >= len(known):
+        return ""
+    those = columns.joints if set(columns.joints) <= set(known) and columns.joints else known[: columns.n]
+    return f", or the joints that it has: --joints {' '.join(those)} (the others are held at 0, or where --lock says)"
+
+
+def _require_seconds(path: Path, t: Array) -> None:
+    """Raise ExperimentError if times are those of a log in another unit."""
+    step = float(np.median(np.diff(t))) if len(t) > 1 and np.isfinite(t).all() else 0.0
+    if step >= SLOWEST:
+        raise ExperimentError(
+            f"{path} has a sample every {step:.4g} s, if t is in s: is it in ms, microseconds or ns? Divide it by 1e3, 1e6 or "
+            "1e9"
+        )
+
+
+def _turned(path: Path, q: Array, request: Request, unwrap: bool) -> Array:
+    """Return positions whose hinges do not jump by a turn, undone if that is wanted; raise ExperimentError if it is not."""
+    tree, q = request.subject.tree, q.copy()
+    for j, joint in enumerate(tree.joints):
+        jumps = np.abs(np.abs(np.diff(q[:, j])) - TURN) < NEARLY * TURN
+        if joint.kind != "hinge" or not jumps.any():
+            continue
+        if not unwrap:
+            k = int(np.argmax(jumps))
+            raise ExperimentError(
+                f"{path}: {joint.name} jumps from {q[k, j]:.4g} to {q[k + 1, j]:.4g} rad at sample {k + 1}: an angle that "
+                "starts anew at every turn? Add --unwrap to count the turns"
+            )
+        known = np.isfinite(q[:, j])
+        q[known, j] = np.unwrap(q[known, j])
+    return q
+
+
+def channel_of(stated: TorqueChannel | None, meaning: Meaning, delay: str | None) -> TorqueChannel:
+    """Return the channel that a file and the options state together: another meaning voids the delay that the file states."""
+    stated = stated or TorqueChannel(meaning)
+    return replace(stated, meaning=meaning, delay=_seconds(delay, stated.delay if stated.meaning == meaning else 0.0))
+
+
+def _seconds(delay: str | None, otherwise: float) -> float:
+    if delay is None or delay == "estimate":
+        return otherwise
+    try:
+        return float(delay)
+    except ValueError:
+        raise ExperimentError(f"--torque-delay {delay} must be seconds, such as 0.002, or estimate") from None

@@ -1,0 +1,101 @@
+"""What is asked for: a robot, models, a chain and an estimator, checked before any log is read."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from experiments.errors import ExperimentError
+from experiments.identification.choices import Consistency, Start
+from experiments.identification.defaults import CHAIN, ESTIMATOR
+from experiments.identification.simulators import RobotPlant, ScenarioLoop
+from experiments.identification.subject import Subject
+from identify import CHAINS, ESTIMATORS, MODELS, AbstractEstimator, Chain, ExplicitModel, MotionLog, Problem, Simulation
+from identify.blame import blamed
+from identify.estimators.settle import settled
+from identify.signals.masks import ReversalMask
+from sim.scenario.scenario import Scenario
+
+
+@dataclass(frozen=True, eq=False)
+class Request:
+    """What is asked for of logs; names and settings are checked when it is made.
+
+    Parameters
+    ----------
+    subject : Subject
+        The robot.
+    models : tuple of str
+        Names of the models.
+    chain, estimator : str
+        Their names.
+    method : tuple of Chain and AbstractEstimator, optional
+        Both with settings of their own, instead of those that have the names.
+    trim : float, optional
+        Time at either end of a log that makes no rows [s]; by default what the chain needs.
+    name : str
+        What to call it beside others of the same log; by default chain and estimator.
+    loops : tuple of Scenario
+        The closed loops in which the logs were recorded, for estimators that simulate them: one for each log.
+    start : {"least-squares", "file"}
+        Where estimators begin that simulate or filter: at the least-squares estimate, or at the parameters of the robot's file.
+    consistent : {"no", "pullback", "entropic"}
+        Whether estimates are moved to the nearest physically consistent parameters.
+
+    Raises
+    ------
+    ExperimentError, IdentificationError, BenchError
+        If a name is unknown, or a setting would not be used.
+    """
+
+    subject: Subject = field(default_factory=Subject)
+    models: tuple[str, ...] = ("explicit", "implicit", "power")
+    chain: str = CHAIN
+    estimator: str = ESTIMATOR
+    method: tuple[Chain, AbstractEstimator] | None = None
+    trim: float | None = None
+    name: str = ""
+    loops: tuple[Scenario, ...] = ()
+    start: Start = "least-squares"
+    consistent: Consistency = "no"
+
+    def __post_init__(self) -> None:
+        _ = self.subject.basis, self.processing, self.solver, [MODELS.create(name) for name in self.models]
+        if self.start != "least-squares" and not self.solver.begins:
+            raise ExperimentError(f"--start {self.start}: {self.estimator} needs no start; leave it out, or take IV or DIDIM")
+
+    @property
+    def processing(self) -> Chain:
+        """The chain."""
+        chain = self.method[0] if self.method else CHAINS.create(self.chain)
+        if (couplings := self.subject.tree.couplings) and isinstance(chain.mask, ReversalMask):
+            chain = replace(chain, mask=replace(chain.mask, couplings=tuple(c.weights for c in couplings)))
+        return chain if self.trim is None else replace(chain, trim=self.trim)
+
+    @property
+    def solver(self) -> AbstractEstimator:
+        """The estimator."""
+        return self.method[1] if self.method else ESTIMATORS.create(self.estimator)
+
+    @property
+    def simulates(self) -> bool:
+        """Whether its estimator simulates the robot."""
+        return bool({"loop", "plant"} & self.solver.needs)
+
+    @property
+    def label(self) -> str:
+        """What distinguishes this identification from others of the same log."""
+        return self.name or f"{self.chain}-{self.estimator}"
+
+    def problem(self, logs: Sequence[MotionLog]) -> Problem:
+        """Return logs, robot and chain, by the explicit model; nonlinear parameters at their operating point."""
+        basis, simulation = self.subject.basis, self._simulation(tuple(logs))
+        with blamed():
+            return settled(Problem(tuple(logs), basis, ExplicitModel(), self.processing, simulation))
+
+    def _simulation(self, logs: tuple[MotionLog, ...]) -> Simulation:
+        """Return how the robot is simulated, for estimators that need it."""
+        needs, subject = self.solver.needs, self.subject
+        start = None if self.start == "least-squares" else np.array(list(subject.truth(subject.robot).values()))
+        loop = ScenarioLoop.of(subject, self.loops, logs) if "loop" in needs and self.loops else None
+        return Simulation(loop, RobotPlant(subject) if "plant" in needs else None, start)

@@ -1,0 +1,1 @@
+"""Reports: text, figures and pages, views of a judgement."""

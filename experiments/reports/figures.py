@@ -1,0 +1,164 @@
+"""Figures of an identification's report."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from experiments.identification.fit import Fit
+from experiments.identification.held_out import HeldOut
+from experiments.reports.friction_curves import FRICTIONS, FrictionCurves
+from experiments.reports.html import svg
+from experiments.style import model_color
+from experiments.text import percentage
+from identify import Array, ExplicitModel
+from identify.judge.diagnosis import cutoffs, instants, spectrum
+from identify.judge.noise_spectra import noise_spectra
+
+RESOLUTION = 0.25
+"""Distance of the frequencies of spectra [Hz]."""
+
+SIGMAS = 2.0
+"""Half the width of intervals, in sigma: 95 %."""
+
+WIDTH = 11.0
+"""Of figures [inch]."""
+
+FEW = 2
+"""Joints from which on panels stand in two columns."""
+
+
+def torques_figure(one: HeldOut) -> str:
+    """Return measured and predicted torques on a held-out log, joint by joint."""
+    rows = one.problem.parts[0]
+    figure, panels = _panels(rows.kinds, 1.5)
+    models = list(one.torques)
+    for j, panel in enumerate(panels):
+        own = rows.group == j
+        shown = np.where(rows.valid[own], rows.Y[own], np.nan)
+        panel.plot(rows.time[own], shown, color="0.55", lw=2.4, label="measured")
+        for model in reversed(models):
+            X = one.fit.estimates[model].X
+            predicted = np.where(rows.valid[own], rows.predicted(X)[own], np.nan)
+            panel.plot(rows.time[own], predicted, color=_color(model), lw=1.0, label=model)
+        validation = one.torques[models[0]]
+        joint = one.fit.subject.robot.joints[j]
+        panel.set_title(f"{joint}: {validation.rms[j]:.2g} N m off, {percentage(validation.percent[j])} %", loc="left")
+    _last(panels, "time [s]", "torque [N m]")
+    _legend(figure, panels[0])
+    return svg(figure)
+
+
+def parameters_figure(fit: Fit) -> str:
+    """Return estimates with intervals, over the size of each: those of the first model, and how others differ."""
+    names = fit.basis.names
+    models = list(fit.estimates)
+    leading = fit.estimates[models[0]].X
+    size = np.maximum(np.abs(leading), 1e-300)
+    figure, (panel,) = _panels(1, 2.9)
+    at = np.arange(len(names))
+    for i, model in enumerate(models):
+        estimate = fit.estimates[model]
+        off, half = 100 * (estimate.X - leading) / size, 100 * SIGMAS * estimate.best_sigma / size
+        x = at + 0.22 * (i - (len(models) - 1) / 2)
+        panel.errorbar(x, off, half, fmt="o", ms=2.5, lw=1.2, color=_color(model), label=model)
+    if fit.truth is not None:
+        true = np.array(list(fit.truth.values()))
+        panel.plot(at, 100 * (true - leading) / size, "_", ms=9, color="black", label="true")
+    panel.set_yscale("symlog", linthresh=1.0, linscale=0.6)
+    panel.set_ylim(-300, 300)
+    panel.set_yticks([-100, -10, -1, 0, 1, 10, 100], ["-100", "-10", "-1", "0", "1", "10", "100"])
+    panel.set_xticks(at, names, rotation=90, fontsize=6)
+    panel.set_xlim(-1, len(names))
+    panel.set_ylabel(f"difference from {models[0]}, with\n95 % interval [% of its value]")
+    _legend(figure, panel)
+    return svg(figure)
+
+
+def friction_figure(fit: Fit) -> str:
+    """Return friction over velocity: what the rigid body leaves of the torque, and the law that was found.
+
+    Beyond the speeds of the log the law is dotted. One that grows with the load is drawn at the least and most load of the log.
+    """
+    estimate = fit.estimates[next(iter(fit.estimates))]
+    if not any(p.kind in FRICTIONS for p in fit.basis.parameters):
+        return ""
+    curves = FrictionCurves(fit, estimate.X)
+    figure, panels = _panels(fit.basis.n, 1.6)
+    for j, panel in enumerate(panels):
+        v, torque = curves.measured(j)
+        panel.plot(v, torque, ".", ms=2, color="0.6", label="torque less the rigid body's")
+        for number, line in enumerate(curves.laws(j)):
+            inside = np.abs(line.v) <= np.abs(v).max(initial=0.0)
+            label = "law that was found" if number == 0 else None
+            panel.plot(line.v[inside], line.torque[inside], color=_color("explicit"), lw=1.6, label=label)
+            beyond = np.where(inside, np.nan, line.torque)
+            panel.plot(line.v, beyond, ":", color=_color("power"), lw=1.6, label=label and "beyond the speeds of the log")
+        panel.set_title(f"{fit.subject.robot.joints[j]}: {' + '.join(fit.subject.laws.names[j])}", loc="left")
+    _last(panels, "velocity [rad/s]", "friction [N m]")
+    _legend(figure, panels[0])
+    return svg(figure)
+
+
+def spectra_figure(fit: Fit) -> str:
+    """Return spectra of what the first model leaves, and of the noise that was found, joint by joint; of the first log."""
+    alone = fit.on(0)
+    model, estimate = next(iter(alone.estimates.items()))
+    left = instants(alone.problem.signals[0], alone.basis, ExplicitModel(), alone.processing, estimate.X)
+    fs, f = alone.logs.fitted[0].fs, np.empty(0)
+    figure, panels = _panels(alone.basis.n, 1.6)
+    lines = []
+    for j in range(alone.basis.n):
+        weight = left.weight[j]
+        f, density = spectrum(left.residual[j] * weight, fs, RESOLUTION)
+        lines.append(density / np.sqrt(max(np.mean(weight**2), 1e-12)))
+    noise = noise_spectra(alone.problem, estimate.noise_levels, f)
+    for j, panel in enumerate(panels):
+        panel.set_title(alone.subject.robot.joints[j], loc="left")
+        panel.plot(f[1:], lines[j][1:], color=_color(model), lw=1.0, label="residual")
+        panel.plot(f[1:], noise[0][j, 1:], color="0.5", lw=1.0, ls="--", label="noise of the torque")
+        panel.plot(f[1:], noise[1][j, 1:], color="tab:brown", lw=1.0, ls=":", label="noise of the positions")
+        for cutoff in cutoffs(alone.processing, fs).values():
+            panel.axvline(cutoff, color="0.8", lw=1.0)
+        if not lines[j][1:].any():  # a joint that never moves
+            continue
+        top = lines[j][1:].max()
+        panel.set_xscale("log")
+        panel.set_yscale("log")
+        panel.set_ylim(top * 1e-5, top * 3)
+        panel.minorticks_off()
+    _last(panels, "frequency [Hz]", "[N m/√Hz]")
+    _legend(figure, panels[0])
+    return svg(figure)
+
+
+def _panels(count: int, height: float) -> tuple[Figure, list[Axes]]:
+    """Return a figure with a panel each, in two columns if there are many."""
+    columns = 2 if count > FEW else 1
+    lines = -(-count // columns)
+    whole = height * lines + 0.5
+    figure = Figure(figsize=(WIDTH, whole))
+    panels = list(np.atleast_1d(figure.subplots(lines, columns)).ravel())
+    # By hand: a layout that is solved for draws everything twice.
+    left, right, bottom, top = 0.75 / WIDTH, 1 - 0.1 / WIDTH, 0.5 / whole, 1 - 0.5 / whole
+    figure.subplots_adjust(left, bottom, right, top, wspace=0.15, hspace=0.42)
+    for panel in panels[count:]:
+        panel.set_visible(False)
+    return figure, panels[:count]
+
+
+def _last(panels: Sequence[Axes], x: str, y: str) -> None:
+    for panel in panels[-2:]:
+        panel.set_xlabel(x)
+    for panel in panels[:: 2 if len(panels) > FEW else 1]:
+        panel.set_ylabel(y)
+
+
+def _legend(figure: Figure, panel: Axes) -> None:
+    handles, labels = panel.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="upper right", ncols=8, frameon=False)
+
+
+def _color(model: str) -> Array:
+    return np.array(model_color(model))[:3] / 255

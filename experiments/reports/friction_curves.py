@@ -1,0 +1,145 @@
+"""Friction over velocity: as measured, and as the laws have it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from experiments.identification.fit import Fit
+from identify import AbstractBlock, Array, Basis, Chain, OfJoints
+from identify.arrays import combined
+from identify.basis import LoadFriction
+from identify.basis.joint_law import AbstractFriction
+from identify.basis.of_joints import inner_of
+from identify.judge.diagnosis import filtered
+from identify.rows.grid import Kernel
+from identify.signals.signals import Signals
+from identify.signals.state import State
+
+FRICTIONS = ("viscous friction", "Coulomb friction", "friction", "shape of friction", "offset")
+"""Kinds of parameters that make a friction law."""
+
+WHOLE = 0.99
+"""Share of a row's weights from which on the mask takes nothing of it."""
+
+BEYOND = 1.3
+"""Up to which multiple of the speeds of the log a law is drawn."""
+
+POINTS = 201
+"""Of a curve to either side."""
+
+LOADS = (0.05, 0.95)
+"""Quantiles of the load at which a law that grows with it is drawn."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A law over velocity."""
+
+    v: Array
+    """Velocity [rad/s], shape (point,)."""
+    torque: Array
+    """Friction [N m], shape (point,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionCurves:
+    """The friction of the joints of an identification.
+
+    Parameters
+    ----------
+    fit : Fit
+        The identification.
+    X : Array, shape (p,)
+        The parameters of one of its estimates.
+    """
+
+    fit: Fit
+    X: Array
+
+    def measured(self, j: int) -> tuple[Array, Array]:
+        """Return velocities of a joint, and its torque less the rigid body's, at rows of which the mask takes nothing."""
+        v, torque = [], []
+        for rows, signals in zip(self.fit.problem.parts, self.fit.problem.signals, strict=True):
+            qd, weight = _seen(signals, self.fit.processing)
+            own = np.flatnonzero(rows.group == j)[weight[j] > WHOLE]
+            v.append(qd[j][weight[j] > WHOLE])
+            torque.append((rows.Y - rows.predicted(self.X))[own] + self._law(signals, j)[weight[j] > WHOLE])
+        return np.concatenate(v), np.concatenate(torque)
+
+    def laws(self, j: int) -> Iterator[Curve]:
+        """Yield the law of a joint over velocity, with each of some loads where it depends on that."""
+        fastest = BEYOND * max(np.abs(self.measured(j)[0]).max(initial=0.0), 1e-3)
+        side = np.linspace(0, fastest, POINTS)[1:]
+        v = np.concatenate([-side[::-1], [0.0], side])
+        for load in self._loads(j):
+            torque = self._at(j, v, load)
+            torque[POINTS - 1] = np.nan  # where friction jumps
+            yield Curve(v, torque)
+
+    def _law(self, signals: Signals, j: int) -> Array:
+        """Return the friction of a joint by its law at the rows, shape (row,)."""
+        laws, X = self._laws
+        total = combined(laws.explicit(signals.state), laws.names, X, np.zeros(signals.state.q.shape))
+        return _rows_of(signals, self.fit.processing, total)[j]
+
+    def _at(self, j: int, v: Array, load: float) -> Array:
+        """Return the law of a joint at velocities, in the middle of its positions, under a load."""
+        laws, X = self._laws
+        blocks = tuple(_loaded(block, load) for block in laws.blocks)
+        state = self.fit.problem.signals[0].state
+        q = np.repeat(np.median(state.q, axis=-1)[:, None], len(v), axis=1)
+        conditions = {name: np.repeat(np.median(x, axis=-1)[:, None], len(v), axis=1) for name, x in state.conditions.items()}
+        moving = State(q, np.tile(v, (len(q), 1)), np.zeros_like, conditions)
+        columns = replace(laws, blocks=blocks).explicit(moving)
+        return combined(columns, laws.names, X, np.zeros(q.shape))[j]
+
+    def _loads(self, j: int) -> list[float]:
+        """Return the loads at which a law of a joint is drawn: one, if it depends on none."""
+        own = [inner_of(block) for block in self._laws[0].blocks if not isinstance(block, OfJoints) or j in block.joints]
+        law = next((block for block in own if isinstance(block, LoadFriction)), None)
+        if law is None:
+            return [0.0]
+        load = np.abs(law.load(self.fit.problem.signals[0].state)[j])
+        return [float(x) for x in np.quantile(load, LOADS)]
+
+    @cached_property
+    def _laws(self) -> tuple[Basis, Array]:
+        """The laws of friction of the joints, and their parameters."""
+        basis = self.fit.basis
+        names = [p.name for p in basis.parameters if p.kind in FRICTIONS and p.joint is not None]
+        X = np.array([self.X[basis.names.index(name)] for name in names])
+        laws = basis.renamed({name: name for name in names})
+        own = tuple(b for b in laws.blocks if {p.name for p in b.parameters(basis.n)} & set(names))
+        return replace(laws, blocks=own, order=(), held={}), X
+
+
+@dataclass(frozen=True)
+class _Loaded(AbstractFriction):
+    """Friction under a load that does not change."""
+
+    load: float
+    symbol = "Fl"
+    unit = "1"
+
+    def force(self, q: Array, qd: Array) -> Array:
+        del q
+        return self.load * np.sign(qd)
+
+
+def _loaded(block: AbstractBlock, load: float) -> AbstractBlock:
+    """Return a block whose load is a given one."""
+    made = _Loaded(load) if isinstance(inner_of(block), LoadFriction) else inner_of(block)
+    return replace(block, block=made) if isinstance(block, OfJoints) else made
+
+
+def _seen(signals: Signals, chain: Chain) -> tuple[Array, Array]:
+    """Return velocities and weights as the rows see them, shape (joint, row) each."""
+    return filtered(signals, chain)["qd"], _rows_of(signals, chain, signals.weight)
+
+
+def _rows_of(signals: Signals, chain: Chain, x: Array) -> Array:
+    """Return signals as the rows see them, shape (joint, row)."""
+    response = chain.operator.response(signals.fs)
+    return Kernel(response / response.sum(), (len(response) - 1) // 2, chain.grid(signals.log)).apply(x)

@@ -1,0 +1,52 @@
+"""A log as a picture: its motion, torques, spectra and clock."""
+
+import numpy as np
+import scipy
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from experiments.identification.log_facts import LogFacts
+from experiments.style import JOINTS
+from identify import Array
+
+POINTS = 4000
+"""Points of a curve at the most: more are not seen."""
+
+
+def figure_of(facts: LogFacts) -> Figure:
+    """Return positions, velocities and torques over time, spectra of the torques, and the steps of the clock."""
+    figure = Figure(figsize=(11, 9), layout="constrained")
+    grid = figure.add_gridspec(4, 2, height_ratios=(1, 1, 1, 1))
+    log, step = facts.log, max(1, facts.log.samples // POINTS)
+    panels = [figure.add_subplot(grid[row, :]) for row in range(3)]
+    shown = (("q [rad]", log.q), ("qd [rad/s]", facts.velocities), ("torque [N m]", log.tau))
+    for panel, (name, values) in zip(panels, shown, strict=True):
+        for j, joint in enumerate(facts.joints):
+            panel.plot(log.t[::step], values[::step, j], color=_color(j), lw=0.8, label=joint)
+        panel.set_ylabel(name)
+    panels[-1].set_xlabel("time [s]")
+    handles, labels = panels[-1].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=8, frameon=False)
+    spectra, clock = figure.add_subplot(grid[3, 0]), figure.add_subplot(grid[3, 1])
+    f, power = scipy.signal.welch(log.tau, log.fs, nperseg=min(log.samples, round(4 * log.fs)), axis=0)
+    for j in range(log.n):
+        spectra.loglog(f[1:], np.sqrt(power[1:, j]), color=_color(j), lw=0.8)
+    spectra.set_xlabel("frequency [Hz]")
+    spectra.set_ylabel("torque [N m/$\\sqrt{Hz}$]")
+    _clock(clock, facts)
+    return figure
+
+
+def _clock(panel: Axes, facts: LogFacts) -> None:
+    """Draw the time steps of the file, and of the clock that was found."""
+    t, clock = facts.columns.t, facts.repaired.clock
+    panel.plot(t[1:], 1e3 * np.diff(t), ".", ms=2, color="0.6", label="steps of the file")
+    panel.plot(clock.t[1:], 1e3 * np.diff(clock.t), ".", ms=2, color="tab:blue", label="steps that count")
+    panel.set_xlabel("time [s]")
+    panel.set_ylabel("time step [ms]")
+    panel.set_ylim(bottom=0)
+    panel.legend(frameon=False, markerscale=4)
+
+
+def _color(j: int) -> Array:
+    return np.array(JOINTS[j % len(JOINTS)]) / 255

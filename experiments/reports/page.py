@@ -1,0 +1,85 @@
+"""The report of an identification: one HTML file that needs no other."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.metadata import version
+from typing import Any
+
+from experiments.identification.fit import Fit
+from experiments.identification.held_out import HeldOut
+from experiments.identification.judgement import Judgement, Unjudged
+from experiments.reports.figures import (
+    friction_figure,
+    parameters_figure,
+    spectra_figure,
+    torques_figure,
+)
+from experiments.reports.html import rendered
+from experiments.text import number, percentage
+
+
+def report(judgement: Judgement, warnings: Mapping[str, Sequence[str]], notes: Sequence[str], command: str) -> str:
+    """Return the page: whether to trust it, what to check, torques, parameters, friction, residuals, logs, the command."""
+    fit, first = judgement.fit, judgement.on[0]
+    subject = fit.subject
+    cutoff = getattr(fit.processing.operator, "cutoff", None)
+    return rendered(
+        "experiments.reports",
+        "identify.html.j2",
+        title=f"{subject.tree.name}: {fit.logs.title}",
+        subtitle=f"{subject.tree.n} joints, {len(fit.basis.names)} parameters, {fit.request.estimator}",
+        verdicts=[] if isinstance(first, Unjudged) else list(_verdicts(first)),
+        unjudged=first.why if isinstance(first, Unjudged) else "",
+        failures=fit.failures,
+        warnings={about: messages for about, messages in warnings.items() if messages},
+        unseen=[_held_out(one) for one in judgement.held_out],
+        parameters=parameters_figure(fit),
+        parameter_heads=[f"{model} {what}" for model in fit.estimates for what in ("X", "sigma", "%")],
+        parameter_rows=list(_parameters(fit)),
+        friction=friction_figure(fit),
+        spectra=spectra_figure(fit),
+        joints=subject.robot.joints,
+        logs=list(_logs(fit)),
+        notes=notes,
+        command=command,
+        version=version("idbench"),
+        robot=subject.name,
+        chain=fit.request.chain,
+        cutoff="" if cutoff is None else f"{cutoff:g} Hz",
+        estimator=fit.request.estimator,
+    )
+
+
+def _verdicts(one: HeldOut) -> Iterator[tuple[str, str, str]]:
+    for model, verdict in one.verdicts.items():
+        yield model, verdict.word, "; ".join(verdict.reasons)
+
+
+def _held_out(one: HeldOut) -> tuple[str, str, list[str], list[list[str]]]:
+    """Return title, figure and table of a held-out log."""
+    torques = one.torques
+    heads = ["rms of the torque", *(f"{model} {what}" for model in torques for what in ("rms", "%", "R2"))]
+    rows = []
+    for j, joint in enumerate(one.fit.subject.robot.joints):
+        first = next(iter(torques.values()))
+        cells = [cell for v in torques.values() for cell in (f"{v.rms[j]:.3g}", percentage(v.percent[j]), f"{v.R2[j]:.4f}")]
+        rows.append([joint, f"{first.level[j]:.3g}", *cells])
+    return one.title, torques_figure(one), heads, rows
+
+
+def _parameters(fit: Fit) -> Iterator[list[str]]:
+    base = fit.subject.base
+    for i, (name, unit) in enumerate(zip(fit.basis.names, fit.basis.units, strict=True)):
+        cells = []
+        for e in fit.estimates.values():
+            share = 100 * e.best_sigma[i] / abs(e.X[i]) if e.X[i] else float("inf")
+            cells += [number(e.X[i]), f"{e.best_sigma[i]:.2g}", percentage(share)]
+        yield [f"{name} [{unit}]", *cells, base.groupings[name] if base else ""]
+
+
+def _logs(fit: Fit) -> Iterator[list[Any]]:
+    errors = next(iter(fit.torque_errors.values()), None)
+    for k, log in enumerate(fit.logs.fitted):
+        name = fit.logs.name(k)
+        torque = f"{log.torque.meaning}, delay {1e3 * log.torque.delay:.3g} ms"
+        left = [] if errors is None else [f"{x:.2g}" for x in errors[k]]
+        yield [name, f"{log.fs:.5g}", f"{log.samples / log.fs:.4g}", torque, *left]

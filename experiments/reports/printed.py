@@ -1,0 +1,161 @@
+"""Identifications as text."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from math import isfinite, log2, pi
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from experiments.identification.consistent_estimate import words_of_consistency
+from experiments.identification.fit import Fit
+from experiments.identification.held_out import HeldOut
+from experiments.identification.iterations import words_of_iterations
+from experiments.identification.judgement import Unjudged
+from experiments.identification.remedies import SURE
+from experiments.identification.warnings import FLAGS, doubtful, used
+from experiments.text import WORTHLESS, new_table, number, percent, percentage, print_titled
+from identify import AsLogged, Estimate
+
+
+def print_fit(console: Console, fit: Fit, title: str) -> None:
+    """Print truth, if it is known, and of each model estimate, error or sigma, %sigma, Cond(W) and what is explained.
+
+    Sigma is the corrected one; the paper's is in the summary.
+    """
+    marks = doubtful(fit)
+    flags = used(marks)
+    print_titled(
+        console,
+        f"{title}: chain {fit.request.chain}, {fit.request.estimator}",
+        _table(fit, marks, flags),
+        1 + (fit.truth is not None),
+    )
+    if flags:
+        console.print(Text("; ".join(f"{flag} {FLAGS[flag]}" for flag in flags)))
+    for words in _told(fit):
+        console.print(Text(words), soft_wrap=True)
+    if len(fit.logs.fitted) > 1 and fit.torque_errors:
+        _print_logs(console, fit)
+    console.print()
+
+
+def _table(fit: Fit, marks: Mapping[str, Sequence[Sequence[str]]], flags: Sequence[str]) -> Table:
+    """Return the table of the parameters, with marks of those that are doubtful, and of the fit as a whole."""
+    known, estimates = fit.truth is not None, fit.estimates
+    what = ("X", "%e" if known else "sigma", "%sigma")
+    grid = new_table("", [*(["true\nX"] if known else []), *(f"{model}\n{w}" for model in estimates for w in what)])
+    for i, name in enumerate(fit.basis.names):
+        true = [f"{list(fit.truth.values())[i]:g}"] if fit.truth is not None else []
+        each = (_flagged(_cells(e, fit, i), marks[m][i] if flags else ("", "", "")) for m, e in estimates.items())
+        grid.add_row(name, *true, *(cell for cells in each for cell in cells))
+    grid.add_section()
+    whole = {
+        "Cond(W)": [f"{e.condition_number:.1f}" for e in estimates.values()],
+        "rows": [f"{e.row_count}" for e in estimates.values()],
+    }
+    for j in range(fit.basis.n):
+        whole[f"tau{j + 1} explained"] = [_explained(share[j]) for share in fit.explained.values()]
+    for name, cells in whole.items():
+        grid.add_row(name, *([""] if known else []), *(cell for first in cells for cell in (first, "", "")))
+    return grid
+
+
+def _told(fit: Fit) -> Iterator[str]:
+    """Yield what else is to be known: models that failed, torque and delay, noise, rounds, what was moved."""
+    for model, why in fit.failures.items():
+        yield f"{model}: no estimate: {why}"
+    channel = fit.logs.fitted[0].torque
+    ignored = f", which chain {fit.request.chain} ignores: it takes it as logged"
+    logged = isinstance(fit.processing.alignment, AsLogged)
+    yield f"torque: {channel.meaning}, delay {1e3 * channel.delay:.4g} ms{ignored if logged else ''}"
+    if fit.delay is not None:
+        delay, sigma = (1e3 * x for x in fit.delay)
+        words = f"delay found with the parameters: {delay:.4g} ms, sigma {sigma:.2g} ms"
+        if abs(delay - 1e3 * channel.delay) > SURE * sigma:
+            words += f"; what follows judges them at {1e3 * channel.delay:.4g} ms: give --torque-delay {1e-3 * delay:.4g}"
+        yield words
+    yield _noise(fit)
+    yield from words_of_iterations(fit)
+    if fit.request.consistent != "no":
+        before = {name: e for name, e in fit.unconstrained.items() if isinstance(e, Estimate)}
+        yield from words_of_consistency(before, fit.estimates)
+
+
+def _print_logs(console: Console, fit: Fit) -> None:
+    """Print the torque error of the first estimate, log by log."""
+    model, errors = next(iter(fit.torque_errors.items()))
+    grid = new_table("", fit.subject.robot.joints)
+    for k in range(len(fit.logs.fitted)):
+        grid.add_row(fit.logs.name(k), *(f"{x:.2g}" if isfinite(x) else "" for x in errors[k]))
+    print_titled(console, f"what the {model} model leaves of each log while joints move: rms torque error [N m, N]", grid)
+
+
+def _flagged(cells: Sequence[str], marks: Sequence[str]) -> Iterator[str]:
+    """Yield cells, each with its mark."""
+    return (f"{cell}{mark}" for cell, mark in zip(cells, marks, strict=True))
+
+
+def _noise(fit: Fit) -> str:
+    """Return the noise of a log in words, joint by joint."""
+    torque, position = (" ".join("?" if x is None else f"{x:.2g}" for x in fit.noise[name]) for name in ("torque", "position"))
+    slides = [joint.kind == "slide" for joint in fit.subject.tree.joints]
+    force, length = ("N m, N", "rad, m") if any(slides) else ("N m", "rad")
+    words = f"noise found in the log: torque {torque} {force}, position {position} {length}"
+    steps = fit.noise["encoder_step"]
+    if not any(steps):
+        return words
+    each = zip(steps, slides, strict=True)
+    bits = " ".join("-" if slide else f"{log2(2 * pi / step):.1f}" if step else "?" for step, slide in each)
+    return f"{words}; encoder steps {' '.join(f'{x:.3g}' if x else '?' for x in steps)} {length} ({bits} bits)"
+
+
+def _explained(share: float) -> str:
+    if not isfinite(share):
+        return "no torque"
+    return f"{100 * share:.3f} %" if share > -WORTHLESS / 100 else f"<-{WORTHLESS:g} %"
+
+
+def _cells(estimate: Estimate, fit: Fit, i: int) -> tuple[str, str, str]:
+    if fit.truth is None:
+        second = f"{estimate.best_sigma[i]:.2g}"
+    else:
+        error = float(estimate.error_percent(list(fit.truth.values()))[i])
+        second = percent(error) if isfinite(error) else ""
+    share = 100 * estimate.best_sigma[i] / abs(estimate.X[i]) if estimate.X[i] else float("inf")
+    return number(estimate.X[i]), second, percentage(share) or f">{WORTHLESS:g}"
+
+
+def print_held_out(console: Console, one: HeldOut | Unjudged) -> None:
+    """Print how well torques of a held-out log are predicted, what the simulated robot does on it, and verdicts."""
+    if isinstance(one, Unjudged):
+        console.print(Text(f"not judged on {one.title}: {one.why}\n"), soft_wrap=True)
+        return
+    torques, joints = one.torques, one.fit.subject.robot.joints
+    simulated = any(one.position_error(model) is not None for model in torques)
+    heads = [f"{model}\n{what}" for model in torques for what in ("rms", "%", "R2", "q rms")[: 3 + simulated]]
+    grid, first = new_table("", ["noise of\nthe log %", *heads]), next(iter(torques.values()))
+    for j, joint in enumerate(joints):
+        noise = percentage(first.percent_of_level(first.noise)[j])
+        cells = (cell for model in torques for cell in _held_out_cells(one, model, j)[: 3 + simulated])
+        grid.add_row(joint, noise, *cells)
+    what = "torque error while moving [N m, N]" + (", position error of the simulated robot [rad, m]" if simulated else "")
+    print_titled(console, f"{one.title}: {what}", grid, 2)
+    apart = [f"{joint} {rms:.2g}" for joint, rms in zip(joints, first.standing, strict=True) if isfinite(rms)]
+    if apart:
+        console.print(Text(f"at rest and reversing, where friction is not determined: {', '.join(apart)} N m"), soft_wrap=True)
+    for model, verdict in one.verdicts.items():
+        console.print(Text(f"{model}: {verdict.word}: {'; '.join(verdict.reasons)}"), soft_wrap=True)
+    reasons = dict.fromkeys(verdict.unsimulated for verdict in one.verdicts.values() if verdict.unsimulated)
+    for why in reasons:
+        models = [model for model, verdict in one.verdicts.items() if verdict.unsimulated == why]
+        console.print(Text(f"{', '.join(models)}: not simulated: {why}"), soft_wrap=True)
+    for model, why in one.fit.failures.items():
+        console.print(Text(f"{model}: not judged: {why}"), soft_wrap=True)
+    console.print()
+
+
+def _held_out_cells(one: HeldOut, model: str, j: int) -> tuple[str, str, str, str]:
+    validation, off = one.torques[model], one.position_error(model)
+    R2 = f"{validation.R2[j]:.5f}" if validation.R2[j] > -WORTHLESS else f"<-{WORTHLESS:g}"
+    return f"{validation.rms[j]:.2g}", percentage(validation.percent[j]), R2, "" if off is None else f"{off[j]:.1e}"

@@ -1,0 +1,52 @@
+"""What only shows results: each view may fail alone, and says so in one line."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TypeVar, final
+
+from experiments.errors import ResultsError
+from experiments.faults import REPORT, is_told, reason, report, trace
+from experiments.results.folder import ResultsFolder
+
+T = TypeVar("T")
+
+
+@final
+class Attempts:
+    """Works on results that are complete; one that fails takes nothing away from the others.
+
+    Parameters
+    ----------
+    kept : str
+        What is there whatever fails.
+    folder : ResultsFolder, optional
+        Where the results are, and tracebacks of faults go.
+    """
+
+    def __init__(self, kept: str, folder: ResultsFolder | None = None) -> None:
+        self._kept, self._folder, self._failures, self._traces = kept, folder, list[str](), list[str]()
+
+    def attempt(self, what: str, make: Callable[[], T]) -> T | None:
+        """Return what `make` returns, None if it fails."""
+        try:
+            return make()
+        except (Exception, SystemExit) as error:  # Ctrl-C alone ends the others, too
+            self.failed(what, reason(error), "" if is_told(error) else trace(error), error)
+            return None
+
+    def failed(self, what: str, why: str, traceback: str = "", error: BaseException | None = None) -> None:
+        """Note that something failed, and why; of a fault its traceback."""
+        if traceback and self._folder is None and error is not None:
+            why += f"; its traceback is in {report(error)}"
+        elif traceback:
+            self._traces.append(f"{what}\n{traceback}")
+            why += f"; its traceback is in {self._folder.out / REPORT}" if self._folder else ""
+        self._failures.append(why if what in why else f"{what}: {why}")
+
+    def close(self) -> None:
+        """Write tracebacks; raise ResultsError that names all that failed, and what is there all the same."""
+        if self._traces and self._folder:
+            with suppress(ResultsError), self._folder.more() as hidden:
+                (hidden / REPORT).write_text("\n".join(self._traces), encoding="utf-8")
+        if self._failures:
+            raise ResultsError(f"{'; '.join(self._failures)}; {self._kept}")

@@ -1,0 +1,218 @@
+"""The folder of an experiment's results: held while it is written, complete or absent, and never somebody else's."""
+
+import json
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import final
+
+from experiments.errors import ResultsError
+from experiments.results.manifest import Manifest, Written, digest
+from experiments.results.writing import Read, exchange, hidden_folder
+
+try:
+    import fcntl
+except ImportError:  # not on Windows, where two processes in one folder are noticed at the exchange of files alone
+    fcntl = None  # type: ignore[assignment]
+
+COMMON = ("summary.json", "recording.rrd", "recording.*.rrd", "log*.parquet", "fault.txt")
+
+FILES: Mapping[str, tuple[str, ...]] = {
+    "run": (*COMMON, "scenario.toml"),
+    "identify": (*COMMON, "report.html"),
+    "table1": COMMON,
+    "table1-motions": (*COMMON, "motions.png"),
+    "table2": COMMON,
+    "excite": (*COMMON, "scenario.toml", "report.html", "motion*.csv"),
+    "payload": ("summary.json", "fault.txt"),
+    "gains": ("summary.json", "fault.txt"),
+    "study": ("summary.json", "report.html", "recording.rrd", "fault.txt"),
+}
+"""What an experiment may write: files of these names are looked for before the work."""
+
+
+@final
+@dataclass(frozen=True)
+class ResultsFolder:
+    """The folder of an experiment's results.
+
+    Parameters
+    ----------
+    out : Path
+        The folder.
+    experiment : str
+        Which kind of experiment writes there.
+    command : str
+        The command that makes the results, with all options on which they depend.
+    force : bool
+        Whether files of others may be replaced.
+    read : sequence of Path
+        Files that the command reads: they are never replaced.
+    """
+
+    out: Path
+    experiment: str
+    command: str
+    force: bool = False
+    read: Read = ()
+
+    def check(self) -> None:
+        """Raise ResultsError if the results cannot go there, or files of others would have to go."""
+        try:
+            self._check()
+        except OSError as error:
+            raise self._unwritable(error) from error
+
+    def _check(self) -> None:
+        if str(self.out) == "." and not self.force:
+            raise ResultsError("--out is the folder that you are in, or empty: name a folder of its own for the results")
+        if self.out.exists() and not self.out.is_dir():
+            raise ResultsError(f"{self.out} is a file, not a folder: choose another --out")
+        if self.force or not self.out.is_dir():
+            return
+        if (self.out / "study.toml").is_file() and self.experiment != "study":
+            raise ResultsError(f"{self.out} holds a study: choose another --out")
+        manifest = Manifest.of(self.out)
+        there = sorted({path.name for pattern in FILES[self.experiment] for path in self.out.glob(pattern)})
+        if strange := [name for name in there if not manifest.owns(name)]:
+            raise ResultsError(
+                f"{self.out} holds {_summarized(self.out)}{', '.join(strange)}, not written by idbench or changed since: "
+                "choose another --out, or replace them with --force"
+            )
+        if others := [command for command in manifest.commands if command != self.command]:
+            raise ResultsError(
+                f"{self.out} holds the results of `{others[0]}`: choose another --out, or replace them with --force"
+            )
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Check the folder, make it if it is not there, and hold it against other processes until the end of the block.
+
+        Raises
+        ------
+        ResultsError
+            As `check` does, or if another process holds it.
+        """
+        self.check()
+        made = self._made()
+        try:
+            with _lock(self.out):
+                yield
+        except OSError as error:
+            raise self._unwritable(error) from error
+        finally:
+            for folder in made:  # where nothing came into them
+                with suppress(OSError):
+                    folder.rmdir()
+
+    def _made(self) -> list[Path]:
+        """Make the folder; return which folders were made, the innermost first."""
+        missing = [folder for folder in (self.out, *self.out.parents) if not folder.exists()]
+        try:
+            self.out.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise self._unwritable(error) from error
+        return missing
+
+    @contextmanager
+    def complete(self) -> Iterator[Path]:
+        """Give a hidden folder to write results to; on success they take the place of all earlier ones, summary.json last.
+
+        Raises
+        ------
+        ResultsError
+            If they cannot be written, or files have come meanwhile that idbench did not write.
+        """
+        with self._exchanged(complete=True) as hidden:
+            yield hidden
+
+    @contextmanager
+    def more(self) -> Iterator[Path]:
+        """Give a hidden folder to write further files to; on success they come beside the results; errors as `complete`."""
+        with self._exchanged(complete=False) as hidden:
+            yield hidden
+
+    @contextmanager
+    def _exchanged(self, *, complete: bool) -> Iterator[Path]:
+        try:
+            with hidden_folder(self.out) as hidden:
+                yield hidden
+                self._exchange(hidden, complete=complete)
+        except OSError as error:
+            raise self._unwritable(error) from error
+
+    def _exchange(self, hidden: Path, *, complete: bool) -> None:
+        manifest = Manifest.of(self.out)
+        paths = sorted(hidden.iterdir(), key=lambda path: (path.name == "summary.json", path.name))
+        own = {path.name for path in paths if manifest.owns(path.name)}
+        for path in paths:
+            self._require_exchangeable(self.out / path.name, path.name in own)
+        gone = self._old(manifest) - {path.name for path in paths} if complete else set()
+        kept = {} if complete or self.force else manifest.files  # of another command, and only laid out anew
+        written = {
+            path.name: Written(kept[path.name].command if path.name in kept else self.command, (digest(path),))
+            for path in paths
+        }
+        manifest.save(written, gone)
+        for path in paths:
+            try:
+                exchange(path, self.out / path.name, force=self.force or path.name in own)
+            except FileExistsError:
+                raise self._strange(self.out / path.name) from None
+        for name in gone:
+            (self.out / name).unlink(missing_ok=True)
+
+    def _require_exchangeable(self, target: Path, own: bool) -> None:
+        """Raise ResultsError if a file must not be replaced."""
+        if target.is_dir():
+            raise ResultsError(f"{target} is a folder where a file must go: remove it or choose another --out")
+        if any(target.exists() and path.exists() and target.samefile(path) for path in self.read):
+            raise ResultsError(f"{target} is a file that this command reads: choose another --out")
+        if target.exists() and not own and not self.force:
+            raise self._strange(target)
+
+    def _old(self, manifest: Manifest) -> set[str]:
+        """Return the files of earlier results."""
+        if not self.force:
+            return {name for name in manifest.files if manifest.owns(name)}
+        return {path.name for pattern in FILES[self.experiment] for path in self.out.glob(pattern) if path not in self.read}
+
+    def _strange(self, target: Path) -> ResultsError:
+        return ResultsError(
+            f"{target} exists, and idbench did not write it as it is: choose another --out, or replace it with --force"
+        )
+
+    def _unwritable(self, error: OSError) -> ResultsError:
+        return ResultsError(f"cannot write to {self.out}: {error.strerror or error}; choose another --out, or free some space")
+
+
+@contextmanager
+def _lock(folder: Path) -> Iterator[None]:
+    """Hold a folder against other processes; raise ResultsError if one of them holds it."""
+    if fcntl is None:
+        yield
+        return
+    held = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise ResultsError(
+                f"another process is writing its results to {folder}: wait for it, or choose another --out"
+            ) from None
+        except OSError:  # a file system without locks: the exchange of files looks once more
+            pass
+        yield
+    finally:
+        os.close(held)
+
+
+def _summarized(folder: Path) -> str:
+    """Return what the summary of a folder says of its experiment, to be named before its files."""
+    try:
+        found = json.loads((folder / "summary.json").read_text(encoding="utf-8"))["experiment"]
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return ""
+    return f"{found!s:.40}: "

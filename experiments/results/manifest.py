@@ -1,0 +1,83 @@
+"""Which files of a folder idbench wrote, by which command, and whether they are still as it wrote them."""
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Self, final
+
+from experiments.results.writing import replace_own
+
+NAME = ".idbench.json"
+"""Name of its file in a folder."""
+
+
+@final
+@dataclass(frozen=True)
+class Written:
+    """A file that idbench wrote.
+
+    Parameters
+    ----------
+    command : str
+        The command that wrote it.
+    digests : tuple of str
+        Of its content, and of that which was there before: an exchange may have been cut off between the two.
+    """
+
+    command: str
+    digests: tuple[str, ...]
+
+
+@final
+@dataclass(frozen=True)
+class Manifest:
+    """The files of a folder that idbench wrote.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    files : mapping of str to Written
+        By their names.
+    """
+
+    folder: Path
+    files: Mapping[str, Written] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, folder: Path) -> Self:
+        """Return the manifest of a folder; an empty one if it has none that can be read."""
+        try:
+            content: Mapping[str, Any] = json.loads((folder / NAME).read_text(encoding="utf-8"))["files"]
+            files = {name: Written(str(w["command"]), tuple(map(str, w["digests"]))) for name, w in content.items()}
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+            return cls(folder)
+        return cls(folder, files)
+
+    def owns(self, name: str) -> bool:
+        """Return whether a file is there and as idbench wrote it."""
+        path = self.folder / name
+        return name in self.files and path.is_file() and digest(path) in self.files[name].digests
+
+    @property
+    def commands(self) -> list[str]:
+        """The commands whose files are still there."""
+        return list(dict.fromkeys(w.command for name, w in self.files.items() if (self.folder / name).is_file()))
+
+    def save(self, written: Mapping[str, Written], gone: Iterable[str] = ()) -> None:
+        """Write it with files that were written, and without those that are gone."""
+        files = {name: w for name, w in self.files.items() if name not in set(gone)}
+        for name, new in written.items():
+            before = files[name].digests[:1] if name in files else ()
+            files[name] = Written(new.command, tuple(dict.fromkeys((*new.digests, *before))))
+        content = {name: {"command": w.command, "digests": list(w.digests)} for name, w in sorted(files.items())}
+        about = "files that idbench wrote here: it replaces no others"
+        replace_own(self.folder / NAME, json.dumps({"about": about, "files": content}, indent=1) + "\n")
+
+
+def digest(path: Path) -> str:
+    """Return what tells the content of a file from others."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,0 +1,138 @@
+"""The one way to a file: written whole or not at all, and never in the place of what somebody else wrote."""
+
+import os
+import socket
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from filecmp import cmp
+from pathlib import Path
+from shutil import rmtree
+
+from experiments.errors import ResultsError
+
+HIDDEN = f".idbench-{socket.gethostname()}-"
+"""How the names of hidden folders begin; the number of their process follows. Other machines may share the disk."""
+
+Read = Sequence[Path]
+"""Files that a command reads: they are never replaced, not even with --force."""
+
+
+def require_free(path: Path, option: str, *, force: bool = False, read: Read = ()) -> None:
+    """Raise ResultsError if a file cannot be written to `path`, before the work that it takes; `option` names it.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    option : str
+        The option that named it.
+    force : bool
+        Whether a file that is there may be replaced.
+    read : sequence of Path
+        Files that the command reads.
+    """
+    _require_place(path, option, read)
+    if path.exists() and not force:
+        raise _taken(path, option)
+
+
+def _require_place(path: Path, option: str, read: Read) -> None:
+    try:
+        if path.is_dir() or not path.absolute().parent.is_dir():
+            raise ResultsError(f"{option} {path}: there is no folder {path.parent} for it, or it is a folder itself")
+        if any(path.exists() and other.exists() and path.samefile(other) for other in read):
+            raise ResultsError(f"{option} {path} is a file that this command reads: choose another name")
+    except OSError as error:
+        raise ResultsError(f"{option} {path}: {error.strerror}; choose another name") from error
+
+
+def _taken(path: Path, option: str) -> ResultsError:
+    return ResultsError(f"{option} {path} exists: choose another name, or replace it with --force")
+
+
+def folder_for(path: Path, option: str) -> Path:
+    """Make a folder unless it is there, and return it; raise ResultsError if that fails."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ResultsError(f"{option} {path}: {error.strerror}; choose another folder") from error
+    return path
+
+
+@contextmanager
+def new_file(path: Path, option: str, *, force: bool = False, read: Read = ()) -> Iterator[Path]:
+    """Give a hidden file to write to; on success it becomes `path`.
+
+    Raises
+    ------
+    ResultsError
+        If there is a file with other contents and it may not be replaced, or it cannot be written.
+    """
+    _require_place(path, option, read)
+    try:
+        with hidden_folder(path.absolute().parent) as folder:
+            hidden = folder / path.name
+            yield hidden
+            try:
+                exchange(hidden, path, force=force)
+            except FileExistsError:
+                if not path.is_file() or not cmp(hidden, path, shallow=False):
+                    raise _taken(path, option) from None
+    except OSError as error:
+        raise ResultsError(f"cannot write {option} {path}: {error.strerror or error}; choose another place") from error
+
+
+def write_text(path: Path, text: str, option: str, *, force: bool = False, read: Read = ()) -> None:
+    """Write `text` to `path`, whole or not at all; raise ResultsError as `new_file` does."""
+    with new_file(path, option, force=force, read=read) as file:
+        file.write_text(text, encoding="utf-8")
+
+
+def replace_own(path: Path, text: str) -> None:
+    """Write `text` to a file of which idbench alone knows, whole or not at all; raise ResultsError if that fails."""
+    try:
+        with hidden_folder(path.parent) as folder:
+            (folder / path.name).write_text(text, encoding="utf-8")
+            (folder / path.name).replace(path)
+    except OSError as error:
+        raise ResultsError(f"cannot write {path}: {error.strerror}; choose another place") from error
+
+
+def exchange(written: Path, target: Path, *, force: bool) -> None:
+    """Move a file to its place; raise FileExistsError if there is another now that may not be replaced."""
+    if force:
+        written.replace(target)
+        return
+    try:
+        target.hardlink_to(written)  # unlike a renamed file, a link never takes another's place
+    except FileExistsError:
+        raise
+    except OSError:  # a file system without links
+        if target.exists():
+            raise FileExistsError(target) from None
+        written.replace(target)
+
+
+@contextmanager
+def hidden_folder(folder: Path) -> Iterator[Path]:
+    """Give a hidden folder on the same file system, which goes at the end; those of processes that were killed go first."""
+    for left in folder.glob(f"{HIDDEN}*-*"):
+        number = left.name.removeprefix(HIDDEN).split("-")[0]
+        if number.isdigit() and not _is_running(int(number)):
+            rmtree(left, ignore_errors=True)
+    hidden = Path(tempfile.mkdtemp(prefix=f"{HIDDEN}{os.getpid()}-", dir=folder))
+    try:
+        yield hidden
+    finally:
+        rmtree(hidden, ignore_errors=True)
+
+
+def _is_running(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # somebody else's
+        return True
+    return True

@@ -1,0 +1,91 @@
+"""Jumps of logged positions: wild samples, and encoders that slip."""
+
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from identify.arrays import Array
+
+COMMON = 0.99
+"""Share of the steps from one sample to the next that are below what is usual: those above may be the fastest of a motion."""
+
+NEAR = 2
+"""Steps to either side that a step is compared with."""
+
+SPREAD = 3.0
+"""A step jumps if it is farther from the median of its neighbours than this many times their scatter."""
+
+RETURN = 0.2
+"""Share of a jump that may be left after it has gone back."""
+
+ROUNDING = 1e-3
+"""Share of a joint's travel that no jump is below: quiet joints tremble by counts of their encoders."""
+
+
+@final
+@dataclass(frozen=True)
+class Jump:
+    """A step of a position that the motion around it does not explain.
+
+    Parameters
+    ----------
+    joint, sample : int
+        Where it is, from 0.
+    size : float
+        By how far [rad, m].
+    speed, usual : float
+        Its speed, and that below which nearly all steps of the joint are [rad/s, m/s].
+    back : bool
+        Whether the position comes back at once: a wild sample, not a slip.
+    """
+
+    joint: int
+    sample: int
+    size: float
+    speed: float
+    usual: float
+    back: bool
+
+
+def jumps(q: Array, fs: float) -> list[Jump]:
+    """Return the jumps of positions, joint by joint.
+
+    A step counts that is larger than 99 % of the joint's steps, and farther from the median of its neighbours than these
+    scatter: a fast motion has fast neighbours.
+
+    Parameters
+    ----------
+    q : Array, shape (time, joint)
+        Positions [rad, m].
+    fs : float
+        Sampling frequency [Hz].
+
+    Examples
+    --------
+    >>> q = np.sin(np.arange(500)[:, None] / 50)
+    >>> q[200:] += 0.5
+    >>> [(jump.joint, jump.sample, jump.back) for jump in jumps(q, 100.0)]
+    [(0, 200, False)]
+    """
+    return [jump for j, x in enumerate(q.T) for jump in _of_joint(j, np.asarray(x), fs)]
+
+
+def _of_joint(j: int, x: Array, fs: float) -> list[Jump]:
+    steps, found = np.diff(x), list[Jump]()
+    if len(steps) <= 2 * NEAR:
+        return found
+    usual = float(np.quantile(np.abs(steps), COMMON))
+    padded = np.pad(steps, NEAR, mode="edge")
+    around = np.stack([padded[i : i + len(steps)] for i in range(2 * NEAR + 1) if i != NEAR])
+    middle = np.median(around, axis=0)
+    off, scatter = np.abs(steps - middle), np.median(np.abs(around - middle), axis=0)
+    least = max(usual, ROUNDING * float(np.ptp(x)))
+    left = np.flatnonzero((off > least) & (off > SPREAD * scatter))
+    while len(left):
+        k, near = left[0], left[left - left[0] <= NEAR]
+        size, total = float(steps[k] - middle[k]), float(np.sum(steps[near] - middle[near]))
+        back = len(near) > 1 and abs(total) < RETURN * abs(size)
+        found.append(Jump(j, int(k) + 1, size, abs(float(steps[k])) * fs, usual * fs, back))
+        left = left[left > near[-1]]
+    return found
