@@ -6,6 +6,8 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from identify.errors import SettingError
+
 Array: TypeAlias = npt.NDArray[np.float64]
 
 Columns: TypeAlias = Mapping[tuple[int, str], Array]
@@ -31,6 +33,9 @@ def combined(columns: Columns, names: Sequence[str], X: Array, total: Array) -> 
 
 def frozen(values: npt.ArrayLike) -> Array:
     """Return a read-only float64 copy, contiguous in memory."""
-    array = np.array(values, dtype=np.float64, order="C")
+    given = np.asarray(values)
+    if given.dtype.kind not in "fiub":
+        raise SettingError(f"an array of {given.dtype} is given where real numbers are needed")
+    array = np.array(given, dtype=np.float64, order="C")
     array.setflags(write=False)
     return array

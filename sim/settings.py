@@ -27,6 +27,7 @@ Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]
 Share = Annotated[Number, Field(ge=0, le=1)]
 Whole = Annotated[int, Strict()]
+Truth = Annotated[bool, Strict()]
 Seed = Annotated[Whole, Field(ge=0, lt=2**63)]
 
 

@@ -28,7 +28,8 @@ idbench: identify the dynamics of robots, on simulated data whose truth is known
 """What `idbench` alone prints."""
 
 APP = SubcommandApp()
-"""What the commands register with."""
+COMMANDS: dict[str, type] = {}
+"""The commands by name, and what the parser makes of them."""
 
 ENVIRONMENT = {
     "MUJOCO_GL": "disable",  # nothing is drawn by MuJoCo, and what would draw takes a tenth of a second to load
@@ -53,7 +54,7 @@ def run(args: Sequence[str] | None = None) -> int:
                 _print(OVERVIEW)
             else:
                 with importing():
-                    command = APP.cli(prog="idbench", description=DESCRIPTION, args=words)
+                    command = _parsed(words)
                 _do(command)
     except KeyboardInterrupt:
         return _complain("interrupted", INTERRUPTED)
@@ -64,6 +65,27 @@ def run(args: Sequence[str] | None = None) -> int:
             return _complain("interrupted", INTERRUPTED)
         return _complain(f"{reason(error)}; its traceback is in {report(error)}", 1)
     return 0
+
+
+def _parsed(words: list[str]) -> Callable[[], None]:
+    """Return the command that words name, with its options."""
+    from experiments.cli.wrong_words import refused, require_command
+
+    require_command(words, COMMANDS)
+    with refused(words, COMMANDS):
+        made: Callable[[], None] = APP.cli(prog="idbench", description=DESCRIPTION, args=words)
+    return made
+
+
+def command(name: str) -> Callable[[type], type]:
+    """Return a decorator that registers options as a command."""
+
+    def register(options: type) -> type:
+        COMMANDS[name] = options
+        APP.command(name=name)(options)
+        return options
+
+    return register
 
 
 def _do(command: Callable[[], None]) -> None:

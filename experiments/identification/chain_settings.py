@@ -19,6 +19,9 @@ STAGES: dict[str, PluginTable[Any]] = {
 }
 """The stages of a chain that are plug-ins."""
 
+LOWEST = 0.01
+"""Band [Hz] below which no joint moves."""
+
 KIND = "kind"
 """Key of a stage's table that names its plug-in."""
 
@@ -86,8 +89,8 @@ def with_cutoff(chain: Chain, cutoff: float) -> Chain:
     """
     if not hasattr(chain.operator, "cutoff"):
         raise ExperimentError(f"--cutoff {cutoff:g}: the operator of this chain, {type(chain.operator).__name__}, has none")
-    if not cutoff > 0:
-        raise ExperimentError(f"--cutoff {cutoff:g} must be above 0 [Hz]")
+    if not LOWEST <= cutoff < float("inf"):
+        raise ExperimentError(f"--cutoff {cutoff:g} must be at least {LOWEST:g} [Hz], and finite")
     ratio = cutoff / chain.operator.cutoff
     for stage, setting, scale in (
         ("operator", "transition", ratio),

@@ -6,7 +6,7 @@ from itertools import chain
 from typing import Any, final
 
 from experiments.errors import ExperimentError
-from identify import BLOCKS, AbstractBlock, AbstractJointLaw, OfJoints, UnknownNameError
+from identify import BLOCKS, AbstractBlock, AbstractJointLaw, Array, OfJoints, UnknownNameError
 from identify.plugins import did_you_mean
 
 AUTO = "auto"
@@ -20,6 +20,12 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "none": (),
 }
 """Laws that go together, by one name."""
+
+NUMBERS = (float, Array | float)
+"""Types of settings that a number after a colon may be."""
+
+BEYOND, LARGEST = 100.0, 1e6
+"""How far beyond the range in which a shape is looked for it may be given, and the largest of other settings."""
 
 COMPARED = ("offset", "asymmetric-viscous", "load", "stribeck", "arctan", "temperature")
 """What `auto` compares, beside viscous and Coulomb friction; temperature where the log has it."""
@@ -121,7 +127,7 @@ def _laws(text: str, laws: str) -> tuple[str, ...]:
     return found
 
 
-def law_of(name: str) -> AbstractBlock:
+def law_of(name: str, option: str = "--friction") -> AbstractBlock:
     """Return the law of a name, its first setting the number after a colon.
 
     Raises
@@ -132,16 +138,28 @@ def law_of(name: str) -> AbstractBlock:
     kind, mark, value = name.partition(":")
     block = BLOCKS.create(kind)
     if not isinstance(block, AbstractJointLaw):
-        raise ExperimentError(f"--friction {name}: {kind} is no law of a joint's friction")
+        raise ExperimentError(f"{option} {name}: {kind} is no law of a joint's friction")
     if not mark:
+        if block.asks:
+            raise ExperimentError(f"{option} {name}: give {block.asks}")
         return block
     law: Any = getattr(block, "law", block)  # with a number an unknown shape is known
-    settings = [f.name for f in fields(law)] if is_dataclass(law) else []
+    settings = [f.name for f in fields(law) if f.type in NUMBERS] if is_dataclass(law) else []
+    if not settings:
+        raise ExperimentError(f"{option} {name}: {kind} has no setting: leave :{value} out")
+    shapes = getattr(block, "shapes", ())
+    if len(shapes) > 1:
+        own = ", ".join(shape.letters for shape in shapes)
+        raise ExperimentError(f"{option} {name}: {kind} is the law of unknown {own}: leave :{value} out, or name a law of one")
+    low, high = (shapes[0].range[0] / BEYOND, shapes[0].range[1] * BEYOND) if shapes else (-LARGEST, LARGEST)
     try:
-        found: AbstractBlock = replace(law, **{settings[0]: float(value)})
+        number = float(value)
+        if not low <= number <= high:
+            raise ValueError(f"it must be from {low:g} to {high:g}")
+        found: AbstractBlock = replace(law, **{settings[0]: number})
         return found
-    except (IndexError, ValueError, TypeError) as error:
-        raise ExperimentError(f"--friction {name}: {value!r} is no setting of {kind}, which takes a number: {error}") from error
+    except (ValueError, TypeError) as error:
+        raise ExperimentError(f"{option} {name}: {value!r} is no {settings[0]} of {kind}: {error}") from error
 
 
 def _joint(text: str, where: str, joints: Sequence[str]) -> int:

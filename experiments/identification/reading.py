@@ -23,6 +23,9 @@ from identify.judge.delay import DelayEstimate
 SLOWEST = 0.5
 """Sampling period [s] that no robot's log has: its times are in another unit."""
 
+LATEST = 1.0
+"""Delay [s] that no torque of a log has."""
+
 TURN = 2 * np.pi
 
 NEARLY = 0.2
@@ -232,7 +235,13 @@ def _turned(path: Path, q: Array, request: Request, unwrap: bool) -> Array:
 def channel_of(stated: TorqueChannel | None, meaning: Meaning, delay: str | None) -> TorqueChannel:
     """Return the channel that a file and the options state together: another meaning voids the delay that the file states."""
     stated = stated or TorqueChannel(meaning)
-    return replace(stated, meaning=meaning, delay=_seconds(delay, stated.delay if stated.meaning == meaning else 0.0))
+    seconds = _seconds(delay, stated.delay if stated.meaning == meaning else 0.0)
+    if not abs(seconds) < LATEST:
+        raise ExperimentError(
+            f"a torque delay of {seconds:g} s is none: it must be below {LATEST:g} s in size; is it in ms or in samples? "
+            "Write s, such as --torque-delay 0.002, or let --torque-delay estimate find it"
+        )
+    return replace(stated, meaning=meaning, delay=seconds)
 
 
 def _seconds(delay: str | None, otherwise: float) -> float:

@@ -9,7 +9,7 @@ from typing import Self, final
 import numpy as np
 
 from experiments.errors import ExperimentError
-from experiments.identification.friction_laws import STANDARD, FrictionLaws
+from experiments.identification.friction_laws import STANDARD, FrictionLaws, law_of
 from experiments.identification.parameters import Parameters
 from identify import BLOCKS, AbstractJointLaw, BaseParameters, Basis, KinematicTree, scara, tree_basis
 from sim.frictions import AbstractFrictionLaw
@@ -121,8 +121,8 @@ class Subject:
 
     def _with_laws(self, basis: Basis) -> Basis:
         for name in self.asked.add:
-            block = BLOCKS.create(name)
-            if not isinstance(block, AbstractJointLaw):
+            block = law_of(name, "--add") if name in BLOCKS and isinstance(BLOCKS.create(name), AbstractJointLaw) else None
+            if block is None:
                 laws = [known for known in BLOCKS if isinstance(BLOCKS.create(known), AbstractJointLaw)]
                 raise ExperimentError(f"--add {name}: that is no law of a joint's friction; known: {', '.join(laws)}")
             basis = basis + block

@@ -8,6 +8,9 @@ import numpy as np
 from experiments.errors import ExperimentError
 from identify.loads.loaded_robot import LETTERS
 
+HEAVIEST, FARTHEST, ROUNDING = 1e5, 1e3, 1e-9
+"""Mass [kg] and distance [m] beyond which no gripper holds anything, and a share of rounding."""
+
 
 def known_of(mass: float | None, at: Sequence[float] | None, inertia: Sequence[float] | None) -> dict[str, float]:
     """Return the parameters of a payload that follow from its mass, centre of mass and inertia about that.
@@ -20,6 +23,23 @@ def known_of(mass: float | None, at: Sequence[float] | None, inertia: Sequence[f
     for name, needs, given in (("--at", "--mass", at), ("--inertia", "--at", inertia)):
         if given is not None and (mass is None or (name == "--inertia" and at is None)):
             raise ExperimentError(f"{name} needs {needs}: moments are of a mass that is known")
+    if mass is not None and not 0 < mass <= HEAVIEST:
+        raise ExperimentError(f"--mass {mass:g} must be above 0 and at most {HEAVIEST:g} kg")
+    if wrong := [x for x in at or () if not abs(x) <= FARTHEST]:
+        raise ExperimentError(
+            f"--at {wrong[0]:g}: the centre of mass must lie within {FARTHEST:g} m of the frame of the last link"
+        )
+    if inertia is not None:
+        xx, yy, zz, xy, xz, yz = inertia
+        about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        moments = np.linalg.eigvalsh(about) if np.isfinite(about).all() else np.array([np.nan])
+        if not (
+            moments[0] >= 0 and 2 * moments[-1] <= moments.sum() * (1 + ROUNDING) and moments[-1] <= HEAVIEST * FARTHEST**2
+        ):
+            raise ExperimentError(
+                f"--inertia {' '.join(f'{x:g}' for x in inertia)} is of no body: its principal moments must be 0 or above, "
+                "and none larger than the sum of the others"
+            )
     values = [x for x in (mass, *(at or ()), *(inertia or ())) if x is not None]
     if not all(map(isfinite, values)) or (mass is not None and not mass > 0):
         raise ExperimentError(f"mass, place and inertia of the payload must be finite, the mass above 0: {values}")

@@ -7,11 +7,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import tyro
+from typing import TYPE_CHECKING
 
 from experiments.errors import ExperimentError
+from experiments.option_types import Count, Real, Url
 from experiments.recording.viewers import answers, reachable, served, spawned
 
 if TYPE_CHECKING:
@@ -23,10 +22,10 @@ GOODBYE = 10.0
 DEAF = 6
 """How often in a row a viewer may fail to take what is sent within half a second."""
 
-LEAVING = "idbench-leaving"
+PORT = 9090
+"""Port of the web viewer."""
 
-Url = Annotated[str | None, tyro.conf.arg(metavar="URL", help_behavior_hint="")]
-Times = Annotated[float | None, tyro.conf.arg(metavar="FLOAT", help_behavior_hint="")]
+LEAVING = "idbench-leaving"
 
 
 @dataclass(frozen=True)
@@ -39,9 +38,9 @@ class Watching:
     """Show it in a viewer that runs already, such as rerun+http://127.0.0.1:9876/proxy."""
     serve: bool = False
     """Show it in a browser: serve the web viewer on this machine until Ctrl-C."""
-    port: int = 9090
-    """Port of the web viewer; data go through the port after it."""
-    pace: Times = None
+    port: Count = None
+    """Port of the web viewer, 9090 by default; data go through the port after it."""
+    pace: Real = None
     """Simulated seconds shown in a second, such as 1.0; as fast as possible without it."""
     rerun: bool = True
     """Record; without it rerun is not even loaded."""
@@ -54,7 +53,9 @@ class Watching:
             raise ExperimentError(f"--pace {self.pace:g} must be above 0: 1.0 is real time")
         if self.pace is not None and not ways:
             raise ExperimentError(f"--pace {self.pace:g} needs somebody who watches: add --live, --serve or --connect URL")
-        if not 0 < self.port < 65535:
+        if self.port is not None and not self.serve:
+            raise ExperimentError(f"--port {self.port} is that of the web viewer: add --serve, or leave it out")
+        if self.port is not None and not 0 < self.port < 65535:
             raise ExperimentError(f"--port {self.port} must be between 1 and 65534; data go through the port after it")
         if ways and not self.rerun:
             raise ExperimentError(f"{ways[0]} and --no-rerun contradict each other: give one")
@@ -77,7 +78,7 @@ class Watching:
         elif self.live:
             yield Audience(spawned(), self.pace)
         elif self.serve:
-            with served(self.port) as url:
+            with served(PORT if self.port is None else self.port) as url:
                 yield Audience(url, self.pace)
                 _until_interrupted()
         else:

@@ -20,7 +20,7 @@ from experiments.study.method import Method, combinations, methods_of, whole_fir
 from identify import MODELS, AbstractModel
 from sim.scenario.scenario import Scenario
 from sim.scenario.scenario_file import from_dict
-from sim.settings import NotNegative, Seed, Whole, settings
+from sim.settings import NotNegative, Seed, Truth, Whole, settings
 from sim.trajectories import RandomMoves
 
 MOST_POINTS = 1_000_000
@@ -71,7 +71,7 @@ class Study:
     start: NotNegative = 0.0
     """Standard deviation of the relative error of the parameters at which estimators begin that simulate or filter, drawn for
     each run; 0: they begin at the least-squares estimate."""
-    bound: bool = False
+    bound: Truth = False
     """Whether the least error that encoders and torque noise allow is computed beside (Cramer-Rao)."""
 
     def __post_init__(self) -> None:

@@ -17,6 +17,9 @@ from identify.signals.state import State
 class AbstractJointLaw(AbstractBlock):
     """A law of every joint whose torque stands in the row of the joint alone; a law may have several parameters a joint."""
 
+    asks: ClassVar[str] = ""
+    """A setting without a default that could be meant: what it is, with a number for an example; empty if there is none."""
+
     @abstractmethod
     def letters(self) -> Mapping[str, tuple[Kind, str]]:
         """Return kind and unit of the parameters, by their letters; the joint's number, from 1, follows them."""

@@ -65,11 +65,13 @@ class LogColumns:
             If there are others, or not as many.
         """
         if self.joints and set(self.joints) != set(joints):
-            missing, over = ", ".join(set(joints) - set(self.joints)), ", ".join(set(self.joints) - set(joints))
+            missing = ", ".join(joint for joint in joints if joint not in self.joints)
+            over = ", ".join(joint for joint in self.joints if joint not in joints)
             wrong = "; ".join(text for text in (missing and f"missing: {missing}", over and f"not the robot's: {over}") if text)
             raise LogError(f"the log names the joints {', '.join(self.joints)}, the robot {', '.join(joints)}: {wrong}")
         if self.q.shape[1] != len(joints):
-            raise LogError(f"the log has {self.q.shape[1]} joints, the robot {len(joints)}: {', '.join(joints)}")
+            own = f"{self.n} joint{'s' if self.n > 1 else ''}"
+            raise LogError(f"the log has positions of {own}, the robot {len(joints)} joints: {', '.join(joints)}")
         if not self.joints:
             return self
         place = [self.joints.index(joint) for joint in joints]

@@ -65,9 +65,11 @@ class Repaired:
         LogError
             If too few rows are left, or no piece between gaps is long enough.
         """
+        if fs is not None:
+            require_positive(fs=fs)
         columns, stretches = torque_stretches(columns)
         clock = Clock.of(columns)
-        sound, fs = clock.columns(columns), fs or _round(1 / clock.period)
+        sound, fs = clock.columns(columns), _round(1 / clock.period) if fs is None else fs
         found, short, velocities, parts = list[MotionLog](), 0, None, _parts(sound, clock, stretches)
         for part in parts:
             if part.t[-1] - part.t[0] < SHORTEST and len(parts) > 1:

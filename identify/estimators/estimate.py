@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from identify.arrays import Array, frozen
+from identify.errors import PluginError
 from identify.estimators.likelihood.joint_fit import JointFit
 from identify.estimators.problem import Problem
 from identify.estimators.propagated import Influence, bias_covariance, excess, noise_covariance
@@ -86,10 +87,13 @@ class Estimate:
             G with which X = G' Y to first order: what the estimate changes by if a row of Y, or the error of a row, does. A
             function returns that of any rows of the problem. It is what an honest sigma is computed from.
         """
-        x, given = frozen(X), influence
+        shape, p = problem.factors.together.status.shape, len(problem.names)
+        x = _real_array("X", X, (*shape, p))
+        given = influence
         function = given if given is None or callable(given) else (lambda _: given)
-        own = _paper_covariance(problem.factors.together, x) if covariance is None else covariance
-        return cls(problem, x, frozen(own), function)
+        if covariance is None:
+            return cls(problem, x, frozen(_paper_covariance(problem.factors.together, x)), function)
+        return cls(problem, x, _real_array("covariance", covariance, (*shape, p, p)), function)
 
     @classmethod
     def of_fit(cls, problem: Problem, fit: Fit, *, scaled: bool) -> Self:
@@ -215,6 +219,17 @@ class Estimate:
     def relative_error_percent(self, truth: npt.ArrayLike) -> Array:
         """Return 100 |X - truth| / |truth|, shape (..., p), the paper's %e; NaN where the truth is 0."""
         return np.abs(self.error_percent(truth))
+
+
+def _real_array(name: str, values: npt.ArrayLike, shape: tuple[int, ...]) -> Array:
+    """Return what an estimator gives as an array; raise PluginError if that are no real numbers, or not as many."""
+    given = np.asarray(values)
+    if given.dtype.kind not in "fiub" or given.shape != shape:
+        raise PluginError(
+            f"Estimate.judge is given {name} of {given.dtype}, shape {given.shape}; it takes real numbers, shape {shape}: one "
+            "for each of problem.names"
+        )
+    return frozen(given)
 
 
 def _paper_covariance(factor: Factor, X: Array, inverse: Array | None = None) -> Array:

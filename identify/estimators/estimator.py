@@ -50,14 +50,21 @@ class AbstractEstimator(ABC):
         estimate, status = self.solve(problem), problem.factors.together.status
         if not isinstance(estimate, Estimate):
             raise PluginError(f"plug-in {type(self).__name__}.solve returned {estimate!r:.60}, expected an Estimate")
-        expect(self, "solve", estimate.X, (*status.shape, len(problem.names)))
+        p = len(problem.names)
+        expect(self, "solve", estimate.X, (*status.shape, p))
+        expect(self, "solve", estimate.covariance, (*status.shape, p, p))
         if throw and estimate.failures:
             raise IdentificationError(next(iter(estimate.failures.values())))
         lost = ~np.isfinite(estimate.X) & (status == Status.OK)[..., None]
         if throw and lost.any():
             names = ", ".join(np.array(problem.names)[lost.reshape(-1, len(problem.names)).any(axis=0)])
+            if not np.isfinite(problem.factors.fit(2).X).all():  # nor does weighted least squares
+                raise IdentificationError(
+                    f"{self._called} finds no finite value for {names}: use a longer log, in which all joints move"
+                )
             raise IdentificationError(
-                f"{self._called} finds no finite value for {names}: use a longer log, in which all joints move"
+                f"{self._called} gives NaN or infinity for {names}, where least squares finds all parameters: "
+                "it is the estimator that fails here, not the log; take another, such as WLS"
             )
         return estimate
 

@@ -48,6 +48,8 @@ def read_text(path: Path) -> LogTable:
 
     try:
         skipped, names, mark = _head(path)
+        if not names:
+            _require_no_units(path, skipped, mark)
         if mark == b" ":
             return _blanks(path, skipped, names)
         read = csv.ReadOptions(skip_rows=skipped, column_names=names or None)
@@ -104,6 +106,18 @@ def _head(path: Path) -> tuple[int, list[str], bytes]:
 def _cells(line: bytes, mark: bytes) -> list[str]:
     text = line.decode("utf-8").strip()
     return text.split() if mark == b" " else [cell.strip(' "') for cell in text.split(mark.decode())]
+
+
+def _require_no_units(path: Path, skipped: int, mark: bytes) -> None:
+    """Raise LogError if the line below the names has no number, as one of units has none."""
+    with _opened(path) as file:
+        below = [file.readline() for _ in range(skipped + 2)][-1]
+    cells = [cell for cell in _cells(below.decode("utf-8", errors="replace").encode(), mark) if cell]
+    if cells and not any(re.fullmatch(NUMBER, cell, re.IGNORECASE) for cell in cells):
+        raise LogError(
+            f"{path}: line {skipped + 2} holds no numbers but {', '.join(cells):.60}: if these are units, take the line "
+            "out, and say those that are not SI with --units, such as q=deg tau=mNm, or in a log.toml"
+        )
 
 
 def _decimal(path: Path, skipped: int, mark: bytes) -> str:

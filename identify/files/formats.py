@@ -47,6 +47,9 @@ def read_table(path: Path) -> LogTable:
         table = reader(path)
     except OSError as error:
         raise LogError(f"cannot read the log {path}: {error.strerror or error}") from error
+    if not table.rows and table.words:
+        name, what = next(iter(table.words.items()))
+        raise LogError(f"{path}: no column holds numbers: {name} holds {what}")
     if not table.rows:
-        raise LogError(f"{path} holds no samples")
+        raise LogError(f"{path} holds no samples: there is no row of numbers below its header")
     return table

@@ -94,6 +94,10 @@ class LogLayout:
         """Return the layout that stands beside a log, under its name or as log.toml, and its path; None if there is none."""
         stem = log.with_suffix("") if log.suffix.lower() == ".gz" else log
         for path in (stem.with_suffix(".toml"), log.parent / LAYOUT):
+            if path.is_dir() and path.name == LAYOUT:
+                raise LogError(
+                    f"{path} is a folder, where a file says what the columns of logs are: rename it, or put them elsewhere"
+                )
             if path.is_file() and path != log and (path.name == LAYOUT or _is_layout(path)):
                 return cls.read(path), path
         return None

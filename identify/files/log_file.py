@@ -12,7 +12,10 @@ from identify.files.arrow import TORQUE, arrow
 from identify.files.reading import read_columns
 
 CSV = ".csv"
-"""What the name of a CSV file ends with; other files that idbench writes are Parquet."""
+"""What the name of a CSV file ends with."""
+
+WRITTEN = (CSV, ".parquet")
+"""What names of files end with that idbench writes."""
 
 
 def write_log(log: MotionLog, path: Path, joints: Sequence[str] = ()) -> None:
@@ -27,6 +30,8 @@ def write_log(log: MotionLog, path: Path, joints: Sequence[str] = ()) -> None:
     OSError
         If the file cannot be written.
     """
+    if path.suffix.lower() not in WRITTEN:
+        raise LogError(f"{path}: the name of a log that is written must end with {' or '.join(WRITTEN)}")
     if log.q.ndim != 2:
         raise LogError(f"a file holds one run, the log has shape {log.q.shape}: write each run by itself")
     ends = [f"_{joint}" for joint in joints] or [str(j + 1) for j in range(log.n)]

@@ -19,6 +19,9 @@ from identify.files.units import needs_gain
 CLOCKS = 1e6
 """Times [s] beyond this are those of a calendar: logs count from their beginning."""
 
+LEAST, MOST = 1e-9, 1e9
+"""Sizes of gains beyond which they are slips."""
+
 LAYOUT_FILE = ".toml"
 """What the name of a layout ends with, which may be given in the place of a log."""
 
@@ -72,6 +75,14 @@ def standard_layout(path: Path, table: LogTable) -> LogLayout:
     names = [*table.columns, *table.words]
     _require_names(path, table)
     n = sum(bool(re.fullmatch(r"q\d+", name)) for name in names)
+    of_both = {name[1:] for name in names if name.startswith("q_")} & {name[3:] for name in names if name.startswith("tau_")}
+    mixed = [name for name in names if n and name.removeprefix("tau").removeprefix("q") in of_both]
+    if mixed:
+        numbered = next(name for name in names if re.fullmatch(r"q\d+", name))
+        raise LogError(
+            f"{path} numbers some joints ({numbered}) and names others ({', '.join(mixed)}): call all columns by numbers, "
+            "q1, q2, ..., or all by the names of their joints, or say what they are with --columns"
+        )
     joints = () if n else tuple(name.removeprefix("q_") for name in names if name.startswith("q_"))
     ends = [f"_{joint}" for joint in joints] or [str(j + 1) for j in range(max(n, 1))]
     needed = ["t", *(f"q{end}" for end in ends), *(f"tau{end}" for end in ends)]
@@ -154,6 +165,11 @@ class _Files:
             )
         if gain and len(gain) not in (1, n):
             raise LogError(f"{self.log}: {len(gain)} gains for {n} joints: give one, or one a joint")
+        if wrong := [x for x in gain if not LEAST <= abs(x) <= MOST]:
+            raise LogError(
+                f"{self.log}: a gain of {wrong[0]:g} makes no torque: give N m a unit of tau for each joint (--gain, or "
+                f"gain in [torque] of its log.toml), {LEAST:g} to {MOST:g} in size, negative where the sign is the other way"
+            )
         return np.array(gain or (1.0,))
 
     def _stated(self) -> TorqueChannel | None:

@@ -24,6 +24,12 @@ OF_JOINTS = ("name", "sigma", "alpha", "d", "theta", "range", "armature")
 OF_CONVENTION = {KHALIL: ("parent", "gamma", "b", "r"), CLASSIC: ("a",)}
 """And those that a convention has beside them."""
 
+FARTHEST, STRONGEST = 1e6, 1e3
+"""Lengths, angles and armatures, and accelerations of gravity [m/s^2], beyond which nothing of a robot lies."""
+
+EXAMPLES = {2: "[-2.4, 2.4]", 3: "[0.0, 0.0, -9.81]"}
+"""Lists of so many numbers."""
+
 RIGHT = 1e-5
 """Angles [rad] this near to a multiple of a right angle are meant to be it: 1.5708."""
 
@@ -63,7 +69,7 @@ def _described(path: Path, stated: Mapping[str, Any]) -> tuple[mujoco.MjSpec, li
         raise RobotError(f'{path}: say angles = "rad" or angles = "deg"')
     spec, bodies = mujoco.MjSpec(), dict[str, mujoco.MjsBody]()
     spec.compiler.degree = False
-    spec.option.gravity = stated.get("gravity", [0.0, 0.0, -9.81])
+    spec.option.gravity = _numbers(path, "gravity", stated.get("gravity", [0.0, 0.0, -9.81]), 3, STRONGEST)
     last, distal = spec.worldbody, (np.zeros(3), np.eye(3))
     for number, joint in enumerate(stated.get("joints", [])):
         name = str(joint.get("name", f"joint{number + 1}"))
@@ -88,13 +94,7 @@ class _Values:
         self._path, self._name, self._joint, self._scale = path, name, joint, scale
 
     def length(self, key: str) -> float:
-        try:
-            value = float(self._joint.get(key, 0.0))
-        except (TypeError, ValueError):
-            value = np.nan
-        if not np.isfinite(value):
-            raise RobotError(f"{self._path}: joint {self._name}: {key} = {self._joint[key]!r} must be a number")
-        return value
+        return _number(self._path, f"joint {self._name}: {key}", self._joint.get(key, 0.0), FARTHEST)
 
     def angle(self, key: str) -> float:
         # Multiples of a right angle are meant exactly, however they are rounded.
@@ -104,17 +104,25 @@ class _Values:
 
     @property
     def slides(self) -> bool:
-        if self._joint.get("sigma", 0) not in (0, 1):
+        if (sigma := self._joint.get("sigma", 0)) not in (0, 1) or isinstance(sigma, bool):
             raise RobotError(
                 f"{self._path}: joint {self._name}: sigma = {self._joint['sigma']!r} must be 0 (turns) or 1 (slides)"
             )
         return bool(self._joint.get("sigma", 0))
 
     @property
-    def range(self) -> list[float]:
-        low, high = self._joint.get("range", (0.0, 0.0))
+    def range(self) -> list[float] | None:
+        if (stated := self._joint.get("range")) is None:
+            return None
+        where = f"joint {self._name}: range"
+        low, high = _numbers(self._path, where, stated, 2, FARTHEST)
+        if not low < high:
+            raise RobotError(
+                f"{self._path}: {where} = [{low:g}, {high:g}]: the lowest is not below the highest; leave range out for a "
+                "joint without limits"
+            )
         scale = 1.0 if self.slides else self._scale
-        return [scale * float(low), scale * float(high)]
+        return [scale * low, scale * high]
 
     @property
     def armature(self) -> float:
@@ -149,10 +157,23 @@ def _body(parent: mujoco.MjsBody, name: str, place: tuple[Array, Array], values:
     body.mass, body.inertia, body.explicitinertial = SMALL, [SMALL * SIZE**2] * 3, True
     kind = mujoco.mjtJoint.mjJNT_SLIDE if values.slides else mujoco.mjtJoint.mjJNT_HINGE
     joint = body.add_joint(name=name, type=kind, axis=[0, 0, 1], armature=values.armature)
-    low, high = values.range
-    if low < high:
-        joint.range, joint.limited = [low, high], mujoco.mjtLimited.mjLIMITED_TRUE
+    if values.range is not None:
+        joint.range, joint.limited = values.range, mujoco.mjtLimited.mjLIMITED_TRUE
     return body
+
+
+def _number(path: Path, where: str, stated: object, most: float) -> float:
+    """Return a number of a table; raise RobotError if it is none, or larger than any of a robot."""
+    if isinstance(stated, bool) or not isinstance(stated, (int, float)) or not abs(stated) <= most:
+        raise RobotError(f"{path}: {where} = {stated!r:.60} must be a number from -{most:g} to {most:g}")
+    return float(stated)
+
+
+def _numbers(path: Path, where: str, stated: object, count: int, most: float) -> list[float]:
+    """Return numbers of a table; raise RobotError if they are not as many."""
+    if not isinstance(stated, list) or len(stated) != count:
+        raise RobotError(f"{path}: {where} = {stated!r:.60} must be a list of {count} numbers, such as {EXAMPLES[count]}")
+    return [_number(path, where, each, most) for each in stated]
 
 
 def _turn(axis: str, angle: float) -> Array:

@@ -70,6 +70,9 @@ class Mounting:
             _couple(spec, name, weights)
 
 
+LEAST, MOST = 1e-6, 1e6
+"""Sizes of a coupling's factors beyond which they are slips."""
+
 PLAIN = Mounting()
 """As the file describes it."""
 
@@ -77,6 +80,23 @@ PLAIN = Mounting()
 def _couple(spec: mujoco.MjSpec, name: str, weights: Sequence[tuple[str, float]]) -> None:
     """Add a drive that turns with several joints: a fixed tendon."""
     joints = [joint.name for joint in spec.joints]
+    if name in joints:
+        raise RobotError(
+            f"--coupling {name}: that is the name of a joint, whose parameters would have like names: take another"
+        )
+    named = [joint for joint, _ in weights]
+    if twice := sorted({joint for joint in named if named.count(joint) > 1}):
+        raise RobotError(f"--coupling {name}: {', '.join(twice)} stands twice: add its factors up")
+    if wrong := [f"{weight:g}*{joint}" for joint, weight in weights if not LEAST <= abs(weight) <= MOST]:
+        raise RobotError(
+            f"--coupling {name}: {', '.join(wrong)}: a factor must be from {LEAST:g} to {MOST:g} in size; leave joints out "
+            "with which the motor does not turn"
+        )
+    if len(weights) < 2:
+        raise RobotError(
+            f"--coupling {name}: {named[0]} alone is a drive of its own, which every joint has: name two joints or more, or "
+            "--armature all for its rotor"
+        )
     if name in [tendon.name for tendon in spec.tendons]:
         raise RobotError(f"--coupling {name}: the robot's file has a tendon of this name already")
     tendon = spec.add_tendon(name=name)

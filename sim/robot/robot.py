@@ -70,6 +70,7 @@ class Robot:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # what it warns of ends a simulation, by name
                 robot = cls(Path(name).stem, spec.compile(), notes)
+            robot.require_possible()
             robot.require_resisting()
             return robot
         except BenchError:
@@ -113,6 +114,25 @@ class Robot:
             raise RobotError(f"cannot read robot {name!r}: {error.strerror}") from error
         except (ValueError, ElementTree.ParseError) as error:
             raise RobotError(f"MuJoCo cannot read {name!r}: {' '.join(str(error).split())}") from error
+
+    def require_possible(self) -> None:
+        """Raise RobotError if a number of the file is none, or larger than any of a robot."""
+        model = self.model
+        bodies = {"mass": (model.body_mass, 1e6), "inertia": (model.body_inertia, 1e9)}
+        drives = {"armature": model.dof_armature, "damping": model.dof_damping, "frictionloss": model.dof_frictionloss}
+        for name, (values, most) in bodies.items():
+            if (wrong := ~(np.abs(values) <= most)).any():
+                b = int(np.argwhere(wrong)[0][0])
+                raise RobotError(
+                    f"robot {self.name!r}: {name} of body {model.body(b).name!r} is {np.ravel(values[b])[0]:g}, more than "
+                    f"{most:g} in SI units: correct the file"
+                )
+        for name, values in drives.items():
+            if (wrong := ~(np.abs(values) <= 1e9)).any():
+                j = int(np.argmax(wrong))
+                raise RobotError(f"robot {self.name!r}: joint {self.joints[j]} has {name} = {values[j]:g}: correct the file")
+        if not (np.abs(model.opt.gravity) <= 1e3).all():
+            raise RobotError(f"robot {self.name!r}: gravity = {model.opt.gravity.tolist()} must be numbers up to 1000 m/s^2")
 
     def require_resisting(self) -> None:
         """Raise RobotError if a joint has a negative friction or rotor: it would drive itself."""

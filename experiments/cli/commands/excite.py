@@ -27,7 +27,7 @@ from experiments.results.summaries import write_summary
 from identify import MotionLog, TorqueChannel
 from identify.files.log_file import write_log
 from sim.encoders import IncrementalEncoder
-from sim.limits.motion_limits import MotionLimits, looser
+from sim.limits.motion_limits import MotionLimits, limits_of, looser
 from sim.robot.robot import Robot
 from sim.scenario.measurement import TorqueMeasurement
 from sim.scenario.scenario import Scenario
@@ -112,7 +112,8 @@ def _designed(options: Excite) -> Design:
         raise ExperimentError(f"--seed {options.seed} must be at least 0")
     if options.until is not None and options.log:
         raise ExperimentError("--until simulates its own logs: leave --log out")
-    subject = Subject(absolute(options.robot), options.parameters)
+    subject, limits = Subject(absolute(options.robot), options.parameters), _limits(options)
+    limits_of(subject.robot, limits)  # what is missing is said before the parameters are grouped
     subject.require_linear()
     if len(options.torque_noise) not in (0, 1, subject.robot.n):
         count = len(options.torque_noise)
@@ -125,7 +126,7 @@ def _designed(options: Excite) -> Design:
         kind=options.kind,
         duration=options.duration,
         frequency=options.frequency,
-        asked=MotionLimits.read(options.limits),
+        asked=limits,
         repeat=options.repeat,
         seed=options.seed,
         weights=_weights(options.weigh),
@@ -139,6 +140,18 @@ def _require_between(name: str, value: float, least: float, most: float) -> None
     if not (least <= value <= most and value > 0):
         above = f"at least {least:g}" if least else "above 0"
         raise ExperimentError(f"--{name} {value:g} must be {above} and at most {most:g}")
+
+
+def _limits(options: Excite) -> MotionLimits:
+    """Return what a motion must keep: options before the file of --limits."""
+    limits = MotionLimits.read(options.limits)
+    for name in ("velocity", "acceleration"):
+        values: tuple[float, ...] = getattr(options, name)
+        if wrong := [x for x in values if not 0 < x < float("inf")]:
+            raise ExperimentError(f"--{name} {wrong[0]:g} must be a number above 0")
+        if values:
+            limits = replace(limits, **{name: values})  # type: ignore[arg-type]  # of one of these names
+    return limits
 
 
 def _scenario(options: Excite) -> Scenario:

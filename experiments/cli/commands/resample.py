@@ -14,16 +14,16 @@ from experiments.results.writing import folder_for, new_file, require_free
 from identify import MotionLog
 from identify.data.resample import Repaired
 from identify.files.layout import LAYOUT
-from identify.files.log_file import CSV, read_log, write_log
-
-PARQUET = ".parquet"
+from identify.files.log_file import CSV, WRITTEN, read_log, write_log
 
 
 def resample(options: Resample) -> None:
     """Write a log anew at a fixed sampling frequency, its clock repaired."""
     out, read = options.out, (options.log,)
-    if out.suffix.lower() not in (CSV, PARQUET):
-        raise ExperimentError(f"--out {out}: its name must end with {CSV} or {PARQUET}")
+    if options.fs is not None and not 0 < options.fs < float("inf"):
+        raise ExperimentError(f"--fs {options.fs:g} must be a number above 0 [Hz]; leave it out for that of the log")
+    if out.suffix.lower() not in WRITTEN:
+        raise ExperimentError(f"--out {out}: its name must end with {' or '.join(WRITTEN)}")
     if out.suffix.lower() == CSV and (out.parent / LAYOUT).is_file():
         raise ExperimentError(f"--out {out}: {LAYOUT} there would be taken for its columns: choose another folder, or .parquet")
     require_free(out, "--out", force=options.force, read=read)

@@ -5,12 +5,12 @@ from typing import Annotated, Literal, final
 
 import tyro
 
-from experiments.cli.app import APP
+from experiments.cli.app import command
 from experiments.cli.command import Command
 from experiments.option_types import File, Json
 
 
-@APP.command(name="new")
+@command("new")
 @final
 @dataclass(frozen=True)
 class New(Command, action="authors:begin"):
@@ -29,7 +29,7 @@ class New(Command, action="authors:begin"):
     """File or folder to write; NAME.toml, or NAME, by default."""
 
 
-@APP.command(name="check")
+@command("check")
 @final
 @dataclass(frozen=True)
 class Check(Command, action="authors:check"):

@@ -5,7 +5,7 @@ from typing import Annotated, final
 
 import tyro
 
-from experiments.cli.app import APP
+from experiments.cli.app import command
 from experiments.cli.command import Command
 from experiments.cli.options.shared import Asked, RecordedOptions
 from experiments.identification.parameters import Parameters
@@ -15,7 +15,7 @@ Weights = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=WEIGHT", help_b
 Percent = Annotated[str | None, tyro.conf.arg(metavar="PERCENT", help_behavior_hint="")]
 
 
-@APP.command(name="excite")
+@command("excite")
 @final
 @dataclass(frozen=True)
 class Excite(RecordedOptions, Command, action="excite:excite"):
@@ -43,6 +43,11 @@ class Excite(RecordedOptions, Command, action="excite:excite"):
     """Sampling frequency of controller and log [Hz]; that of the scenario of --noise, or 100."""
     limits: File = None
     """What the motion must keep (TOML): ranges, velocities, torques, boxes around the robot; by default what its file says."""
+    velocity: Each = ()
+    """Largest speed [rad/s, of slides m/s], of all joints or of each; before that of --limits and of the file. MJCF has no word
+    for it."""
+    acceleration: Each = ()
+    """Largest acceleration [rad/s^2, of slides m/s^2], of all joints or of each."""
     weigh: Weights = ()
     """Parameters that count more, as LMY2=4, or less, in the mean of ln sigma."""
     criterion: str = "sigma"

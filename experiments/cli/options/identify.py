@@ -6,7 +6,7 @@ from typing import final
 
 import tyro
 
-from experiments.cli.app import APP
+from experiments.cli.app import command
 from experiments.cli.command import Command
 from experiments.cli.options.shared import LogOptions, Watched
 from experiments.identification.choices import Consistency, Start
@@ -15,7 +15,7 @@ from experiments.option_types import File, Files, Scenarios, Seconds
 from experiments.recording.audience import Watching
 
 
-@APP.command(name="identify")
+@command("identify")
 @final
 @dataclass(frozen=True)
 class Identify(LogOptions, Command, action="identify:identify"):

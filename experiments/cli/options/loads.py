@@ -6,7 +6,7 @@ from typing import Annotated, Literal, final
 
 import tyro
 
-from experiments.cli.app import APP
+from experiments.cli.app import command
 from experiments.cli.command import Command
 from experiments.cli.options.shared import LogOptions
 from experiments.option_types import Count, File, Files, Real, Scenario, Vector
@@ -50,7 +50,7 @@ class LoadOptions(LogOptions):
     """How often it is simulated; 20 by default."""
 
 
-@APP.command(name="payload")
+@command("payload")
 @final
 @dataclass(frozen=True)
 class IdentifyPayload(LoadOptions, Command, action="loads:payload"):
@@ -65,7 +65,7 @@ class IdentifyPayload(LoadOptions, Command, action="loads:payload"):
     """File to write: the robot's own with the payload as a physically consistent body."""
 
 
-@APP.command(name="gains")
+@command("gains")
 @final
 @dataclass(frozen=True)
 class IdentifyGains(LoadOptions, Command, action="loads:gains"):

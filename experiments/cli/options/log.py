@@ -6,14 +6,14 @@ from typing import final
 
 import tyro
 
-from experiments.cli.app import APP
+from experiments.cli.app import command
 from experiments.cli.command import Command
 from experiments.cli.options.shared import Reading
 from experiments.identification.read_options import ColumnOptions
 from experiments.option_types import Delay, File, Folder, Hertz, Json, Torque
 
 
-@APP.command(name="log")
+@command("log")
 @final
 @dataclass(frozen=True)
 class ShowLog(Command, action="log:show_log"):
@@ -33,7 +33,7 @@ class ShowLog(Command, action="log:show_log"):
     """Print the same as JSON; what is for people goes to the error stream."""
 
 
-@APP.command(name="resample")
+@command("resample")
 @final
 @dataclass(frozen=True)
 class Resample(Command, action="resample:resample"):
@@ -55,7 +55,7 @@ class Resample(Command, action="resample:resample"):
     """Replace a file that is there already."""
 
 
-@APP.command(name="export")
+@command("export")
 @final
 @dataclass(frozen=True)
 class Export(Command, action="resample:export"):

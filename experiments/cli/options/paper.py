@@ -4,13 +4,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import final
 
-from experiments.cli.app import APP
+from experiments.cli.app import command
 from experiments.cli.command import Command
 from experiments.cli.options.shared import RecordedOptions
 from experiments.option_types import Count, File, Folder, Scenario, Window
 
 
-@APP.command(name="table1")
+@command("table1")
 @final
 @dataclass(frozen=True)
 class Table1(RecordedOptions, Command, action="paper:compare"):
@@ -29,7 +29,7 @@ class Table1(RecordedOptions, Command, action="paper:compare"):
     """Name of a scenario, or a file (TOML), as `idbench search` writes it, instead of the one that ships."""
 
 
-@APP.command(name="search")
+@command("search")
 @final
 @dataclass(frozen=True)
 class Search(Command, action="paper:search"):
@@ -43,7 +43,7 @@ class Search(Command, action="paper:search"):
     """Replace a file that is there already."""
 
 
-@APP.command(name="table2")
+@command("table2")
 @final
 @dataclass(frozen=True)
 class Table2(RecordedOptions, Command, action="paper:table2"):

@@ -5,7 +5,7 @@ from typing import final
 
 import tyro
 
-from experiments.cli.app import APP
+from experiments.cli.app import command
 from experiments.cli.command import Command
 from experiments.cli.options.shared import Asked, Mounted
 from experiments.identification.parameters import Parameters
@@ -13,7 +13,7 @@ from experiments.identification.read_options import MountingOptions
 from experiments.option_types import Json
 
 
-@APP.command(name="robot")
+@command("robot")
 @final
 @dataclass(frozen=True)
 class DescribeRobot(Command, action="robot:describe"):

@@ -6,7 +6,7 @@ from typing import Annotated, final
 
 import tyro
 
-from experiments.cli.app import APP
+from experiments.cli.app import command
 from experiments.cli.command import Command
 from experiments.cli.options.shared import Asked, RecordedOptions
 from experiments.identification.choices import Consistency, Start
@@ -15,7 +15,7 @@ from experiments.identification.parameters import Parameters
 from experiments.option_types import Count, Folder, Robot, Scenario, Window
 
 
-@APP.command(name="run")
+@command("run")
 @final
 @dataclass(frozen=True)
 class Run(RecordedOptions, Command, action="run:run"):

@@ -5,12 +5,12 @@ from typing import final
 
 import tyro
 
-from experiments.cli.app import APP
+from experiments.cli.app import command
 from experiments.cli.command import Command
 from experiments.option_types import File, Scenario
 
 
-@APP.command(name="scenario")
+@command("scenario")
 @final
 @dataclass(frozen=True)
 class WriteScenario(Command, action="scenario:write"):

@@ -5,14 +5,14 @@ from typing import Annotated, final
 
 import tyro
 
-from experiments.cli.app import APP
+from experiments.cli.app import command
 from experiments.cli.command import Command
 from experiments.cli.options.shared import Watched
 from experiments.option_types import Count, Folder, Json, Url
 from experiments.recording.audience import Watching
 
 
-@APP.command(name="study")
+@command("study")
 @final
 @dataclass(frozen=True)
 class Study(Command, action="study:study"):

@@ -6,12 +6,12 @@ from typing import Annotated, final
 
 import tyro
 
-from experiments.cli.app import APP
+from experiments.cli.app import command
 from experiments.cli.command import Command
 from experiments.option_types import File, Json
 
 
-@APP.command(name="list")
+@command("list")
 @final
 @dataclass(frozen=True)
 class List(Command, action="list:list_plugins"):
@@ -21,7 +21,7 @@ class List(Command, action="list:list_plugins"):
     """Print it as JSON instead."""
 
 
-@APP.command(name="view")
+@command("view")
 @final
 @dataclass(frozen=True)
 class View(Command, action="view:view"):

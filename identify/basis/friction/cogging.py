@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import final
+from typing import ClassVar, final
 
 import numpy as np
 
@@ -23,6 +23,8 @@ class Cogging(AbstractJointLaw):
     periods : float
         In a turn of the joint: slots and poles of the motor, times the ratio of its gear.
     """
+
+    asks: ClassVar[str] = "the number of periods in a turn of the joint, such as cogging:12"
 
     periods: float = 12.0
 
