@@ -48,8 +48,8 @@ ALLOWED_IN = {
     "experiments/reports/log_picture.py": {"matplotlib", "scipy"},
     "experiments/study/figures.py": {"matplotlib"},
     "experiments/paper/motions_report.py": {"matplotlib"},
-    "experiments.reports.excite.py": {"matplotlib"},
     "experiments/study/study_report.py": {"tomli_w"},
+    "experiments/reports/excite.py": {"matplotlib"},
     "experiments/reports/html.py": {"jinja2", "matplotlib"},
 }
 """Libraries that one file alone may use."""

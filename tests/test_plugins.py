@@ -115,7 +115,7 @@ def test_a_plugin_that_cannot_be_loaded_is_named(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     table = PluginTable("estimators", AbstractEstimator, {})
     assert list(table) == ["broken"]
-    with pytest.raises(PluginError, match=r"'broken' \(broken:Nothing\) cannot be loaded: no licence"):
+    with pytest.raises(PluginError, match=r"'broken' \(broken:Nothing\) cannot be loaded: RuntimeError: no licence"):
         table.create("broken")
 
 

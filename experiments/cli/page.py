@@ -44,7 +44,7 @@ class Page(Console):
     @property
     def encoding(self) -> str:
         """The encoding of what people read: tables have plain lines where it lacks others."""
-        return getattr(self._people, "encoding", None) or "utf-8"
+        return (getattr(self._people, "encoding", None) or "utf-8").lower()
 
     @property
     def _people(self) -> TextIO | None:

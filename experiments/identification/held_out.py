@@ -35,7 +35,7 @@ def on_last_quarter(result: Fit) -> "HeldOut":
     logs, k = result.logs, result.logs.longest
     rest, end = split(logs.fitted[k])
     fitted = (*logs.fitted[:k], rest, *logs.fitted[k + 1 :])
-    title = f"the last quarter of {logs.name(k)}, by a fit of the rest"
+    title = f"the last quarter of {logs.longest_name}, by a fit of the rest"
     return HeldOut(fit(result.request, replace(logs, fitted=fitted)), manageable([end])[0], title)
 
 

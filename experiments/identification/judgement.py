@@ -74,7 +74,7 @@ def judge(result: Fit) -> Judgement:
     """Return a fit, judged on each held-out log, or on the last quarter of its longest; one that fails leaves the others."""
     given = (result.logs.held_out or {}).items()
     if not given:
-        title = f"the last quarter of {result.logs.name(result.logs.longest)}"
+        title = f"the last quarter of {result.logs.longest_name}"
         return Judgement(result, (_judged(title, lambda: on_last_quarter(result)),))
     return Judgement(result, tuple(_judged(f"held-out log {name}", lambda: on_log(result, name, log)) for name, log in given))  # noqa: B023  # called at once
 

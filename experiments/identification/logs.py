@@ -31,6 +31,11 @@ class Logs:
     notes: tuple[str, ...] = ()
     truth: Mapping[str, float] | None = None
 
+    @property
+    def longest_name(self) -> str:
+        """What to call the longest of them, where it stands among others or by itself."""
+        return self.name(self.longest) if len(self.fitted) > 1 else "the log"
+
     def name(self, k: int) -> str:
         """Return what to call one of the fitted logs."""
         return self.names[k] if self.names else f"log {k + 1}" if len(self.fitted) > 1 else "the log"

@@ -1,6 +1,6 @@
 """Logs without and with a payload, judged: is there one robot and one payload that makes the torques of all of them?"""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self, final
@@ -17,7 +17,7 @@ from experiments.text import error_percentage
 from identify import Array, Estimate, ExplicitModel, IdentificationError, MotionLog, Problem, validate
 from identify.loads.drive_gains import read_with
 from identify.loads.loaded_robot import LETTERS, LoadedRobot, of_payload
-from identify.loads.payload import Payload
+from identify.loads.payload import Payload, with_robot_held
 
 SURE = 4.0
 """Standard errors from which on a contradiction is reported."""
@@ -47,12 +47,15 @@ class LoadJudgement:
         Names of the logs, those without the payload first.
     gain : Array, shape (joint,)
         Torque over what the files have: the logs have been read with it.
+    before : mapping of str to float, optional
+        Base parameters of the robot that were identified before, where there are no logs without the payload.
     """
 
     robot: LoadedRobot
     request: Request
     names: tuple[str, ...]
     gain: Array
+    before: Mapping[str, float] | None = None
 
     def with_gains(self, ratio: Array) -> Self:
         """Return the same of logs that are read with other multiples of their gains."""
@@ -62,6 +65,8 @@ class LoadJudgement:
     @cached_property
     def estimate(self) -> Estimate:
         """Robot and payload, by all logs."""
+        if self.before is not None:
+            return with_robot_held(self.robot, self.before)
         return self.robot.estimated(self.robot.of_both, self.robot.basis)
 
     @cached_property

@@ -7,6 +7,7 @@ from typing import TypeVar, final
 from experiments.errors import ResultsError
 from experiments.faults import REPORT, is_told, reason, report, trace
 from experiments.results.folder import ResultsFolder
+from identify.blame import is_mistake
 
 T = TypeVar("T")
 
@@ -30,7 +31,9 @@ class Attempts:
         """Return what `make` returns, None if it fails."""
         try:
             return make()
-        except (Exception, SystemExit) as error:  # Ctrl-C alone ends the others, too
+        except BaseException as error:
+            if not is_mistake(error):  # Ctrl-C and a termination end the others, too
+                raise
             self.failed(what, reason(error), "" if is_told(error) else trace(error), error)
             return None
 

@@ -13,8 +13,8 @@ from sim.settings import Number, Whole, settings
 
 MOST_VALUES = 10000
 
-FRICTION = "friction"
-"""Field of the axis of friction laws that are identified; those that are simulated have settings, such as friction.viscous."""
+FRICTION = "friction laws"
+"""Field of the axis of the laws of friction that are identified; `friction` is that of the simulated robot."""
 
 
 @final

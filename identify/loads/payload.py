@@ -14,6 +14,7 @@ from identify.arrays import Array
 from identify.data.kinematics import INERTIAL
 from identify.data.motion_log import MotionLog
 from identify.errors import IdentificationError, LogError
+from identify.estimators.estimate import Estimate
 from identify.estimators.problem import Problem
 from identify.loads.loaded_robot import LETTERS, LoadedRobot, marked, of_payload
 from identify.models.explicit import ExplicitModel
@@ -112,9 +113,7 @@ def with_known_robot(robot: LoadedRobot, names: tuple[str, ...], X: Array, covar
         Their values.
     """
     basis, logs = robot.basis, marked(robot.loaded, 1.0)
-    values = dict(zip(names, map(float, X), strict=True))
-    held = basis.holding(**{name: values.get(name, 0.0) for name in basis.names if name not in robot.names})
-    found = robot.estimated(logs, held)
+    found = with_robot_held(robot, dict(zip(names, map(float, X), strict=True)))
     of_robot = Problem(logs, basis.renamed({name: name for name in names}), ExplicitModel(), robot.chain).rows
     rows = found.problem.rows
     slope = np.zeros((len(found.names), len(names)))
@@ -123,6 +122,13 @@ def with_known_robot(robot: LoadedRobot, names: tuple[str, ...], X: Array, covar
     X_payload, C = of_payload(found, robot.names)
     place = [found.names.index(name) for name in robot.names]
     return Payload(robot.names, X_payload, C + slope[place] @ covariance @ slope[place].T, robot.known)
+
+
+def with_robot_held(robot: LoadedRobot, values: Mapping[str, float]) -> Estimate:
+    """Return the estimate of the payload by the logs with it, the base parameters of the robot held at values, 0 by default."""
+    basis = robot.basis
+    held = basis.holding(**{name: values.get(name, 0.0) for name in basis.names if name not in robot.names})
+    return robot.estimated(marked(robot.loaded, 1.0), held)
 
 
 def apart(robot: LoadedRobot) -> Payload:

@@ -1,4 +1,4 @@
-"""Arms of six and seven joints in closed loop: simulated, identified, judged on unseen motion, and put back into their file."""
+"""Arms of six and seven joints in closed loop: simulated, identified, judged on held-out log, and put back into their file."""
 
 from dataclasses import replace
 

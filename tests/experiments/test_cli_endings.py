@@ -10,15 +10,34 @@ import pytest
 
 import experiments.recording.table1_recording
 from experiments.cli import main
+from experiments.results.manifest import NAME as MANIFEST
+
+KEPT = ["log.parquet", "summary.json"]
+"""What is there before anything is shown."""
 
 
-def test_interruption_is_quiet_and_leaves_nothing(out, capfd, monkeypatch):
+def listed(folder):
+    return sorted({path.name for path in folder.iterdir()} - {MANIFEST})
+
+
+def test_interruption_of_a_view_is_quiet_and_loses_no_result(out, capfd, monkeypatch):
     def interrupted(*args):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(experiments.recording.table1_recording, "record_table1", interrupted)
     assert main(["table1", "--out", str(out)]) == 130
-    assert "interrupted" in capfd.readouterr().err
+    printed = capfd.readouterr()
+    assert "interrupted" in printed.err
+    assert "explicit model" in printed.out
+    assert listed(out) == KEPT
+
+
+def test_interruption_of_the_work_leaves_nothing(out, capfd, monkeypatch):
+    def interrupted(*args):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("experiments.cli.commands.paper.print_table1", interrupted)
+    assert main(["table1", "--out", str(out)]) == 130
     assert not list(out.parent.iterdir())
 
 
@@ -74,24 +93,23 @@ def test_an_interrupt_while_a_module_is_loaded_is_as_quiet(tmp_path, module, sta
         sys.exit(main(["table1", "--out", "x"]))
     """
     process = start("-c", code, cwd=tmp_path)
-    assert process.stdout.readline() == "loading\n"
+    assert any(line == "loading\n" for line in process.stdout)
     process.send_signal(signal.SIGINT)
     _, err = process.communicate()
     assert (process.returncode, err) == (130, "idbench: interrupted\n")
-    assert not list(tmp_path.iterdir())
+    assert [listed(path) for path in tmp_path.iterdir()] == ([KEPT] if module == "rerun" else [])
 
 
 def test_termination_leaves_nothing_half_written(tmp_path, start):
-    """SIGTERM while the recording is written: the hidden folder goes, too."""
+    """SIGTERM while the recording is written: the hidden folder goes, what was complete stays."""
     code = "import sys; from experiments import cli; import experiments.recording.table1_recording as r\n"
     code += "def slow(*args): print('recording', flush=True); import time; time.sleep(600)\n"
     code += "r.record_table1 = slow\nsys.exit(cli.main(['table1', '--out', 'results']))"
-    process = start("-c", code, cwd=tmp_path)
-    assert process.stdout.readline()
-    assert len(list(tmp_path.iterdir())) == 1
+    process = start("-uc", code, cwd=tmp_path)
+    assert any(line == "recording\n" for line in process.stdout)
     process.terminate()
     assert process.wait() == 143
-    assert not list(tmp_path.iterdir())
+    assert listed(tmp_path / "results") == KEPT
 
 
 @pytest.mark.parametrize(("size", "kept"), [(20_000, []), (300_000, ["log.parquet", "summary.json"])])
@@ -104,22 +122,32 @@ def test_a_full_disk_is_one_line_and_what_has_room_is_kept(tmp_path, size, kept)
     assert len(done.stderr.splitlines()) == 1
     assert done.stderr.startswith("idbench: cannot write")
     assert "explicit model" in done.stdout
-    assert sorted(path.name for path in tmp_path.glob("results/*")) == kept
+    assert (listed(tmp_path / "results") if kept else list(tmp_path.iterdir())) == kept
     assert not list(tmp_path.glob(".idbench-*"))
 
 
-def test_a_failure_half_way_leaves_earlier_results_whole(out, monkeypatch, capfd, complaint):
-    main(["table1", "--out", str(out), "--chain", "paper"])
+def test_a_failure_of_a_view_is_one_line_and_the_rest_is_there(out, monkeypatch, capfd, complaint):
+    def full(*args):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(experiments.recording.table1_recording, "record_table1", full)
+    assert "the recording: No space left on device; the table is printed, and with the log in" in complaint(
+        "table1", "--out", str(out)
+    )
+    assert listed(out) == KEPT
+    assert list(out.parent.iterdir()) == [out]
+
+
+def test_results_that_cannot_be_written_leave_the_earlier_ones_whole(out, monkeypatch, complaint):
+    assert main(["table1", "--no-rerun", "--out", str(out)]) == 0
     before = {path.name: path.read_bytes() for path in out.iterdir()}
 
     def full(*args):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(experiments.recording.table1_recording, "record_table1", full)
-    capfd.readouterr()
-    assert "No space left on device" in complaint("table1", "--out", str(out))
+    monkeypatch.setattr("experiments.cli.commands.paper.write_summary", full)
+    assert "No space left on device" in complaint("table1", "--no-rerun", "--out", str(out))
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
-    assert list(out.parent.iterdir()) == [out]
 
 
 @pytest.mark.parametrize("command", ["list", "table1"])

@@ -68,7 +68,7 @@ def test_scenarios_that_make_no_sense_are_one_line(changes, message, tmp_path, c
 
 def test_a_folder_in_the_place_of_a_file_stops_all(out, complaint):
     (out / "recording.rrd").mkdir(parents=True)
-    assert "recording.rrd is a folder where a file must go" in complaint("table1", "--out", str(out))
+    assert "holds recording.rrd, not written by idbench" in complaint("table1", "--out", str(out))
     assert [path.name for path in out.iterdir()] == ["recording.rrd"]
 
 
@@ -82,7 +82,7 @@ def test_view_tells_where_there_is_no_display(out, monkeypatch, complaint):
 
 
 def test_search_says_where_it_cannot_write(tmp_path, complaint):
-    assert "cannot write" in complaint("search", "--seed", "5", "--out", str(tmp_path / "nowhere" / "found.toml"))
+    assert "there is no folder" in complaint("search", "--seed", "5", "--out", str(tmp_path / "nowhere" / "found.toml"))
 
 
 def test_view_needs_a_recording(tmp_path, complaint):

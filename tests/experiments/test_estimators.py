@@ -36,7 +36,7 @@ def test_a_run_knows_its_own_loop_and_says_whether_noise_in_W_matters(idbench, r
     assert len(rounds["path"][0]) == 8
     code, out, _ = idbench("identify", ran, "--estimator", "DIDIM", "--start", "file", "--model", "explicit", "--no-rerun")
     assert code == 0
-    assert "explicit: settled after" in out
+    assert "explicit: converged after" in out
     assert "explicit: good" in out
 
 
@@ -45,7 +45,7 @@ def test_a_log_alone_needs_its_loop(idbench, ran, scenario, tmp_path):
     words = ("identify", tmp_path / "log.parquet", "--estimator", "DIDIM", "--model", "explicit")
     code, out, _ = idbench(*words, "--loop", scenario)
     assert code == 0
-    assert "settled after" in out
+    assert "converged after" in out
     wrong = {
         (): "DIDIM simulates the closed loop in which a log was recorded, which is not known",
         ("--loop", scenario, "--estimator", "GLS"): "--loop: GLS simulates no loop",

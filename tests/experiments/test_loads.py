@@ -152,7 +152,7 @@ def files(pairs, tmp_path, monkeypatch):
 def test_the_payload_command(files, capsys):
     words = ["payload", "full.parquet", "--unloaded", "empty.parquet", "--robot", "puma560", "--estimator", "WLS"]
     assert main([*words, "--write-mjcf", "arm.xml", "--out", "found"]) == 0
-    mass = re.search(r"a body that can exist: ([\d.]+) kg", capsys.readouterr().out)
+    mass = re.search(r"the nearest physically consistent body: ([\d.]+) kg", capsys.readouterr().out)
     assert float(mass[1]) == pytest.approx(2.0, rel=0.01)
     robot = Robot.load(str(files / "arm.xml"))
     assert robot.model.body("payload").mass[0] == pytest.approx(2.0, rel=0.01)
@@ -186,7 +186,7 @@ def test_the_gains_command(files, capsys):
         (["payload", "full.parquet", "--robot", "puma560", "--before", "none.json"], "--before none.json: No such file"),
         (["payload", "full.parquet", "--robot", "puma560", "--before", "full.parquet"], "holds no base parameters of an arm"),
         (["payload", "full.parquet", "--robot", "puma560", "--at", "0", "0", "1"], "--at needs --mass"),
-        (["payload", "full.parquet", "--robot", "puma560", "--mass", "-2"], "the mass above 0"),
+        (["payload", "full.parquet", "--robot", "puma560", "--mass", "-2"], "--mass -2 must be above 0"),
         (["payload", "full.parquet", "--robot", "puma560", "--write-mjcf", "arm.txt"], "its name must end with .xml"),
         (["payload", "full.parquet", "--simulate", "payload"], "--simulate needs no logs"),
         (["payload", "--simulate", "quantization"], "scenario quantization has no payload"),

@@ -77,7 +77,7 @@ def test_each_log_is_judged_by_itself(idbench, logs, first, tmp_path):
     assert code == 0
     summary = found(tmp_path / "out")
     assert (unseen(summary, 1) > 2 * unseen(summary, 0)).any()
-    assert out.count("unseen motion") == 2
+    assert out.count("held-out log") == 2
     assert summary["validation"] == summary["validations"][0]
 
 
@@ -257,7 +257,7 @@ def test_the_report_says_in_a_minute_whether_to_trust_it(idbench, logs, tmp_path
     )  # fmt: skip
     assert code == 0
     page = (tmp_path / "out" / "report.html").read_text()
-    for words in ("explicit model: ", "What to see to", "unseen motion", "--torque-delay", "XX", "Friction", "What is left"):
+    for words in ("explicit model: ", "What to see to", "held-out log", "--torque-delay", "XX", "Friction", "What is left"):
         assert words in page, words
     assert page.count("<svg") == 4
     assert 'src="http' not in page

@@ -29,7 +29,7 @@ def test_identify_validates_and_writes_the_file(idbench, logs, tmp_path):
     code, out, err = idbench("identify", logs / "first.parquet", *words, "--no-rerun")
     assert code == 0, err
     assert "explicit: good: the torque of joint" in out
-    assert "standing and turning, where friction is not determined: joint1" in out
+    assert "at rest and reversing, where friction is not determined: joint1" in out
     assert "written to out.xml: the robot with the parameters of the explicit model" in out
     made = standard_parameters(Robot.load(str(tmp_path / "out.xml")))
     truth = standard_parameters(Robot.load("puma560"))

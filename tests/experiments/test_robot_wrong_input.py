@@ -65,7 +65,7 @@ def test_files_are_not_written_where_they_would_be_lost(idbench, logs, tmp_path)
     (tmp_path / "own.xml").write_text(Robot.path("puma560").read_text())
     words = "identify", logs / "first.parquet", "--robot", "own.xml", "--write-mjcf"
     for target, message in (
-        ("own.xml", "is the robot's own file: choose another name"),
+        ("own.xml", "is a file that this command reads: choose another name"),
         ("out.txt", "its name must end with .xml"),
         ("no/such/out.xml", "there is no folder no/such"),
     ):

@@ -23,7 +23,7 @@ from experiments.identification.iterations import iterations
 from experiments.identification.judgement import Judgement, judge
 from experiments.identification.load import load, with_held_out
 from experiments.identification.log_warnings import warnings_of_log
-from experiments.identification.reading import stated_by
+from experiments.identification.reading import file_of, stated_by
 from experiments.identification.request import Request
 from experiments.recording.audience import Audience
 from experiments.reports.printed import print_fit, print_held_out
@@ -42,6 +42,8 @@ def identify(options: Identify) -> None:
     """Identify logs, judge the result, save and show it."""
     if not options.log:
         raise ExperimentError("name a log, or several of one fit")
+    for path in (*options.log, *options.validate):
+        file_of(path)
     page, stated = new_page(machine=options.json), stated_by(options.log[0])
     request = request_of(options, stated)
     command, read = command_of("identify", options, "log", LEFT_OUT), _read(options, request)

@@ -78,6 +78,7 @@ def _identify_payload(page: Page, options: IdentifyPayload) -> tuple[LoadJudgeme
     if options.before is not None:
         names, X, C = _before(options.before)
         found: dict[str, Payload | str] = {"fixed": with_known_robot(robot, names, X, C)}
+        judgement = replace(judgement, before=dict(zip(names, X.tolist(), strict=True)))
     else:
         found = _by_ways(robot, options)
     print_payloads(page, found, request.subject.robot.joints[-1])

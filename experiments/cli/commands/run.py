@@ -9,7 +9,7 @@ from experiments.cli.command_text import command_of
 from experiments.cli.commands.inner import doubt_window, recording_of, require_window
 from experiments.cli.options.run import Run
 from experiments.cli.page import Page, new_page, shown
-from experiments.cli.progress import progress_of, stages_of
+from experiments.cli.progress import stages_of
 from experiments.errors import ExperimentError
 from experiments.identification.request import Request
 from experiments.identification.scenario_run import ScenarioRun
@@ -47,12 +47,11 @@ def run(options: Run) -> None:
     with watching.audience() as audience, shown(page), folder.held():
         subject = made.request.subject
         recording = recording_of(made.scenario, audience, options.inner, subject) if watching.rerun else None
-        with progress_of(f"simulating {name}") as progress:
-            ran = replace(made, progress=progress, watch=recording.watch if recording else None)
-            _ = ran.run
-        with stages_of("identifying") as told:
-            ran = replace(ran, told=told)
-            _show_run(page, ran)
+        with stages_of(name) as told:
+            watch = recording.watch if recording else None
+            ran = replace(made, progress=lambda share: told(f"simulating, {share:.0%}"), watch=watch, told=told)
+            _ = ran.fit
+        _show_run(page, ran)
         _save_run(folder, page, ran)
         page.end()
         attempts = Attempts(f"the estimates are printed, and with the log in {folder.out}", folder)

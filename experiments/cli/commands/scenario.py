@@ -2,7 +2,7 @@
 
 from experiments.cli.options.scenario import WriteScenario
 from experiments.cli.page import new_page
-from experiments.results.writing import write_text
+from experiments.results.writing import require_free, write_text
 from sim.scenario.scenario_file import designed, load, names, to_toml
 
 
@@ -16,6 +16,7 @@ def write(options: WriteScenario) -> None:
     elif options.out is None:
         page.out(to_toml(load(options.name)).rstrip("\n"))
     else:
+        require_free(options.out, "--out", force=options.force)
         write_text(options.out, to_toml(load(options.name)), "--out", force=options.force)
         page.out(f"written to {options.out}; run it: uv run idbench run {options.out}")
     page.end()

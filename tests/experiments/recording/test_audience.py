@@ -11,6 +11,7 @@ import pytest
 from experiments.cli import main
 from experiments.errors import ExperimentError
 from experiments.recording.audience import Audience, Watching
+from experiments.results.manifest import NAME as MANIFEST
 from sim.scenario.scenario_file import load, to_toml
 from sim.trajectories import RandomMoves
 
@@ -85,7 +86,11 @@ def test_without_rerun_it_is_not_even_loaded(tmp_path):
     code += "sys.exit(code or [name for name in sys.modules if name.startswith('rerun')] != [])"
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["log.parquet", "scenario.toml", "summary.json"]
+    assert sorted({x.name for x in (tmp_path / "run").iterdir()} - {MANIFEST}) == [
+        "log.parquet",
+        "scenario.toml",
+        "summary.json",
+    ]
     assert "view" not in done.stdout
 
 

@@ -87,8 +87,8 @@ def test_another_motion_is_not_laid_over(table1):
 def test_runs_of_equal_names_and_of_names_that_begin_alike_stay_apart(folder, tmp_path, reading):
     """Of every run its own curves, named and coloured as its own."""
     copies = [shutil.copytree(folder / "ideal", tmp_path / "copies" / name) for name in ("x/run", "y/run", "rip-2", "rip")]
-    for first, second in (copies[:2], copies[2:]):
-        one = tmp_path / "one.rrd"
+    for k, (first, second) in enumerate((copies[:2], copies[2:])):
+        one = tmp_path / f"{k}.rrd"
         assert main(["view", str(first), str(second), "--save", str(one)]) == 0
         names = sorted({path.split("/")[1] for path in reading.entities(one) if path.startswith("identify/")})
         assert len(names) == 2
