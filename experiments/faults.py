@@ -5,6 +5,7 @@ import tempfile
 import traceback
 from pathlib import Path
 
+from experiments.control import shortened
 from experiments.errors import ExperimentError
 
 REPORT = "fault.txt"
@@ -25,7 +26,7 @@ def reason(error: BaseException) -> str:
     if isinstance(error, MemoryError):
         return f"not enough memory{f': {error}' if str(error) else ''}; take a part of the log, or close other programs"
     if isinstance(error, OSError) and not isinstance(error, ExperimentError):
-        return ": ".join(filter(None, (error.strerror or str(error), str(error.filename or ""))))
+        return ": ".join(filter(None, (error.strerror or str(error), shortened(error.filename or ""))))
     if is_told(error):
         return str(error)
     return f"a fault of idbench, not of your input ({type(error).__name__}: {' '.join(str(error).split())[:200]})"

@@ -4,11 +4,14 @@ import sys
 import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import TypeVar
 
 import numpy as np
 
 from identify.arrays import Array
 from identify.errors import PluginError
+
+T = TypeVar("T")
 
 OURS = ("identify", "sim", "models", "experiments")
 """Packages whose mistakes are not those of a plug-in."""
@@ -38,6 +41,13 @@ def blamed() -> Iterator[None]:
             raise
         message = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
         raise PluginError(f"plug-in {frame.name} raised {message} ({frame.filename}, line {frame.lineno})") from error
+
+
+def expect_kind(plugin: object, method: str, value: object, kind: type[T]) -> T:
+    """Return what a method of a plug-in returned, if it is of a kind; raise PluginError otherwise."""
+    if isinstance(value, kind):
+        return value
+    raise PluginError(f"plug-in {type(plugin).__name__}.{method} returned {value!r:.60}, expected {kind.__name__}")
 
 
 def expect(plugin: object, method: str, value: object, *shapes: Sequence[int]) -> Array:

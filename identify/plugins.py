@@ -28,10 +28,12 @@ class PluginTable(Mapping[str, Callable[[], T]], Generic[T]):
         The factories of this package.
     """
 
-    def __init__(self, point: str, kind: type[T], builtin: dict[str, Callable[[], T]]) -> None:
+    def __init__(
+        self, point: str, kind: type[T], builtin: dict[str, Callable[[], T]], check: Callable[[T], None] | None = None
+    ) -> None:
         self.point = point
         self.kind: type[T] = kind
-        self._builtin = builtin
+        self._builtin, self._check = builtin, check
 
     @cached_property
     def _found(self) -> dict[str, list[EntryPoint]]:
@@ -99,6 +101,8 @@ class PluginTable(Mapping[str, Callable[[], T]], Generic[T]):
             raise PluginError(f"{self.point} plug-in {name!r} cannot be made without arguments: {why}") from error
         if not isinstance(made, self.kind):
             raise PluginError(f"{self.point} plug-in {name!r} makes {type(made).__name__}, not {self.kind.__name__}")
+        if self._check is not None:
+            self._check(made)
         return made
 
     def summary(self, name: str) -> str:

@@ -22,7 +22,10 @@ _SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 
 _CHECKED = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
 
-Number = Annotated[float, Strict(), AllowInfNan(False)]
+LARGEST = 1e12
+"""Size of a number in SI units beyond which it is a slip."""
+
+Number = Annotated[float, Strict(), AllowInfNan(False), Field(ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]
 Share = Annotated[Number, Field(ge=0, le=1)]

@@ -3,6 +3,7 @@
 import os
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 
 from tyro.extras import SubcommandApp
 
@@ -12,6 +13,9 @@ from experiments.errors import ExperimentError
 from experiments.faults import is_told, reason, report
 
 DESCRIPTION = "A MuJoCo testbench for the dynamic identification of robots."
+
+LEAST_MEMORY = 1.5
+"""Address space [GB] below which libraries fail while they are loaded."""
 
 OVERVIEW = """\
 idbench: identify the dynamics of robots, on simulated data whose truth is known, and on logs of real ones
@@ -47,6 +51,7 @@ def run(args: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if args is None else list(args)
     notice = Notice()
     try:
+        _require_memory()
         with terminating(), noticing() as notice:
             if words == ["--version"]:
                 _print(f"idbench {_version()}")
@@ -65,6 +70,19 @@ def run(args: Sequence[str] | None = None) -> int:
             return _complain("interrupted", INTERRUPTED)
         return _complain(f"{reason(error)}; its traceback is in {report(error)}", 1)
     return 0
+
+
+def _require_memory() -> None:
+    """Raise ExperimentError if so little memory is allowed that libraries fail, or hang, while they are loaded."""
+    with suppress(ImportError):  # not on Windows
+        import resource
+
+        limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+        if limit != resource.RLIM_INFINITY and 1e-9 * limit < LEAST_MEMORY:
+            raise ExperimentError(
+                f"this process may have {1e-9 * limit:.2g} GB of address space (ulimit -v), idbench needs {LEAST_MEMORY:g} "
+                "GB: raise it, as in ulimit -v unlimited"
+            )
 
 
 def _parsed(words: list[str]) -> Callable[[], None]:

@@ -88,8 +88,10 @@ class Page(Console):
     def _write(self, stream: TextIO | None, text: str) -> None:
         if stream is None or self._gone or not text:  # None where it was closed before we began
             return
+        text = text.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")  # names of files need not be UTF-8
+        encoding = getattr(stream, "encoding", None) or "utf-8"
         try:
-            stream.write(text)
+            stream.write(text.encode(encoding, "replace").decode(encoding))
             stream.flush()
         except BrokenPipeError:  # its reader has had enough, as `head` has: nobody is to be told
             self._gone = True

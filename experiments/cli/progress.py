@@ -17,17 +17,25 @@ Told = Callable[[str], None]
 
 @contextmanager
 def stages_of(what: str) -> Iterator[Told]:
-    """Give what receives the stage of a work, which is shown on the error stream with the time that it takes."""
+    """Give what receives the stage of a work, which is shown on the error stream with the time that it takes.
+
+    What `identify` works at in the block is shown, too: model, estimator, iteration.
+    """
+    from identify.telling import listening
+
     console = Console(stderr=True)
     if console.is_terminal:
-        columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+        columns = SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn()
         with Progress(*columns, console=console, transient=True) as bar:
             task = bar.add_task(what)
-            yield lambda stage: bar.update(task, description=f"{what}: {stage}")
+            told: Told = lambda stage: bar.update(task, description=f"{what}: {stage}")  # noqa: E731
+            with listening(told):
+                yield told
         return
     lines = _Lines(console, what)
     try:
-        yield lines.receive
+        with listening(lines.receive):
+            yield lines.receive
     finally:
         lines.done.set()
 

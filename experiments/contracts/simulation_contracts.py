@@ -76,7 +76,7 @@ def excitation_becomes_its_trajectory(excitation: Any, _: Example) -> None:
     t, robot = np.arange(0.25, T, 0.5), Robot.load("scara")
     shapes = excitation.shapes(t, T, f)
     c = 0.1 * np.random.default_rng(0).standard_normal((shapes.count, 2))
-    planned = excitation.trajectory(c, np.array([0.1, -0.2]), T, 1).plan(robot)
+    planned = excitation.trajectory(c, np.array([0.1, -0.2]), T, 1).motion(robot)
     rest = (planned.duration - T) / 2
     require(rest >= 0, f"it lasts {planned.duration:g} s, less than the {T:g} s that it was given")
     q = planned.at(rest + t, FS).q

@@ -225,7 +225,7 @@ class Design:
         share = np.sqrt(fs / self.scenario.fs)
         levels = NoiseLevels(self.levels.torque * share, self.levels.position * share)
         for i in range(0, len(each), TOGETHER):
-            planned = [self.trajectory(c, 1).plan(self.subject.robot).sample(fs).q for c in each[i : i + TOGETHER]]
+            planned = [self.trajectory(c, 1).motion(self.subject.robot).sample(fs).q for c in each[i : i + TOGETHER]]
             q = np.stack(planned)
             log = MotionLog(fs, q, np.zeros_like(q), self.scenario.channel)
             found.append(predicted_information(log, self.subject.basis, self.X, levels, CHAINS.create("idbench")))
@@ -242,7 +242,7 @@ class Design:
 
     def ways(self, c: Array, fs: float, pace: float) -> tuple[Reference, Reference]:
         """Return the ways from home to where a motion starts, and back, sampled at `fs` [Hz], at a share of the limits."""
-        start = self.trajectory(c, 1).plan(self.subject.robot).at(np.zeros(1), fs).q[0]
+        start = self.trajectory(c, 1).motion(self.subject.robot).at(np.zeros(1), fs).q[0]
         most = np.stack([self.limits.velocity, self.limits.acceleration, self.limits.jerk])
         there = approach(self.subject.robot, self.home, start, fs, WAY * pace * np.where(np.isfinite(most), most, MOST))
         return there, Reference(fs, there.q[::-1], -there.qd[::-1], there.qdd[::-1])
@@ -256,4 +256,4 @@ class Design:
 
     def look(self, c: Array) -> LimitUse:
         """Return how far a motion uses its limits."""
-        return self.inspector.look(self.trajectory(c, 1).plan(self.subject.robot).sample(FS))
+        return self.inspector.look(self.trajectory(c, 1).motion(self.subject.robot).sample(FS))

@@ -188,7 +188,7 @@ class Excited:
 
     def planned(self, fs: float) -> tuple[Array, Reference]:
         """Return the part of each sample (0 there, 1 motion, 2 back), and the whole way of the arm, from home to home."""
-        main = self.design.trajectory(self.c).plan(self.design.subject.robot).sample(fs)
+        main = self.design.trajectory(self.c).motion(self.design.subject.robot).sample(fs)
         there, back = self.design.ways(self.c, fs, self.pace)
         whole = [np.concatenate([getattr(x, name) for x in (there, main, back)]) for name in ("q", "qd", "qdd")]
         return np.repeat([0.0, 1.0, 2.0], [len(there.q), len(main.q), len(back.q)]), Reference(fs, *whole)

@@ -1,6 +1,5 @@
 """Logs identified by some models: the estimates, and what follows from them."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self, final
@@ -28,15 +27,16 @@ from identify import (
 )
 from identify.judge.friction_choice import FrictionChoice
 from identify.rows.rows import Rows
+from identify.telling import stage
+
+NOTHING = 1e-12
+"""Share of a torque's squares below which its variance is rounding."""
 
 Outcomes = dict[str, Estimate | IdentificationError]
 """The estimate of every model, or why it has none."""
 
-Told = Callable[[str], None]
-"""Receives what is being computed."""
 
-
-def fit(request: Request, logs: Logs, told: Told | None = None) -> "Fit":
+def fit(request: Request, logs: Logs) -> "Fit":
     """Return logs, identified: laws of friction chosen where that is asked for, what the logs do not show left out.
 
     Raises
@@ -46,21 +46,22 @@ def fit(request: Request, logs: Logs, told: Told | None = None) -> "Fit":
     """
     choice = None
     if request.subject.laws.auto:
-        request, choice = chosen_friction(request, logs.fitted)
-    found, hidden = _fit(request, logs, told), list[str]()
+        with stage("laws of friction"):
+            request, choice = chosen_friction(request, logs.fitted)
+    found, hidden = _fit(request, logs), list[str]()
     leading = next(iter(found.outcomes.values()))
     while isinstance(leading, ExcitationError) and leading.hidden and len(leading.hidden) < len(found.basis.names):
         hidden += leading.hidden
-        found = _fit(replace(found.request, subject=found.subject.without(leading.hidden)), logs, told)
+        found = _fit(replace(found.request, subject=found.subject.without(leading.hidden)), logs)
         leading = next(iter(found.outcomes.values()))
     if not found.estimates and isinstance(leading, IdentificationError):
         raise leading
     return replace(found, choice=choice, hidden=tuple(hidden))
 
 
-def _fit(request: Request, logs: Logs, told: Told | None) -> "Fit":
+def _fit(request: Request, logs: Logs) -> "Fit":
     problem = request.problem(logs.fitted)
-    plain = attempt_each(problem, {name: MODELS.create(name) for name in request.models}, request.solver, told=told)
+    plain = attempt_each(problem, {name: MODELS.create(name) for name in request.models}, request.solver)
     return Fit(request, logs, problem, plain, {name: _moved(request, outcome) for name, outcome in plain.items()})
 
 
@@ -177,8 +178,8 @@ class Fit:
         if not self.problem.long:
             rows = self.problem.rows
             squares = squares - np.sum(rows.by_kind(rows.Y), axis=-1) ** 2 / np.maximum(rows.count, 1)
-        factors, there = self.problem.factors, self._torque_squares > 0
-        share = np.divide(1.0, squares, out=np.full(len(squares), np.nan), where=there & (squares > 0))
+        factors, some = self.problem.factors, squares > NOTHING * np.maximum(self._torque_squares, 1e-300)
+        share = np.divide(1.0, squares, out=np.full(len(squares), np.nan), where=some)
         return {name: 1 - factors.squares(e.X) * share for name, e in self.estimates.items()}
 
     @cached_property

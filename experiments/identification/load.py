@@ -14,6 +14,7 @@ from experiments.identification.reading import ReadLog, ReadOptions, file_of, re
 from experiments.identification.request import Request
 from identify import LogError, MotionLog
 from identify.judge.band import Band
+from identify.telling import stage
 
 MOST_STARTS = 1000
 """Instants of a log that are looked at for the beginning of another."""
@@ -68,7 +69,8 @@ def load(paths: Sequence[Path], options: ReadOptions, request: Request, *, band:
         Parameters that are identified beside those of the basis.
     """
     require_different(paths)
-    read_ = [read(file_of(path), options, request) for path in paths]
+    with stage("reading logs"):
+        read_ = [read(file_of(path), options, request) for path in paths]
     _require_other_samples(read_)
     of_band = list[str]()
     if band:
@@ -77,7 +79,8 @@ def load(paths: Sequence[Path], options: ReadOptions, request: Request, *, band:
         if needed.cutoff > least:
             request, of_band = in_band(request, needed.cutoff), [needed.words(p, least)]
     if options.delay == "estimate":
-        read_ = with_delays(read_, request)
+        with stage("the delay of the torques"):
+            read_ = with_delays(read_, request)
     several = len(read_) > 1
     said = [(f"{one.path.name}: " if several else "") + note for one in read_ for note in one.notes]
     return Loaded(request, tuple(read_), tuple(dict.fromkeys([*said, *of_band])))

@@ -16,6 +16,7 @@ from experiments.identification.warnings import wrong_sign
 from experiments.text import error_percentage
 from identify import IdentificationError, RangeError, WeightedLeastSquares, estimate, validate
 from identify.judge.delay import estimate_delay
+from identify.telling import stage
 from sim.errors import BenchError
 
 NEGLIGIBLE = 2e-3
@@ -74,7 +75,8 @@ class Remedies:
             if option == AUTO and least < TOLERABLE:  # what is well enough is not worth the time
                 continue
             try:
-                after = self._worst(replace(request, subject=make()))
+                with stage(f"trying {option}"):
+                    after = self._worst(replace(request, subject=make()))
             except (IdentificationError, ExperimentError, BenchError):
                 continue
             if option == AUTO and after > WORTH * least:  # it finds what the others say, too

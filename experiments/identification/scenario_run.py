@@ -5,8 +5,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from experiments.errors import ExperimentError
-from experiments.identification.fit import Fit, Told, fit
+from experiments.identification.fit import Fit, fit
 from experiments.identification.iterations import iterations
 from experiments.identification.logs import Logs
 from experiments.identification.request import Request
@@ -34,15 +36,12 @@ class ScenarioRun:
         Receives how much of the simulation is done.
     watch : Watch, optional
         Receives what happens in it.
-    told : callable, optional
-        Receives what is being identified.
     """
 
     scenario: Scenario
     request: Request
     progress: Progress | None = None
     watch: Watch | None = None
-    told: Told | None = None
 
     def __post_init__(self) -> None:
         # A robot that does not fit is reported before the simulation.
@@ -51,7 +50,7 @@ class ScenarioRun:
     def require_bearable(self, yes: bool) -> None:
         """Say how long a simulation is that takes long; raise ExperimentError if it would hardly end, unless that is wanted."""
         h = self.scenario.drive.step_length(self.scenario.fs, self.scenario.physics.step)
-        steps = self.scenario.trajectory.plan(self.scenario.real_robot).duration / h
+        steps = self.scenario.trajectory.motion(self.scenario.real_robot).duration / h
         size = f"{steps:.1e} physics steps of {h:.2g} s"
         if steps > ENDLESS and not yes:
             raise ExperimentError(f"scenario {self.scenario.name} makes {size}: hours or days; if you mean it, add --yes")
@@ -67,8 +66,19 @@ class ScenarioRun:
     def fit(self) -> Fit:
         """What the models make of its log."""
         robot, friction = self.run.robots[0], self.scenario.friction
-        truth = friction.truth(robot) | self.request.subject.truth(robot, friction)
-        return fit(replace(self.request, loops=(self.scenario,)), Logs((self.run.alone(),), truth=truth), self.told)
+        truth, log = friction.truth(robot) | self.request.subject.truth(robot, friction), self.run.alone()
+        if not np.any(log.tau):
+            raise ExperimentError(f"scenario {self.scenario.name}: all torques of the log are 0: {self._why_nothing}")
+        return fit(replace(self.request, loops=(self.scenario,)), Logs((log,), truth=truth))
+
+    @property
+    def _why_nothing(self) -> str:
+        """What makes all torques zero."""
+        step = max(self.scenario.torque.resolution)
+        coarse = (
+            f"torque.resolution = {step:g} N m is coarser than all of them: give a smaller one, or 0 for an exact converter"
+        )
+        return coarse if step else "nothing acts on the joints"
 
     def summary(self) -> dict[str, Any]:
         """Return summary.json."""

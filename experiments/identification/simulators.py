@@ -214,7 +214,7 @@ def _require_matching(scenario: Scenario, log: MotionLog, subject: Subject) -> N
         )
     if abs(scenario.fs / log.fs - 1) > SAME:
         raise IdentificationError(f"{name} runs at {scenario.fs:g} Hz, the log has {log.fs:g} Hz: write the log's fs into it")
-    if (samples := round(scenario.trajectory.plan(other).duration * scenario.fs)) < log.samples:
+    if (samples := round(scenario.trajectory.motion(other).duration * scenario.fs)) < log.samples:
         raise IdentificationError(
             f"{name} moves for {samples / scenario.fs:g} s, the log for {log.samples / log.fs:g} s: it is of another motion"
         )

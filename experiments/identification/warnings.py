@@ -135,7 +135,13 @@ def _too_little(fit: Fit, name: str) -> Iterator[str]:
 def _badly_explained(fit: Fit, name: str) -> Iterator[str]:
     """Yield which torques a model does not explain: the log is suspected, unless another model explains them."""
     joints = fit.subject.robot.joints
-    poor = {j: share for j, share in enumerate(fit.explained[name]) if not share >= WELL_EXPLAINED}
+    shares = dict(enumerate(fit.explained[name]))
+    if nothing := [joints[j] for j, share in shares.items() if np.isnan(share)]:
+        yield (
+            f"no torque of {', '.join(nothing)} is left to explain: the mask leaves no row, or the torque never changes; "
+            "nothing is identified of it, move it faster"
+        )
+    poor = {j: share for j, share in shares.items() if share < WELL_EXPLAINED}
     if not poor:
         return
     poorly = ", ".join(f"{_share(share)} of tau{j + 1}" for j, share in poor.items())

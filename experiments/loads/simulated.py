@@ -26,6 +26,9 @@ from sim.scenario.scenario import Scenario
 GAINS = (0.7, 1.4)
 """True gains are drawn between these multiples of those that logs are read with."""
 
+MOST_RUNS = 1000
+"""Runs that are simulated at once."""
+
 Told = Callable[[float], None]
 
 Found: TypeAlias = tuple[tuple[str, ...], Array, Array, Array]
@@ -92,8 +95,10 @@ class Pairs:
     def __post_init__(self) -> None:
         if not self.scenario.payload.mass:
             raise ExperimentError(f"scenario {self.scenario.name} has no payload: give it a table [payload] with a mass")
-        if self.runs < 1:
-            raise ExperimentError(f"--runs {self.runs} must be at least 1")
+        if not 1 <= self.runs <= MOST_RUNS:
+            raise ExperimentError(
+                f"--runs {self.runs} must be at least 1 and at most {MOST_RUNS:,}: all are simulated at once, 1 s and 2 MB each"
+            )
 
     @cached_property
     def subject(self) -> Subject:

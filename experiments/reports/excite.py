@@ -83,7 +83,7 @@ def _sigma_figure(found: Excited) -> str:
 def _motion_figure(found: Excited) -> str:
     """Return positions, velocities and torques of all joints, as shares of their limits."""
     d, step = found.design, max(1, round(FS / PLOTTED))
-    motion = d.trajectory(found.c, 1).plan(d.subject.robot).sample(FS)
+    motion = d.trajectory(found.c, 1).motion(d.subject.robot).sample(FS)
     shown = {
         "position": (motion.q - d.limits.middle) / d.limits.sizes[0],
         "velocity": motion.qd / d.limits.velocity,

@@ -50,6 +50,6 @@ class Attempts:
         """Write tracebacks; raise ResultsError that names all that failed, and what is there all the same."""
         if self._traces and self._folder:
             with suppress(ResultsError), self._folder.more() as hidden:
-                (hidden / REPORT).write_text("\n".join(self._traces), encoding="utf-8")
+                (hidden / REPORT).write_text("\n".join(self._traces), encoding="utf-8", errors="backslashreplace")
         if self._failures:
             raise ResultsError(f"{'; '.join(self._failures)}; {self._kept}")

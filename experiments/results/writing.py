@@ -9,6 +9,7 @@ from filecmp import cmp
 from pathlib import Path
 from shutil import rmtree
 
+from experiments.control import shortened
 from experiments.errors import ResultsError
 
 HIDDEN = f".idbench-{socket.gethostname()}-"
@@ -44,7 +45,7 @@ def _require_place(path: Path, option: str, read: Read) -> None:
         if any(path.exists() and other.exists() and path.samefile(other) for other in read):
             raise ResultsError(f"{option} {path} is a file that this command reads: choose another name")
     except OSError as error:
-        raise ResultsError(f"{option} {path}: {error.strerror}; choose another name") from error
+        raise ResultsError(f"{option} {shortened(path)}: {error.strerror}; choose another name") from error
 
 
 def _taken(path: Path, option: str) -> ResultsError:
@@ -86,7 +87,7 @@ def new_file(path: Path, option: str, *, force: bool = False, read: Read = ()) -
 def write_text(path: Path, text: str, option: str, *, force: bool = False, read: Read = ()) -> None:
     """Write `text` to `path`, whole or not at all; raise ResultsError as `new_file` does."""
     with new_file(path, option, force=force, read=read) as file:
-        file.write_text(text, encoding="utf-8")
+        file.write_text(text, encoding="utf-8", errors="backslashreplace")  # names of files need not be UTF-8
 
 
 def replace_own(path: Path, text: str) -> None:

@@ -3,6 +3,7 @@
 import logging
 import signal
 import sys
+import time
 from collections.abc import Iterator
 from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager
@@ -21,7 +22,10 @@ if TYPE_CHECKING:
     from distributed import Client
 
 PATIENCE = 10.0
-"""How long [s] a scheduler may take to answer."""
+"""How long [s] a scheduler may take to answer, and workers may be away before it is said."""
+
+DESERTED = 600.0
+"""How long [s] a study waits for workers when all have gone."""
 
 
 QUIET = {
@@ -46,6 +50,7 @@ class ClusterPool:
     def __init__(self, study: Study, client: "Client") -> None:
         self._study, self._client = study, client
         self._pool = client.get_executor(pure=False)
+        self._seen, self._told = time.monotonic(), False
 
     @property
     def width(self) -> int:
@@ -58,8 +63,26 @@ class ClusterPool:
         return future
 
     def partial(self) -> float:
-        """Return 0: how far a worker is in a shard is not known."""
+        """Return 0: how far a worker is in a shard is not known; raise StudyError if no worker has been there for long."""
+        self._look(sum(self._client.nthreads().values()))
         return 0.0
+
+    def _look(self, threads: int) -> None:
+        """Say when all workers have gone, and when one is back; raise StudyError if none comes."""
+        away = time.monotonic() - self._seen
+        if threads:
+            if self._told:
+                sys.stderr.write("idbench: a worker is there: the study goes on\n")
+            self._seen, self._told = time.monotonic(), False
+        elif away > DESERTED:
+            raise StudyError(
+                f"all workers are gone for {away:.0f} s: what is finished is kept, start some and go on with --resume"
+            )
+        elif away > PATIENCE and not self._told:
+            self._told = True
+            sys.stderr.write(
+                f"idbench: all workers are gone; waiting {DESERTED:.0f} s for new ones; Ctrl-C keeps what there is\n"
+            )
 
 
 @contextmanager
@@ -79,7 +102,8 @@ def cluster_pool(study: Study, scheduler: str | None, workers: int) -> Iterator[
         raise StudyError(
             "studies on workers need Dask: install the extra, as in uv sync --extra cluster, or pip install 'idbench[cluster]'"
         ) from error
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong we say ourselves, in one line
+    for name in ("distributed", *(name for name in logging.root.manager.loggerDict if name.startswith("distributed."))):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what goes wrong we say ourselves, in one line; each has its own
     with ExitStack() as stack:
         if scheduler is None:
             options = {"host": "127.0.0.1", "dashboard_address": "127.0.0.1:0", "silence_logs": logging.CRITICAL}
@@ -96,9 +120,10 @@ def cluster_pool(study: Study, scheduler: str | None, workers: int) -> Iterator[
         _require_workers(client)
         try:
             yield ClusterPool(study, client)
-        except (CancelledError, KilledWorker, CommClosedError) as error:
-            what = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
-            raise StudyError(f"the workers are lost ({what}): what is finished is kept, go on with --resume") from error
+        except (CancelledError, KilledWorker, CommClosedError, TimeoutError) as error:
+            said = " ".join(str(error).split())[:200]
+            what = f"the workers are lost ({type(error).__name__}: {said})" if said else "the scheduler or all workers are gone"
+            raise StudyError(f"{what}: what is finished is kept, go on with --resume") from error
 
 
 def _require_workers(client: "Client") -> None:

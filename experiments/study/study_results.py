@@ -53,7 +53,9 @@ def write_results(page: "Page", store: Store, folder: ResultsFolder, recording: 
 
 def _report(folder: ResultsFolder, study: Study, found: Sequence[Cell], seconds: dict[str, float]) -> None:
     with folder.more() as hidden:
-        (hidden / "report.html").write_text(report(study, found, seconds, folder.out), encoding="utf-8")
+        (hidden / "report.html").write_text(
+            report(study, found, seconds, folder.out), encoding="utf-8", errors="backslashreplace"
+        )
 
 
 def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:

@@ -94,7 +94,9 @@ class Clock:
     @property
     def filled(self) -> int:
         """Samples within pieces that were never logged, or left out."""
-        return sum(round(step / self.period) - 1 for step in np.diff(self.t) if 1.5 * self.period < step <= self.longest)
+        period, steps = self.period, np.diff(self.t)
+        within = steps[(steps > 1.5 * period) & (steps <= self.longest)]
+        return int(np.sum(np.rint(within / period) - 1))
 
     @property
     def longest(self) -> float:

@@ -46,4 +46,5 @@ ESTIMATORS: PluginTable[AbstractEstimator] = PluginTable(
         "OE": OutputError,
         "UKF": UnscentedKalmanFilter,
     },
+    check=AbstractEstimator.require_needs,
 )

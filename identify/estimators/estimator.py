@@ -1,7 +1,7 @@
 """What an estimator is."""
 
 from abc import ABC, abstractmethod
-from typing import ClassVar, Literal, final
+from typing import ClassVar, Literal, final, get_args
 
 import numpy as np
 
@@ -60,29 +60,41 @@ class AbstractEstimator(ABC):
             names = ", ".join(np.array(problem.names)[lost.reshape(-1, len(problem.names)).any(axis=0)])
             if not np.isfinite(problem.factors.fit(2).X).all():  # nor does weighted least squares
                 raise IdentificationError(
-                    f"{self._called} finds no finite value for {names}: use a longer log, in which all joints move"
+                    f"{self.called} finds no finite value for {names}: use a longer log, in which all joints move"
                 )
             raise IdentificationError(
-                f"{self._called} gives NaN or infinity for {names}, where least squares finds all parameters: "
+                f"{self.called} gives NaN or infinity for {names}, where least squares finds all parameters: "
                 "it is the estimator that fails here, not the log; take another, such as WLS"
             )
         return estimate
 
     def _require(self, problem: Problem) -> None:
+        self.require_needs()
         if "loop" in self.needs and problem.simulation.loop is None:
             raise IdentificationError(
-                f"{self._called} simulates the closed loop in which a log was recorded, which is not known: name the "
+                f"{self.called} simulates the closed loop in which a log was recorded, which is not known: name the "
                 "scenario that describes it (--loop scenario.toml)"
             )
         if "plant" in self.needs and problem.simulation.plant is None:
             raise IdentificationError(
-                f"{self._called} simulates the robot from the torques of the log, and the caller gave no simulator"
+                f"{self.called} simulates the robot from the torques of the log, and the caller gave no simulator"
             )
         if "rows" in self.needs:
-            problem.require_rows(f"{self._called} needs rows, and ")
+            problem.require_rows(f"{self.called} needs rows, and ")
+
+    @final
+    def require_needs(self) -> None:
+        """Raise PluginError unless what it says that it needs is a set of what there is."""
+        known, given = get_args(Need), self.needs
+        if not isinstance(given, (set, frozenset)) or not given <= set(known):
+            raise PluginError(
+                f"plug-in {type(self).__name__}.needs is {given!r:.60}, expected a frozenset of {', '.join(map(repr, known))}, "
+                'such as frozenset({"rows"})'
+            )
 
     @property
-    def _called(self) -> str:
+    def called(self) -> str:
+        """Its name."""
         from identify.estimators import ESTIMATORS  # whose table this class is the kind of
 
         return ESTIMATORS.name_of(self)

@@ -1,6 +1,6 @@
 """From logs to estimates: what users call."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from identify.basis.basis import Basis
 from identify.blame import blamed
@@ -16,6 +16,7 @@ from identify.models.explicit import ExplicitModel
 from identify.models.model import AbstractModel
 from identify.rows.chain import Chain
 from identify.rows.chains import idbench_chain
+from identify.telling import stage
 
 
 def identify(
@@ -86,7 +87,6 @@ def attempt_each(
     estimator: AbstractEstimator | None = None,
     *,
     throw: bool = True,
-    told: Callable[[str], None] | None = None,
 ) -> dict[str, Estimate | IdentificationError]:
     """Identify with several models; return the estimate of each, or why it has none: one does not take the others' away.
 
@@ -100,8 +100,6 @@ def attempt_each(
         Generalized least squares by default.
     throw : bool
         Raise if a run cannot be solved; otherwise the estimates' `status` says it.
-    told : callable, optional
-        Receives the name of each model before it is identified.
 
     Raises
     ------
@@ -115,15 +113,15 @@ def attempt_each(
         _require(model, AbstractModel, 'a model, such as MODELS.create("power")')
     problems = {name: problem.with_model(model) for name, model in models.items()}
     with blamed():  # what one model's rows lack, such as the joints of the basis, all lack
-        for each in problems.values():
-            _ = each.parts
+        for name, each in problems.items():
+            with stage(f"rows of the {name} model"):
+                _ = each.parts
     for signals in problem.signals:
         signals.state.forget()
     found = dict[str, Estimate | IdentificationError]()
-    for name, each in problems.items():
-        if told is not None:
-            told(name)
-        found[name] = _outcome(each, estimator, throw)
+    for number, (name, each) in enumerate(problems.items(), 1):
+        with stage(f"{name} model, {estimator.called} ({number} of {len(problems)})"):
+            found[name] = _outcome(each, estimator, throw)
     return found
 
 

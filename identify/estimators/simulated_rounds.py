@@ -18,6 +18,7 @@ from identify.estimators.row_products import Solved
 from identify.estimators.simulator import AbstractLoop, Simulated
 from identify.estimators.steps import Steps
 from identify.models.explicit import ExplicitModel
+from identify.telling import stage
 
 SMALL = 1e-3
 """Change of a parameter, as a share of what makes the whole torque of a joint."""
@@ -95,8 +96,9 @@ class Rounds:
         """
         found: Solved | None = None
         steps, move, left = steps or Steps(), np.full(X.shape, np.inf), np.full(X.shape[:-1], np.inf)
-        for _ in range(self.most):
-            new = step(X)
+        for number in range(1, self.most + 1):
+            with stage(f"round {number} of at most {self.most}"):
+                new = step(X)
             self._require_finite(new.X, "the simulated motion does not determine the parameters")
             found = new.where(self.active, found)
             unit = np.maximum(new.sigma, NOTHING * self._small)

@@ -11,6 +11,7 @@ import scipy
 
 from identify.arrays import Array
 from identify.errors import LogError
+from identify.files.room import require_room
 from identify.files.table import LogTable
 
 BROKEN = (MemoryError, ValueError, EOFError, KeyError, TypeError, zipfile.BadZipFile, zlib.error, OSError)
@@ -23,7 +24,11 @@ def read_numpy(path: Path) -> LogTable:
         with path.open("rb") as file:
             found = np.load(file, allow_pickle=False)
             if isinstance(found, np.lib.npyio.NpzFile):
+                sizes = [member.file_size for member in found.zip.infolist()] if found.zip else []
+                require_room(path, f"{len(sizes)} arrays of {1e-9 * sum(sizes):.3g} GB", sum(sizes))
                 return _table({name: _array(found, name) for name in found.files})
+    except LogError:
+        raise
     except BROKEN as error:
         raise LogError(f"cannot read the log {path} as NumPy's: {str(error).splitlines()[0]}") from error
     if found.dtype.names:

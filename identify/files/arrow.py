@@ -1,7 +1,6 @@
 """Text and Parquet files, read by pyarrow, which only this file and the one that writes logs need."""
 
 import gzip
-import os
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 
 from identify.arrays import Array
 from identify.errors import LogError
+from identify.files.room import require_room
 from identify.files.table import LogTable
 
 if TYPE_CHECKING:
@@ -30,9 +30,16 @@ def arrow() -> ModuleType:
     """Return pyarrow; raise LogError if it is not installed."""
     try:
         import pyarrow
-    except ImportError as error:
+    except ModuleNotFoundError as error:
+        if error.name != "pyarrow":
+            raise
         raise LogError(
             "files of logs are read and written with pyarrow: pip install pyarrow; or make a MotionLog of your own arrays"
+        ) from error
+    except ImportError as error:
+        raise LogError(
+            f"pyarrow is installed and cannot be loaded: {error}; is memory limited (ulimit -v)? Or install it anew: pip "
+            "install --force-reinstall pyarrow"
         ) from error
     return pyarrow
 
@@ -164,18 +171,8 @@ def _numeric(path: Path, file: Any) -> "pa.Table":
         elif re.fullmatch(r"t|(q|tau)\d+", field.name.strip(' "')):
             raise LogError(f"{path}: column {field.name} holds {kind}, not numbers")
     rows = file.metadata.num_rows
-    if (needed := 1e-9 * rows * size) > (room := _memory()):
-        what = f"{rows:.3g} samples of {len(wanted)} columns, {needed:.3g} GB"
-        raise LogError(f"{path} says that it holds {what}; this machine has {room:.3g} GB: cut the log")
+    require_room(path, f"{rows:.3g} samples of {len(wanted)} columns", rows * size)
     return file.read(columns=wanted)
-
-
-def _memory() -> float:
-    """Return the memory of this machine [GB]; infinity where it does not say."""
-    try:
-        return 1e-9 * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):
-        return float("inf")
 
 
 def _entries(column: "pa.ChunkedArray[Any]") -> Array | str:

@@ -1,5 +1,6 @@
 """The kinds of files that logs are read from, and their table."""
 
+import stat
 from collections.abc import Callable
 from pathlib import Path
 
@@ -30,6 +31,14 @@ def kind_of(path: Path) -> str:
     return Path(path.stem).suffix.lower() if path.suffix.lower() == ".gz" else path.suffix.lower()
 
 
+def require_file(path: Path) -> None:
+    """Raise LogError if a path is a pipe or a device: it would be waited for, and a log is read more than once."""
+    kind = path.stat().st_mode
+    if not (stat.S_ISREG(kind) or stat.S_ISDIR(kind)):
+        what = "a pipe" if stat.S_ISFIFO(kind) else "no file"
+        raise LogError(f"{path} is {what}: a log is read more than once; write it to a file, such as log.csv, and name that")
+
+
 def read_table(path: Path) -> LogTable:
     """Return what a file holds.
 
@@ -42,6 +51,7 @@ def read_table(path: Path) -> LogTable:
     reader = read_bag if bag else FORMATS.get(kind_of(path), read_parquet)
     try:
         if not bag:
+            require_file(path)
             with path.open("rb"):  # whatever the reader is, a missing file is said in the same words
                 pass
         table = reader(path)

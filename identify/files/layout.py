@@ -20,6 +20,9 @@ QUANTITIES = ("t", "q", "qd", "tau", "temperature")
 SINGULAR = 1e-12
 """Determinants below this are none."""
 
+SLOWEST, FASTEST = 1e-3, 1e7
+"""Sampling frequencies [Hz] outside of which a slip is suspected."""
+
 LAYOUT = "log.toml"
 """Name of the file that says what all logs of its folder hold."""
 
@@ -132,9 +135,12 @@ class LogLayout:
             raise LogError(f"rows = {rows!r} must be a table: [rows], then lines such as episode_index = 3")
         rows = {str(k): float(v) for k, v in rows.items()}
         matrix = tuple(tuple(map(float, row)) for row in motors.get("matrix", ()))
-        return cls(
-            **sources, joints=tuple(stated.get("joints", ())), torque=channel, gain=gains, rows=rows, motors=_regular(matrix)
-        )
+        joints = stated.get("joints", [])
+        if not isinstance(joints, list) or not all(isinstance(name, str) and name for name in joints):
+            raise LogError(f'joints = {joints!r:.60} must be names in quotes, such as joints = ["1", "2"]')
+        if twice := sorted({name for name in joints if joints.count(name) > 1}):
+            raise LogError(f"joints = {joints!r:.60}: {', '.join(twice)} stands twice; each joint has a name of its own")
+        return cls(**sources, joints=tuple(joints), torque=channel, gain=gains, rows=rows, motors=_regular(matrix))
 
     def where(self, quantity: str, source: Source) -> Self:
         """Return the layout with another source of a quantity: t, q, qd or tau."""
@@ -217,6 +223,8 @@ def _source(name: str, stated: Any, file: str) -> Source:
         str(stated.get("t", "")),
         None if fs is None else float(fs),
     )
+    if found.fs is not None and not SLOWEST <= found.fs <= FASTEST:
+        raise LogError(f"[{name}]: fs = {found.fs:g} must be between {SLOWEST:g} and {FASTEST:g} Hz: samples a second")
     try:
         found.scale(name)
     except IdentificationError as error:

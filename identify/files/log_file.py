@@ -47,10 +47,12 @@ def write_log(log: MotionLog, path: Path, joints: Sequence[str] = ()) -> None:
         columns |= {f"temperature{end}": x for end, x in zip(ends, np.broadcast_to(warm, log.q.shape).T, strict=True)}
     table = pa.table({name: pa.array(values) for name, values in columns.items()})
     if in_newton_metres:
-        csv.write_csv(table, path)
+        with path.open("wb") as file:  # not by its name, which pyarrow takes in UTF-8 alone
+            csv.write_csv(table, file)
         return
     torque = {"meaning": log.torque.meaning, "delay": log.torque.delay, "gain": log.torque.gain}
-    parquet.write_table(table.replace_schema_metadata({TORQUE: json.dumps(torque).encode()}), path)
+    with path.open("wb") as file:
+        parquet.write_table(table.replace_schema_metadata({TORQUE: json.dumps(torque).encode()}), file)
 
 
 def read_log(path: Path, torque: TorqueChannel | None = None, joints: Sequence[str] = ()) -> MotionLog:

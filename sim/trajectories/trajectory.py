@@ -5,6 +5,7 @@ from typing import final
 
 import numpy as np
 
+from identify.blame import blamed, expect_kind
 from sim.errors import ScenarioError
 from sim.robot.motors import Array
 from sim.robot.robot import Robot
@@ -25,6 +26,15 @@ class AbstractTrajectory(ABC):
         """Return the motion for `robot`; raise ScenarioError if it makes no sense."""
 
     @final
+    def motion(self, robot: Robot) -> AbstractMotion:
+        """Return the motion for `robot`, checked: one that lasts for a while; raise PluginError or ScenarioError if not."""
+        with blamed():
+            planned = expect_kind(self, "plan", self.plan(robot), AbstractMotion)  # type: ignore[type-abstract]
+        if not 0 <= planned.duration < LONGEST:
+            raise ScenarioError(f"the motion lasts {planned.duration:.3g} s: it must be 0 to {LONGEST:.0e} s")
+        return planned
+
+    @final
     def sample(self, robot: Robot, fs: float) -> Reference:
         """Return the motion at `fs` [Hz], checked: it moves the robot's joints, inside their ranges.
 
@@ -33,9 +43,7 @@ class AbstractTrajectory(ABC):
         ScenarioError
             If it does not, or has no sample, or too many to be meant.
         """
-        planned = self.plan(robot)
-        if not planned.duration < LONGEST:
-            raise ScenarioError(f"the motion lasts {planned.duration:.3g} s, more than {LONGEST:.0e} s")
+        planned = self.motion(robot)
         # Extremes of smooth moves between waypoints lie at waypoints or a little beyond; 50 Hz finds them to 0.1 %.
         probe = np.linspace(0.0, planned.duration, 2 + int(50 * planned.duration))
         require_in_range(robot, planned.at(probe, 50.0).q)

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -36,8 +35,8 @@ from sim.scenario.scenario_file import load, to_toml
 LONGEST, FASTEST = 3600.0, 10000.0
 """Time of a motion, repeated [s], and sampling frequency [Hz] above which they are taken for a slip."""
 
-BITS, TORQUE_NOISE, QUIET = 17.0, (0.05,), 1e-6
-"""Noise without a scenario: resolution of the encoders [bits], rms of the torques [N m]; and the least of that."""
+BITS, TORQUE_NOISE, QUIET, LOUD = 17.0, (0.05,), 1e-6, 1e6
+"""Noise without a scenario: resolution of the encoders [bits], rms of the torques [N m]; and the least and most of that."""
 
 
 LEFT_OUT = ("out", "force", "json", "watching")
@@ -82,7 +81,7 @@ def _save(folder: ResultsFolder, found: Excited, sequence: MotionSequence | None
             write_log(each.log, hidden / f"log{number}.parquet")
             write_motion(each.excited, hidden / f"motion{number}.csv")
         write_motion(found, hidden / "motion.csv")
-        (hidden / "scenario.toml").write_text(to_toml(found.scenario), encoding="utf-8")
+        (hidden / "scenario.toml").write_text(to_toml(found.scenario), encoding="utf-8", errors="backslashreplace")
         write_summary(hidden / "summary.json", summary)
 
 
@@ -90,7 +89,7 @@ def _report(folder: ResultsFolder, found: Excited, command: str) -> None:
     from experiments.reports.excite import report
 
     with folder.more() as hidden:
-        (hidden / "report.html").write_text(report(found, command), encoding="utf-8")
+        (hidden / "report.html").write_text(report(found, command), encoding="utf-8", errors="backslashreplace")
 
 
 def _record(folder: ResultsFolder, found: Excited, audience: Audience | None) -> None:
@@ -163,8 +162,9 @@ def _scenario(options: Excite) -> Scenario:
         _require_between("encoder-bits", bits, 4, 40)
         scenario = replace(scenario, encoder=IncrementalEncoder(lines=(max(1, round(2**bits / 4)),)))
     if noise:
-        if not all(isfinite(x) and x >= QUIET for x in noise):
-            raise ExperimentError(f"--torque-noise {' '.join(f'{x:g}' for x in noise)} must be at least {QUIET:g} N m")
+        if not all(QUIET <= x <= LOUD for x in noise):
+            given = " ".join(f"{x:g}" for x in noise)
+            raise ExperimentError(f"--torque-noise {given} must be at least {QUIET:g} and at most {LOUD:g} N m")
         scenario = replace(scenario, torque=TorqueMeasurement(noise=noise))
     elif not max(scenario.torque.noise):
         raise ExperimentError(f"scenario {options.noise} has no noise of its torques: add --torque-noise, such as 0.05")
@@ -182,8 +182,8 @@ def _weights(given: tuple[str, ...]) -> Mapping[str, float]:
             found[name] = float(value)
         except ValueError:
             found[name] = -1.0
-        if not (isfinite(found[name]) and found[name] > 0):
-            raise ExperimentError(f"--weigh {text}: give a parameter and a weight above 0, such as LMY2=4")
+        if not 1e-6 <= found[name] <= 1e6:
+            raise ExperimentError(f"--weigh {text}: give a parameter and a weight from 1e-6 to 1e6, such as LMY2=4")
     return found
 
 

@@ -14,7 +14,7 @@ from experiments.cli.commands.identify_views import Shown, require_layer, requir
 from experiments.cli.commands.requests import chooses_band, read_options, request_of
 from experiments.cli.options.identify import Identify
 from experiments.cli.page import Page, new_page, shown
-from experiments.cli.progress import Told, stages_of
+from experiments.cli.progress import stages_of
 from experiments.errors import ExperimentError
 from experiments.identification.checks import checks
 from experiments.identification.fit import Fit, fit
@@ -56,11 +56,11 @@ def identify(options: Identify) -> None:
         stack.enter_context(folder.held() if folder else nullcontext())
         audience = stack.enter_context(options.watching.audience())
         options = _followed(stack, options, request, audience)
-        with stages_of("identifying") as told:
-            result = _fitted(options, request, stated, told)
+        with stages_of("identifying"):
+            result = _fitted(options, request, stated)
         _show_fit(page, result, options, read[0])
         _save(folder, page, result)
-        with stages_of("judging"):
+        with stages_of("judging, by a fit of the rest" if not options.validate else "judging"):
             judgement = judge(result)
         _show_judgement(page, judgement)
         _save(folder, page)
@@ -97,13 +97,12 @@ def _followed(stack: ExitStack, options: Identify, request: Request, audience: A
     return replace(options, log=(follower.complete(Path(folder)),))
 
 
-def _fitted(options: Identify, request: Request, stated: dict[str, Any], told: Told) -> Fit:
+def _fitted(options: Identify, request: Request, stated: dict[str, Any]) -> Fit:
     """Return the fit; what goes wrong says what is suspicious about the logs, too."""
-    told("reading logs")
     loaded = load(options.log, read_options(options), request, band=chooses_band(options))
     logs = with_held_out(loaded, options.validate, read_options(options), _truth(stated, request))
     try:
-        return fit(loaded.request, logs, told)
+        return fit(loaded.request, logs)
     except IdentificationError as error:
         doubts = [f"warning: {doubt}" for log in logs.fitted for doubt in warnings_of_log(log, request.subject.tree)]
         raise ExperimentError("; ".join([str(error), *doubts])) from error

@@ -65,7 +65,7 @@ def report(shown: Shown) -> None:
         return
     with shown.folder.more() as hidden:
         text = page_of(shown.judgement, shown.warnings, shown.page.found["notes"], shown.command)
-        (hidden / "report.html").write_text(text, encoding="utf-8")
+        (hidden / "report.html").write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
 def recording(shown: Shown) -> None:

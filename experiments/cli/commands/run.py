@@ -11,10 +11,11 @@ from experiments.cli.options.run import Run
 from experiments.cli.page import Page, new_page, shown
 from experiments.cli.progress import stages_of
 from experiments.errors import ExperimentError
+from experiments.identification.log_warnings import warnings_of_log
 from experiments.identification.request import Request
 from experiments.identification.scenario_run import ScenarioRun
 from experiments.identification.subject import Subject, absolute
-from experiments.identification.warnings import FILE, warnings_of_robot
+from experiments.identification.warnings import FILE, LOG, warnings_of_robot
 from experiments.plugin_tables import plugin_conflicts
 from experiments.reports.printed import print_fit
 from experiments.results.attempts import Attempts
@@ -49,7 +50,7 @@ def run(options: Run) -> None:
         recording = recording_of(made.scenario, audience, options.inner, subject) if watching.rerun else None
         with stages_of(name) as told:
             watch = recording.watch if recording else None
-            ran = replace(made, progress=lambda share: told(f"simulating, {share:.0%}"), watch=watch, told=told)
+            ran = replace(made, progress=lambda share: told(f"simulating, {share:.0%}"), watch=watch)
             _ = ran.fit
         _show_run(page, ran)
         _save_run(folder, page, ran)
@@ -99,7 +100,8 @@ def _described(page: Page, options: Run) -> ScenarioRun:
 def _show_run(page: Page, ran: ScenarioRun) -> None:
     """Show the estimates."""
     print_fit(page, ran.fit, f"Scenario {ran.scenario.name}")
-    page.warn({FILE: [*warnings_of_robot(ran.run.robots[0]), *plugin_conflicts()]})
+    of_log = warnings_of_log(ran.run.alone(), ran.fit.subject.tree)
+    page.warn({LOG: of_log, FILE: [*warnings_of_robot(ran.run.robots[0]), *plugin_conflicts()]})
     page.found |= ran.summary()
     page.show()
 

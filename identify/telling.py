@@ -1,0 +1,37 @@
+"""How far a long work is, told to whoever listens: nobody, unless a caller says so."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+Listener = Callable[[str], None]
+"""Receives what is being worked at, from the outermost to the innermost: "power model, IV: round 3 of 15"."""
+
+_listener: ContextVar[Listener | None] = ContextVar("listener", default=None)
+_within: ContextVar[tuple[str, ...]] = ContextVar("within", default=())
+
+
+@contextmanager
+def listening(listener: Listener) -> Iterator[None]:
+    """Let `listener` hear what is told in the block, in this thread."""
+    token = _listener.set(listener)
+    try:
+        yield
+    finally:
+        _listener.reset(token)
+
+
+@contextmanager
+def stage(what: str) -> Iterator[None]:
+    """Tell what the block works at; stages may stand in each other."""
+    token = _within.set((*_within.get(), what))
+    try:
+        _tell()
+        yield
+    finally:
+        _within.reset(token)
+
+
+def _tell() -> None:
+    if (listener := _listener.get()) is not None:
+        listener(": ".join(_within.get()))
