@@ -9,6 +9,10 @@ class IdentificationError(ValueError):
     """Root of all errors that `identify` raises on purpose."""
 
 
+class InvariantError(Exception):
+    """A fault of this package that no input should cause: it is reported with its traceback, not as wrong input."""
+
+
 class LogError(IdentificationError):
     """A motion log that cannot be used as it is."""
 

@@ -12,6 +12,7 @@ from identify.arrays import combined
 from identify.basis import LoadFriction
 from identify.basis.joint_law import AbstractFriction
 from identify.basis.of_joints import inner_of
+from identify.errors import InvariantError
 from identify.judge.diagnosis import filtered
 from identify.rows.grid import Kernel
 from identify.signals.signals import Signals
@@ -112,6 +113,9 @@ class FrictionCurves:
         X = np.array([self.X[basis.names.index(name)] for name in names])
         laws = basis.renamed({name: name for name in names})
         own = tuple(b for b in laws.blocks if {p.name for p in b.parameters(basis.n)} & set(names))
+        known = {p.name for b in own for p in b.parameters(basis.n)}
+        if missing := [name for name in names if name not in known]:
+            raise InvariantError(f"no law of friction has the parameters {', '.join(missing)}")
         return replace(laws, blocks=own, order=(), held={}), X
 
 

@@ -1,8 +1,8 @@
 """The report of an identification: one HTML file that needs no other."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.metadata import version
-from typing import Any
+from typing import Any, TypeVar
 
 from experiments.identification.fit import Fit
 from experiments.identification.held_out import HeldOut
@@ -14,11 +14,19 @@ from experiments.reports.figures import (
     torques_figure,
 )
 from experiments.reports.html import rendered
+from experiments.results.attempts import Attempts
 from experiments.text import number, percentage
 
+T = TypeVar("T")
 
-def report(judgement: Judgement, warnings: Mapping[str, Sequence[str]], notes: Sequence[str], command: str) -> str:
-    """Return the page: whether to trust it, what to check, torques, parameters, friction, residuals, logs, the command."""
+
+def report(
+    judgement: Judgement, warnings: Mapping[str, Sequence[str]], notes: Sequence[str], command: str, attempts: Attempts
+) -> str:
+    """Return the page: whether to trust it, what to check, torques, parameters, friction, residuals, logs, the command.
+
+    A figure that fails is noted in `attempts`, and missing.
+    """
     fit, first = judgement.fit, judgement.on[0]
     subject = fit.subject
     cutoff = getattr(fit.processing.operator, "cutoff", None)
@@ -31,12 +39,12 @@ def report(judgement: Judgement, warnings: Mapping[str, Sequence[str]], notes: S
         unjudged=first.why if isinstance(first, Unjudged) else "",
         failures=fit.failures,
         warnings={about: messages for about, messages in warnings.items() if messages},
-        unseen=[_held_out(one) for one in judgement.held_out],
-        parameters=parameters_figure(fit),
+        unseen=[_held_out(one, attempts) for one in judgement.held_out],
+        parameters=_figure(attempts, "parameters", parameters_figure, fit),
         parameter_heads=[f"{model} {what}" for model in fit.estimates for what in ("X", "sigma", "%")],
         parameter_rows=list(_parameters(fit)),
-        friction=friction_figure(fit),
-        spectra=spectra_figure(fit),
+        friction=_figure(attempts, "friction", friction_figure, fit),
+        spectra=_figure(attempts, "spectra", spectra_figure, fit),
         joints=subject.robot.joints,
         logs=list(_logs(fit)),
         notes=notes,
@@ -49,12 +57,17 @@ def report(judgement: Judgement, warnings: Mapping[str, Sequence[str]], notes: S
     )
 
 
+def _figure(attempts: Attempts, name: str, draw: Callable[[T], str], shown: T) -> str:
+    """Return a figure, or nothing if it fails."""
+    return attempts.attempt(f"the figure of {name} in report.html", lambda: draw(shown)) or ""
+
+
 def _verdicts(one: HeldOut) -> Iterator[tuple[str, str, str]]:
     for model, verdict in one.verdicts.items():
         yield model, verdict.word, "; ".join(verdict.reasons)
 
 
-def _held_out(one: HeldOut) -> tuple[str, str, list[str], list[list[str]]]:
+def _held_out(one: HeldOut, attempts: Attempts) -> tuple[str, str, list[str], list[list[str]]]:
     """Return title, figure and table of a held-out log."""
     torques = one.torques
     heads = ["rms of the torque", *(f"{model} {what}" for model in torques for what in ("rms", "%", "R2"))]
@@ -63,7 +76,7 @@ def _held_out(one: HeldOut) -> tuple[str, str, list[str], list[list[str]]]:
         first = next(iter(torques.values()))
         cells = [cell for v in torques.values() for cell in (f"{v.rms[j]:.3g}", percentage(v.percent[j]), f"{v.R2[j]:.4f}")]
         rows.append([joint, f"{first.level[j]:.3g}", *cells])
-    return one.title, torques_figure(one), heads, rows
+    return one.title, _figure(attempts, "torques", torques_figure, one), heads, rows
 
 
 def _parameters(fit: Fit) -> Iterator[list[str]]:

@@ -257,7 +257,7 @@ def test_the_report_says_in_a_minute_whether_to_trust_it(idbench, logs, tmp_path
     )  # fmt: skip
     assert code == 0
     page = (tmp_path / "out" / "report.html").read_text()
-    for words in ("explicit model: ", "What to see to", "held-out log", "--torque-delay", "XX", "Friction", "What is left"):
+    for words in ("explicit model: ", "Check these first", "held-out log", "--torque-delay", "XX", "Friction", "Residuals"):
         assert words in page, words
     assert page.count("<svg") == 4
     assert 'src="http' not in page

@@ -57,19 +57,20 @@ class Shown:
         return self.judgement.fit
 
 
-def report(shown: Shown) -> None:
+def report(shown: Shown, attempts: Attempts) -> None:
     """Write the page of the identification."""
     from experiments.reports.page import report as page_of
 
     if shown.folder is None or shown.fit.logs.long:
         return
     with shown.folder.more() as hidden:
-        text = page_of(shown.judgement, shown.warnings, shown.page.found["notes"], shown.command)
+        text = page_of(shown.judgement, shown.warnings, shown.page.found["notes"], shown.command, attempts)
         (hidden / "report.html").write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
-def recording(shown: Shown) -> None:
+def recording(shown: Shown, attempts: Attempts) -> None:
     """Write the recording, or show it to who watches."""
+    del attempts
     run, rerun = shown.options.log[0], shown.options.watching.rerun
     into = shown.folder or (_layered(shown, run) if run.is_dir() else None)
     if not rerun or (into is None and shown.audience is None):
@@ -107,14 +108,14 @@ def require_layer(options: Identify, label: str, command: str) -> None:
         )
 
 
-VIEWS: dict[str, Callable[[Shown], None]] = {"report.html": report, "the recording": recording}
+VIEWS: dict[str, Callable[[Shown, Attempts], None]] = {"report.html": report, "the recording": recording}
 """What shows an identification, by name."""
 
 
 def view_all(shown: Shown, attempts: Attempts) -> None:
     """Make every view; those that fail are noted."""
     for name, view in VIEWS.items():
-        attempts.attempt(name, lambda view=view: view(shown))  # type: ignore[misc]
+        attempts.attempt(name, lambda view=view: view(shown, attempts))  # type: ignore[misc]
     for option, path in _targets(shown.options):
         attempts.attempt(f"{option} {path}", lambda option=option, path=path: _export(shown, option, path))  # type: ignore[misc]
     if shown.folder:
