@@ -15,7 +15,10 @@ def example():
     return Example()
 
 
-@pytest.mark.parametrize("name", EVERY)
+SIMULATING = {f"estimators/{name}" for name in ("IV", "DIDIM", "CLIE", "CLOE", "OE", "UKF")}
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.thorough] * (n in SIMULATING)) for n in EVERY])
 def test_it_keeps_its_contract(name, example):
     assert [f"{asked} {complaint}" for asked, complaint in kept(name, example) if complaint] == []
 
@@ -25,6 +28,7 @@ def test_every_point_has_a_contract():
     assert all(clause.__doc__ for clauses in CONTRACTS.values() for clause in clauses)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", CHAINS.builtin)
 @pytest.mark.parametrize("model", MODELS.builtin)
 def test_chains_recover_ideal_data(name, model, log, truth):

@@ -67,6 +67,7 @@ def logs(tmp_path_factory, table1):
     return folder
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("page", ["identification.md", "noise.md", "any-arm.md", "plugins.md"])
 def test_the_code_of_a_page_runs(root, logs, page):
     for code in re.findall(r"```python\n(.*?)```", (root / "docs" / page).read_text(), re.DOTALL):

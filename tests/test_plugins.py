@@ -53,6 +53,7 @@ def test_the_readmes_package_is_listed(readme_package, monkeypatch):
     assert re.search(r"plain-TLS\s+Least squares that allows for noise in W", listed)
 
 
+@pytest.mark.thorough
 def test_the_readmes_friction_is_identified_by_all_models_with_its_estimator(readme_package, monkeypatch):
     """A robot with quadratic drag, known to no file of this project, gives its drag back in all three models."""
     out = python(
@@ -74,6 +75,7 @@ def test_the_readmes_friction_is_identified_by_all_models_with_its_estimator(rea
     np.testing.assert_allclose(np.array(out.split(), float).reshape(3, 2), [[0.03, 0.004]] * 3, rtol=1e-3)
 
 
+@pytest.mark.thorough
 def test_the_readmes_estimator_identifies_every_run_by_itself(readme_package, monkeypatch, truth):
     """A run in a batch is what it is alone; without noise the truth, with noise not what OLS gives."""
     out = python(

@@ -79,6 +79,7 @@ def pages(root):
     return re.findall(r"```python\n(.*?)```", (root / "docs" / "your-own-log.md").read_text(), re.DOTALL)
 
 
+@pytest.mark.thorough
 def test_the_recipe_for_a_log_in_csv_works(root, tmp_path, table1):
     log = table1.log
     columns = np.column_stack([log.t, log.q, log.tau])
@@ -105,6 +106,7 @@ def test_the_pendulum_of_the_docs_is_identified_by_all_models(root):
         np.testing.assert_allclose(estimate.X, [0.8, 1.2, -0.1, 0.3, 0.5], rtol=1e-4)
 
 
+@pytest.mark.thorough
 def test_the_example_of_the_virtual_robot_runs(root):
     (example,) = re.findall(r"```python\n(.*?)```", (root / "docs" / "virtual-robot.md").read_text(), re.DOTALL)
     done = subprocess.run([sys.executable, "-c", example], capture_output=True, text=True, check=False)

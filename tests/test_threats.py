@@ -76,8 +76,8 @@ def test_a_parquet_file_of_terabytes_in_kilobytes_is_refused_before_it_is_read(t
     table = pa.table({name: np.zeros(rows) for name in ("t", "q1", "tau1")})
     pq.write_table(table, tmp_path / "bomb.parquet", compression="zstd")
     assert (tmp_path / "bomb.parquet").stat().st_size < 10_000
-    monkeypatch.setattr("identify.files.arrow._memory", lambda: 1e-3)
-    with pytest.raises(LogError, match=r"holds 2e\+05 samples of 3 columns, 0.0048 GB; this machine has 0.001 GB"):
+    monkeypatch.setattr("identify.files.room.memory", lambda: 1e-3)
+    with pytest.raises(LogError, match=r"holds 2e\+05 samples of 3 columns: reading them takes 0.0144 GB, and there are 0.001 GB"):
         read_columns(tmp_path / "bomb.parquet")
 
 
@@ -90,7 +90,7 @@ def test_columns_that_a_log_does_not_have_are_not_read(tmp_path, monkeypatch):
         "quality": ["good"] * 50,
     }
     pq.write_table(pa.table(columns), tmp_path / "log.parquet")
-    monkeypatch.setattr("identify.files.arrow._memory", lambda: 1.1 * 50 * 8 * 3e-9)
+    monkeypatch.setattr("identify.files.room.memory", lambda: 1.1 * 3 * 50 * 8 * 3e-9)
     assert len(read_columns(tmp_path / "log.parquet").t) == 50
     pq.write_table(pa.table(columns | {"q1": ["0.0"] * 50}), tmp_path / "words.parquet")
     with pytest.raises(LogError, match="column q1 holds string, not numbers"):

@@ -110,11 +110,11 @@ def _do(command: Callable[[], None]) -> None:
     """Run a command, which ends by returning or by an error."""
     try:
         command()
-    except TerminatedError:
+    except (Exception, KeyboardInterrupt, TerminatedError):
         raise
-    except SystemExit as ended:
+    except BaseException as ended:
         raise ExperimentError(
-            f"what was called ended the process (SystemExit, code {ended.code}) before the command was done: a plug-in must "
+            f"what was called ended the process ({type(ended).__name__}: {ended}) before the command was done: a plug-in must "
             "return, or raise an error; what is printed above is complete, and nothing else"
         ) from ended
 

@@ -70,8 +70,8 @@ class LogColumns:
             wrong = "; ".join(text for text in (missing and f"missing: {missing}", over and f"not the robot's: {over}") if text)
             raise LogError(f"the log names the joints {', '.join(self.joints)}, the robot {', '.join(joints)}: {wrong}")
         if self.q.shape[1] != len(joints):
-            own = f"{self.n} joint{'s' if self.n > 1 else ''}"
-            raise LogError(f"the log has positions of {own}, the robot {len(joints)} joints: {', '.join(joints)}")
+            own, others = (f"{n} joint{'s' if n > 1 else ''}" for n in (self.n, len(joints)))
+            raise LogError(f"the log has positions of {own}, the robot {others}: {', '.join(joints)}")
         if not self.joints:
             return self
         place = [self.joints.index(joint) for joint in joints]

@@ -17,13 +17,15 @@ from sim.robot.robot import Robot
 from sim.robot.tree import standard_parameters
 from sim.scenario.scenario_file import load
 
+pytestmark = pytest.mark.thorough
+
 ARMS = "puma560", "panda"
 
 
 def scenario(robot, moves, seed):
-    """Averaged drives, 17-bit encoders, gravity, friction, half a millisecond of computing time, at 250 Hz."""
+    """Averaged drives, 17-bit encoders, gravity, friction, half a millisecond of computing time, at 500 Hz."""
     arm = load("arm")
-    return replace(arm, robot=robot, fs=250.0, trajectory=replace(arm.trajectory, moves=moves, seed=seed))
+    return replace(arm, robot=robot, fs=500.0, trajectory=replace(arm.trajectory, moves=moves, seed=seed))
 
 
 @pytest.fixture(scope="module", params=["panda"])

@@ -29,6 +29,7 @@ def test_a_plugin_is_begun_that_keeps_its_contract(kind, here, monkeypatch, caps
     assert f"of the {KINDS[kind].point}" in capsys.readouterr().out
 
 
+@pytest.mark.thorough
 def test_its_own_test_passes(here):
     assert main(["new", "plugin", "begun"]) == 0
     words = ["-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-c", "pyproject.toml", "--rootdir", "."]
@@ -39,6 +40,7 @@ def test_its_own_test_passes(here):
     assert "3 passed" in done.stdout
 
 
+@pytest.mark.thorough
 def test_a_scenario_and_a_study_are_begun_that_run(here, capsys):
     assert main(["new", "scenario", "mine", "--like", "quantization"]) == 0
     assert main(["run", "mine.toml", "--no-rerun"]) == 0

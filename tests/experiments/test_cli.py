@@ -2,6 +2,8 @@
 
 import json
 
+import pytest
+
 from experiments.cli import main
 from experiments.paper.table1 import SCENARIO
 from experiments.results.manifest import NAME as MANIFEST
@@ -59,6 +61,7 @@ def test_results_go_through_a_link(tmp_path, capsys):
     assert len(sorted({x.name for x in (tmp_path / "elsewhere").iterdir()} - {MANIFEST})) == 4
 
 
+@pytest.mark.thorough
 def test_search_writes_a_scenario(tmp_path, capsys):
     path = tmp_path / "found.toml"
     assert main(["search", "--seed", "5", "--out", str(path)]) == 0

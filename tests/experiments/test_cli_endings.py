@@ -79,6 +79,7 @@ def test_an_interrupt_that_comes_out_as_another_error_is_one(tmp_path, start):
     assert (process.returncode, err.strip()) == (130, "idbench: interrupted")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("module", ["numpy", "scipy.signal", "mujoco", "rerun"])
 def test_an_interrupt_while_a_module_is_loaded_is_as_quiet(tmp_path, module, start):
     code = f"""if True:
@@ -100,6 +101,7 @@ def test_an_interrupt_while_a_module_is_loaded_is_as_quiet(tmp_path, module, sta
     assert [listed(path) for path in tmp_path.iterdir()] == ([KEPT] if module == "rerun" else [])
 
 
+@pytest.mark.thorough
 def test_termination_leaves_nothing_half_written(tmp_path, start):
     """SIGTERM while the recording is written: the hidden folder goes, what was complete stays."""
     code = "import sys; from experiments import cli; import experiments.recording.table1_recording as r\n"
@@ -112,6 +114,7 @@ def test_termination_leaves_nothing_half_written(tmp_path, start):
     assert listed(tmp_path / "results") == KEPT
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("size", "kept"), [(20_000, []), (300_000, ["log.parquet", "summary.json"])])
 def test_a_full_disk_is_one_line_and_what_has_room_is_kept(tmp_path, size, kept):
     """Too small for the log, and for the recording alone: no file may grow beyond `size` bytes. What was found is printed."""
@@ -150,6 +153,7 @@ def test_results_that_cannot_be_written_leave_the_earlier_ones_whole(out, monkey
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("command", ["list", "table1"])
 def test_output_that_cannot_be_written_is_told_and_results_stay(command, tmp_path):
     if not Path("/dev/full").exists():

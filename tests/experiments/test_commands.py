@@ -28,6 +28,7 @@ def shortened(name, tmp_path):
     return path
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", names())
 def test_every_scenario_that_ships_runs(name, tmp_path, capsys):
     out = tmp_path / "out"
@@ -97,6 +98,7 @@ def test_a_file_that_does_not_say_is_asked(csv, complaint):
     assert "does not say what its torque means: add --torque held" in complaint("identify", str(csv))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("args", "message"),
     [
@@ -193,6 +195,7 @@ def test_a_parameter_whose_truth_is_zero_is_reported(tmp_path):
     assert json.loads((out / "summary.json").read_text())["models"]["power"]["relative_error_percent"][1] is None
 
 
+@pytest.mark.thorough
 def test_table2_on_a_short_motion(tmp_path, capsys, monkeypatch):
     """Its own robot with an averaged drive, 12 moves: signature, rows, attribution."""
     points = RandomMoves(moves=12).plan(load("table2").nominal_robot)

@@ -11,6 +11,8 @@ from identify.files.log_file import read_log, write_log
 from sim.scenario.scenario_file import load, to_toml
 from sim.trajectories import RandomMoves
 
+pytestmark = pytest.mark.thorough
+
 MOVES = RandomMoves(moves=8, durations=(1.3, 1.3), rest=0.7, seed=1)
 
 

@@ -19,6 +19,7 @@ def whole(table1, tmp_path):
     return (tmp_path / "whole.csv").read_text().splitlines(keepends=True)
 
 
+@pytest.mark.thorough
 def test_estimates_come_while_the_log_grows_and_the_last_is_of_all_of_it(whole, tmp_path, capsys):
     path, pieces = tmp_path / "grows.csv", np.array_split(np.array(whole, dtype=object), 5)
 

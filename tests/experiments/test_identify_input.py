@@ -69,6 +69,7 @@ def test_names_in_another_case_are_guessed(idbench, logs):
     assert "(did you mean 'WLS'?)" in err
 
 
+@pytest.mark.thorough
 def test_one_models_failure_takes_nothing_from_the_others(idbench, logs, tmp_path):
     """A seventh of the log leaves the power model fewer rows than parameters; the explicit one has six times as many."""
     from identify.files.log_file import write_log
@@ -82,6 +83,7 @@ def test_one_models_failure_takes_nothing_from_the_others(idbench, logs, tmp_pat
     assert "tau6 explained" in out
 
 
+@pytest.mark.thorough
 def test_a_file_that_cannot_be_written_costs_nothing_else(idbench, logs, monkeypatch):
     from identify import IdentificationError
 

@@ -46,6 +46,7 @@ def robot(pairs):
     return replace(pairs.robot(0, {}), estimator=ESTIMATORS.create("WLS"))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("way", "sigmas"), [("together", 4.0), ("fixed", 4.0), ("apart", 4.0)])
 def test_a_payload_is_found(robot, pairs, way, sigmas):
     found = WAYS[way](robot)
@@ -93,6 +94,7 @@ def test_what_is_known_of_a_payload_stays(robot):
         replace(robot, known={"M7": 2.0})
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("all_known", [False, True])
 def test_gains_are_found(pairs, all_known):
     gains = np.array([0.8, 1.3, 1.1, 0.75, 1.25, 0.9])
@@ -104,6 +106,7 @@ def test_gains_are_found(pairs, all_known):
     assert np.abs((found.gains - gains) / found.sigma).max() < 4.0
 
 
+@pytest.mark.thorough
 def test_least_squares_of_currents_finds_gains_too_small(pairs):
     """Noise of the currents on the side of the parameters: the classical fault, which the way taken here does not have."""
     noisy = replace(short(pairs), torque=replace(pairs.scenario.torque, noise=(2.0,)))
@@ -121,6 +124,7 @@ def test_least_squares_of_currents_finds_gains_too_small(pairs):
     assert (theirs[3:] < 0.9).all()  # wrists, whose torques are small
 
 
+@pytest.mark.thorough
 def test_a_payload_on_the_axis_says_nothing_of_its_gain(pairs):
     """The last joint of a payload whose mass alone counts, on its axis, is refused; the others are not."""
     on_axis = replace(short(pairs), payload=replace(pairs.scenario.payload, position=(0.0, 0.0, 0.15), inertia=0.0))
@@ -169,6 +173,7 @@ def test_the_payload_of_a_robot_identified_before(files):
     assert found["body"]["mass"] == pytest.approx(2.0, rel=0.01)
 
 
+@pytest.mark.thorough
 def test_the_gains_command(files, capsys):
     words = ["gains", "full.parquet", "--unloaded", "empty.parquet", "--robot", "puma560", "--estimator", "WLS"]
     assert main([*words, "--mass", "2.0", "--out", "found"]) == 0
@@ -201,6 +206,7 @@ def test_what_cannot_be_is_said(files, capsys, words, message):
     assert message in capsys.readouterr().err
 
 
+@pytest.mark.thorough
 def test_all_ways_are_compared_on_a_simulated_robot(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["payload", "--simulate", "payload", "--runs", "1", "--out", "ways"]) == 0

@@ -39,6 +39,7 @@ def test_the_masked_chain_is_the_papers_but_for_its_mask():
     assert {**vars(masked), "mask": paper.mask} == vars(paper)
 
 
+@pytest.mark.thorough
 def test_kept_motions_have_the_papers_condition_numbers_and_reversals_make_the_friction(few):
     for chain in COMPARED:
         for model, column in PAPER.items():
@@ -48,6 +49,7 @@ def test_kept_motions_have_the_papers_condition_numbers_and_reversals_make_the_f
     assert (friction[0] > 2 * friction[1]).all()
 
 
+@pytest.mark.thorough
 def test_a_motion_does_not_depend_on_how_many_are_drawn(few):
     more = Table1Motions(70, seed=3, tolerance=0.6)
     for chain in COMPARED:
@@ -62,6 +64,7 @@ def test_the_papers_errors_count_to_the_digits_that_it_prints():
     assert not Errors(5, {}, {"explicit": percent + 4e-4}).explained("explicit").any()
 
 
+@pytest.mark.thorough
 def test_the_command_writes_table_and_picture(tmp_path, capsys):
     assert main(["table1", "--motions", "150", "--seed", "3", "--out", str(tmp_path / "out")]) == 0
     printed = capsys.readouterr().out

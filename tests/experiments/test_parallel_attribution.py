@@ -15,21 +15,22 @@ from sim.drives import AveragedDrive
 from sim.scenario.scenario_file import load, to_dict
 from sim.trajectories import Quintic, RandomMoves
 
+pytestmark = pytest.mark.thorough
+
 NAMES = ("nothing", "hold, not given", "standstill, not masked")
 
 
-@pytest.fixture(scope="module")
-def short():
-    """Three moves, three of the imperfections."""
-    points = RandomMoves(moves=3).plan(load("table2").nominal_robot)
+@pytest.fixture
+def short(monkeypatch):
+    """Six moves, three of the imperfections."""
+    points = RandomMoves(moves=6).plan(load("table2").nominal_robot)
     trajectory = Quintic(tuple(map(tuple, points.waypoints.tolist())), tuple(points.durations.tolist()), 3.0)
     scenario = replace(load("table2"), trajectory=trajectory, drive=AveragedDrive())
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(parallel_attribution, "imperfections", lambda s: [i for i in imperfections(s) if i.name in NAMES])
-        yield scenario
+    monkeypatch.setattr(parallel_attribution, "imperfections", lambda s: [i for i in imperfections(s) if i.name in NAMES])
+    return scenario
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def alone(short):
     """The errors without a second process."""
     return dict(json.loads(line) for line in lines(json.dumps(to_dict(short))))

@@ -148,6 +148,7 @@ def test_commands_ask_before_the_work(tmp_path, complaint, monkeypatch):
     assert {path.name: path.read_bytes() for path in (tmp_path / "kept").iterdir()} == before
 
 
+@pytest.mark.thorough
 def test_another_estimator_does_not_replace_a_run_unsaid(tmp_path, complaint, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main([*RUN, "kept"]) == 0

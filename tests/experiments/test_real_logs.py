@@ -38,6 +38,7 @@ def first(logs):
     return read_log(logs / "first.parquet")
 
 
+@pytest.mark.thorough
 def test_several_logs_of_other_rates_meanings_and_kinds_in_one_fit(idbench, logs, first, tmp_path):
     """Two halves, one of them at a third of the rate, measured instead of averaged, in degrees and mN m."""
     half = first.samples // 2
@@ -68,6 +69,7 @@ def test_several_logs_of_other_rates_meanings_and_kinds_in_one_fit(idbench, logs
     assert (unseen(summary) < 1.1 * unseen(found(tmp_path / "one"))).all()
 
 
+@pytest.mark.thorough
 def test_each_log_is_judged_by_itself(idbench, logs, first, tmp_path):
     write_log(MotionLog(first.fs, first.q, 1.1 * first.tau, first.torque), tmp_path / "wrong.parquet")
     code, out, _ = idbench(
@@ -81,6 +83,7 @@ def test_each_log_is_judged_by_itself(idbench, logs, first, tmp_path):
     assert summary["validation"] == summary["validations"][0]
 
 
+@pytest.mark.thorough
 def test_repeated_rows_are_left_out(idbench, logs, first, tmp_path, rng):
     """One row in sixteen is the one before, written again."""
     seen = np.maximum.accumulate(np.where(rng.uniform(size=first.samples) > 0.06, np.arange(first.samples), 0))
@@ -115,6 +118,7 @@ def test_a_log_with_a_gap_becomes_two(idbench, first, tmp_path):
     assert read_log(tmp_path / "even2.parquet").fs == pytest.approx(250.0)
 
 
+@pytest.mark.thorough
 def test_a_short_fast_log_gets_the_band_that_it_needs(idbench, first, tmp_path):
     """Seven seconds: 70 instants at 5 Hz for 52 parameters, from which the power model cannot be identified at all."""
     write_log(first.part(0, round(7 * first.fs)), tmp_path / "short.parquet")
@@ -128,6 +132,7 @@ def test_a_short_fast_log_gets_the_band_that_it_needs(idbench, first, tmp_path):
     assert "this log does not show" in " ".join(out.split())
 
 
+@pytest.mark.thorough
 def test_a_chain_of_a_file(idbench, log, tmp_path):
     (tmp_path / "chain.toml").write_text('chain = "idbench"\n[operator]\ncutoff = 12.0\n[mask]\nkind = "none"\n')
     write_log(log, tmp_path / "log.parquet")
@@ -136,6 +141,7 @@ def test_a_chain_of_a_file(idbench, log, tmp_path):
     assert found(tmp_path / "file")["cutoff"] == 12.0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -145,7 +151,7 @@ def test_a_chain_of_a_file(idbench, log, tmp_path):
         (("--cutoff", "-3"), "cutoff"),
         (("--lock", "joint9=1"), "there is no joint 'joint9'"),
         (("--lock", "joint1"), "--lock joint1: give a joint and where it is held"),
-        (("--joints", "joint1"), "the log has 6 joints, the robot 1"),
+        (("--joints", "joint1"), "the log has positions of 6 joints, the robot 1 joint"),
         (("--write", "arm.step"), "--write arm.step: its name must end with .xml, .urdf, .json, .py"),
         (("--columns", "q"), "--columns q: give t="),
         (("--units", "q=inch"), "--units: unit 'inch' of q is unknown"),
@@ -159,6 +165,7 @@ def test_options_that_make_no_sense_are_told(complaint, logs, tmp_path, monkeypa
     assert message in complaint("identify", str(logs / "second.parquet"), *PUMA, *options)
 
 
+@pytest.mark.thorough
 def test_a_robot_with_more_joints_than_the_log(idbench, first, tmp_path):
     """The wrist was held: its columns are not in the log. What follows from them belongs to the forearm."""
     robot = Robot.load("puma560")
@@ -179,6 +186,7 @@ def test_a_robot_with_more_joints_than_the_log(idbench, first, tmp_path):
     assert Robot.load(str(tmp_path / "arm.xml")).joints == names
 
 
+@pytest.mark.thorough
 def test_torques_that_do_not_see_rotors_are_told_apart(idbench, logs, first, tmp_path):
     """Sensors behind the gears: what the robot's file says of rotors is missing in the torques."""
     qdd = np.gradient(np.gradient(first.q, 1 / first.fs, axis=0), 1 / first.fs, axis=0)
@@ -195,6 +203,7 @@ def test_torques_that_do_not_see_rotors_are_told_apart(idbench, logs, first, tmp
     assert not [name for name in found(tmp_path / "out")["parameters"] if name.startswith(("Ia", "Fv", "Fs"))]
 
 
+@pytest.mark.thorough
 def test_what_is_written_makes_the_torques_that_were_identified(idbench, logs, tmp_path):
     """The function for a controller, against MuJoCo's inverse dynamics of the robot that is written beside it."""
     code, _, _ = idbench(
@@ -250,6 +259,7 @@ def test_the_function_of_true_parameters_is_mujocos_inverse_dynamics(robot, tmp_
     )
 
 
+@pytest.mark.thorough
 def test_the_report_says_in_a_minute_whether_to_trust_it(idbench, logs, tmp_path):
     code, _, _ = idbench(
         "identify", logs / "first.parquet", *PUMA, "--validate", logs / "second.parquet", "--out", "out", "--no-rerun",

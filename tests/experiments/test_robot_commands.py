@@ -41,18 +41,19 @@ def test_identify_validates_and_writes_the_file(idbench, logs, tmp_path):
     assert len(summary["validation"]["models"]["explicit"]["position_error_rms"]) == 6
 
 
+@pytest.mark.thorough
 def test_without_a_second_log_the_end_of_the_first_is_held_out(idbench, logs):
     code, out, _ = idbench("identify", logs / "first.parquet", "--robot", "puma560", "--model", "explicit")
     assert code == 0
     assert "the last quarter of the log, by a fit of the rest" in out
 
 
+@pytest.mark.thorough
 def test_run_takes_any_robot(idbench, tmp_path):
     arm = load("arm")
-    scenario = replace(arm, name="short", fs=250.0, trajectory=replace(arm.trajectory, moves=5))
+    scenario = replace(arm, name="short", fs=250.0, trajectory=replace(arm.trajectory, moves=8))
     (tmp_path / "short.toml").write_text(to_toml(scenario))
-    words = "--robot", "puma560", "--out", "mine", "--estimator", "WLS"
-    code, out, err = idbench("run", "short.toml", *words)
+    code, out, err = idbench("run", "short.toml", "--robot", "puma560", "--out", "mine", "--estimator", "WLS")
     assert code == 0, err
     summary = json.loads((tmp_path / "mine" / "summary.json").read_text())
     assert summary["robot"] == "puma560"
@@ -62,15 +63,16 @@ def test_run_takes_any_robot(idbench, tmp_path):
     assert "added to the recording" in out
 
 
+@pytest.mark.thorough
 def test_a_fixed_trajectory_of_another_robot_is_replaced(idbench, tmp_path):
     (tmp_path / "two.toml").write_text(to_toml(replace(load("ideal"), name="two", fs=100.0)))
-    words = "--robot", "panda", "--no-rerun", "--estimator", "WLS"
-    code, out, err = idbench("run", "two.toml", *words)
+    code, out, err = idbench("run", "two.toml", "--robot", "panda", "--no-rerun", "--estimator", "WLS")
     assert code == 0, err
     assert "is none for robot panda: it makes the random moves of scenario arm" in out
     assert (tmp_path / "runs" / "two-panda" / "summary.json").exists()
 
 
+@pytest.mark.thorough
 def test_parameters_can_be_left_out_and_laws_added(idbench, logs):
     words = "identify", logs / "first.parquet", "--robot", "puma560", "--model", "explicit"
     code, out, _ = idbench(*words, "--without", "XXR6", "XY6", "--add", "offset")
@@ -85,6 +87,7 @@ def test_parameters_can_be_left_out_and_laws_added(idbench, logs):
     assert "--add armature: that is no law of a joint's friction; known: viscous, coulomb, offset" in err
 
 
+@pytest.mark.thorough
 def test_joints_by_name_are_put_in_order_and_unknown_ones_refused(idbench, logs, tmp_path):
     from pyarrow import csv, parquet
 
@@ -105,17 +108,19 @@ def test_joints_by_name_are_put_in_order_and_unknown_ones_refused(idbench, logs,
     assert "missing: joint3; not the robot's: elbow" in err
 
 
+@pytest.mark.thorough
 def test_the_closed_form_is_written_too(idbench, tmp_path):
     """ZZR1 ... of the paper are base parameters of the links: bodies that have them are found."""
     code, _, err = idbench("run", "ideal", "--no-rerun", "--out", "mine")
     assert code == 0, err
-    code, _, err = idbench("identify", "mine/log.parquet", "--write-mjcf", "out.xml", "--model", "explicit")
+    code, _, err = idbench("identify", "mine/log.parquet", "--write-mjcf", "out.xml")
     assert code == 0, err
     made = standard_parameters(Robot.load(str(tmp_path / "out.xml")))
     assert made["ZZ1"] + made["Ia1"] + 0.25 * made["M2"] == pytest.approx(3.5, rel=1e-3)
     assert 0.5 * made["MX2"] == pytest.approx(0.12, rel=1e-2)
 
 
+@pytest.mark.thorough
 def test_a_file_without_motors_ranges_and_room_is_described_simulated_and_judged(idbench, arm):
     code, out, err = idbench("robot", "arm.xml")
     assert code == 0, err
@@ -134,6 +139,7 @@ def test_a_file_without_motors_ranges_and_room_is_described_simulated_and_judged
     assert max(summary["validation"]["models"]["explicit"]["position_error_rms"]) < 1e-3
 
 
+@pytest.mark.thorough
 def test_an_offset_is_no_error_of_the_simulated_robot(idbench, changed):
     path = changed(tau=lambda tau: tau + [5, -8, 4, 1, -1, 0.5])
     words = "identify", path, "--robot", "puma560", "--model", "explicit"
@@ -147,6 +153,7 @@ def test_an_offset_is_no_error_of_the_simulated_robot(idbench, changed):
     assert max(summary["validation"]["models"]["explicit"]["position_error_rms"]) < 1e-3
 
 
+@pytest.mark.thorough
 def test_what_is_left_out_is_zero_in_the_file(idbench, logs, tmp_path):
     words = "--robot", "puma560", "--model", "explicit", "--without", "Fs6", "--write-mjcf", "out.xml"
     code, _, err = idbench("identify", logs / "first.parquet", *words)
@@ -158,6 +165,7 @@ def test_what_is_left_out_is_zero_in_the_file(idbench, logs, tmp_path):
     assert code == 2
 
 
+@pytest.mark.thorough
 def test_names_of_joints_survive_resampling_and_other_columns_do_not_matter(idbench, logs, tmp_path):
     from pyarrow import csv, parquet
 

@@ -11,8 +11,8 @@ from sim.robot.robot import Robot
 @pytest.mark.parametrize(
     ("robot", "message"),
     [
-        ("panda", "the log has 6 joints, the robot 7: joint1, joint2"),
-        ("scara", "the log has 6 joints, the robot 2: joint1, joint2"),
+        ("panda", "the log has positions of 6 joints, the robot 7 joints: joint1, joint2"),
+        ("scara", "the log has positions of 6 joints, the robot 2 joints: joint1, joint2"),
         ("kuka", "no robot 'kuka'; known: panda, puma560, scara"),
         ("gone.xml", "gone.xml': No such file or directory"),
     ],
@@ -25,12 +25,14 @@ def test_robots_that_do_not_fit(idbench, logs, robot, message):
     assert err.count("\n") == 1
 
 
+@pytest.mark.thorough
 def test_a_log_in_degrees_is_pointed_out(idbench, changed):
     path = changed(q=np.rad2deg)
     _, out, err = idbench("identify", path, "--robot", "puma560", "--model", "explicit")
     assert "are positions logged in degrees? They must be in rad" in out + err
 
 
+@pytest.mark.thorough
 def test_positions_out_of_range_are_pointed_out(idbench, changed):
     path = changed(q=lambda q: q + 10)
     _, out, err = idbench("identify", path, "--robot", "puma560", "--model", "explicit")
@@ -38,6 +40,7 @@ def test_positions_out_of_range_are_pointed_out(idbench, changed):
     assert "are joints in the order of the robot's file, and counted from its zero in its direction?" in out + err
 
 
+@pytest.mark.thorough
 def test_torques_of_the_wrong_sign_are_pointed_out(idbench, changed):
     code, out, _ = idbench("identify", changed(tau=np.negative), "--robot", "puma560", "--model", "explicit")
     assert code == 0
@@ -49,6 +52,7 @@ def test_torques_of_the_wrong_sign_are_pointed_out(idbench, changed):
     assert "friction drives joint6 in the explicit model: does the torque have the wrong sign" in out
 
 
+@pytest.mark.thorough
 def test_a_joint_that_stands_is_told_with_the_move_that_helps(idbench, changed):
     def hold(x):
         return np.where(np.arange(6) == 5, 0.0, x)
@@ -95,6 +99,7 @@ def test_no_parameter_left_is_told(idbench):
     assert "there is no parameter left" in err
 
 
+@pytest.mark.thorough
 def test_a_slide_in_millimetres_is_pointed_out(idbench, tmp_path, arm):
     code, _, err = idbench("run", "second.toml", "--robot", "arm.xml", "--out", "run", "--no-rerun")
     assert code == 0, err

@@ -11,6 +11,8 @@ from experiments.paper.table1 import SCENARIO, Table1
 from sim.errors import ScenarioError
 from sim.scenario.scenario_file import load
 
+pytestmark = pytest.mark.thorough
+
 
 def test_the_scenario_that_ships_is_what_its_command_finds(robot):
     """Numbers to 1e-9 rad: another machine may round Cond(W) differently, but must take the same way."""

@@ -47,6 +47,7 @@ def without(letters):
     return Parameters(without=tuple(name for name in names if name.startswith(letters)))
 
 
+@pytest.mark.thorough
 def test_the_right_model_is_good_and_noise_explains_all_of_it(pair):
     verdict = validated(pair).verdicts["explicit"]
     assert verdict.word == "good"
@@ -63,6 +64,7 @@ def test_noise_of_the_log_is_no_fault_of_the_model(pair):
     assert any("noise and sigma explain all of it" in reason for reason in verdict.reasons)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("letters", ["F", "Ia"])
 def test_models_without_friction_or_rotors_are_poor(pair, letters):
     verdict = validated(pair, without(letters)).verdicts["explicit"]
@@ -70,6 +72,7 @@ def test_models_without_friction_or_rotors_are_poor(pair, letters):
     assert verdict.validation.percent_of_level(verdict.validation.excess).max() > 10
 
 
+@pytest.mark.thorough
 def test_a_joint_of_the_wrong_sign_is_poor_by_its_torque(pair):
     wrong = [torques(log, lambda tau: tau * [1, -1, 1, 1, 1, 1]) for log in pair]
     verdict = validated(wrong).verdicts["explicit"]
@@ -77,6 +80,7 @@ def test_a_joint_of_the_wrong_sign_is_poor_by_its_torque(pair):
     assert "joint2" in " ".join(verdict.reasons)
 
 
+@pytest.mark.thorough
 def test_noise_that_could_hide_a_wrong_model_leaves_it_unsure(pair):
     rng = np.random.default_rng(1)
     loud = [torques(log, lambda tau: tau + 2 * level(log) * rng.standard_normal(tau.shape)) for log in pair]  # noqa: B023
@@ -85,6 +89,7 @@ def test_noise_that_could_hide_a_wrong_model_leaves_it_unsure(pair):
     assert "a wrong model could hide" in " ".join(verdict.reasons)
 
 
+@pytest.mark.thorough
 def test_a_wrong_delay_is_named_by_the_log_itself(pair):
     """8 ms too late: small in the torque, not in friction."""
     (found,) = delay_advice(validated([late(log, 8) for log in pair]).fit)
@@ -93,6 +98,7 @@ def test_a_wrong_delay_is_named_by_the_log_itself(pair):
     assert not list(delay_advice(validated(pair).fit))
 
 
+@pytest.mark.thorough
 def test_options_are_advised_that_help_and_by_how_much(pair):
     moved = [torques(log, lambda tau: tau + 0.2 * level(pair[0])) for log in pair]
     found = list(Remedies(validated(moved)).options())
@@ -111,6 +117,7 @@ def test_a_starved_power_model_is_told_to_be_so_and_the_explicit_one_recommended
     assert not any("units" in warning for warning in warnings_of_result(found))
 
 
+@pytest.mark.thorough
 def test_torques_in_other_units_are_pointed_out(pair):
     milli = [torques(log, lambda tau: 1000 * tau) for log in pair]
     warnings = warnings_of_result(validated(milli).fit)["the log"]
@@ -118,6 +125,7 @@ def test_torques_in_other_units_are_pointed_out(pair):
     assert not any("are they in N m?" in warning for warning in warnings_of_result(validated(pair).fit))
 
 
+@pytest.mark.thorough
 def test_a_dead_torque_column_is_poor_and_named(pair):
     dead = [torques(log, lambda tau: tau * [1, 0, 1, 1, 1, 1]) for log in pair]
     made = validated(dead)
@@ -132,6 +140,7 @@ def test_a_delay_beyond_the_range_that_is_looked_at_is_told(pair):
     assert "the torque fits best at an end of the range" in found
 
 
+@pytest.mark.thorough
 def test_a_single_wild_sample_does_not_excuse_itself_by_the_sigma_it_makes(pair):
     def struck(tau):
         wild = tau.copy()

@@ -132,6 +132,7 @@ def test_the_scaras_tree_spans_its_closed_form_and_gives_the_same_estimates(log,
         np.testing.assert_allclose(by_tree[name].residual_rms, estimate.residual_rms, rtol=1e-4, atol=1e-12)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("robot", ["puma560", "panda"])
 def test_ideal_data_give_every_base_parameter_in_all_models(robot):
     """Torques by MuJoCo, sensors exact: what is left is the error of differences and of what lies between samples."""
@@ -202,6 +203,7 @@ def exact(x):
     return repr(float(near if abs(x - near) < 5e-3 else x))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("arm", ARMS)
 def test_rounded_angles_do_not_change_the_grouping(arm, tmp_path):
     """As shipped, and with two digits, 1.57: the same parameters stay as with exact angles, and all rotors are asked for."""

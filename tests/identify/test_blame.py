@@ -76,7 +76,7 @@ def test_a_friction_law_that_goes_wrong(log, do, error, message):
         (
             lambda problem: Estimate(problem, np.r_[np.nan, np.ones(7)], np.eye(8), None),
             IdentificationError,
-            "value for ZZR1: use a longer log",
+            "gives NaN or infinity for ZZR1",
         ),
     ],
     ids=["None", "raises", "shape", "nan"],

@@ -62,6 +62,7 @@ def test_a_wide_prefilter_is_harmless(prefilter, log, truth):
     assert error(log, ExplicitModel(), replace(idbench_chain(), prefilter=wide), truth).max() < 0.01
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("model", MODELS.builtin)
 def test_the_same_chain_serves_a_log_at_ten_times_the_frequency(model, table1, truth):
     fast = ideal_log(table1.robot, table1.scenario.trajectory.points.sample(1000.0))
@@ -88,6 +89,7 @@ def test_several_logs_may_have_several_frequencies_and_channels(table1, log, tru
     assert error([log, scaled], ExplicitModel(), idbench_chain(), truth).max() < 0.01
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", CHAINS.builtin)
 def test_a_batch_is_identified_run_by_run_with_the_same_bits(name, log):
     """Other runs in the batch, failed ones among them, change no bit of a run."""
@@ -197,6 +199,7 @@ def test_the_halo_counts_every_stage():
     assert filtered.halo(100.0, plain) > chain.halo(100.0, plain) + 0.1
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("model", MODELS.builtin)
 def test_logging_faster_does_not_make_a_coarse_encoder_worse(model, table1, truth):
     """16 bits at 5 kHz: differences over samples would be 50 times noisier than at 100 Hz, and errors above 100 %."""

@@ -23,7 +23,9 @@ def without_delay(run):
     return MotionLog(log.fs, log.q, log.tau, TorqueChannel("held"))
 
 
-@pytest.mark.parametrize(("delay", "seed"), [(0.0, None), (0.0017, 1), (0.0083, None), (0.015, 1)])
+@pytest.mark.thorough
+@pytest.mark.parametrize("delay", [0.0, 0.0017, 0.0083, 0.015])
+@pytest.mark.parametrize("seed", [None, 1])
 def test_a_known_delay_is_found_with_16_bits(delay, seed):
     """Within 0.05 ms, a quarter of what is asked for, and within five of its own sigma."""
     scenario = load("ideal")
@@ -35,9 +37,10 @@ def test_a_known_delay_is_found_with_16_bits(delay, seed):
     assert found.sigma < 5e-5
 
 
+@pytest.mark.thorough
 def test_its_sigma_is_its_scatter():
     """Twelve realizations of torque noise: the jackknife says the scatter, known to a fifth, to a factor of two."""
-    noisy = replace(load("ideal"), torque=TorqueMeasurement(noise=(0.5, 0.05)), trajectory=RandomMoves(moves=10, seed=1))
+    noisy = replace(load("ideal"), torque=TorqueMeasurement(noise=(0.5, 0.05)))
     run = simulate(noisy, range(12))
     logs = [MotionLog(100.0, run.log.q[i], run.log.tau[i], TorqueChannel("held")) for i in range(12)]
     found = [estimate_delay(log, scara()) for log in logs]
@@ -45,6 +48,7 @@ def test_its_sigma_is_its_scatter():
     assert 0.5 < np.mean([one.sigma for one in found]) / scatter < 2
 
 
+@pytest.mark.thorough
 def test_the_lag_of_a_current_loop_is_found_as_well():
     run = simulate(replace(load("ideal"), drive=AveragedDrive(bandwidth=200.0), timing=Timing(delay=0.003)))
     assert estimate_delay(without_delay(run), scara()).delay == pytest.approx(0.003 + 1 / (2 * np.pi * 200), abs=5e-5)

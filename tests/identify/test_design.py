@@ -126,6 +126,7 @@ def test_greedy_moves_tell_more_than_random_ones():
     assert max(chosen) < np.median(drawn)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("position", [0.0, 1e-4], ids=["torque noise", "torque and position noise"])
 def test_estimates_scatter_as_predicted(position):
     """Errors of 400 logs of one motion, by generalized least squares; the scatter of a variance is 7 %, its sigma's 3.5 %."""

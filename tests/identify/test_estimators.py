@@ -76,6 +76,7 @@ def off(truth):
     return truth * [0.5, 1, 1, 0.5, 0.5, 0.5, 1, 1]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["IV", "DIDIM"])
 def test_five_simulations_are_enough_from_inertias_that_are_half(name, sixteen, off, truth):
     """The first round's controller knows the robot, so that it follows the motion."""
@@ -87,6 +88,7 @@ def test_five_simulations_are_enough_from_inertias_that_are_half(name, sixteen, 
     np.testing.assert_array_equal(found.path[0], off)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("name", "most"), [("IV", 3), ("DIDIM", 6)])
 def test_six_joints_take_no_more_than_six(name, most):
     """Positions to 1.75e-5 rad, torques to 0.05 N m: errors are then those of the noise."""
@@ -104,6 +106,7 @@ def test_six_joints_take_no_more_than_six(name, most):
     assert np.sqrt(np.mean(((found.X - truth) / found.best_sigma) ** 2)) < 2
 
 
+@pytest.mark.thorough
 def test_instrumental_variables_take_the_noise_out_of_W(twelve, truth):
     """12-bit counts up to 20 Hz: least squares loses inertia to the noise of its accelerations; scaled TLS gets most of it."""
     simulation = loop_of(*twelve)
@@ -121,6 +124,7 @@ def test_instrumental_variables_take_the_noise_out_of_W(twelve, truth):
     assert test.off[0] < -3  # least squares finds too small an inertia
 
 
+@pytest.mark.thorough
 def test_noise_in_W_does_not_matter_with_16_bits(sixteen):
     way = InstrumentalVariables()
     test = noise_in_rows(identify(sixteen[1], scara(), ExplicitModel(), estimator=way, simulation=loop_of(*sixteen)))
@@ -128,6 +132,7 @@ def test_noise_in_W_does_not_matter_with_16_bits(sixteen):
     assert np.abs(test.off).max() < 0.1
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("part", [{"controller": PDFeedforward(bandwidth=18.0)}, {"timing": Timing(delay=0.01)}])
 def test_a_wrong_loop_makes_didim_wrong_and_iv_not(part, sixteen, truth):
     """Gains 44 % higher, or a sample of delay: instruments that are a little off leave no more than chance, four sigma."""
@@ -140,6 +145,7 @@ def test_a_wrong_loop_makes_didim_wrong_and_iv_not(part, sixteen, truth):
     assert np.abs(didim.X / truth - 1).max() > 5 * np.abs(iv.X / truth - 1).max()
 
 
+@pytest.mark.thorough
 def test_several_logs_with_a_loop_each_are_one_fit_and_looked_at_one_by_one(sixteen):
     """Two logs know more than each; each alone has the parameters and the sigma of both, and needs no loop."""
     scenario, log = sixteen
@@ -159,6 +165,7 @@ def test_several_logs_with_a_loop_each_are_one_fit_and_looked_at_one_by_one(sixt
     assert len(seen.problem.rows.time) == len(alone[1].problem.rows.time)
 
 
+@pytest.mark.thorough
 def test_every_estimator_finds_what_didim_finds_from_the_same_torques(sixteen, truth):
     """CLIE minimises what DIDIM has the fixed point of; their difference is below both sigmas."""
     scenario, log = closed(16, trajectory=replace(MOVES, moves=5))
@@ -231,6 +238,7 @@ def test_endless_memory_is_weighted_least_squares_and_a_short_one_knows_less(six
     assert (short.corrected_sigma > endless.corrected_sigma).all()
 
 
+@pytest.mark.thorough
 def test_the_filter_finds_parameters_from_a_start_that_is_off(sixteen, truth):
     """15 % off, one pass."""
     start = truth * (1 + 0.15 * np.array([1, -1, 1, -1, 1, -1, 1, -1]))

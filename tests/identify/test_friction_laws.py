@@ -104,6 +104,7 @@ def test_the_column_of_a_shape_is_its_slope():
     assert law.believed(2) == {"vs1": 0.2, "vs2": 0.4}
 
 
+@pytest.mark.thorough
 def test_sigma_of_shapes_is_honest():
     """40 runs of white noise in one batch: two sigma hold 95 %, between 90 and 99 % of 480 correlated cases."""
     exact, rng = made(stribeck_law).part(0, 5000), np.random.default_rng(5)
@@ -166,6 +167,7 @@ def test_parts_and_runs_keep_their_conditions():
         replace(log, conditions={"temperature": np.full((1, 1), np.nan)})
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("name", "law"),
     [("stribeck", stribeck_law), ("load", SHAPED["load"][0]), ("offset", SHAPED["offset"][0]), ("", lambda q, qd, load: 0 * q)],

@@ -79,6 +79,7 @@ def test_torque_in_a_cell_is_what_its_samples_mean(meaning):
         np.testing.assert_allclose(x[inner], y[: cells.count][inner], atol=1e-7)
 
 
+@pytest.mark.thorough
 def test_the_right_hand_side_is_the_slope_of_the_cost(exact, truth):
     """By central differences of the cost, in X and in the motion, where friction does not jump."""
     log = noisy(exact, BITS16, 0.01).part(0, 200)
@@ -105,7 +106,10 @@ def test_the_right_hand_side_is_the_slope_of_the_cost(exact, truth):
         assert -2 * found.b_nodes.reshape(*z.shape, -1)[(*index, 0)] == pytest.approx(slope, rel=2e-2)
 
 
-@pytest.mark.parametrize(("position", "torque", "most"), [(BITS16, 0.0, 0.25), (16 * BITS16, 0.0, 0.2), (BITS16, 0.1, 1.1)])
+@pytest.mark.thorough
+@pytest.mark.parametrize(
+    ("position", "torque", "most"), [(BITS16, 0.0, 0.25), (16 * BITS16, 0.0, 0.2), (BITS16, 0.01, 0.9), (BITS16, 0.1, 1.1)]
+)
 def test_errors_against_weighted_least_squares(position, torque, most, exact, truth):
     """Typical errors of 12 motions, each known to a fifth, and sigma: the table of docs/noise.md has 64."""
     log = noisy(exact, position, torque)
@@ -116,6 +120,7 @@ def test_errors_against_weighted_least_squares(position, torque, most, exact, tr
     assert np.sqrt(np.mean(z**2)) == pytest.approx(1, abs=0.25)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("coulomb", [(20.0, 10.0), (60.0, 15.0)])
 def test_friction_a_hundred_times_larger_than_what_moves_a_joint(coulomb, truth):
     """As of geared arms: where its sign is not known, velocities would swing between the counts, and no fit converge."""
@@ -130,6 +135,7 @@ def test_friction_a_hundred_times_larger_than_what_moves_a_joint(coulomb, truth)
     np.testing.assert_allclose(found.noise_levels.torque, [3.0, 0.5], rtol=0.1)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("delay", [0.003, 0.012])
 def test_a_stated_delay_is_taken_into_account(delay, truth):
     made = scenario(timing=replace(load("ideal").timing, delay=delay))
@@ -192,6 +198,7 @@ def test_a_motion_that_nothing_moves_is_refused(exact):
         identify(log, scara(), EXPLICIT, estimator=ML)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("stated", [0.004, 0.002, 0.007])
 def test_the_delay_is_found_with_the_parameters(stated, truth):
     """A true one of 4 ms, from what the log states: to five of its sigmas, which are below 50 us."""
@@ -217,6 +224,7 @@ def test_one_run_does_not_take_the_others_away(exact):
     assert np.isnan(found.X[1]).all()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("delay", [0.0, 0.004])
 def test_the_smoothed_log_has_the_torques_of_its_positions(delay, truth):
     log = simulate(scenario(timing=replace(load("ideal").timing, delay=delay))).alone()

@@ -31,6 +31,7 @@ def noisy():
     return log, replace(log, tau=tau), replace(log, tau=tau, q=log.q + where[1] * rng.uniform(-0.017, 0.017, log.q.shape))
 
 
+@pytest.mark.thorough
 def test_wild_samples_cost_less_than_twice_the_error(noisy, truth):
     """Typical error of eight runs. Ordinary least squares breaks, and weighted as well."""
 

@@ -14,6 +14,7 @@ def held():
     return simulate(load("ideal")).alone()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("fs", [97.0, 100.0, 211.0])
 def test_a_held_log_at_another_frequency_is_identified(fs, held, truth):
     """The mean of what was held: within 1 %, which is what means over a new period do to a staircase of the old one."""

@@ -55,6 +55,7 @@ def test_a_held_torque_is_the_acceleration_that_samples_of_its_motion_show(delay
     np.testing.assert_allclose(power[INNER], s.derivative(kinetic, FS)[INNER], atol=2e-4)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("delay", DELAYS)
 def test_an_averaged_torque_has_its_mean_and_power(delay):
     def mean_from(t):

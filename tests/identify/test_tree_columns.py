@@ -184,7 +184,7 @@ def test_positions_count_from_where_the_frames_are_placed():
     assert zero_defect(TreeLinks) < 1e-12
 
 
-@pytest.mark.parametrize("peer", ["Panda with its hand"], indirect=True)
+@pytest.mark.thorough
 def test_any_sign_that_is_changed_is_noticed(peer, monkeypatch):
     """By pinocchio's explicit columns or by an identity; changes that leave all columns as they are do not count."""
     folder = Path(identify.basis.tree_links.__file__).parent

@@ -70,6 +70,7 @@ def test_pid_brings_the_error_at_rest_to_zero(short):
     assert np.abs(pid.reference.q[-1] - pid.q[0, -1]).max() < 1e-4
 
 
+@pytest.mark.thorough
 def test_a_loop_at_5_khz_works(short):
     run = simulate(replace(short, fs=5000.0, controller=PDFeedforward(bandwidth=30.0)))
     assert run.log.samples == 16500
@@ -153,6 +154,7 @@ def test_friction_of_the_scenario_replaces_that_of_the_robot(short):
         _ = replace(short, friction=CoulombViscous(viscous=(1.0, 2.0, 3.0))).real_robot
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("law", [Stribeck(static=1.6, velocity=0.3), LuGre(static=1.6, velocity=0.3)])
 def test_slow_motion_meets_the_stribeck_curve(short, law):
     """A steady creep: torque = Fs (1 + (static - 1) exp(-(qd/velocity)^2)) + Fv qd, measured in the middle of long moves."""

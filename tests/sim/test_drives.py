@@ -79,6 +79,7 @@ def test_an_exact_chopper_gives_the_torque_that_is_asked(robot):
         np.testing.assert_allclose(drive.step(demand, speed, 1), tau, rtol=1e-9)
 
 
+@pytest.mark.thorough
 def test_the_books_of_energy_close_over_a_move(short, monkeypatch):
     """Electrical in = mechanical + copper + stored to 0.1 %; the mechanical work from MuJoCo's motion, not from the drive."""
     made = []
@@ -110,6 +111,7 @@ def test_a_fast_joint_runs_out_of_voltage(robot):
     np.testing.assert_allclose(tau[-1, 0], 5 * 10 / 3, rtol=1e-9)
 
 
+@pytest.mark.thorough
 def test_without_emf_compensation_a_motor_seems_heavier(short):
     """By K^2 T / (R (1 - a)), from the loop's lag behind a rising back-EMF; the mean torque lacks that times qdd."""
     plain, known = (

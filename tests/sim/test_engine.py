@@ -30,6 +30,7 @@ BUSY = {
 """Everything that is random or remembers something."""
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "parts",
     [
@@ -94,6 +95,7 @@ FREE = """
 """A hinge and a slide that nothing stops."""
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("bandwidth", "delay"), [(60.0, 0.009), (200.0, 0.009), (600.0, 0.0), (2000.0, 0.0)])
 def test_a_loop_that_runs_away_without_a_range_fails_quietly(ideal, tmp_path, monkeypatch, capfd, bandwidth, delay):
     """MuJoCo would warn of Nan and begin anew; neither it nor NumPy prints, or writes MUJOCO_LOG.TXT."""
@@ -189,17 +191,19 @@ def test_a_held_torque_moves_the_arm_by_newtons_law(short):
     np.testing.assert_allclose(np.diff(momentum), 0.01 * run.tau[0, :-1, 0], atol=1e-9)
 
 
+@pytest.mark.thorough
+@pytest.mark.parametrize("delay", [0.00105, 0.0134])
 @pytest.mark.parametrize(
-    ("parts", "delay"),
+    "parts",
     [
-        ({}, 0.00105),
-        ({"drive": AveragedDrive()}, 0.0134),
-        ({"drive": SwitchedDrive(dead_time=0.0)}, 0.00105),
-        ({"ripple": Ripple(cogging=0.01), "physics": Physics(step=1e-4)}, 0.0134),
-        ({"physics": Physics(step=1e-3, integrator="implicitfast")}, 0.0134),
-        ({"torque": TorqueMeasurement(source="current")}, 0.00105),
-        ({"torque": TorqueMeasurement(source="current", cutoff=100.0), "physics": Physics(integrator="implicitfast")}, 0.0134),
-        ({"drive": AveragedDrive(bandwidth=300.0), "torque": TorqueMeasurement(source="current")}, 0.00105),
+        {},
+        {"drive": AveragedDrive()},
+        {"drive": SwitchedDrive(dead_time=0.0)},
+        {"ripple": Ripple(cogging=0.01), "physics": Physics(step=1e-4)},
+        {"physics": Physics(step=1e-3, integrator="implicitfast")},
+        {"torque": TorqueMeasurement(source="current")},
+        {"torque": TorqueMeasurement(source="current", cutoff=100.0), "physics": Physics(integrator="implicitfast")},
+        {"drive": AveragedDrive(bandwidth=300.0), "torque": TorqueMeasurement(source="current")},
     ],
     ids=["ideal", "averaged", "switched", "ripple", "early", "current", "filtered", "slow loop"],
 )
@@ -257,6 +261,7 @@ def test_a_simulation_that_fails_ends_alone(short):
     np.testing.assert_array_equal(run.log.q[2], alone.log.q[0])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("controller", CONTROLLERS.builtin)
 def test_every_simulation_may_have_a_motion_of_its_own(short, robot, controller):
     """With the bits that it has as the trajectory of a scenario."""

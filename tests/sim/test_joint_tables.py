@@ -72,7 +72,7 @@ def test_a_classic_table_moves_as_the_puma_of_corke(load_robot):
         (("d = 0.45", 'parent = "nobody"'), "parent 'nobody' is no joint before it"),
         (("[[joints]]", "[["), "arm.toml"),
         (("r = 0.1", "a = 0.1"), "joint joint3: a is unknown"),
-        (("range = [-120.0, 120.0]", "range = 3"), "a value is of the wrong kind"),
+        (("range = [-120.0, 120.0]", "range = 3"), "must be a list of 2 numbers"),
     ],
 )
 def test_a_table_that_makes_no_sense_is_told(load_robot, change, message):

@@ -32,7 +32,9 @@ DRIVES = {
 }
 
 
-@pytest.mark.parametrize(("name", "every"), [*((name, 0.37) for name in DRIVES), ("fine and late", 0.05), ("switched", np.inf)])
+@pytest.mark.thorough
+@pytest.mark.parametrize("every", [0.05, 0.37, np.inf])
+@pytest.mark.parametrize("name", DRIVES)
 def test_stretches_are_the_run_and_change_no_bit_of_it(name, every):
     described, heard = scenario(**DRIVES[name]), []
     alone, watched = simulate(described, [3, 4]), simulate(described, [3, 4], watch=Watch(heard.append, every))
@@ -127,6 +129,7 @@ def test_the_window_is_on_the_time_of_the_log():
     np.testing.assert_allclose(t, 0.25 + np.arange(200) / 1000, atol=1e-9)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("drive", [SWITCHED, SWITCHED | {"dead_time": 2e-6}, SWITCHED | {"modulation": "unipolar"}])
 def test_between_the_edges_the_current_is_that_of_the_period(drive):
     """It begins where the period before ends, its mean is that of the period, and so is that of the voltage."""

@@ -12,6 +12,7 @@ from experiments.cli.page import Page, new_page, shown
 from experiments.cli.progress import stages_of
 from experiments.errors import ExperimentError
 from experiments.identification.log_warnings import warnings_of_log
+from experiments.identification.parameters import Parameters
 from experiments.identification.request import Request
 from experiments.identification.scenario_run import ScenarioRun
 from experiments.identification.subject import Subject, absolute
@@ -80,11 +81,14 @@ def _described(page: Page, options: Run) -> ScenarioRun:
             raise ExperimentError(f"--robot {options.robot}: a run of a study is of the study's robot")
         scenario, method = _again(page, options.study, options.index, options.method)
         names, name = method.names, f"{'-'.join(method.names)}-study"
-        chosen = (method.chain, method.estimator)
+        chosen, parameters = (method.chain, method.estimator), Parameters(friction=tuple(method.friction.split()))
+        if options.parameters != Parameters():
+            raise ExperimentError("--from: which parameters are identified is the study's; leave --friction and the like out")
     else:
         scenario = _with_robot(page, load(_alone(options.scenario, options.study, options.index)), options.robot)
         names, name, chosen = (options.chain, options.estimator), "", None
-    subject = Subject(scenario.robot, options.parameters)
+        parameters = options.parameters
+    subject = Subject(scenario.robot, parameters)
     request = Request(
         subject,
         chain=names[0],

@@ -79,6 +79,7 @@ def test_options_that_make_no_sense_are_told(complaint, out, options, said):
     assert not out.exists()
 
 
+@pytest.mark.thorough
 def test_without_rerun_it_is_not_even_loaded(tmp_path):
     code = "import sys; from experiments.cli import main\n"
     code += "code = main(['run', 'ideal', '--no-rerun', '--out', 'run'])\n"
@@ -111,6 +112,7 @@ def said_of_viewers(err):
     return [line for line in err.splitlines() if not line.startswith("simulating")]
 
 
+@pytest.mark.thorough
 def test_a_viewer_that_goes_away_costs_nothing_but_itself(tmp_path, reading):
     """Somebody answers when it is asked whether a viewer is there, and has gone when the run begins."""
     with socket.socket() as server:
@@ -133,6 +135,7 @@ def test_a_viewer_that_goes_away_costs_nothing_but_itself(tmp_path, reading):
     reading.verify(tmp_path / "run" / "recording.rrd")
 
 
+@pytest.mark.thorough
 def test_a_viewer_that_hangs_keeps_nothing_back(tmp_path, reading):
     """It takes connections and never says a word; the run is written, and ends."""
     with socket.socket() as server:
@@ -154,6 +157,7 @@ def test_a_host_that_cannot_be_one_does_not_answer(complaint, out):
     assert f"no viewer answers at {url}" in complaint("run", "ideal", "--connect", url, "--out", str(out))
 
 
+@pytest.mark.thorough
 def test_a_window_in_which_nothing_lies_is_told(out, capsys):
     assert main(["run", "ideal", "--inner", "1", "2", "--out", str(out)]) == 0
     assert "warning: nothing lies inside the loop from 1 to 2 s" in capsys.readouterr().out

@@ -10,6 +10,8 @@ from experiments.cli import main
 from experiments.recording.compared import difference, shift_of
 from identify import MotionLog, TorqueChannel
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):

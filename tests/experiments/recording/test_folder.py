@@ -29,6 +29,7 @@ def copied(recorded, tmp_path):
     return folder.out
 
 
+@pytest.mark.thorough
 def test_identify_adds_a_layer_to_a_run_and_replaces_one_of_the_same_name(copied, reading, capsys, recorded):
     before = (copied / "recording.rrd").read_bytes()
     layer = "identify", str(copied), "--label", "second"
@@ -77,6 +78,7 @@ def test_one_file_holds_everything(copied, reading):
     reading.verify(one)
 
 
+@pytest.mark.thorough
 def test_what_is_wrong_is_told(copied, tmp_path, complaint):
     assert "no tab 'frictoin'; it has overview, friction, drive, filters, noise, excitation, parameters" in complaint(
         "view", str(copied), "--tab", "frictoin", "--save", str(tmp_path / "x.rrd")

@@ -24,6 +24,7 @@ def folder(tmp_path_factory):
     return out / "found"
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("joint", "most"), [("joint1", 0.6), ("joint2", 1.2)])
 def test_measured_positions_are_off_by_counts_and_the_band_is_narrower(folder, joint, most, reading):
     """A count is off by 0.29 steps; a moving joint is known better, the heavy one by far."""

@@ -181,6 +181,7 @@ def test_a_recording_is_a_base_and_layers_of_one_id_each_with_one_layout(recorde
     assert recording.startswith("short-")
 
 
+@pytest.mark.thorough
 def test_watching_changes_no_bit_of_the_run_nor_of_the_recording(recorded, reading, tmp_path):
     """Sent in stretches of half a second, what is read back is the same."""
     audience = Audience("rerun+http://127.0.0.1:9/proxy")

@@ -11,6 +11,7 @@ from sim.encoders.encoder import AbstractEncoder
 from sim.errors import ScenarioError
 
 
+@pytest.mark.thorough
 def test_the_bound_stands_beside_the_errors(tmp_path, capsys):
     """Of a study of nine runs: below the error of WLS, in the table, the summary and the report."""
     path = tmp_path / "small.toml"

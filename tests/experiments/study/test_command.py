@@ -17,6 +17,7 @@ from experiments.study import run_study as engine
 from experiments.study.store import Store
 
 
+@pytest.mark.thorough
 def test_the_folder_has_all_that_is_promised(done, undisturbed):
     names = {"study.toml", "shards", "summary.json", "report.html", "recording.rrd"}
     assert names <= {path.name for path in done.iterdir()}
@@ -99,6 +100,7 @@ def bare(monkeypatch):
     monkeypatch.setattr("experiments.study.study_results.report", lambda *args: "")
 
 
+@pytest.mark.thorough
 def test_an_interrupted_study_says_how_to_go_on(file, tmp_path, capfd, monkeypatch, undisturbed, bare):
     out, real = tmp_path / "out", Store.write
 
@@ -124,6 +126,7 @@ def test_number_of_seeds(file, tmp_path, bare):
     assert Store.open(tmp_path / "out").table().num_rows == 2 * 2 * 2 * 2
 
 
+@pytest.mark.thorough
 def test_a_thousand_million_runs_are_asked_for_twice(file, complaint, tmp_path, monkeypatch, bare):
     out = ("--out", str(tmp_path / "out"))
     printed = complaint("study", str(file), "--seeds", "1000000000", *out)
@@ -154,6 +157,7 @@ def test_wrong_calls(done, file, tmp_path, complaint):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.thorough
 def test_a_scheduler_may_be_anywhere(file, tmp_path, undisturbed, bare):
     """Its workers have no part in the folder: rows travel."""
     with LocalCluster(n_workers=1, threads_per_worker=2, host="127.0.0.1", dashboard_address="127.0.0.1:0") as cluster:
@@ -174,6 +178,7 @@ def test_without_dask_workers_are_refused_and_the_rest_works(file, tmp_path, com
     assert "install the extra" in complaint("study", str(file), "--workers", "2", "--out", str(tmp_path / "out"))
 
 
+@pytest.mark.thorough
 def test_a_full_disk_is_one_line_and_keeps_what_there_is(file, tmp_path, complaint, monkeypatch):
     out, real = tmp_path / "out", Store.write
 
@@ -214,6 +219,7 @@ rest = 0.6
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("axis", "failed"),
     [
@@ -229,8 +235,7 @@ rest = 0.6
 def test_odd_studies_end_in_a_report(tmp_path, axis, failed, capfd):
     """Values of several kinds, words that look like markup, runs that all fail, noise that nothing shows, a truth of 0."""
     (tmp_path / "odd.toml").write_text(f"{ODD}\n[[axes]]\n{axis}\n")
-    words = [] if "[/b]" in axis else ["--no-rerun"]
-    code = main(["study", str(tmp_path / "odd.toml"), "--out", str(tmp_path / "out"), *words])
+    code = main(["study", str(tmp_path / "odd.toml"), "--out", str(tmp_path / "out")])
     printed = capfd.readouterr()
     assert "Is [/b] [red]fine?" in printed.out
     assert ("\nfailed: " in printed.out) == bool(failed)

@@ -14,11 +14,13 @@ from experiments.study.study_file import study_from
 from experiments.study.versions import versions
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("shard", "threads"), [(1, 2), (7, 1)])
 def test_same_bits_whatever_the_shards_and_threads(small, tmp_path, undisturbed, run_study, shard, threads):
     assert run_study(small, tmp_path / "out", shard, threads).table().equals(undisturbed)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("workers", [1, 2])
 def test_same_bits_on_any_number_of_workers(small, tmp_path, undisturbed, run_study, workers):
     with cluster_pool(small, None, workers) as pool:
@@ -35,6 +37,7 @@ def test_rows_are_those_of_the_study(undisturbed, small):
     assert {row["seed"] for row in rows} == {small.scenario_of(run).seed for run in range(18)}
 
 
+@pytest.mark.thorough
 def test_a_run_comes_out_again_by_itself(small, tmp_path, run_study):
     store = run_study(small, tmp_path / "out")
     rows, known = compare_again(store, 13)
@@ -42,6 +45,7 @@ def test_a_run_comes_out_again_by_itself(small, tmp_path, run_study):
     assert len(rows) == 4
 
 
+@pytest.mark.thorough
 def test_a_run_with_other_bits_is_told(small, tmp_path, run_study, monkeypatch):
     store = run_study(small, tmp_path / "out")
     rows = store.rows_of(13)
@@ -83,6 +87,7 @@ def test_and_those_that_come_later_complain_to_the_process_that_asks(small, tmp_
             run_study(small, tmp_path / "out", pool=pool)
 
 
+@pytest.mark.thorough
 def test_a_cluster_that_goes_is_told_in_one_line(small, tmp_path, run_study):
     """The scheduler is closed while the study runs."""
 
@@ -97,7 +102,7 @@ def test_a_cluster_that_goes_is_told_in_one_line(small, tmp_path, run_study):
     with LocalCluster(n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0") as cluster:
         address = cluster.scheduler_address
         with (
-            pytest.raises(StudyError, match=r"the workers are lost .* go on with --resume"),
+            pytest.raises(StudyError, match=r"are gone: what is finished is kept, go on with --resume"),
             cluster_pool(small, address, 1) as pool,
         ):
             run_study(small, tmp_path / "out", 64, pool=Closing())
@@ -111,6 +116,7 @@ def test_motion_can_be_shared(content):
     assert len({row["ZZR1"] for row in power}) == 6  # the torques' noise is drawn anew
 
 
+@pytest.mark.thorough
 def test_a_study_leaves_the_threads_of_the_libraries_as_they_were(small, tmp_path, run_study):
     """One BLAS thread while it runs, and afterwards as many as before."""
     with threadpool_limits(2):

@@ -26,6 +26,7 @@ def finished(folder):
     return {path.name: path.read_bytes() for path in (folder / "shards").glob("runs-*")}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("shards", [3])
 def test_a_kill_loses_no_finished_shard(small, tmp_path, undisturbed, shards, start):
     """SIGKILL as soon as so many shards are there; what was there stays as it was."""
@@ -46,6 +47,7 @@ def test_a_kill_loses_no_finished_shard(small, tmp_path, undisturbed, shards, st
     assert resumed.table().equals(undisturbed)
 
 
+@pytest.mark.thorough
 def test_a_killed_worker_costs_only_time(small, tmp_path, undisturbed):
     """One of two workers is killed while shards are computed; it is replaced, and its shard is done again."""
     store, killed = Store.new(small, tmp_path), []

@@ -25,6 +25,7 @@ def begun(small, some, tmp_path):
     return store
 
 
+@pytest.mark.thorough
 def test_only_what_is_missing_is_run_and_no_shard_mixes_combinations(begun):
     assert list(begun.missing(2)) == [range(2), range(2, 3), range(6, 8), range(8, 9)]
     assert list(begun.missing(64)) == [range(3), range(6, 9)]

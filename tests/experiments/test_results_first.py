@@ -1,0 +1,168 @@
+"""Results come before what shows them: a view that fails takes nothing else away, and says so in one line."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from experiments.cli import main
+from experiments.results.manifest import NAME
+from identify import IdentificationError
+
+WORDS = "--robot", "puma560", "--model", "explicit", "--estimator", "WLS"
+
+
+class BrokenError(RuntimeError):
+    """What no input should cause."""
+
+
+def broken(*args, **options):
+    raise BrokenError("on purpose")
+
+
+def refused(*args, **options):
+    raise IdentificationError("it cannot be drawn")
+
+
+RECORDING = "recording.rrd", "recording.idbench-WLS.rrd"
+
+VIEWS = {
+    "experiments.reports.page.rendered": ("report.html", {*RECORDING, "arm.json"}),
+    "experiments.reports.page.friction_figure": (
+        "the figure of friction in report.html",
+        {"report.html", *RECORDING, "arm.json"},
+    ),
+    "experiments.recording.identification_recording.record_log": ("the recording", {"report.html", "arm.json"}),
+    "experiments.exports.exports.json_text": ("--write found/arm.json", {"report.html", *RECORDING}),
+    "experiments.cli.commands.identify.checks": (
+        "the checks",
+        {"report.html", *RECORDING, "arm.json"},
+    ),
+}
+"""What is broken; what is named; which views are there all the same."""
+
+
+@pytest.mark.parametrize("error", [broken, pytest.param(refused, marks=pytest.mark.thorough)], ids=["fault", "refusal"])
+@pytest.mark.parametrize("view", VIEWS)
+def test_a_view_that_fails_leaves_everything_else(view, error, idbench, logs, tmp_path, monkeypatch):
+    name, others = VIEWS[view]
+    monkeypatch.setattr(view, error)
+    code, out, err = idbench("identify", logs / "first.parquet", *WORDS, "--out", "found", "--write", "found/arm.json")
+    assert code == 2
+    assert "Cond(W)" in out
+    assert "explicit: good" in out
+    assert len(err.splitlines()) == 1
+    assert f"idbench: {name}: " in err
+    assert "the estimates are printed, and with the logs in found" in err
+    there = {path.name for path in (tmp_path / "found").iterdir()} - {NAME}
+    assert there == {"summary.json", "log.parquet", *others, *(["fault.txt"] if error is broken else [])}
+    assert "explicit" in json.loads((tmp_path / "found" / "summary.json").read_text())["models"]
+    if error is broken:
+        assert "a fault of idbench, not of your input (BrokenError: on purpose)" in err
+        assert "in broken" in (tmp_path / "found" / "fault.txt").read_text()
+    else:
+        assert "it cannot be drawn" in err
+
+
+@pytest.mark.parametrize("error", [broken, pytest.param(refused, marks=pytest.mark.thorough)], ids=["fault", "refusal"])
+def test_a_held_out_log_that_cannot_be_judged_leaves_the_others(error, idbench, logs, tmp_path, monkeypatch):
+    """The second of three; the table was printed, the summary is there, one line names what is missing."""
+    from experiments.identification import held_out
+
+    real, calls = held_out.validate, []
+
+    def sometimes(*args):
+        calls.append(args)
+        return real(*args) if len(calls) != 2 else error()
+
+    monkeypatch.setattr(held_out, "validate", sometimes)
+    names = [tmp_path / f"{name}.parquet" for name in "abc"]
+    for k, path in enumerate(names):
+        part(logs / "second.parquet", path, k)
+    words = ["--out", "found", "--no-rerun", "--validate", *names]
+    code, out, err = idbench("identify", logs / "first.parquet", *WORDS, *words)
+    assert code == 2
+    assert len(err.splitlines()) == 1
+    assert f"held-out log {names[1]}" in err
+    judged = json.loads((tmp_path / "found" / "summary.json").read_text())["validations"]
+    assert [bool(one["models"]) for one in judged] == [True, False, True]
+    assert out.count("explicit: good") == 2
+    assert (tmp_path / "found" / "report.html").is_file()
+
+
+def part(log, target, k):
+    """Write a part of a log."""
+    from identify.files.log_file import read_log, write_log
+
+    whole = read_log(log)
+    write_log(whole.part(100 * k, whole.samples - 100), target)
+
+
+def test_a_fault_before_the_results_is_told_with_its_report(idbench, logs, monkeypatch, tmp_path):
+    monkeypatch.setattr("experiments.cli.commands.identify.fit", broken)
+    code, out, err = idbench("identify", logs / "first.parquet", *WORDS, "--out", "found")
+    assert (code, out) == (1, "")
+    assert len(err.splitlines()) == 1
+    assert "a fault of idbench, not of your input (BrokenError: on purpose); its traceback is in " in err
+    with open(err.rpartition(" ")[2].strip()) as report:  # noqa: PTH123
+        assert "in broken" in report.read()
+    assert not (tmp_path / "found").exists()
+
+
+def test_results_are_saved_before_the_judgement(idbench, logs, tmp_path, monkeypatch):
+    """Ctrl-C while it is judged: the estimates are on the screen and in the folder."""
+
+    def interrupted(*args):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("experiments.cli.commands.identify.judge", interrupted)
+    code, out, err = idbench("identify", logs / "first.parquet", *WORDS, "--out", "found")
+    assert (code, err) == (130, "idbench: interrupted\n")
+    assert "Cond(W)" in out
+    summary = json.loads((tmp_path / "found" / "summary.json").read_text())
+    assert summary["models"]["explicit"]["estimate"]
+    assert (tmp_path / "found" / "log.parquet").is_file()
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(
+    ("most", "lost", "kept"),
+    [
+        (150_000, {"log.parquet"}, set()),
+        (1_500_000, {"recording.rrd", "report.html"}, {"summary.json", "log.parquet"}),
+    ],
+)
+def test_a_full_disk_in_each_view(most, lost, kept, logs, tmp_path):
+    """No file may grow beyond a size: views that have room are there, the others are named in one line."""
+    code = f"import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, ({most}, {most}))\n"
+    words = ["identify", str(logs / "first.parquet"), *WORDS, "--out", "found"]
+    code += f"from experiments.cli import main; sys.exit(main({words}))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "Cond(W)" in done.stdout
+    assert len(done.stderr.splitlines()) == 1
+    there = {path.name for path in (tmp_path / "found").glob("*")} if (tmp_path / "found").exists() else set()
+    assert kept <= there
+    assert lost - there
+
+
+def test_json_is_whole_whatever_fails(idbench, logs, monkeypatch):
+    monkeypatch.setattr("experiments.reports.page.rendered", broken)
+    code, out, err = idbench("identify", logs / "first.parquet", *WORDS, "--out", "found", "--no-rerun", "--json")
+    assert code == 2
+    found = json.loads(out)
+    assert found["validation"]["models"]["explicit"]["verdict"] == "good"
+    assert "report.html" in err
+
+
+def test_runs_and_tables_keep_theirs(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("experiments.recording.identification_recording.layer", broken)
+    assert main(["run", "ideal", "--estimator", "OLS", "--out", "kept"]) == 2
+    out, err = capfd.readouterr()
+    assert "Cond(W)" in out
+    assert "idbench: the recording: a fault of idbench" in err
+    assert {path.name for path in (tmp_path / "kept").iterdir()} == {
+        NAME, "fault.txt", "log.parquet", "scenario.toml", "summary.json",
+    }  # fmt: skip
