@@ -61,11 +61,12 @@ on the command line `idbench table1` and `idbench view` do the same.
 
 from pathlib import Path
 
-from experiments.identification.results import write_recording
 from experiments.recording.notebook import notebook_viewer
 from experiments.recording.table1_recording import record_table1
+from experiments.results.folder import ResultsFolder
+from experiments.results.streams import write_streams
 
-folder = Path("comparison")
-folder.mkdir(exist_ok=True)
-write_recording(folder, record_table1(table))
-notebook_viewer(folder)
+folder = ResultsFolder(Path("comparison"), "table1", command="notebook comparison")
+with folder.held():
+    write_streams(record_table1(table), folder)
+notebook_viewer(folder.out)

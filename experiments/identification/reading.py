@@ -13,7 +13,7 @@ from experiments.errors import ExperimentError
 from experiments.identification.read_options import ColumnOptions
 from experiments.identification.request import Request
 from experiments.option_types import Meaning
-from identify import Array, LogError, MotionLog, SettingError, TimeError, TorqueChannel
+from identify import Array, AsLogged, LogError, MotionLog, RangeError, SettingError, TimeError, TorqueChannel
 from identify.data.log_columns import LogColumns
 from identify.data.resample import Repaired
 from identify.files.layout import LogLayout
@@ -155,10 +155,20 @@ def with_delays(every: Sequence[ReadLog], request: Request) -> list[ReadLog]:
     """Return logs with the delay of their torques, estimated from all that have the same meaning together."""
     from identify.judge.delay import estimate_delay
 
+    if isinstance(request.processing.alignment, AsLogged):
+        raise ExperimentError(
+            f"--torque-delay estimate: --chain {request.chain} takes torques as they were logged and reads no delay: "
+            "leave one of the two out"
+        )
     found = {}
     for meaning in {log.logs[0].torque.meaning for log in every}:
         alike = [log for read in every for log in read.logs if log.torque.meaning == meaning]
-        found[meaning] = estimate_delay(alike, request.subject.basis, request.processing)
+        try:
+            found[meaning] = estimate_delay(alike, request.subject.basis, request.processing)
+        except RangeError as error:
+            laws = " ".join(request.subject.asked.friction)
+            without = "" if request.subject.laws.standard else f", with --friction {laws}: does that fit the robot?"
+            raise ExperimentError(f"--torque-delay estimate: {error}{without}") from error
     return [_delayed(log, found[log.logs[0].torque.meaning]) for log in every]
 
 

@@ -103,6 +103,11 @@ class Subject:
     @cached_property
     def basis(self) -> Basis:
         """What is identified."""
+        if missing := [name for name in self.asked.without if name not in self.whole.names]:
+            laws = "" if self.laws.standard else f" with --friction {' '.join(self.asked.friction)}"
+            raise ExperimentError(
+                f"--without {' '.join(missing)}: there is no such parameter{laws}; there are {', '.join(self.whole.names)}"
+            )
         return self.whole.without(*self.asked.without) if self.asked.without else self.whole
 
     def truth(self, robot: Robot, friction: AbstractFrictionLaw | None = None) -> dict[str, float]:

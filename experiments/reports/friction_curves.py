@@ -12,7 +12,6 @@ from identify.arrays import combined
 from identify.basis import LoadFriction
 from identify.basis.joint_law import AbstractFriction
 from identify.basis.of_joints import inner_of
-from identify.errors import InvariantError
 from identify.judge.diagnosis import filtered
 from identify.rows.grid import Kernel
 from identify.signals.signals import Signals
@@ -110,13 +109,10 @@ class FrictionCurves:
         """The laws of friction of the joints, and their parameters."""
         basis = self.fit.basis
         names = [p.name for p in basis.parameters if p.kind in FRICTIONS and p.joint is not None]
-        X = np.array([self.X[basis.names.index(name)] for name in names])
         laws = basis.renamed({name: name for name in names})
-        own = tuple(b for b in laws.blocks if {p.name for p in b.parameters(basis.n)} & set(names))
-        known = {p.name for b in own for p in b.parameters(basis.n)}
-        if missing := [name for name in names if name not in known]:
-            raise InvariantError(f"no law of friction has the parameters {', '.join(missing)}")
-        return replace(laws, blocks=own, order=(), held={}), X
+        own = tuple(b for b in laws.blocks if {p.name for p in b.parameters(basis.n)} & set(laws.kept_names))
+        laws = replace(laws, blocks=own, order=(), held={})
+        return laws, np.array([self.X[basis.names.index(name)] for name in laws.names])
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,15 @@ from functools import partial
 from pathlib import Path
 
 import rerun as rr
-from experiments.identification.results import write_recording
 
+from experiments.identification.request import Request
 from experiments.identification.scenario_run import ScenarioRun
 from experiments.recording.audience import Audience
 from experiments.recording.identification_recording import RunRecording
 from experiments.recording.motion_layer import Base
 from experiments.recording.viewers import served
+from experiments.results.folder import ResultsFolder
+from experiments.results.streams import write_streams
 from identify import MotionLog
 from sim.engine.simulation import simulate
 from sim.engine.watch import Inner, Stretch, Watch
@@ -41,14 +43,14 @@ def timed(work: Callable[[], object]) -> float:
 
 def forty_seconds(folder: Path) -> None:
     """Record 40 s of a closed loop with an averaged drive, simulated and identified beforehand."""
-    whole, heard = ScenarioRun(load("gain")), list[Stretch]()
+    whole, heard = ScenarioRun(load("gain"), Request()), list[Stretch]()
     run = simulate(whole.scenario, watch=Watch(heard.append))
     part = cut(run.alone(), 4000)
     seconds = []
     for _ in range(TIMES):
         ran = replace(whole)
         vars(ran)["run"] = replace(run, log=MotionLog(100.0, part.q[None], part.tau[None], part.torque))
-        _ = [estimate.corrected_sigma for estimate in ran.identified.estimates.values()]
+        _ = [estimate.corrected_sigma for estimate in ran.fit.estimates.values()]
         recording = RunRecording(whole.scenario)
         seconds.append(timed(partial(record, recording, ran, heard[0], folder)))
     size = sum(path.stat().st_size for path in folder.glob("*.rrd"))
@@ -67,7 +69,12 @@ def record(recording: RunRecording, ran: ScenarioRun, heard: Stretch, folder: Pa
     reference = replace(heard.reference, **{x: getattr(heard.reference, x)[:4000] for x in ("q", "qd", "qdd")})
     electric = heard.electric and type(heard.electric)(*(x[:4000] for x in heard.electric))
     recording.base.stretch(replace(heard, reference=reference, electric=electric, **parts))
-    write_recording(folder, recording.finish(ran))
+    write_streams(recording.finish(ran), results(folder))
+
+
+def results(folder: Path) -> ResultsFolder:
+    """Return where recordings go."""
+    return ResultsFolder(folder, "run", command="benchmark")
 
 
 def inside(folder: Path) -> None:
@@ -108,10 +115,10 @@ def once(described: Scenario, audience: Audience | None, folder: Path) -> tuple[
     """Return how long a run takes [s]: until it is simulated, and until it is written."""
     start = time.perf_counter()
     recording = RunRecording(described, audience)
-    ran = ScenarioRun(described, watch=recording.watch)
+    ran = ScenarioRun(described, Request(), watch=recording.watch)
     _ = ran.run
     simulated = time.perf_counter() - start
-    write_recording(folder, recording.finish(ran))
+    write_streams(recording.finish(ran), results(folder))
     return simulated, time.perf_counter() - start
 
 
