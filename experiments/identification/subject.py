@@ -84,6 +84,10 @@ class Subject:
         """The laws of friction of its joints."""
         return FrictionLaws.of(self.asked.friction, self.robot.joints)
 
+    def units(self, j: int) -> tuple[str, str]:
+        """Return the units of a joint's torque and position."""
+        return ("N", "m") if self.tree.joints[j].kind == "slide" else ("N m", "rad")
+
     @cached_property
     def base(self) -> BaseParameters | None:
         """The grouping, where its base parameters are what is identified; None for the closed form."""

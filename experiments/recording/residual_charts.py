@@ -1,7 +1,7 @@
 """Charts of what an identification leaves over: over velocity and position, with the friction laws, and its spectrum."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 
@@ -9,9 +9,10 @@ from experiments.identification.fit import Fit
 from experiments.recording.chart import NARROW, Chart
 from experiments.recording.scales import decades, linear
 from experiments.recording.stream import Stream
-from experiments.reports.friction_curves import FRICTIONS
+from experiments.reports.friction_curves import FRICTIONS, FrictionCurves
+from experiments.reports.spectra import Spectrum, left_over, of_joints, spectra
 from experiments.style import GREY, JOINTS, Color, model_color
-from identify import MODELS, Array, Estimate, Instants, binned, cutoffs, instants, noise_spectra, spectrum
+from identify import Array, Instants, binned, cutoffs
 
 BINS = {"over_velocity": 41, "over_position": 240}
 """Bins of residuals: over position fine enough for a motor of many slots."""
@@ -21,12 +22,6 @@ FEWEST = 5
 
 DOTS = 2500
 """Dots of a chart: more would only hide each other."""
-
-LAW = 400
-"""Points of the curve of a friction law."""
-
-RESOLUTION = 0.5
-"""Distance of the frequencies of a spectrum [Hz]."""
 
 FAINTEST = 1e-3
 """What a spectrum shows, as a share of its highest value."""
@@ -61,25 +56,17 @@ class ResidualCharts:
 
     def send(self) -> None:
         """Send them all."""
-        left = {form: self._instants(form, estimate) for form, estimate in self.fit.estimates.items()}
-        of_joints = {form: one for form, one in left.items() if form != "power" and len(one.residual) == len(self.joints)}
-        for j in range(len(self.joints)) if of_joints else ():
-            self._over("over_velocity", j, of_joints)
-            self._over("over_position", j, of_joints)
-            self._friction(j, of_joints)
-            self._spectrum(self.joints[j], j, of_joints)
-        for form in left.keys() - of_joints.keys():
-            self._spectrum(form, 0, {form: left[form]})
+        left = left_over(self.fit)
+        joined = of_joints(self.fit, left)
+        for j in range(len(self.joints)) if joined else ():
+            self._over("over_velocity", j, joined)
+            self._over("over_position", j, joined)
+            self._friction(j, joined)
+        for found in spectra(self.fit, left):
+            self._spectrum(found)
 
     def _color(self, name: str) -> Color:
         return COLORS.get(name) or model_color(name, self.number)
-
-    def _instants(self, form: str, estimate: Estimate) -> Instants:
-        return instants(self.fit.problem.signals[0], self.fit.basis, MODELS.create(form), self.fit.processing, estimate.X)
-
-    def _units(self, j: int) -> tuple[str, str]:
-        """Return the units of a joint's torque and position."""
-        return ("N", "m") if self.fit.subject.tree.joints[j].kind == "slide" else ("N m", "rad")
 
     def _state(self, kind: str, j: int, left: Instants) -> Array:
         state = left.equations.signals.state
@@ -87,7 +74,7 @@ class ResidualCharts:
 
     def _over(self, kind: str, j: int, left: Mapping[str, Instants]) -> None:
         """Send the residual over velocity or position: dots of the first model, and the mean of every one."""
-        force, way = self._units(j)
+        force, way = self.fit.subject.units(j)
         leading = next(iter(left.values()))
         seen, weight = self._state(kind, j, leading), leading.weight[j]
         x = linear(f"qd [{way}/s]" if kind == "over_velocity" else f"q [{way}]", seen)
@@ -112,52 +99,40 @@ class ResidualCharts:
 
     def _friction(self, j: int, left: Mapping[str, Instants]) -> None:
         """Send what is left of the torque without the rigid body, over velocity, the laws that were found, and the true one."""
-        mine = np.array([p.kind in FRICTIONS and p.joint == j for p in self.fit.basis.parameters])
-        if not mine.any():
+        if not any(p.kind in FRICTIONS and p.joint == j for p in self.fit.basis.parameters):
             return
-        force, way = self._units(j)
-        form, leading = next(iter(left.items()))
-        qd, laws = self._state("over_velocity", j, leading), dict[str, Array]()
-        for name, one in left.items():
-            laws[name] = self._law(one, np.where(mine, self.fit.estimates[name].X, 0.0), j)
+        force, way = self.fit.subject.units(j)
+        found = {form: self.fit.estimates[form].X for form in left}
         if self.fit.truth is not None:
-            laws["true"] = self._law(leading, np.where(mine, list(self.fit.truth.values()), 0.0), j)
-        torque, weight = leading.residual[j] + laws[form], leading.weight[j]
-        y = linear(f"friction of {self.joints[j]} [{force}]", _around(np.concatenate(list(laws.values()))))
-        chart = Chart(self.stream, f"{self.at}/friction/{self.joints[j]}", linear(f"qd [{way}/s]", qd), y, NARROW)
-        self._dots(chart, qd, torque, weight, GREY)
-        order = np.argsort(qd)[:: max(1, len(qd) // LAW)]
-        for name, law in laws.items():
-            chart.line(name, qd[order], law[order], self._color(name), 2.5 if name == "explicit" else 1.2)
+            found["true"] = np.array(list(self.fit.truth.values()))
+        curves = {name: FrictionCurves(self.fit, X) for name, X in found.items()}
+        dots = curves[next(iter(left))].measured(j)
+        laws = {name: list(each.laws(j)) for name, each in curves.items()}
+        every = [curve for each in laws.values() for curve in each]
+        y = linear(f"friction of {self.joints[j]} [{force}]", _around(np.concatenate([curve.torque for curve in every])))
+        x = linear(f"qd [{way}/s]", every[0].v)
+        chart = Chart(self.stream, f"{self.at}/friction/{self.joints[j]}", x, y, NARROW)
+        self._dots(chart, *dots, GREY)
+        for name, each in laws.items():
+            v, torque = (np.concatenate([np.append(x, np.nan) for x in xs]) for xs in zip(*map(astuple, each), strict=True))
+            chart.line(name, v, torque, self._color(name), 2.5 if name == "explicit" else 1.2)
 
-    def _law(self, left: Instants, X: Array, j: int) -> Array:
-        return left.equations.predicted(X)[j, left.inner]
-
-    def _spectrum(self, row: str, joint: int, left: Mapping[str, Instants]) -> None:
+    def _spectrum(self, found: Spectrum) -> None:
         """Send spectra of what models leave over in a row, what the noise found predicts, and the cut-offs of the chain."""
-        fs, lines, f = self.fit.logs.fitted[0].fs, dict[str, Array](), np.empty(0)
-        for form, one in left.items():
-            weight = one.weight[joint]
-            f, density = spectrum(one.residual[joint] * weight, fs, RESOLUTION)
-            lines[form] = density / np.sqrt(max(np.mean(weight**2), 1e-12))  # as if what is masked were like the rest
-        highest = max(density[1:].max() for density in lines.values())
-        if "explicit" in left:
-            estimate = self.fit.estimates["explicit"]
-            expected = noise_spectra(estimate.problem, estimate.noise_levels, f)
-            lines |= {f"{kind} noise": each[joint] for kind, each in zip(("torque", "position"), expected, strict=True)}
-        unit = "W" if row == "power" else self._units(joint)[0]
-        shown = [np.maximum(density[1:], FAINTEST * highest) for density in lines.values()]
-        y = decades(f"residual of {row} [{unit}/√Hz]", *shown)
-        chart = Chart(self.stream, f"{self.at}/spectrum/{row}", decades("f [Hz]", f[1:]), y)
-        for name, density in lines.items():
-            chart.line(name, f[1:], density[1:], self._color(name), 2.5 if name == "explicit" else 1.2)
-        for name, cutoff in cutoffs(self.fit.processing, fs).items():
+        models = [density for name, density in found.lines.items() if name not in COLORS]
+        shown = [np.maximum(density, FAINTEST * max(x.max() for x in models)) for density in found.lines.values()]
+        y = decades(f"residual of {found.row} [{found.unit}/√Hz]", *shown)
+        row = found.row if found.joint is None else self.joints[found.joint]
+        chart = Chart(self.stream, f"{self.at}/spectrum/{row}", decades("f [Hz]", found.f), y)
+        for name, density in found.lines.items():
+            chart.line(name, found.f, density, self._color(name), 2.5 if name == "explicit" else 1.2)
+        for name, cutoff in cutoffs(self.fit.processing, self.fit.logs.fitted[0].fs).items():
             chart.line(f"cut-off {name}", np.full(2, cutoff), np.array([y.low, y.high]), DARK)
 
 
 def _around(x: Array) -> Array:
     """Return the ends of an axis on which a law fills the middle third: dots beyond it are noise that would hide it."""
-    low, high = float(x.min()), float(x.max())
+    low, high = float(np.nanmin(x)), float(np.nanmax(x))
     return np.array([low, high]) + (high - low) * np.array([-1.0, 1.0])
 
 

@@ -1,6 +1,7 @@
 """Figures of an identification's report."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -8,16 +9,18 @@ from matplotlib.figure import Figure
 
 from experiments.identification.fit import Fit
 from experiments.identification.held_out import HeldOut
-from experiments.reports.friction_curves import FRICTIONS, FrictionCurves
+from experiments.reports.friction_curves import FRICTIONS, WHOLE, FrictionCurves
 from experiments.reports.html import svg
+from experiments.reports.spectra import left_over, spectra
 from experiments.style import model_color
 from experiments.text import percentage
-from identify import Array, ExplicitModel
-from identify.judge.diagnosis import cutoffs, instants, spectrum
-from identify.judge.noise_spectra import noise_spectra
+from identify import Array, cutoffs
 
-RESOLUTION = 0.25
-"""Distance of the frequencies of spectra [Hz]."""
+NOISES: dict[str, dict[str, Any]] = {
+    "torque noise": {"color": "0.5", "lw": 1.0, "ls": "--"},
+    "position noise": {"color": "tab:brown", "lw": 1.0, "ls": ":"},
+}
+"""How the noise that was found is drawn."""
 
 SIGMAS = 2.0
 """Half the width of intervals, in sigma: 95 %."""
@@ -87,7 +90,8 @@ def friction_figure(fit: Fit) -> str:
     curves = FrictionCurves(fit, estimate.X)
     figure, panels = _panels(fit.basis.n, 1.6)
     for j, panel in enumerate(panels):
-        v, torque = curves.measured(j)
+        v, torque, weight = curves.measured(j)
+        v, torque = v[weight > WHOLE], torque[weight > WHOLE]
         panel.plot(v, torque, ".", ms=2, color="0.6", label="torque less the rigid body's")
         for number, line in enumerate(curves.laws(j)):
             inside = np.abs(line.v) <= np.abs(v).max(initial=0.0)
@@ -103,32 +107,25 @@ def friction_figure(fit: Fit) -> str:
 
 def spectra_figure(fit: Fit) -> str:
     """Return spectra of what the first model leaves, and of the noise that was found, joint by joint; of the first log."""
-    alone = fit.on(0)
-    model, estimate = next(iter(alone.estimates.items()))
-    left = instants(alone.problem.signals[0], alone.basis, ExplicitModel(), alone.processing, estimate.X)
-    fs, f = alone.logs.fitted[0].fs, np.empty(0)
-    figure, panels = _panels(alone.basis.n, 1.6)
-    lines = []
-    for j in range(alone.basis.n):
-        weight = left.weight[j]
-        f, density = spectrum(left.residual[j] * weight, fs, RESOLUTION)
-        lines.append(density / np.sqrt(max(np.mean(weight**2), 1e-12)))
-    noise = noise_spectra(alone.problem, estimate.noise_levels, f)
-    for j, panel in enumerate(panels):
-        panel.set_title(alone.subject.robot.joints[j], loc="left")
-        panel.plot(f[1:], lines[j][1:], color=_color(model), lw=1.0, label="residual")
-        panel.plot(f[1:], noise[0][j, 1:], color="0.5", lw=1.0, ls="--", label="noise of the torque")
-        panel.plot(f[1:], noise[1][j, 1:], color="tab:brown", lw=1.0, ls=":", label="noise of the positions")
-        for cutoff in cutoffs(alone.processing, fs).values():
+    form = next(iter(fit.estimates))
+    every = list(spectra(fit, {form: left_over(fit)[form]}))
+    figure, panels = _panels(len(every), 1.6)
+    for panel, found in zip(panels, every, strict=True):
+        panel.set_title(f"{found.row} [{found.unit}/√Hz]", loc="left")
+        for name, density in found.lines.items():
+            panel.plot(
+                found.f, density, label="residual" if name == form else name, **NOISES.get(name, {"color": _color(form)})
+            )
+        for cutoff in cutoffs(fit.processing, fit.logs.fitted[0].fs).values():
             panel.axvline(cutoff, color="0.8", lw=1.0)
-        if not lines[j][1:].any():  # a joint that never moves
+        top = found.lines[form].max()
+        if not top:  # a joint that never moves
             continue
-        top = lines[j][1:].max()
         panel.set_xscale("log")
         panel.set_yscale("log")
         panel.set_ylim(top * 1e-5, top * 3)
         panel.minorticks_off()
-    _last(panels, "frequency [Hz]", "[N m/√Hz]")
+    _last(panels, "frequency [Hz]", "")
     _legend(figure, panels[0])
     return svg(figure)
 

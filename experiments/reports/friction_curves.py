@@ -58,31 +58,33 @@ class FrictionCurves:
     fit: Fit
     X: Array
 
-    def measured(self, j: int) -> tuple[Array, Array]:
-        """Return velocities of a joint, and its torque less the rigid body's, at rows of which the mask takes nothing."""
-        v, torque = [], []
+    def measured(self, j: int) -> tuple[Array, Array, Array]:
+        """Return velocities of a joint, its torque less the rigid body's, and the weights of the mask, shape (row,) each."""
+        v, torque, weight = (np.concatenate(each) for each in zip(*((x[j] for x in part) for part in self._rows), strict=True))
+        return v, torque, weight
+
+    @cached_property
+    def _rows(self) -> list[tuple[Array, Array, Array]]:
+        """The same of all joints, log by log, shape (joint, row) each."""
+        found, (laws, X) = [], self._laws
         for rows, signals in zip(self.fit.problem.parts, self.fit.problem.signals, strict=True):
-            qd, weight = _seen(signals, self.fit.processing)
-            own = np.flatnonzero(rows.group == j)[weight[j] > WHOLE]
-            v.append(qd[j][weight[j] > WHOLE])
-            torque.append((rows.Y - rows.predicted(self.X))[own] + self._law(signals, j)[weight[j] > WHOLE])
-        return np.concatenate(v), np.concatenate(torque)
+            friction = combined(laws.explicit(signals.state), laws.names, X, np.zeros(signals.state.q.shape))
+            residual = rows.Y - rows.predicted(self.X)
+            left = np.stack([residual[rows.group == j] for j in range(self.fit.basis.n)])
+            qd, chain = filtered(signals, self.fit.processing)["qd"], self.fit.processing
+            found.append((qd, left + _rows_of(signals, chain, friction), _rows_of(signals, chain, signals.weight)))
+        return found
 
     def laws(self, j: int) -> Iterator[Curve]:
         """Yield the law of a joint over velocity, with each of some loads where it depends on that."""
-        fastest = BEYOND * max(np.abs(self.measured(j)[0]).max(initial=0.0), 1e-3)
+        v, _, weight = self.measured(j)
+        fastest = BEYOND * max(np.abs(v[weight > WHOLE]).max(initial=0.0), 1e-3)
         side = np.linspace(0, fastest, POINTS)[1:]
         v = np.concatenate([-side[::-1], [0.0], side])
         for load in self._loads(j):
             torque = self._at(j, v, load)
             torque[POINTS - 1] = np.nan  # where friction jumps
             yield Curve(v, torque)
-
-    def _law(self, signals: Signals, j: int) -> Array:
-        """Return the friction of a joint by its law at the rows, shape (row,)."""
-        laws, X = self._laws
-        total = combined(laws.explicit(signals.state), laws.names, X, np.zeros(signals.state.q.shape))
-        return _rows_of(signals, self.fit.processing, total)[j]
 
     def _at(self, j: int, v: Array, load: float) -> Array:
         """Return the law of a joint at velocities, in the middle of its positions, under a load."""
@@ -132,11 +134,6 @@ def _loaded(block: AbstractBlock, load: float) -> AbstractBlock:
     """Return a block whose load is a given one."""
     made = _Loaded(load) if isinstance(inner_of(block), LoadFriction) else inner_of(block)
     return replace(block, block=made) if isinstance(block, OfJoints) else made
-
-
-def _seen(signals: Signals, chain: Chain) -> tuple[Array, Array]:
-    """Return velocities and weights as the rows see them, shape (joint, row) each."""
-    return filtered(signals, chain)["qd"], _rows_of(signals, chain, signals.weight)
 
 
 def _rows_of(signals: Signals, chain: Chain, x: Array) -> Array:
