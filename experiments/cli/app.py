@@ -130,7 +130,7 @@ def _print(text: str) -> None:
 
     page = new_page()
     page.print(text)
-    page.end()
+    page.close()
 
 
 def _complain(what: str, code: int) -> int:

@@ -49,8 +49,9 @@ def _options(part: Any, left_out: tuple[str, ...], absolute: bool) -> Iterator[s
 def _word(value: object, absolute: bool) -> str:
     """Return a value as it is typed."""
     text = str(value)
+    named = isinstance(value, Path) or bool(Path(text).suffix)  # other words name what ships, whatever files there are
     try:
-        there = absolute and Path(text).exists()
+        there = absolute and named and Path(text).exists()
     except (OSError, ValueError):  # too long for a name
         there = False
     return quote(str(Path(text).absolute()) if there else text)

@@ -76,11 +76,15 @@ class Page(Console):
         self._write(self._people, text)
 
     def end(self) -> None:
-        """Show the rest, and what a program reads; raise ExperimentError if something could not be shown."""
+        """Show the rest, and what a program reads."""
         self.show()
         if self.machine and self.found and not self._ended:
             self._write(sys.stdout, json.dumps(self.found, indent=2, default=str) + "\n")
         self._ended = True
+
+    def close(self) -> None:
+        """End the page; raise ExperimentError if something could not be shown."""
+        self.end()
         if self._failure:
             failure, self._failure = self._failure, ""
             raise ExperimentError(f"cannot print: {failure}")
@@ -110,4 +114,4 @@ def shown(page: Page) -> Iterator[None]:
     try:
         yield
     finally:
-        page.end()
+        page.close()

@@ -31,12 +31,14 @@ def checks(judgement: Judgement, *, delay: bool) -> dict[str, list[str]]:
     result = judgement.fit
     of_logs = list(warnings_of_logs(judgement))
     found: dict[str, list[str]] = {LOG: of_logs, DELAY: [], FILE: warnings_of_robot(result.subject.robot)}
-    found |= {MOTION: hidden_notes(result), MODEL: []}
+    found |= {MOTION: [], MODEL: []}
+    if any(map(unusable, result.logs.fitted)):  # all else may be its doing
+        return found
+    found[MOTION] += hidden_notes(result)
     for about, warnings in warnings_of_result(result).items():
         found[about] += warnings
-    broken = any(map(unusable, result.logs.fitted))
     first = judgement.on[0]
-    if isinstance(first, HeldOut) and not broken and not result.logs.long:
+    if isinstance(first, HeldOut) and not result.logs.long:
         # Friction absorbs a wrong delay, and the verdict may be good: the log itself is asked.
         found[DELAY] += delay_advice(result) if delay else ()
         found[MODEL] += () if judgement.good else Remedies(first).options()

@@ -46,10 +46,15 @@ class Loaded:
     def names(self) -> tuple[str, ...]:
         """What to call them."""
         found = []
-        for one in self.read:
-            several = len(one.logs) > 1
-            found += [f"{one.path.name}, piece {k + 1}" if several else one.path.name for k in range(len(one.logs))]
+        for one, name in zip(self.read, _names(self.read), strict=True):
+            found += [f"{name}, piece {k + 1}" if len(one.logs) > 1 else name for k in range(len(one.logs))]
         return tuple(found)
+
+
+def _names(every: Sequence[ReadLog]) -> list[str]:
+    """Return names of files, with their folders where they would be alike: every run has a log.parquet."""
+    alike = len({one.path.name for one in every}) < len(every)
+    return [str(one.path) if alike else one.path.name for one in every]
 
 
 def load(paths: Sequence[Path], options: ReadOptions, request: Request, *, band: bool, more: int = 0) -> Loaded:
@@ -82,7 +87,8 @@ def load(paths: Sequence[Path], options: ReadOptions, request: Request, *, band:
         with stage("the delay of the torques"):
             read_ = with_delays(read_, request)
     several = len(read_) > 1
-    said = [(f"{one.path.name}: " if several else "") + note for one in read_ for note in one.notes]
+    named = zip(read_, _names(read_), strict=True)
+    said = [(f"{name}: " if several else "") + note for one, name in named for note in one.notes]
     return Loaded(request, tuple(read_), tuple(dict.fromkeys([*said, *of_band])))
 
 

@@ -1,6 +1,6 @@
 """Logs without and with a payload, judged: is there one robot and one payload that makes the torques of all of them?"""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self, final
@@ -27,6 +27,9 @@ SHARE = 0.01
 
 WORDS = ("good", "fair", "unsure", "poor")
 """Verdicts, the worst last."""
+
+PAYLOAD = "the payload"
+"""What some warnings are about."""
 
 OPTIONS = {"ML": "--mass", "MXL": "--at", "MYL": "--at", "MZL": "--at"}
 """Options that state parameters of a payload; those of its inertia by --inertia."""
@@ -77,19 +80,18 @@ class LoadJudgement:
         judged = [validate(problem, found.X, found.best_covariance) for problem in each]
         return {name: Verdict(joints, validation) for name, validation in zip(self.names, judged, strict=True)}
 
-    @property
-    def word(self) -> str:
-        """The verdict on the worst log."""
-        return max((verdict.word for verdict in self.verdicts.values()), key=WORDS.index)
+    def word(self, doubts: Mapping[str, Sequence[str]]) -> str:
+        """Return the verdict on the worst log; poor, if what was found cannot be, or contradicts what is stated."""
+        return "poor" if doubts[PAYLOAD] else max((verdict.word for verdict in self.verdicts.values()), key=WORDS.index)
 
     def warnings(self, payload: Payload | None) -> dict[str, list[str]]:
         """Return what to check, by what it is about."""
         of_payload_ = [*self._of_stated(), *(_of_body(payload, self.names[len(self.robot.without) :]) if payload else ())]
-        return {LOG: list(self._of_logs()), "the payload": of_payload_, MODEL: list(self._of_fit())}
+        return {LOG: list(self._of_logs()), PAYLOAD: of_payload_, MODEL: list(self._of_fit())}
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self, word: str) -> dict[str, Any]:
         """Return what a summary.json says of it."""
-        return {"verdict": self.word, "logs": {name: verdict.summary() for name, verdict in self.verdicts.items()}}
+        return {"verdict": word, "logs": {name: verdict.summary() for name, verdict in self.verdicts.items()}}
 
     def _of_logs(self) -> Iterator[str]:
         """Yield what is suspicious about each log by itself, by the robot alone: its last link includes the payload."""

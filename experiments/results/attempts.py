@@ -1,8 +1,10 @@
 """What only shows results: each view may fail alone, and says so in one line."""
 
+import sys
 from collections.abc import Callable
 from contextlib import suppress
-from typing import TypeVar, final
+from types import TracebackType
+from typing import Self, TypeVar, final
 
 from experiments.errors import ResultsError
 from experiments.faults import REPORT, is_told, reason, report, trace
@@ -26,6 +28,17 @@ class Attempts:
 
     def __init__(self, kept: str, folder: ResultsFolder | None = None) -> None:
         self._kept, self._folder, self._failures, self._traces = kept, folder, list[str](), list[str]()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        """Close at the end of the block; if it was interrupted, say what is there all the same."""
+        del error, trace
+        if kind is None:
+            self.close()
+        elif issubclass(kind, KeyboardInterrupt | SystemExit):
+            sys.stderr.write(f"\nidbench: {self._kept}\n")
 
     def attempt(self, what: str, make: Callable[[], T]) -> T | None:
         """Return what `make` returns, None if it fails."""

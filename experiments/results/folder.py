@@ -5,11 +5,12 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import final
 
 from experiments.errors import ResultsError
-from experiments.results.manifest import Manifest, Written, digest
+from experiments.results.manifest import NAME, Manifest, Written, digest
 from experiments.results.writing import Read, exchange, hidden_folder
 
 try:
@@ -70,7 +71,11 @@ class ResultsFolder:
             raise ResultsError("--out is the folder that you are in, or empty: name a folder of its own for the results")
         if self.out.exists() and not self.out.is_dir():
             raise ResultsError(f"{self.out} is a file, not a folder: choose another --out")
-        if self.force or not self.out.is_dir():
+        if not self.out.is_dir():
+            return
+        if read := next((path for path in self.out.iterdir() if self._writes(path.name) and self._reads(path)), None):
+            raise ResultsError(f"{read} is a file that this command reads, and results take its name: choose another --out")
+        if self.force:
             return
         if (self.out / "study.toml").is_file() and self.experiment != "study":
             raise ResultsError(f"{self.out} holds a study: choose another --out")
@@ -98,14 +103,35 @@ class ResultsFolder:
         self.check()
         made = self._made()
         try:
-            with _lock(self.out):
+            with self._locked():
                 yield
-        except OSError as error:
-            raise self._unwritable(error) from error
         finally:
             for folder in made:  # where nothing came into them
                 with suppress(OSError):
                     folder.rmdir()
+
+    @contextmanager
+    def _locked(self) -> Iterator[None]:
+        """Hold the folder against other processes; raise ResultsError if one of them holds it."""
+        if fcntl is None:
+            yield
+            return
+        try:
+            held = os.open(self.out, os.O_RDONLY)
+        except OSError as error:
+            raise self._unwritable(error) from error
+        try:
+            try:
+                fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise ResultsError(
+                    f"another process is writing its results to {self.out}: wait for it, or choose another --out"
+                ) from None
+            except OSError:  # a file system without locks: the exchange of files looks once more
+                pass
+            yield
+        finally:
+            os.close(held)
 
     def _made(self) -> list[Path]:
         """Make the folder; return which folders were made, the innermost first."""
@@ -158,7 +184,8 @@ class ResultsFolder:
         manifest.save(written, gone)
         for path in paths:
             try:
-                exchange(path, self.out / path.name, force=self.force or path.name in own)
+                unchanged = path.name in own and manifest.owns(path.name)  # looked at once more
+                exchange(path, self.out / path.name, force=self.force or unchanged)
             except FileExistsError:
                 raise self._strange(self.out / path.name) from None
         for name in gone:
@@ -168,16 +195,32 @@ class ResultsFolder:
         """Raise ResultsError if a file must not be replaced."""
         if target.is_dir():
             raise ResultsError(f"{target} is a folder where a file must go: remove it or choose another --out")
-        if any(target.exists() and path.exists() and target.samefile(path) for path in self.read):
+        if self._reads(target):
             raise ResultsError(f"{target} is a file that this command reads: choose another --out")
         if target.exists() and not own and not self.force:
             raise self._strange(target)
 
     def _old(self, manifest: Manifest) -> set[str]:
-        """Return the files of earlier results."""
-        if not self.force:
-            return {name for name in manifest.files if manifest.owns(name)}
-        return {path.name for pattern in FILES[self.experiment] for path in self.out.glob(pattern) if path not in self.read}
+        """Return the files of earlier results, as idbench wrote them."""
+        return {name for name in manifest.files if self._writes(name) and manifest.owns(name)}
+
+    def _writes(self, name: str) -> bool:
+        """Return whether results may have a file of that name."""
+        return any(fnmatch(name, pattern) for pattern in FILES[self.experiment])
+
+    def _reads(self, target: Path) -> bool:
+        """Return whether a file is one that the command reads."""
+        return any(target.exists() and path.exists() and target.samefile(path) for path in self.read)
+
+    def goes_beside(self, path: Path, option: str) -> bool:
+        """Return whether a further file goes beside the results; raise ResultsError if it has the name of one of them."""
+        if path.absolute().parent != self.out.absolute():
+            return False
+        if self._writes(path.name) or path.name == NAME:
+            raise ResultsError(f"{option} {path}: the results have a file of that name; choose another")
+        if path.exists() and not self.force and not Manifest.of(self.out).owns(path.name):
+            raise self._strange(path)
+        return True
 
     def _strange(self, target: Path) -> ResultsError:
         return ResultsError(
@@ -186,27 +229,6 @@ class ResultsFolder:
 
     def _unwritable(self, error: OSError) -> ResultsError:
         return ResultsError(f"cannot write to {self.out}: {error.strerror or error}; choose another --out, or free some space")
-
-
-@contextmanager
-def _lock(folder: Path) -> Iterator[None]:
-    """Hold a folder against other processes; raise ResultsError if one of them holds it."""
-    if fcntl is None:
-        yield
-        return
-    held = os.open(folder, os.O_RDONLY)
-    try:
-        try:
-            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise ResultsError(
-                f"another process is writing its results to {folder}: wait for it, or choose another --out"
-            ) from None
-        except OSError:  # a file system without locks: the exchange of files looks once more
-            pass
-        yield
-    finally:
-        os.close(held)
 
 
 def _summarized(folder: Path) -> str:

@@ -7,12 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.study.comparison import differences
+from experiments.study.axis import FRICTION
+from experiments.study.comparison import SURE, differences
 from experiments.study.requirement import in_words, requirements
 from experiments.study.statistics import Cell
-
-SURE = 0.01
-"""Probability below which two ways of identification count as different."""
 
 
 def answer(cells: Sequence[Cell], edges: int = 4) -> str:
@@ -132,14 +130,21 @@ def failures(cells: Sequence[Cell]) -> str:
 
 def combination(cell: Cell) -> str:
     """Return the settings of a cell in words."""
-    return ", ".join(f"{short(name)} {value(x)}" for name, x in cell.settings.items())
+    return ", ".join(f"{short(name)} {value(x)}" for name, x in settings_of(cell).items())
+
+
+def settings_of(cell: Cell) -> dict[str, Any]:
+    """Return the settings of a cell without the laws of friction: these are part of how it was identified."""
+    return {name: x for name, x in cell.settings.items() if name != FRICTION}
 
 
 def method(cell: Cell, among: Sequence[Cell]) -> str:
-    """Return how a cell was identified: its model, and chain and estimator where those of other cells differ."""
+    """Return how a cell was identified: its model, and chain, estimator and laws of friction where those of others differ."""
     chain, estimator, model = cell.names
     words = [f"chain {chain}"] if any(other.names[0] != chain for other in among) else []
     words += [estimator] if any(other.names[1] != estimator for other in among) else []
+    laws = cell.settings.get(FRICTION)
+    words += [str(laws)] if any(other.settings.get(FRICTION) != laws for other in among) else []
     return f"{model} ({', '.join(words)})" if words else model
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from math import log2
 
+from experiments.study.axis import FRICTION
 from experiments.study.statistics import Cell
 
 LEVELS = (0.1, 0.01, 0.001, 0.0001)
@@ -25,7 +26,8 @@ def requirements(cells: Sequence[Cell], edges: int = 4) -> str:
     edges : int
         Edges that are counted in a line of an encoder.
     """
-    varied = [field for field in cells[0].settings if len({str(cell.settings[field]) for cell in cells}) > 1]
+    fields = [field for field in cells[0].settings if field != FRICTION]
+    varied = [field for field in fields if len({str(cell.settings[field]) for cell in cells}) > 1]
     if len(varied) != 1 or not all(isinstance(cell.settings[varied[0]], float) for cell in cells):
         return ""
     found = list(_requirements(cells, varied[0], edges))

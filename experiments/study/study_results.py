@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from rich.console import Console
 from rich.text import Text
 
@@ -13,7 +14,8 @@ from experiments.results.attempts import Attempts
 from experiments.results.folder import ResultsFolder
 from experiments.results.streams import write_streams
 from experiments.results.summaries import write_summary
-from experiments.study.answer import answer, method, percent, short, value
+from experiments.study.answer import answer, method, percent, settings_of, short, value
+from experiments.study.axis import FRICTION
 from experiments.study.shard_file import arrays
 from experiments.study.statistics import Cell, cells
 from experiments.study.store import Store
@@ -59,24 +61,30 @@ def _report(folder: ResultsFolder, study: Study, found: Sequence[Cell], seconds:
 
 
 def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:
-    axes = [short(field) for field in store.study.varied]
+    axes = [short(field) for field in store.study.varied if field != FRICTION] or [""]
     least = ["bound"] if store.study.bound else []
     often = ["simulations"] if any(cell.mean_simulations for cell in found) else []
     columns = [*axes[1:], "identified by", "runs", "failed", "typical error", *least, "within 2 sigma", *often]
     grid = new_table(store.study.question, columns)
     for cell in found:
-        settings = [value(x) for x in cell.settings.values()]
+        settings = [value(x) for x in settings_of(cell).values()] or [""]
         numbers = f"{cell.runs}", f"{cell.failed or ''}"
         errors = (
             [percent(cell.typical), *([percent(cell.typical_least)] if least else [])] if cell.runs else [""] * (1 + len(least))
         )
-        judged = *errors, f"{100 * cell.coverage(cell.sigma).mean():.0f} %" if cell.runs else "", *_often(cell, often)
+        judged = *errors, _held(cell), *_often(cell, often)
         grid.add_row(*settings, method(cell, found), *numbers, *judged)
     grid.columns[0].header = axes[0]
     print_table(page, grid, len(axes) + 1)
     page.print(Text(answer(found, store.study.edges)))
     for reason in _reasons(found)[:MOST_REASONS]:
         page.print(Text(f"failed: {reason}"), soft_wrap=True)
+
+
+def _held(cell: Cell) -> str:
+    """Return how many truths lie within two sigma, of those parameters that the cell has."""
+    held = cell.coverage(cell.sigma)
+    return f"{100 * np.nanmean(held):.0f} %" if np.isfinite(held).any() else ""
 
 
 def _often(cell: Cell, shown: Sequence[str]) -> list[str]:

@@ -6,6 +6,7 @@ from typing import final
 import numpy as np
 
 from identify.arrays import Array
+from identify.data.encoder_step import encoder_steps
 
 COMMON = 0.99
 """Share of the steps from one sample to the next that are below what is usual: those above may be the fastest of a motion."""
@@ -20,7 +21,10 @@ RETURN = 0.2
 """Share of a jump that may be left after it has gone back."""
 
 ROUNDING = 1e-3
-"""Share of a joint's travel that no jump is below: quiet joints tremble by counts of their encoders."""
+"""Share of the largest travel of a joint that no jump is below."""
+
+COUNTS = 2.5
+"""Steps of its encoder that no jump is below: quiet joints tremble by one, and creep by one after the other."""
 
 
 @final
@@ -68,10 +72,15 @@ def jumps(q: Array, fs: float) -> list[Jump]:
     >>> [(jump.joint, jump.sample, jump.back) for jump in jumps(q, 100.0)]
     [(0, 200, False)]
     """
-    return [jump for j, x in enumerate(q.T) for jump in _of_joint(j, np.asarray(x), fs)]
+    steps = encoder_steps(q)
+    known = steps[np.isfinite(steps)]
+    usual = float(np.median(known)) if len(known) else 0.0  # of joints that hardly move: like the encoders of the others
+    tremble = COUNTS * np.where(np.isfinite(steps), steps, usual)
+    least = np.maximum(tremble, ROUNDING * np.ptp(q, axis=0).max(initial=0.0))
+    return [jump for j, x in enumerate(q.T) for jump in _of_joint(j, np.asarray(x), float(least[j]), fs)]
 
 
-def _of_joint(j: int, x: Array, fs: float) -> list[Jump]:
+def _of_joint(j: int, x: Array, least: float, fs: float) -> list[Jump]:
     steps, found = np.diff(x), list[Jump]()
     if len(steps) <= 2 * NEAR:
         return found
@@ -80,7 +89,7 @@ def _of_joint(j: int, x: Array, fs: float) -> list[Jump]:
     around = np.stack([padded[i : i + len(steps)] for i in range(2 * NEAR + 1) if i != NEAR])
     middle = np.median(around, axis=0)
     off, scatter = np.abs(steps - middle), np.median(np.abs(around - middle), axis=0)
-    least = max(usual, ROUNDING * float(np.ptp(x)))
+    least = max(usual, least)
     left = np.flatnonzero((off > least) & (off > SPREAD * scatter))
     while len(left):
         k, near = left[0], left[left - left[0] <= NEAR]

@@ -137,7 +137,7 @@ def test_a_payload_on_the_axis_says_nothing_of_its_gain(pairs):
 
 
 def test_gains_need_what_is_known(pairs):
-    with pytest.raises(SettingError, match="nothing is known of the payload"):
+    with pytest.raises(SettingError, match="--mass is missing: the gains follow"):
         identify_drive_gains(pairs.robot(0, {}))
     with pytest.raises(SettingError, match="there is no log without the payload"):
         identify_drive_gains(replace(pairs.robot(0, {"ML": 2.0}), without=()))
@@ -196,7 +196,7 @@ def test_the_gains_command(files, capsys):
         (["payload", "full.parquet", "--simulate", "payload"], "--simulate needs no logs"),
         (["payload", "--simulate", "quantization"], "scenario quantization has no payload"),
         (["payload", "--simulate", "payload", "--runs", "0"], "--runs 0 must be at least 1"),
-        (["gains", "full.parquet", "--unloaded", "empty.parquet", "--robot", "puma560"], "nothing is known of the payload"),
+        (["gains", "full.parquet", "--unloaded", "empty.parquet", "--robot", "puma560"], "--mass is missing: the gains follow"),
         (["gains", "full.parquet", "--robot", "puma560", "--mass", "2"], "there is no log without the payload"),
     ],
 )

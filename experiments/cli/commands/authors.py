@@ -25,11 +25,11 @@ def begin(options: New) -> None:
         new_plugin(options.name, options.kind, out)
         how = f"uv pip install -e {out}, then: uv run idbench check {options.name}"
     page.print(Text(f"written to {out}; next: {how}"), soft_wrap=True)
-    page.end()
+    page.close()
 
 
 def check(options: Check) -> None:
-    """Print what a plug-in is options, and what of it is kept; raise ExperimentError if something is not."""
+    """Print what a plug-in is asked to do, and what of it is kept; raise ExperimentError if something is not."""
     page, (table, plugin) = new_page(machine=options.json), found(options.plugin)
     page.print(Text(f"{options.plugin}: {type(plugin).__name__}, of the {table.point}", style="bold"))
     answers = list(keeps(table, plugin, Example()))
@@ -39,6 +39,6 @@ def check(options: Check) -> None:
             page.print(Text(f"     {complaint}"), soft_wrap=True)
     broken = sum(bool(complaint) for _, complaint in answers)
     page.found |= {"plugin": options.plugin, "point": table.point, "contract": dict(answers)}
-    page.end()
+    page.close()
     if broken:
         raise ExperimentError(f"{options.plugin} does not keep {broken} of {len(answers)} parts of its contract")

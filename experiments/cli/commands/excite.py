@@ -100,7 +100,7 @@ def _record(folder: ResultsFolder, found: Excited, audience: Audience | None) ->
 
 
 def _designed(options: Excite) -> Design:
-    """Return what is options, checked."""
+    """Return what is asked for, checked."""
     if options.fs is not None:
         _require_between("fs", options.fs, 10, FASTEST)
     scenario = _scenario(options)
@@ -201,5 +201,5 @@ def _percent(text: str | None) -> float | None:
 
 
 def _log(path: Path, subject: Subject) -> MotionLog:
-    """Return an earlier log: of its torques nothing counts, so that their meaning is not options for."""
+    """Return an earlier log: of its torques nothing counts, so that their meaning is not asked for."""
     return read(file_of(path), ReadOptions(fallback=TorqueChannel("held")), Request(subject)).longest

@@ -60,27 +60,34 @@ def identify(options: Identify) -> None:
             result = _fitted(options, request, stated)
         _show_fit(page, result, options, read[0])
         _save(folder, page, result)
-        with stages_of("judging, by a fit of the rest" if not options.validate else "judging"):
-            judgement = judge(result)
-        _show_judgement(page, judgement)
-        _save(folder, page)
         kept = f"the estimates are printed{f', and with the logs in {folder.out}' if folder else ''}"
-        attempts = Attempts(kept, folder)
-        for log in judgement.failures:
-            attempts.failed(log.title, log.why, log.traceback)
-        with stages_of("checking"):
-            delay = options.torque_delay != "estimate"
-            warnings = attempts.attempt("the checks", lambda: checks(judgement, delay=delay)) or {}
-        page.warn(warnings)
-        page.end()
-        view_all(Shown(page, options, command, judgement, warnings, folder, audience), attempts)
-        attempts.close()
+        with Attempts(kept, folder) as attempts:
+            judgement = attempts.attempt("the verdict", lambda: _judged(result, options))
+            if judgement is None:
+                return
+            _show_judgement(page, judgement)
+            for log in judgement.failures:
+                attempts.failed(log.title, log.why, log.traceback)
+            with stages_of("checking"):
+                delay = options.torque_delay != "estimate"
+                warnings = attempts.attempt("the checks", lambda: checks(judgement, delay=delay)) or {}
+            page.warn(warnings)
+            attempts.attempt("summary.json", lambda: _save(folder, page))
+            page.end()
+            view_all(Shown(page, options, command, judgement, warnings, folder, audience), attempts)
+
+
+def _judged(result: Fit, options: Identify) -> Judgement:
+    with stages_of("judging" if options.validate else "judging, by a fit of the rest"):
+        return judge(result)
 
 
 def _read(options: Identify, request: Request) -> tuple[Path, ...]:
     """Return the files that are read."""
-    robot = Robot.path(request.subject.name)
-    return (*(path.absolute() for path in (*options.log, *options.validate)), robot)
+    logs = [file_of(path).absolute() for path in (*options.log, *options.validate)]
+    named = (options.chain_file, options.reading.layout, *options.loop)
+    more = [Path(name) for name in named if name is not None]
+    return (*logs, Robot.path(request.subject.name), *(path.absolute() for path in more if path.suffix))
 
 
 def _followed(stack: ExitStack, options: Identify, request: Request, audience: Audience | None) -> Identify:

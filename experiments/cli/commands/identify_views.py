@@ -14,6 +14,7 @@ from experiments.exports.exports import EXPORTS
 from experiments.identification.fit import Fit
 from experiments.identification.judgement import Judgement
 from experiments.recording.audience import Audience
+from experiments.recording.folder import BASE
 from experiments.results.attempts import Attempts
 from experiments.results.folder import ResultsFolder
 from experiments.results.manifest import Manifest
@@ -63,8 +64,8 @@ def report(shown: Shown, attempts: Attempts) -> None:
 
     if shown.folder is None or shown.fit.logs.long:
         return
+    text = page_of(shown.judgement, shown.warnings, shown.page.found["notes"], shown.command, attempts)
     with shown.folder.more() as hidden:
-        text = page_of(shown.judgement, shown.warnings, shown.page.found["notes"], shown.command, attempts)
         (hidden / "report.html").write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
@@ -72,7 +73,7 @@ def recording(shown: Shown, attempts: Attempts) -> None:
     """Write the recording, or show it to who watches."""
     del attempts
     run, rerun = shown.options.log[0], shown.options.watching.rerun
-    into = shown.folder or (_layered(shown, run) if run.is_dir() else None)
+    into = shown.folder or (_layered(shown, run) if has_recording(run) else None)
     if not rerun or (into is None and shown.audience is None):
         return
     if shown.fit.logs.long:
@@ -90,6 +91,11 @@ def recording(shown: Shown, attempts: Attempts) -> None:
         shown.page.print(f"added to the recording in {run}{shown.options.watching.hint(run)}", soft_wrap=True)
 
 
+def has_recording(run: Path) -> bool:
+    """Return whether a log is the folder of a run with a recording, to which layers can be added."""
+    return (run / BASE).is_file()
+
+
 def _layered(shown: Shown, run: Path) -> ResultsFolder:
     """Return the folder of a run whose recording gets a layer."""
     return ResultsFolder(run, "run", shown.command, shown.options.force)
@@ -98,7 +104,7 @@ def _layered(shown: Shown, run: Path) -> ResultsFolder:
 def require_layer(options: Identify, label: str, command: str) -> None:
     """Raise ExperimentError if the layer of another identification would be replaced in the folder of a run."""
     name = f"recording.{label}.rrd"
-    if not options.log[0].is_dir() or options.out or options.force or not options.watching.rerun:
+    if not has_recording(options.log[0]) or options.out or options.force or not options.watching.rerun:
         return
     there = Manifest.of(options.log[0]).files.get(name)
     if there is not None and there.command != command and (options.log[0] / name).is_file():
@@ -128,7 +134,11 @@ def _export(shown: Shown, option: str, path: Path) -> None:
     """Write a file for other software, with the parameters of the first model that has an estimate."""
     what, render = EXPORTS[path.suffix]
     text, warnings = render(shown.fit, shown.fit.leading, path)
-    write_text(path, text, option, force=shown.options.force, read=shown.folder.read if shown.folder else ())
+    if shown.folder and shown.folder.goes_beside(path, option):
+        with shown.folder.more() as hidden:
+            (hidden / path.name).write_text(text, encoding="utf-8", errors="backslashreplace")
+    else:
+        write_text(path, text, option, force=shown.options.force, read=shown.folder.read if shown.folder else ())
     shown.page.print(Text(f"written to {path}: {what} with the parameters of the {shown.fit.leading} model"), soft_wrap=True)
     shown.page.warn({"the file that was written": warnings})
 
@@ -146,7 +156,7 @@ def require_targets(options: Identify, folder: ResultsFolder | None, read: Seque
             raise ExperimentError(f"--write-mjcf {path}: its name must end with .xml, or nothing would read it back")
         if path.suffix not in EXPORTS:
             raise ExperimentError(f"--write {path}: its name must end with {', '.join(EXPORTS)}")
-        if not (folder and path.absolute().parent == folder.out.absolute() and not folder.out.exists()):  # it will be made
+        if not (folder and folder.goes_beside(path, option)):
             require_free(path, option, force=options.force, read=read)
     targets = [path.absolute() for _, path in _targets(options)]
     if twice := next((path for k, path in enumerate(targets) if path in targets[:k]), None):

@@ -14,7 +14,7 @@ def list_plugins(options: List) -> None:
     page = new_page(machine=options.json)
     print_plugins(page)
     page.found |= {table.point: {name: table.summary(name) for name in table} for table in TABLES}
-    page.end()
+    page.close()
 
 
 def print_plugins(console: Console) -> None:

@@ -13,10 +13,11 @@ from experiments.cli.command_text import command_of
 from experiments.cli.commands.requests import read_options
 from experiments.cli.options.loads import IdentifyGains, IdentifyPayload, LoadOptions
 from experiments.cli.page import Page, new_page, shown
-from experiments.cli.progress import progress_of
+from experiments.cli.progress import progress_of, stages_of
 from experiments.errors import ExperimentError
 from experiments.identification.friction_choice import chosen_friction, words
 from experiments.identification.load import in_band, load
+from experiments.identification.reading import file_of
 from experiments.identification.request import Request
 from experiments.identification.subject import Subject, absolute
 from experiments.loads.judgement import LoadJudgement, negative_mass
@@ -53,10 +54,10 @@ def payload(options: IdentifyPayload) -> None:
             _finish(page, folder)
             return
         judgement, found = _identify_payload(page, options)
-        attempts = _finish(page, folder)
-        if options.write_mjcf is not None:
-            attempts.attempt("--write-mjcf", lambda: _write_mjcf(page, options, judgement.request.subject, found))
-        attempts.close()
+        with _finish(page, folder) as attempts:
+            _judge(page, judgement, found, attempts, folder)
+            if options.write_mjcf is not None:
+                attempts.attempt("--write-mjcf", lambda: _write_mjcf(page, options, judgement.request.subject, found))
 
 
 def gains(options: IdentifyGains) -> None:
@@ -65,9 +66,11 @@ def gains(options: IdentifyGains) -> None:
     with shown(page), folder.held() if folder else nullcontext():
         if options.simulate is not None:
             _try_gains(page, options)
-        else:
-            _identify_gains(page, options)
-        _finish(page, folder)
+            _finish(page, folder)
+            return
+        judgement = _identify_gains(page, options)
+        with _finish(page, folder) as attempts:
+            _judge(page, judgement, None, attempts, folder)
 
 
 def _identify_payload(page: Page, options: IdentifyPayload) -> tuple[LoadJudgement, Payload]:
@@ -77,6 +80,11 @@ def _identify_payload(page: Page, options: IdentifyPayload) -> tuple[LoadJudgeme
     robot, request = judgement.robot, judgement.request
     if options.before is not None:
         names, X, C = _before(options.before)
+        if missing := [name for name in names if name not in robot.robot.names]:
+            raise ExperimentError(
+                f"--before {options.before} is of another robot, or of other laws of friction: this one has no "
+                f"{', '.join(missing[:3])}"
+            )
         found: dict[str, Payload | str] = {"fixed": with_known_robot(robot, names, X, C)}
         judgement = replace(judgement, before=dict(zip(names, X.tolist(), strict=True)))
     else:
@@ -87,20 +95,28 @@ def _identify_payload(page: Page, options: IdentifyPayload) -> tuple[LoadJudgeme
     page.found |= {"experiment": "payload", "path": str(options.log[0].absolute()), "log": options.log[0].name}
     leading = next(p for p in found.values() if isinstance(p, Payload))
     page.found |= {"robot": request.subject.name, **payload_summary(found)}
-    _judge(page, judgement, leading)
     return judgement, leading
 
 
-def _judge(page: Page, judgement: LoadJudgement, payload: Payload | None) -> None:
-    """Print the verdict, and what to check."""
+def _judge(
+    page: Page, judgement: LoadJudgement, payload: Payload | None, attempts: Attempts, folder: ResultsFolder | None
+) -> None:
+    """Print the verdict, and what to check, and save both."""
+    with stages_of("judging"):
+        doubts = attempts.attempt("the verdict", lambda: judgement.warnings(payload))
+    if doubts is None:
+        return
+    word = judgement.word(doubts)
+    page.print(Text(f"verdict: {word}; how well one robot with one payload explains each log:"), soft_wrap=True)
     for name, verdict in judgement.verdicts.items():
         page.print(Text(f"{name}: {verdict.word}: {'; '.join(verdict.reasons)}"), soft_wrap=True)
-    page.found |= {"judgement": judgement.summary()}
-    page.warn(judgement.warnings(payload))
+    page.found |= {"judgement": judgement.summary(word)}
+    page.warn(doubts)
+    attempts.attempt("summary.json", lambda: _save(page, folder))
 
 
 def _by_ways(robot: LoadedRobot, options: IdentifyPayload) -> dict[str, Payload | str]:
-    """Return the payload by the ways that are options for, or why one has none; raise if none has."""
+    """Return the payload by the ways that are asked for, or why one has none; raise if none has."""
     if not robot.without:
         raise ExperimentError("give logs without the payload (--unloaded), or the robot as it was identified before (--before)")
     found = dict[str, Payload | str]()
@@ -125,7 +141,9 @@ def _write_mjcf(page: Page, options: IdentifyPayload, subject: Subject, found: P
     page.print(Text(f"written to {path}: the robot with the payload as a body of its last link"), soft_wrap=True)
 
 
-def _identify_gains(page: Page, options: IdentifyGains) -> None:
+def _identify_gains(page: Page, options: IdentifyGains) -> LoadJudgement:
+    if options.known.mass is None:
+        raise ExperimentError("--mass is missing: the gains follow from a payload whose mass is known")
     judgement, notes = _loaded(options)
     robot, subject = judgement.robot, judgement.request.subject
     found = identify_drive_gains(robot)
@@ -139,7 +157,7 @@ def _identify_gains(page: Page, options: IdentifyGains) -> None:
         page.print(Text(note), soft_wrap=True)
     page.found |= {"experiment": "gains", "path": str(options.log[0].absolute()), "log": options.log[0].name}
     page.found |= {"robot": subject.name, **gains_summary(found, given.tolist(), joints)}
-    _judge(page, judgement.with_gains(gains / given), None)
+    return judgement.with_gains(gains / given)
 
 
 def _loaded(options: LoadOptions) -> tuple[LoadJudgement, list[str]]:
@@ -244,7 +262,9 @@ def _summary(score: Score) -> dict[str, Any]:
 def _read(options: LoadOptions) -> tuple[Path, ...]:
     """Return the files that are read."""
     robot = [] if options.robot is None else [Robot.path(options.robot)]
-    return (*robot, *options.log, *options.unloaded)
+    logs = [file_of(path) for path in (*options.log, *options.unloaded)]
+    before = getattr(options, "before", None)
+    return (*robot, *logs, *([before] if before else ()))
 
 
 def _folder(options: LoadOptions, experiment: str) -> ResultsFolder | None:
@@ -256,12 +276,16 @@ def _folder(options: LoadOptions, experiment: str) -> ResultsFolder | None:
     return folder
 
 
-def _finish(page: Page, folder: ResultsFolder | None) -> Attempts:
-    """Show and save what was found; return what keeps it while it is shown in other ways."""
-    page.show()
+def _save(page: Page, folder: ResultsFolder | None) -> None:
     if folder is not None:
         with folder.complete() as hidden:
             write_summary(hidden / "summary.json", page.found)
+
+
+def _finish(page: Page, folder: ResultsFolder | None) -> Attempts:
+    """Show and save what was found; return what keeps it while it is shown in other ways."""
+    page.show()
+    _save(page, folder)
+    if folder is not None:
         page.print(f"written to {folder.out}", soft_wrap=True)
-    page.end()
     return Attempts("the results are printed" + (f", and in {folder.out}" if folder else ""), folder)

@@ -40,7 +40,7 @@ def describe(options: DescribeRobot) -> None:
         page.print(Text(f"no torque budget: {error}"), soft_wrap=True)
     page.warn({FILE: warnings_of_robot(subject.robot)})
     page.found |= _summary(subject, truth)
-    page.end()
+    page.close()
 
 
 def _summary(subject: Subject, truth: dict[str, float]) -> dict[str, Any]:

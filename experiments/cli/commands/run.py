@@ -56,22 +56,21 @@ def run(options: Run) -> None:
         _show_run(page, ran)
         _save_run(folder, page, ran)
         page.end()
-        attempts = Attempts(f"the estimates are printed, and with the log in {folder.out}", folder)
-        if recording:
-            from experiments.results.streams import write_streams
+        with Attempts(f"the estimates are printed, and with the log in {folder.out}", folder) as attempts:
+            if recording:
+                from experiments.results.streams import write_streams
 
-            attempts.attempt("the recording", lambda: write_streams(recording.finish(ran), folder))
-            doubt_window(page, options.inner, recording)
-            if ran.fit.logs.long:
-                page.print("the identification is not recorded: the rows of so long a log are not kept")
-        page.print(f"written to {folder.out}{watching.hint(folder.out)}", soft_wrap=True)
-        attempts.close()
+                attempts.attempt("the recording", lambda: write_streams(recording.finish(ran), folder))
+                doubt_window(page, options.inner, recording)
+                if ran.fit.logs.long:
+                    page.print("the identification is not recorded: the rows of so long a log are not kept")
+            page.print(f"written to {folder.out}{watching.hint(folder.out)}", soft_wrap=True)
 
 
 def _read(options: Run) -> tuple[Path, ...]:
     """Return the files that are read."""
     named = [options.scenario, options.robot]
-    return tuple(Path(name).absolute() for name in named if name is not None)
+    return tuple(Path(name).absolute() for name in named if name is not None and Path(name).suffix)
 
 
 def _described(page: Page, options: Run) -> ScenarioRun:

@@ -19,4 +19,4 @@ def write(options: WriteScenario) -> None:
         require_free(options.out, "--out", force=options.force)
         write_text(options.out, to_toml(load(options.name)), "--out", force=options.force)
         page.out(f"written to {options.out}; run it: uv run idbench run {options.out}")
-    page.end()
+    page.close()

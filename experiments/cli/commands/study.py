@@ -42,7 +42,7 @@ def study(options: Study) -> None:
         for name in names():
             page.out(f"{name:16} {load_study(name).question}")
             page.found[name] = load_study(name).question
-        page.end()
+        page.close()
         return
     for name, value in (("seeds", seeds), ("shard", shard), ("threads", threads), ("workers", workers)):
         if value is not None and value < 1:
@@ -52,7 +52,7 @@ def study(options: Study) -> None:
         if resume
         else _begun(str(options.study), options.out, seeds, options.yes)
     )
-    folder = ResultsFolder(store.folder, "study", f"idbench study {store.study.name}", force=resume is not None)
+    folder = ResultsFolder(store.folder, "study", f"idbench study {store.study.name}", options.force)
     folder.check()
     width = workers or threads or os.cpu_count() or 1
     runs = shard or min(LARGEST_SHARD, ceil(store.study.size / (2 * width)))

@@ -23,12 +23,12 @@ def view(options: View) -> None:
     if not options.folders:
         page.print(f"the latest of {LATEST}: {folders[0]}", soft_wrap=True)
     if options.save is None:
-        page.end()
+        page.close()
         open_viewer(folders, options.tab)
         return
     save(folders, options.tab, options.save, force=options.force)
     page.print(f"written to {options.save}", soft_wrap=True)
-    page.end()
+    page.close()
 
 
 def open_viewer(folders: Sequence[Path], tab: str = "") -> None:

@@ -34,6 +34,8 @@ class Study(Command, action="study:study"):
     """Processes of this machine to run on instead (needs the extra `cluster`)."""
     scheduler: Url = None
     """Address of a Dask scheduler to run on instead, as tcp://host:8786 (needs the extra `cluster`)."""
+    force: bool = False
+    """Replace what is there already, results of other commands included."""
     yes: bool = False
     """Run more than a hundred thousand runs."""
     json: Json = False
