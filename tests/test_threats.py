@@ -77,7 +77,9 @@ def test_a_parquet_file_of_terabytes_in_kilobytes_is_refused_before_it_is_read(t
     pq.write_table(table, tmp_path / "bomb.parquet", compression="zstd")
     assert (tmp_path / "bomb.parquet").stat().st_size < 10_000
     monkeypatch.setattr("identify.files.room.memory", lambda: 1e-3)
-    with pytest.raises(LogError, match=r"holds 2e\+05 samples of 3 columns: reading them takes 0.0144 GB, and there are 0.001 GB"):
+    with pytest.raises(
+        LogError, match=r"holds 2e\+05 samples of 3 columns: reading them takes 0.0144 GB, and there are 0.001 GB"
+    ):
         read_columns(tmp_path / "bomb.parquet")
 
 

@@ -137,7 +137,7 @@ def test_a_payload_on_the_axis_says_nothing_of_its_gain(pairs):
 
 
 def test_gains_need_what_is_known(pairs):
-    with pytest.raises(SettingError, match="--mass is missing: the gains follow"):
+    with pytest.raises(SettingError, match="nothing is known of the payload"):
         identify_drive_gains(pairs.robot(0, {}))
     with pytest.raises(SettingError, match="there is no log without the payload"):
         identify_drive_gains(replace(pairs.robot(0, {"ML": 2.0}), without=()))

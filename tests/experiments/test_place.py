@@ -84,10 +84,47 @@ def test_results_replace_all_of_the_earlier_ones_and_further_files_none(tmp_path
     folder = filled(tmp_path / "out")
     with folder.held():
         with folder.more() as hidden:
-            (hidden / "report.html").write_text("page")
-        assert Manifest.of(folder.out).owns("report.html")
+            (hidden / "recording.rrd").write_text("page")
+            (hidden / "arm.json").write_text("written on demand")
+        assert Manifest.of(folder.out).owns("recording.rrd")
     filled(tmp_path / "out", "two")
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [NAME, "log.parquet", "summary.json"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [NAME, "arm.json", "log.parquet", "summary.json"]
+
+
+def test_force_replaces_what_is_written_and_removes_nothing_of_others(tmp_path, idbench, logs):
+    """Logs beside the results stay, above all the one that is read."""
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "log_of_monday.parquet").write_bytes((logs / "second.parquet").read_bytes())
+    (out / "summary.json").write_text("mine")
+    words = "--robot", "puma560", "--model", "explicit", "--estimator", "WLS", "--no-rerun", "--out", out, "--force"
+    assert idbench("identify", logs / "first.parquet", *words)[0] == 0
+    assert read_log(out / "log_of_monday.parquet").samples
+    for read in ("log_of_monday.parquet", "log.parquet"):
+        code, _, err = idbench("identify", f"out/{read}", *words)
+        assert (code, f"out/{read} is a file that this command reads" in err) == (2, True)
+    code, _, err = idbench("identify", "out", *words)
+    assert (code, "log.parquet is a file that this command reads" in err) == (2, True)
+    assert read_log(out / "log_of_monday.parquet").samples
+
+
+def test_a_command_can_be_repeated(tmp_path, idbench, logs):
+    """Its own folder may be called like a scenario, and files that it wrote beside the results are its own."""
+    for _ in range(2):
+        assert idbench("run", "ideal", "--no-rerun", "--out", "ideal")[0] == 0
+    words = "--robot", "puma560", "--model", "explicit", "--estimator", "WLS", "--no-rerun", "--out", "found"
+    for _ in range(2):
+        assert idbench("identify", logs / "first.parquet", *words, "--write", "found/arm.json")[0] == 0
+    code, _, err = idbench("identify", logs / "first.parquet", *words, "--write", "found/summary.json")
+    assert (code, "the results have a file of that name" in err) == (2, True)
+    (tmp_path / "found" / "arm.json").write_text("mine")
+    assert idbench("identify", logs / "first.parquet", *words, "--write", "found/arm.json")[0] == 2
+    assert (tmp_path / "found" / "arm.json").read_text() == "mine"
+
+
+def test_errors_of_others_are_not_called_errors_of_the_folder(tmp_path):
+    with pytest.raises(PermissionError, match="Permission denied"), ResultsFolder(tmp_path / "out", "run", "x").held():
+        raise PermissionError(13, "Permission denied", "log.csv")
 
 
 def test_two_runs_into_one_folder_at_once(tmp_path):

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -118,11 +119,29 @@ def test_results_are_saved_before_the_judgement(idbench, logs, tmp_path, monkeyp
 
     monkeypatch.setattr("experiments.cli.commands.identify.judge", interrupted)
     code, out, err = idbench("identify", logs / "first.parquet", *WORDS, "--out", "found")
-    assert (code, err) == (130, "idbench: interrupted\n")
+    kept = "idbench: the estimates are printed, and with the logs in found"
+    assert (code, err.strip().splitlines()) == (130, [kept, "idbench: interrupted"])
     assert "Cond(W)" in out
     summary = json.loads((tmp_path / "found" / "summary.json").read_text())
     assert summary["models"]["explicit"]["estimate"]
     assert (tmp_path / "found" / "log.parquet").is_file()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+def test_a_screen_that_is_full_costs_no_view(logs, tmp_path):
+    words = ["identify", str(logs / "first.parquet"), *WORDS, "--no-rerun", "--out", "found"]
+    code = f"import sys; from experiments.cli import main; sys.exit(main({words}))"
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, check=False)
+    assert (done.returncode, b"cannot print: No space left" in done.stderr) == (2, True)
+    assert (tmp_path / "found" / "report.html").is_file()
+
+
+def test_a_run_without_a_recording_gets_no_layer(idbench, tmp_path):
+    assert idbench("run", "ideal", "--no-rerun", "--out", "ran")[0] == 0
+    code, _, err = idbench("identify", "ran", "--estimator", "WLS", "--label", "again")
+    assert (code, err) == (0, "")
+    assert not list((tmp_path / "ran").glob("*.rrd"))
 
 
 @pytest.mark.thorough

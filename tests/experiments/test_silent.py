@@ -49,7 +49,7 @@ def test_the_order_of_laws_does_not_matter():
 def test_a_study_compares_laws_of_friction(tmp_path, monkeypatch, capsys):
     """Both are in table, summary and report; typical errors are of the parameters that both have."""
     monkeypatch.chdir(tmp_path)
-    text = 'name = "laws"\nquestion = "Which law?"\nscenario = "ideal"\nseeds = 2\nmodels = ["explicit"]\n'
+    text = 'name = "laws"\nquestion = "Which law?"\nscenario = "ideal"\nseeds = 12\nmodels = ["explicit"]\n'
     text += 'friction = ["standard", "standard+stribeck:0.1"]\n[settings.trajectory]\nkind = "random"\nmoves = 3\n'
     text += '[[axes]]\nfield = "torque.noise"\nvalues = [0.01, 0.1]\n'
     (tmp_path / "laws.toml").write_text(text)
@@ -60,6 +60,9 @@ def test_a_study_compares_laws_of_friction(tmp_path, monkeypatch, capsys):
     assert found == {"standard", "standard+stribeck:0.1"}
     assert len(summary["cells"]) == 4
     assert "standard+stribeck:0.1" in printed
+    assert "nan" not in printed
+    assert "explicit (standard)" in summary["answer"]
+    assert "not significantly worse than any other in 2 of 2 settings" in summary["answer"]
     assert "standard+stribeck:0.1" in (tmp_path / "out" / "report.html").read_text()
     assert main(["run", "--from", "out", "--index", "0", "--method", "1", "--no-rerun", "--out", "again"]) == 0
     assert "Fst1" in capsys.readouterr().out
@@ -113,6 +116,33 @@ def test_a_payload_has_a_verdict(payload, idbench, loaded, unloaded, more, words
         assert word in out, word
     assert ("warning" in out) == (words[0] not in ("empty.parquet: good", "full.parquet: good"))
     assert ("the nearest physically consistent body" in out) == ("below zero" not in out)
+
+
+@pytest.mark.thorough
+def test_logs_of_one_name_are_judged_each(payload, idbench, tmp_path):
+    """Every run has a log.parquet; the verdict is that of the worst, and what cannot be is poor."""
+    for name in ("empty", "full"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "log.parquet").write_bytes((payload / f"{name}.parquet").read_bytes())
+    for loaded, unloaded, word in (("full", "empty", "good"), ("empty", "full", "poor")):
+        logs = f"{loaded}/log.parquet", "--unloaded", f"{unloaded}/log.parquet"
+        code, out, err = idbench("payload", *logs, *WAY, "--out", loaded + "-found")
+        assert (code, err) == (0, "")
+        assert f"verdict: {word}" in out
+        judged = json.loads((tmp_path / f"{loaded}-found" / "summary.json").read_text())["judgement"]
+        assert (judged["verdict"], set(judged["logs"])) == (word, {"full/log.parquet", "empty/log.parquet"})
+
+
+@pytest.mark.thorough
+def test_a_payload_is_saved_before_it_is_judged(payload, idbench, tmp_path, monkeypatch):
+    def broken(*args):
+        raise ZeroDivisionError("on purpose")
+
+    monkeypatch.setattr("experiments.loads.judgement.LoadJudgement.warnings", broken)
+    code, out, err = idbench("payload", payload / "full.parquet", "--unloaded", payload / "empty.parquet", *WAY, "--out", "f")
+    assert (code, "the verdict: " in err, "consistent body" in out) == (2, True, True)
+    assert (tmp_path / "f" / "summary.json").is_file()
+    assert (tmp_path / "f" / "fault.txt").is_file()
 
 
 @pytest.mark.thorough
@@ -215,7 +245,8 @@ def test_positions_that_jump_are_named_and_nothing_is_advised(idbench, scara_csv
     for word in words:
         assert word in out + err
     assert "no advice is drawn from a log with jumps" in out + err
-    assert "the worst joint's error falls" not in out
+    for advice in ("the worst joint's error falls", "are they in N m", "are units, signs"):
+        assert advice not in out
 
 
 @pytest.mark.thorough
@@ -223,6 +254,27 @@ def test_positions_that_jump_are_named_and_nothing_is_advised(idbench, scara_csv
 def test_no_motion_of_a_robot_jumps(name):
     log = simulate(replace(load(name), trajectory=RandomMoves(moves=6))).alone()
     assert not jumps(log.q, log.fs)
+
+
+COUNT = 2 * np.pi / 4096
+
+
+@pytest.mark.parametrize(
+    "quiet",
+    [
+        lambda t: np.where((t > 12.33) & (t < 12.36) | (t > 30), COUNT, 0.0),
+        lambda t: np.floor(t / 2) * COUNT,
+        lambda t: np.round(0.3 * np.sin(2 * np.pi * t / 40) / COUNT) * COUNT,
+        lambda t: np.round(np.clip(t - 20, 0, 1) * 0.5 / 0.01) * 0.01,
+    ],
+    ids=["flickers", "creeps", "slow", "coarse"],
+)
+def test_a_quiet_joint_does_not_jump(quiet):
+    t = np.arange(4000) / 100
+    other = np.round(np.sin(2 * np.pi * 0.3 * t) / COUNT) * COUNT
+    assert not jumps(np.stack([quiet(t), other], axis=1), 100.0)
+    slipped = quiet(t) + np.where(t > 15, 0.5, 0.0)
+    assert [(jump.joint, jump.sample) for jump in jumps(np.stack([slipped, other], axis=1), 100.0)] == [(0, 1501)]
 
 
 def test_a_column_counts_once(complaint, scara_csv):
