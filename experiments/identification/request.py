@@ -62,7 +62,9 @@ class Request:
     def __post_init__(self) -> None:
         _ = self.subject.basis, self.processing, self.solver, [MODELS.create(name) for name in self.models]
         if self.start != "least-squares" and not self.solver.begins:
-            raise ExperimentError(f"--start {self.start}: {self.estimator} needs no start; leave it out, or take IV or DIDIM")
+            raise ExperimentError(
+                f"--start {self.start}: {self.estimator} needs no start; leave it out, or take --estimator IV or DIDIM"
+            )
 
     @property
     def processing(self) -> Chain:

@@ -41,7 +41,9 @@ def request_of(options: Identify, stated: Mapping[str, Any]) -> Request:
         consistent=options.consistent,
     )
     if options.loop and "loop" not in request.solver.needs:
-        raise ExperimentError(f"--loop: {options.estimator} simulates no loop; leave it out, or take IV, DIDIM, CLIE or CLOE")
+        raise ExperimentError(
+            f"--loop: {options.estimator} simulates no loop; leave it out, or take --estimator IV, DIDIM, CLIE or CLOE"
+        )
     return _with_chain(options, request)
 
 
