@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 
-from experiments.identification.held_out import HeldOut
 from experiments.identification.judgement import Judgement
 from experiments.identification.log_warnings import unusable, warnings_of_log
 from experiments.identification.remedies import Remedies, delay_advice
@@ -37,11 +36,11 @@ def checks(judgement: Judgement, *, delay: bool) -> dict[str, list[str]]:
     found[MOTION] += hidden_notes(result)
     for about, warnings in warnings_of_result(result).items():
         found[about] += warnings
-    first = judgement.on[0]
-    if isinstance(first, HeldOut) and not result.logs.long:
+    hardest = judgement.hardest
+    if hardest is not None and not result.logs.long:
         # Friction absorbs a wrong delay, and the verdict may be good: the log itself is asked.
         found[DELAY] += delay_advice(result) if delay else ()
-        found[MODEL] += () if judgement.good else Remedies(first).options()
+        found[MODEL] += () if judgement.good else Remedies(hardest).options()
     return found
 
 

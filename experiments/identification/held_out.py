@@ -35,7 +35,8 @@ def on_last_quarter(result: Fit) -> "HeldOut":
     logs, k = result.logs, result.logs.longest
     rest, end = split(logs.fitted[k])
     fitted = (*logs.fitted[:k], rest, *logs.fitted[k + 1 :])
-    title = f"the last quarter of {logs.longest_name}, by a fit of the rest"
+    laws = "" if result.choice is None else ", with the laws of friction that all of it chose"
+    title = f"the last quarter of {logs.longest_name}, by a fit of the rest{laws}"
     return HeldOut(fit(result.request, replace(logs, fitted=fitted)), manageable([end])[0], title)
 
 

@@ -7,6 +7,7 @@ from typing import Any, final
 from experiments.faults import is_told, reason, trace
 from experiments.identification.fit import Fit
 from experiments.identification.held_out import HeldOut, on_last_quarter, on_log
+from experiments.identification.verdict import WORDS
 
 
 @final
@@ -60,14 +61,24 @@ class Judgement:
         return [one for one in self.on if isinstance(one, Unjudged) and (self.fit.logs.held_out or one.traceback)]
 
     @property
+    def hardest(self) -> HeldOut | None:
+        """The held-out log on which the best model does worst; None if it was judged on none."""
+        return max(self.held_out, key=_best, default=None)
+
+    @property
     def good(self) -> bool:
-        """Whether a model is good on the first held-out log."""
-        return isinstance(self.on[0], HeldOut) and any(verdict.word == "good" for verdict in self.on[0].verdicts.values())
+        """Whether a model is good on every held-out log."""
+        return self.hardest is not None and WORDS[_best(self.hardest)] == "good"
 
     def summary(self) -> dict[str, Any]:
         """Return what a summary.json says of it, beside the fit's own."""
         each = [one.summary() for one in self.on]
         return {"validation": each[0], "validations": each}
+
+
+def _best(one: HeldOut) -> int:
+    """Return the place, in WORDS, of the verdict on the best model."""
+    return min(WORDS.index(verdict.word) for verdict in one.verdicts.values())
 
 
 def judge(result: Fit) -> Judgement:

@@ -18,6 +18,9 @@ GOOD, FAIR = 2.0, 10.0
 
 docs/any-arm.md has the table of right and wrong models from which these come."""
 
+WORDS = ("good", "fair", "unsure", "poor")
+"""Verdicts, the worst last."""
+
 
 @final
 @dataclass(frozen=True, eq=False)

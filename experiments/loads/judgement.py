@@ -11,7 +11,7 @@ from experiments.identification.fit import fit
 from experiments.identification.log_warnings import warnings_of_log
 from experiments.identification.logs import Logs
 from experiments.identification.request import Request
-from experiments.identification.verdict import GOOD, Verdict
+from experiments.identification.verdict import GOOD, WORDS, Verdict
 from experiments.identification.warnings import LOG, MODEL, wrong_sign, wrong_unit
 from experiments.text import error_percentage
 from identify import Array, Estimate, ExplicitModel, IdentificationError, MotionLog, Problem, validate
@@ -24,9 +24,6 @@ SURE = 4.0
 
 SHARE = 0.01
 """Share of a value below which what contradicts it does not matter."""
-
-WORDS = ("good", "fair", "unsure", "poor")
-"""Verdicts, the worst last."""
 
 PAYLOAD = "the payload"
 """What some warnings are about."""

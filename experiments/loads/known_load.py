@@ -1,7 +1,6 @@
 """What is known of a payload, as options say it."""
 
 from collections.abc import Sequence
-from math import isfinite
 
 import numpy as np
 
@@ -40,9 +39,6 @@ def known_of(mass: float | None, at: Sequence[float] | None, inertia: Sequence[f
                 f"--inertia {' '.join(f'{x:g}' for x in inertia)} is of no body: its principal moments must be 0 or above, "
                 "and none larger than the sum of the others"
             )
-    values = [x for x in (mass, *(at or ()), *(inertia or ())) if x is not None]
-    if not all(map(isfinite, values)) or (mass is not None and not mass > 0):
-        raise ExperimentError(f"mass, place and inertia of the payload must be finite, the mass above 0: {values}")
     found = {} if mass is None else {"ML": float(mass)}
     if mass is not None and at is not None:
         found |= {f"M{x}L": mass * c for x, c in zip("XYZ", at, strict=True)}

@@ -27,7 +27,7 @@ def report(
 
     A figure that fails is noted in `attempts`, and missing.
     """
-    fit, first = judgement.fit, judgement.on[0]
+    fit, hardest = judgement.fit, judgement.hardest
     subject = fit.subject
     cutoff = getattr(fit.processing.operator, "cutoff", None)
     return rendered(
@@ -35,8 +35,8 @@ def report(
         "identify.html.j2",
         title=f"{subject.tree.name}: {fit.logs.title}",
         subtitle=f"{subject.tree.n} joints, {len(fit.basis.names)} parameters, {fit.request.estimator}",
-        verdicts=[] if isinstance(first, Unjudged) else list(_verdicts(first)),
-        unjudged=first.why if isinstance(first, Unjudged) else "",
+        verdicts=[] if hardest is None else list(_verdicts(hardest)),
+        unjudged="; ".join(one.why for one in judgement.on if isinstance(one, Unjudged)),
         failures=fit.failures,
         warnings={about: messages for about, messages in warnings.items() if messages},
         unseen=[_held_out(one, attempts) for one in judgement.held_out],

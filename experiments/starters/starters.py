@@ -12,6 +12,7 @@ from jinja2 import Environment, StrictUndefined
 
 from experiments.errors import ExperimentError, ResultsError
 from experiments.plugin_tables import TABLES
+from experiments.results.writing import exchange, folder_for, hidden_folder
 from identify.plugins import did_you_mean
 from sim.scenario.scenario_file import load, to_toml
 
@@ -107,9 +108,16 @@ def _write(out: Path, contents: Mapping[str, str]) -> None:
     if out.exists():
         raise ExperimentError(f"{out} exists: choose another name, or --out")
     try:
-        for name, text in contents.items():
-            path = out / name if name else out
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, encoding="utf-8")
+        with hidden_folder(folder_for(out.absolute().parent, "--out")) as hidden:
+            for name, text in contents.items():
+                path = hidden / out.name / name if name else hidden / out.name
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text(text, encoding="utf-8")
+            if (hidden / out.name).is_dir():
+                (hidden / out.name).rename(out)  # which fails if there is one with files by now
+            else:
+                exchange(hidden / out.name, out, force=False)
+    except FileExistsError:
+        raise ExperimentError(f"{out} exists: choose another name, or --out") from None
     except OSError as error:
         raise ResultsError(f"cannot write {out}: {error.strerror}") from error
