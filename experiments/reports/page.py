@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 from experiments.identification.fit import Fit
 from experiments.identification.held_out import HeldOut
 from experiments.identification.judgement import Judgement, Unjudged
+from experiments.reports.estimates import EstimatesTable
 from experiments.reports.figures import (
     friction_figure,
     parameters_figure,
@@ -15,7 +16,7 @@ from experiments.reports.figures import (
 )
 from experiments.reports.html import rendered
 from experiments.results.attempts import Attempts
-from experiments.text import number, percentage
+from experiments.text import percentage
 
 T = TypeVar("T")
 
@@ -28,6 +29,7 @@ def report(
     A figure that fails is noted in `attempts`, and missing.
     """
     fit, hardest = judgement.fit, judgement.hardest
+    table = EstimatesTable(fit)
     subject = fit.subject
     cutoff = getattr(fit.processing.operator, "cutoff", None)
     return rendered(
@@ -41,8 +43,9 @@ def report(
         warnings={about: messages for about, messages in warnings.items() if messages},
         unseen=[_held_out(one, attempts) for one in judgement.held_out],
         parameters=_figure(attempts, "parameters", parameters_figure, fit),
-        parameter_heads=[f"{model} {what}" for model in fit.estimates for what in ("X", "sigma", "%")],
-        parameter_rows=list(_parameters(fit)),
+        parameter_heads=[" ".join(head) for head in table.heads],
+        parameter_rows=list(_parameters(fit, table)),
+        legend=table.legend,
         friction=_figure(attempts, "friction", friction_figure, fit),
         spectra=_figure(attempts, "spectra", spectra_figure, fit),
         joints=subject.robot.joints,
@@ -79,13 +82,9 @@ def _held_out(one: HeldOut, attempts: Attempts) -> tuple[str, str, list[str], li
     return one.title, _figure(attempts, "torques", torques_figure, one), heads, rows
 
 
-def _parameters(fit: Fit) -> Iterator[list[str]]:
+def _parameters(fit: Fit, table: EstimatesTable) -> Iterator[list[str]]:
     base = fit.subject.base
-    for i, (name, unit) in enumerate(zip(fit.basis.names, fit.basis.units, strict=True)):
-        cells = []
-        for e in fit.estimates.values():
-            share = 100 * e.best_sigma[i] / abs(e.X[i]) if e.X[i] else float("inf")
-            cells += [number(e.X[i]), f"{e.best_sigma[i]:.2g}", percentage(share)]
+    for (name, *cells), unit in zip(table.rows(), fit.basis.units, strict=True):
         yield [f"{name} [{unit}]", *cells, base.groupings[name] if base else ""]
 
 

@@ -1,6 +1,6 @@
 """Identifications as text."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from math import isfinite, log2, pi
 
 from rich.console import Console
@@ -13,8 +13,8 @@ from experiments.identification.held_out import HeldOut
 from experiments.identification.iterations import words_of_iterations
 from experiments.identification.judgement import Unjudged
 from experiments.identification.remedies import SURE
-from experiments.identification.warnings import FLAGS, doubtful, used
-from experiments.text import WORTHLESS, new_table, number, percent, percentage, print_titled
+from experiments.reports.estimates import EstimatesTable
+from experiments.text import WORTHLESS, new_table, percentage, print_titled
 from identify import AsLogged, Estimate
 
 
@@ -23,16 +23,11 @@ def print_fit(console: Console, fit: Fit, title: str) -> None:
 
     Sigma is the corrected one; the paper's is in the summary.
     """
-    marks = doubtful(fit)
-    flags = used(marks)
-    print_titled(
-        console,
-        f"{title}: chain {fit.request.chain}, {fit.request.estimator}",
-        _table(fit, marks, flags),
-        1 + (fit.truth is not None),
-    )
-    if flags:
-        console.print(Text("; ".join(f"{flag} {FLAGS[flag]}" for flag in flags)))
+    table = EstimatesTable(fit)
+    what = f"{title}: chain {fit.request.chain}, {fit.request.estimator}"
+    print_titled(console, what, _grid(table), 1 + (fit.truth is not None))
+    if table.legend:
+        console.print(Text(table.legend))
     for words in _told(fit):
         console.print(Text(words), soft_wrap=True)
     if len(fit.logs.fitted) > 1 and fit.torque_errors:
@@ -40,24 +35,14 @@ def print_fit(console: Console, fit: Fit, title: str) -> None:
     console.print()
 
 
-def _table(fit: Fit, marks: Mapping[str, Sequence[Sequence[str]]], flags: Sequence[str]) -> Table:
-    """Return the table of the parameters, with marks of those that are doubtful, and of the fit as a whole."""
-    known, estimates = fit.truth is not None, fit.estimates
-    what = ("X", "%e" if known else "sigma", "%sigma")
-    grid = new_table("", [*(["true\nX"] if known else []), *(f"{model}\n{w}" for model in estimates for w in what)])
-    for i, name in enumerate(fit.basis.names):
-        true = [f"{list(fit.truth.values())[i]:g}"] if fit.truth is not None else []
-        each = (_flagged(_cells(e, fit, i), marks[m][i] if flags else ("", "", "")) for m, e in estimates.items())
-        grid.add_row(name, *true, *(cell for cells in each for cell in cells))
+def _grid(table: EstimatesTable) -> Table:
+    """Return the table of the parameters, and of the fit as a whole."""
+    grid = new_table("", [f"{first}\n{second}" for first, second in table.heads])
+    for cells in table.rows():
+        grid.add_row(*cells)
     grid.add_section()
-    whole = {
-        "Cond(W)": [f"{e.condition_number:.1f}" for e in estimates.values()],
-        "rows": [f"{e.row_count}" for e in estimates.values()],
-    }
-    for j in range(fit.basis.n):
-        whole[f"tau{j + 1} explained"] = [_explained(share[j]) for share in fit.explained.values()]
-    for name, cells in whole.items():
-        grid.add_row(name, *([""] if known else []), *(cell for first in cells for cell in (first, "", "")))
+    for cells in table.whole():
+        grid.add_row(*cells)
     return grid
 
 
@@ -91,11 +76,6 @@ def _print_logs(console: Console, fit: Fit) -> None:
     print_titled(console, f"what the {model} model leaves of each log while joints move: rms torque error [N m, N]", grid)
 
 
-def _flagged(cells: Sequence[str], marks: Sequence[str]) -> Iterator[str]:
-    """Yield cells, each with its mark."""
-    return (f"{cell}{mark}" for cell, mark in zip(cells, marks, strict=True))
-
-
 def _noise(fit: Fit) -> str:
     """Return the noise of a log in words, joint by joint."""
     torque, position = (" ".join("?" if x is None else f"{x:.2g}" for x in fit.noise[name]) for name in ("torque", "position"))
@@ -108,22 +88,6 @@ def _noise(fit: Fit) -> str:
     each = zip(steps, slides, strict=True)
     bits = " ".join("-" if slide else f"{log2(2 * pi / step):.1f}" if step else "?" for step, slide in each)
     return f"{words}; encoder steps {' '.join(f'{x:.3g}' if x else '?' for x in steps)} {length} ({bits} bits)"
-
-
-def _explained(share: float) -> str:
-    if not isfinite(share):
-        return "no torque"
-    return f"{100 * share:.3f} %" if share > -WORTHLESS / 100 else f"<-{WORTHLESS:g} %"
-
-
-def _cells(estimate: Estimate, fit: Fit, i: int) -> tuple[str, str, str]:
-    if fit.truth is None:
-        second = f"{estimate.best_sigma[i]:.2g}"
-    else:
-        error = float(estimate.error_percent(list(fit.truth.values()))[i])
-        second = percent(error) if isfinite(error) else ""
-    share = 100 * estimate.best_sigma[i] / abs(estimate.X[i]) if estimate.X[i] else float("inf")
-    return number(estimate.X[i]), second, percentage(share) or f">{WORTHLESS:g}"
 
 
 def print_held_out(console: Console, one: HeldOut | Unjudged) -> None:

@@ -1,0 +1,87 @@
+"""The table of estimates: made once, for the screen, the page of a report and a recording."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import isfinite
+
+from experiments.identification.fit import Fit
+from experiments.identification.warnings import FLAGS, doubtful, used
+from experiments.text import WORTHLESS, number, percent, percentage
+from identify import Estimate
+
+
+@dataclass(frozen=True, eq=False)
+class EstimatesTable:
+    """Of each model its estimate, error or sigma, and %sigma, beside the truth if it is known.
+
+    Parameters
+    ----------
+    fit : Fit
+        The identification.
+    """
+
+    fit: Fit
+
+    @property
+    def heads(self) -> list[tuple[str, str]]:
+        """The two lines above each column but the first."""
+        known = self.fit.truth is not None
+        what = "X", "%e" if known else "sigma", "%sigma"
+        return [("true", "X")] * known + [(model, each) for model in self.fit.estimates for each in what]
+
+    def rows(self) -> Iterator[list[str]]:
+        """Yield the cells of every parameter, its name first; marks stand behind what is doubtful."""
+        for i, name in enumerate(self.fit.basis.names):
+            each = (self._cells(model, estimate, i) for model, estimate in self.fit.estimates.items())
+            yield [name, *self._true(i), *(cell for cells in each for cell in cells)]
+
+    def short(self) -> Iterator[list[str]]:
+        """Yield the truth and the estimates alone, with all marks."""
+        for i, name in enumerate(self.fit.basis.names):
+            values = (f"{e.X[i]:.4g}{''.join(self._marks[m][i]).strip()}" for m, e in self.fit.estimates.items())
+            yield [name, *self._true(i), *values]
+
+    def whole(self) -> Iterator[list[str]]:
+        """Yield the cells of what is said of each fit as a whole."""
+        estimates, before = self.fit.estimates.values(), [""] * (self.fit.truth is not None)
+        every = {"Cond(W)": [f"{e.condition_number:.1f}" for e in estimates], "rows": [f"{e.row_count}" for e in estimates]}
+        for j in range(self.fit.basis.n):
+            every[f"tau{j + 1} explained"] = [_explained(share[j]) for share in self.fit.explained.values()]
+        for name, cells in every.items():
+            yield [name, *before, *(cell for first in cells for cell in (first, "", ""))]
+
+    @cached_property
+    def legend(self) -> str:
+        """What the marks mean that are used."""
+        return "; ".join(f"{flag} {FLAGS[flag]}" for flag in used(self._marks))
+
+    @cached_property
+    def _marks(self) -> dict[str, list[tuple[str, str, str]]]:
+        return doubtful(self.fit)
+
+    def _true(self, i: int) -> list[str]:
+        return [] if self.fit.truth is None else [f"{list(self.fit.truth.values())[i]:g}"]
+
+    def _cells(self, model: str, estimate: Estimate, i: int) -> Iterator[str]:
+        if self.fit.truth is None:
+            second = f"{estimate.best_sigma[i]:.2g}"
+        else:
+            error = float(estimate.error_percent(list(self.fit.truth.values()))[i])
+            second = percent(error) if isfinite(error) else ""
+        share = 100 * estimate.best_sigma[i] / abs(estimate.X[i]) if estimate.X[i] else float("inf")
+        cells = number(estimate.X[i]), second, percentage(share) or f">{WORTHLESS:g}"
+        marks = self._marks[model][i] if self.legend else ("", "", "")
+        return (f"{cell}{mark}" for cell, mark in zip(cells, marks, strict=True))
+
+
+def markdown(title: str, heads: Sequence[str], rows: Iterator[list[str]]) -> str:
+    """Return a table as markdown, its first column of names, the others of numbers."""
+    lines = [f"| {' | '.join(cells)} |" for cells in (["", *heads], ["---", *["---:"] * len(heads)], *rows)]
+    return "\n".join([f"{title}\n", *lines])
+
+
+def _explained(share: float) -> str:
+    if not isfinite(share):
+        return "no torque"
+    return f"{100 * share:.3f} %" if share > -WORTHLESS / 100 else f"<-{WORTHLESS:g} %"
