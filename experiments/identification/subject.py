@@ -110,7 +110,7 @@ class Subject:
         if missing := [name for name in self.asked.without if name not in self.whole.names]:
             laws = "" if self.laws.standard else f" with --friction {' '.join(self.asked.friction)}"
             raise ExperimentError(
-                f"--without {' '.join(missing)}: there is no such parameter{laws}; there are {', '.join(self.whole.names)}"
+                f"--without: there is no parameter {', '.join(missing)}{laws}; there are {', '.join(self.whole.names)}"
             )
         return self.whole.without(*self.asked.without) if self.asked.without else self.whole
 

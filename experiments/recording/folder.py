@@ -9,8 +9,9 @@ from rerun.chunk import RrdReader
 from experiments.errors import ResultsError
 from experiments.recording.layouts import tabs
 from experiments.recording.stream import Stream
+from experiments.results.folder import RECORDING
 
-BASE = "recording.rrd"
+BASE = RECORDING
 INNER = "recording.inner.rrd"
 
 

@@ -18,7 +18,10 @@ try:
 except ImportError:  # not on Windows, where two processes in one folder are noticed at the exchange of files alone
     fcntl = None  # type: ignore[assignment]
 
-COMMON = ("summary.json", "recording.rrd", "recording.*.rrd", "log*.parquet", "fault.txt")
+RECORDING = "recording.rrd"
+"""The recording to which identifications add their layers."""
+
+COMMON = ("summary.json", RECORDING, "recording.*.rrd", "log*.parquet", "fault.txt")
 
 FILES: Mapping[str, tuple[str, ...]] = {
     "run": (*COMMON, "scenario.toml"),

@@ -139,8 +139,11 @@ def test_a_screen_that_is_full_costs_no_view(logs, tmp_path):
 
 def test_a_run_without_a_recording_gets_no_layer(idbench, tmp_path):
     assert idbench("run", "ideal", "--no-rerun", "--out", "ran")[0] == 0
-    code, _, err = idbench("identify", "ran", "--estimator", "WLS", "--label", "again")
-    assert (code, err) == (0, "")
+    code, out, err = idbench("identify", "ran", "--estimator", "WLS")
+    assert (code, err, "Cond(W)" in out) == (0, "", True)
+    code, out, err = idbench("identify", "ran", "--estimator", "WLS", "--label", "again")
+    assert (code, out) == (2, "")
+    assert "there is no recording.rrd in ran, to which --label again could add" in err
     assert not list((tmp_path / "ran").glob("*.rrd"))
 
 

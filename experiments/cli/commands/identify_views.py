@@ -14,9 +14,8 @@ from experiments.exports.exports import EXPORTS
 from experiments.identification.fit import Fit
 from experiments.identification.judgement import Judgement
 from experiments.recording.audience import Audience
-from experiments.recording.folder import BASE
 from experiments.results.attempts import Attempts
-from experiments.results.folder import ResultsFolder
+from experiments.results.folder import RECORDING, ResultsFolder
 from experiments.results.manifest import Manifest
 from experiments.results.writing import require_free, write_text
 
@@ -93,7 +92,7 @@ def recording(shown: Shown, attempts: Attempts) -> None:
 
 def has_recording(run: Path) -> bool:
     """Return whether a log is the folder of a run with a recording, to which layers can be added."""
-    return (run / BASE).is_file()
+    return (run / RECORDING).is_file()
 
 
 def _layered(shown: Shown, run: Path) -> ResultsFolder:
@@ -103,8 +102,12 @@ def _layered(shown: Shown, run: Path) -> ResultsFolder:
 
 def require_layer(options: Identify, label: str, command: str) -> None:
     """Raise ExperimentError if the layer of another identification would be replaced in the folder of a run."""
-    name = f"recording.{label}.rrd"
-    if not has_recording(options.log[0]) or options.out or options.force or not options.watching.rerun:
+    name, run = f"recording.{label}.rrd", options.log[0]
+    if not run.is_dir() or options.out or not options.watching.rerun:
+        return
+    if not has_recording(run) and options.label:
+        raise ExperimentError(f"there is no {RECORDING} in {run}, to which --label {label} could add: run it anew")
+    if options.force or not has_recording(run):
         return
     there = Manifest.of(options.log[0]).files.get(name)
     if there is not None and there.command != command and (options.log[0] / name).is_file():
