@@ -172,7 +172,7 @@ def test_the_answer_names_the_least_error_of_its_own_table(rng):
 
 
 def test_the_probability_is_that_of_all_exchanges(rng):
-    """Of eight runs, all 256 exchanges of errors between the two: the share with as large a ratio, within 4 sigma of the draws."""
+    """Of eight runs, all 256 exchanges of errors between the two: the share with as large a ratio."""
     one, other = cell(rng.normal(0, 1, (8, 2))), cell(rng.normal(0, 2, (8, 2)), "power")
     (found,) = differences([one, other])
     counted = 0
