@@ -101,8 +101,8 @@ def _best(group: Sequence[Cell]) -> Cell:
 
 def _not_worse(group: Sequence[Cell], best: Cell, cells: Sequence[Cell]) -> tuple[str, ...]:
     """Return the best cell of a group, and those that are not significantly worse."""
-    worse = {id(d.worse) for d in differences(group) if d.better is best and d.p < SURE}
-    return tuple(method(cell, cells) for cell in group if id(cell) not in worse)
+    worse = {d.worse for d in differences(group) if d.better is best and d.p < SURE}
+    return tuple(method(cell, cells) for cell in group if cell not in worse)
 
 
 def _sigmas(cells: Sequence[Cell]) -> str:
