@@ -4,15 +4,19 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Protocol
 
 from rich.console import Console
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 EVERY = 15.0
 """Time [s] between lines, where there is no terminal."""
 
-Told = Callable[[str], None]
-"""Receives which stage a work has come to."""
+
+class Told(Protocol):
+    """Receives which stage a work has come to, and which share of it is done if that is known."""
+
+    def __call__(self, stage: str, share: float | None = None) -> None: ...  # noqa: D102
 
 
 @contextmanager
@@ -24,41 +28,59 @@ def stages_of(what: str) -> Iterator[Told]:
     from identify.telling import listening
 
     console = Console(stderr=True)
-    if console.is_terminal:
-        columns = SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn()
-        with Progress(*columns, console=console, transient=True) as bar:
-            task = bar.add_task(what)
-            told: Told = lambda stage: bar.update(task, description=f"{what}: {stage}")  # noqa: E731
-            with listening(told):
-                yield told
-        return
-    lines = _Lines(console, what)
-    try:
-        with listening(lines.receive):
-            yield lines.receive
-    finally:
-        lines.done.set()
+    with _bar(console, what) if console.is_terminal else _lines(console, what) as told, listening(told):
+        yield told
 
 
 @contextmanager
 def progress_of(what: str) -> Iterator[Callable[[float], None]]:
-    """Give what receives the share of a work that is done, and shows it on the error stream."""
+    """Give what receives the share of a work that is done, and shows it."""
     with stages_of(what) as told:
-        yield lambda share: told(f"{share:4.0%}")
+        yield lambda share: told(f"{share:4.0%}", share)
 
 
-class _Lines:
-    """A line every EVERY seconds, also while a stage takes longer."""
+@contextmanager
+def runs_of(what: str, todo: int) -> Iterator[Callable[[float], None]]:
+    """Give what receives how many of `todo` runs are done, and shows it, their rate and the time left."""
+    start = time.monotonic()
 
-    def __init__(self, console: Console, what: str) -> None:
-        self._console, self._what, self._stage, self._start = console, what, "", time.monotonic()
-        self.done = threading.Event()
-        threading.Thread(target=self._tick, name="idbench-progress", daemon=True).start()
+    def receive(done: float) -> None:
+        rate = done / max(time.monotonic() - start, 1e-9)
+        rest = f", {rate:.3g} runs/s, {(todo - done) / rate:.0f} s left" if done else ""
+        told(f"{done:.0f} of {todo} runs{rest}", done / todo)
 
-    def receive(self, stage: str) -> None:
-        self._stage = stage.strip()
+    with stages_of(what) as told:
+        yield receive
 
-    def _tick(self) -> None:
-        while not self.done.wait(EVERY):
-            stage, passed = f": {self._stage}" if self._stage else "", time.monotonic() - self._start
-            self._console.print(f"{self._what}{stage}, {passed:.0f} s", highlight=False, soft_wrap=True)
+
+@contextmanager
+def _bar(console: Console, what: str) -> Iterator[Told]:
+    columns = TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn()
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task(what, total=None)
+
+        def receive(stage: str, share: float | None = None) -> None:
+            bar.update(task, description=f"{what}: {stage.strip()}", total=None if share is None else 1.0, completed=share)
+
+        yield receive
+
+
+@contextmanager
+def _lines(console: Console, what: str) -> Iterator[Told]:
+    """Print a line every EVERY seconds, also while a stage takes longer."""
+    done, now, start = threading.Event(), [""], time.monotonic()
+
+    def tick() -> None:
+        while not done.wait(EVERY):
+            stage = f": {now[0]}" if now[0] else ""
+            console.print(f"{what}{stage}, {time.monotonic() - start:.0f} s", highlight=False, soft_wrap=True)
+
+    def receive(stage: str, share: float | None = None) -> None:
+        del share
+        now[0] = stage.strip()
+
+    threading.Thread(target=tick, name="idbench-progress", daemon=True).start()
+    try:
+        yield receive
+    finally:
+        done.set()

@@ -4,12 +4,16 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from types import TracebackType
-from typing import Self, TypeVar, final
+from typing import TYPE_CHECKING, Self, TypeVar, final
 
 from experiments.errors import ResultsError
 from experiments.faults import REPORT, is_told, reason, report, trace
 from experiments.results.folder import ResultsFolder
+from experiments.results.streams import write_streams
 from identify.blame import is_mistake
+
+if TYPE_CHECKING:
+    from experiments.results.streams import Streams
 
 T = TypeVar("T")
 
@@ -49,6 +53,16 @@ class Attempts:
                 raise
             self.failed(what, reason(error), "" if is_told(error) else trace(error), error)
             return None
+
+    def file(self, name: str, make: Callable[[], str | bytes]) -> None:
+        """Write what `make` returns as a file beside the results."""
+        if self._folder is not None:
+            folder = self._folder
+            self.attempt(name, lambda: folder.add(name, make()))
+
+    def recording(self, make: "Callable[[], Streams]", into: ResultsFolder | None = None) -> None:
+        """Write the recording that `make` returns, beside the results or into another folder."""
+        self.attempt("the recording", lambda: write_streams(make(), into or self._folder))
 
     def failed(self, what: str, why: str, traceback: str = "", error: BaseException | None = None) -> None:
         """Note that something failed, and why; of a fault its traceback."""

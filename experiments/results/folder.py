@@ -163,6 +163,12 @@ class ResultsFolder:
         with self._exchanged(complete=False) as hidden:
             yield hidden
 
+    def add(self, name: str, content: str | bytes) -> None:
+        """Write one further file; errors as `complete`."""
+        with self.more() as hidden:
+            whole = content if isinstance(content, bytes) else content.encode("utf-8", "backslashreplace")
+            (hidden / name).write_bytes(whole)
+
     @contextmanager
     def _exchanged(self, *, complete: bool) -> Iterator[Path]:
         try:

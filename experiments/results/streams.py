@@ -9,8 +9,10 @@ if TYPE_CHECKING:
 
     from experiments.recording.stream import Stream
 
+    Streams = Sequence[tuple[str, Stream]]
 
-def write_streams(streams: "Sequence[tuple[str, Stream]]", folder: ResultsFolder | None) -> None:
+
+def write_streams(streams: "Streams", folder: ResultsFolder | None) -> None:
     """Write the files of a recording into a results folder, all or none; who watches has seen them anyway.
 
     Raises

@@ -12,14 +12,12 @@ from rich.text import Text
 from experiments.errors import ResultsError
 from experiments.results.attempts import Attempts
 from experiments.results.folder import ResultsFolder
-from experiments.results.streams import write_streams
 from experiments.results.summaries import write_summary
 from experiments.study.answer import answer, method, percent, settings_of, short, value
 from experiments.study.axis import FRICTION
 from experiments.study.shard_file import arrays
 from experiments.study.statistics import Cell, cells
 from experiments.study.store import Store
-from experiments.study.study import Study
 from experiments.study.study_report import report
 from experiments.study.versions import versions
 from experiments.text import new_table, print_table
@@ -43,21 +41,13 @@ def write_results(page: "Page", store: Store, folder: ResultsFolder, recording: 
     with folder.complete() as hidden:
         write_summary(hidden / "summary.json", summary)
     page.end()
-    attempts = Attempts(f"the answer is printed, and with all runs in {folder.out}", folder)
-    attempts.attempt("report.html", lambda: _report(folder, study, found, seconds))
-    if recording:
-        attempts.attempt("the recording", lambda: write_streams(recording.finish(found), folder))
-    page.print(Text(f"\nwritten to {store.folder}: open {store.folder / 'report.html'}"), soft_wrap=True)
-    attempts.close()
+    with Attempts(f"the answer is printed, and with all runs in {folder.out}", folder) as attempts:
+        attempts.file("report.html", lambda: report(study, found, seconds, folder.out))
+        if recording:
+            attempts.recording(lambda: recording.finish(found))
+        page.print(Text(f"\nwritten to {store.folder}: open {store.folder / 'report.html'}"), soft_wrap=True)
     if not any(cell.runs for cell in found):
         raise ResultsError(f"no run of study {study.name} gave an estimate: {_reasons(found)[0]}")
-
-
-def _report(folder: ResultsFolder, study: Study, found: Sequence[Cell], seconds: dict[str, float]) -> None:
-    with folder.more() as hidden:
-        (hidden / "report.html").write_text(
-            report(study, found, seconds, folder.out), encoding="utf-8", errors="backslashreplace"
-        )
 
 
 def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:

@@ -134,9 +134,7 @@ def test_a_failure_of_a_view_is_one_line_and_the_rest_is_there(out, monkeypatch,
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(experiments.recording.table1_recording, "record_table1", full)
-    assert "the recording: No space left on device; the table is printed, and with the log in" in complaint(
-        "table1", "--out", str(out)
-    )
+    assert "the recording: No space left on device; what was found is printed, and in" in complaint("table1", "--out", str(out))
     assert listed(out) == KEPT
     assert list(out.parent.iterdir()) == [out]
 
@@ -148,7 +146,7 @@ def test_results_that_cannot_be_written_leave_the_earlier_ones_whole(out, monkey
     def full(*args):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("experiments.cli.commands.paper.write_summary", full)
+    monkeypatch.setattr("experiments.cli.saving.write_summary", full)
     assert "No space left on device" in complaint("table1", "--no-rerun", "--out", str(out))
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
 

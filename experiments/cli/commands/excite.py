@@ -1,14 +1,16 @@
 """The command that designs motions."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from experiments.cli.command_text import command_of
 from experiments.cli.options.excite import Excite
 from experiments.cli.page import new_page, shown
 from experiments.cli.progress import progress_of
+from experiments.cli.saving import Files, saved, write_scenario
 from experiments.errors import ExperimentError
 from experiments.excite.design import Design
 from experiments.excite.excited import Excited
@@ -20,9 +22,7 @@ from experiments.identification.subject import Subject, absolute
 from experiments.identification.warnings import FILE, warnings_of_robot
 from experiments.recording.audience import Audience
 from experiments.reports.excite_printed import print_excited, print_sequence
-from experiments.results.attempts import Attempts
 from experiments.results.folder import ResultsFolder
-from experiments.results.summaries import write_summary
 from identify import MotionLog, TorqueChannel
 from identify.files.log_file import write_log
 from sim.encoders import IncrementalEncoder
@@ -30,7 +30,10 @@ from sim.limits.motion_limits import MotionLimits, limits_of, looser
 from sim.robot.robot import Robot
 from sim.scenario.measurement import TorqueMeasurement
 from sim.scenario.scenario import Scenario
-from sim.scenario.scenario_file import load, to_toml
+from sim.scenario.scenario_file import load
+
+if TYPE_CHECKING:
+    from experiments.results.streams import Streams
 
 LONGEST, FASTEST = 3600.0, 10000.0
 """Time of a motion, repeated [s], and sampling frequency [Hz] above which they are taken for a slip."""
@@ -59,44 +62,34 @@ def excite(options: Excite) -> None:
         page.warn({FILE: warnings_of_robot(design.subject.robot), "limits": looser(design.subject.robot, design.asked)})
         if sequence:
             print_sequence(page, sequence)
-        page.show()
-        what = command.removeprefix("uv run idbench excite ")
+        what, hint = command.removeprefix("uv run idbench excite "), options.watching.hint(folder.out)
         summary = found.summary() | {"path": what} | (sequence.summary() if sequence else {})
-        page.found |= summary | {"folder": str(folder.out)}
-        _save(folder, found, sequence, summary)
-        page.end()
-        attempts = Attempts(f"the motion is in {folder.out}", folder)
-        attempts.attempt("report.html", lambda: _report(folder, found, command))
-        if options.watching.rerun:
-            attempts.attempt("the recording", lambda: _record(folder, found, audience))
-        page.print(f"written to {folder.out}{options.watching.hint(folder.out)}", soft_wrap=True)
+        with saved(page, folder, summary, _files(found, sequence), hint) as attempts:
+            attempts.file("report.html", lambda: _report(found, command))
+            if options.watching.rerun:
+                attempts.recording(lambda: _recorded(found, audience))
         page.print(f"try it on the simulated robot: uv run idbench run {folder.out / 'scenario.toml'}", soft_wrap=True)
-        attempts.close()
 
 
-def _save(folder: ResultsFolder, found: Excited, sequence: MotionSequence | None, summary: dict[str, Any]) -> None:
-    """Write motions, logs, scenario and summary."""
-    with folder.complete() as hidden:
-        for number, each in enumerate(sequence.rounds if sequence else (), 1):
-            write_log(each.log, hidden / f"log{number}.parquet")
-            write_motion(each.excited, hidden / f"motion{number}.csv")
-        write_motion(found, hidden / "motion.csv")
-        (hidden / "scenario.toml").write_text(to_toml(found.scenario), encoding="utf-8", errors="backslashreplace")
-        write_summary(hidden / "summary.json", summary)
+def _files(found: Excited, sequence: MotionSequence | None) -> Files:
+    """Return what writes motions, logs and scenario."""
+    files = dict[str, Callable[[Path], object]]()
+    for number, each in enumerate(sequence.rounds if sequence else (), 1):
+        files[f"log{number}.parquet"] = partial(write_log, each.log)
+        files[f"motion{number}.csv"] = partial(write_motion, each.excited)
+    return files | {"motion.csv": partial(write_motion, found), "scenario.toml": partial(write_scenario, found.scenario)}
 
 
-def _report(folder: ResultsFolder, found: Excited, command: str) -> None:
+def _report(found: Excited, command: str) -> str:
     from experiments.reports.excite import report
 
-    with folder.more() as hidden:
-        (hidden / "report.html").write_text(report(found, command), encoding="utf-8", errors="backslashreplace")
+    return report(found, command)
 
 
-def _record(folder: ResultsFolder, found: Excited, audience: Audience | None) -> None:
+def _recorded(found: Excited, audience: Audience | None) -> "Streams":
     from experiments.recording.excite_recording import record_excited
-    from experiments.results.streams import write_streams
 
-    write_streams(record_excited(found, audience), folder)
+    return record_excited(found, audience)
 
 
 def _designed(options: Excite) -> Design:

@@ -64,8 +64,7 @@ def report(shown: Shown, attempts: Attempts) -> None:
     if shown.folder is None or shown.fit.logs.long:
         return
     text = page_of(shown.judgement, shown.warnings, shown.page.found["notes"], shown.command, attempts)
-    with shown.folder.more() as hidden:
-        (hidden / "report.html").write_text(text, encoding="utf-8", errors="backslashreplace")
+    shown.folder.add("report.html", text)
 
 
 def recording(shown: Shown, attempts: Attempts) -> None:
@@ -138,8 +137,7 @@ def _export(shown: Shown, option: str, path: Path) -> None:
     what, render = EXPORTS[path.suffix]
     text, warnings = render(shown.fit, shown.fit.leading, path)
     if shown.folder and shown.folder.goes_beside(path, option):
-        with shown.folder.more() as hidden:
-            (hidden / path.name).write_text(text, encoding="utf-8", errors="backslashreplace")
+        shown.folder.add(path.name, text)
     else:
         write_text(path, text, option, force=shown.options.force, read=shown.folder.read if shown.folder else ())
     shown.page.print(Text(f"written to {path}: {what} with the parameters of the {shown.fit.leading} model"), soft_wrap=True)

@@ -41,12 +41,11 @@ def show_log(options: ShowLog) -> None:
             page.print(Text(note), soft_wrap=True)
         page.found |= {**facts.summary(), "layout": layout.text, "doubts": list(found.doubts)}
         page.end()
-        attempts = Attempts("the rest is printed")
-        if options.write:
-            attempts.attempt("--write", lambda: _write(page, options, layout))
-        if options.picture is not None:
-            attempts.attempt("--picture", lambda: _draw(page, options, facts))
-        attempts.close()
+        with Attempts("the rest is printed") as attempts:
+            if options.write:
+                attempts.attempt("--write", lambda: _write(page, options, layout))
+            if options.picture is not None:
+                attempts.attempt("--picture", lambda: _draw(page, options, facts))
 
 
 def _draw(page: Page, options: ShowLog, facts: LogFacts) -> None:

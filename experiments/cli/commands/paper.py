@@ -1,6 +1,7 @@
 """The commands about the paper's tables: the comparison, the search for its trajectory, the experiment repeated."""
 
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 
 from rich.console import Console
@@ -12,6 +13,7 @@ from experiments.cli.options.paper import Table1 as Table1Options
 from experiments.cli.options.paper import Table2 as Table2Options
 from experiments.cli.page import new_page, shown
 from experiments.cli.progress import progress_of
+from experiments.cli.saving import saved
 from experiments.errors import ExperimentError
 from experiments.paper.motions import Table1Motions
 from experiments.paper.motions_report import picture, print_motions
@@ -20,9 +22,7 @@ from experiments.paper.table1 import CHAINS_COMPARED, SCENARIO, Table1
 from experiments.paper.table1_text import print_table1
 from experiments.paper.table2 import Table2
 from experiments.paper.table2_text import print_table2
-from experiments.results.attempts import Attempts
 from experiments.results.folder import ResultsFolder
-from experiments.results.summaries import write_summary
 from experiments.results.writing import require_free, write_text
 from identify.files.log_file import write_log
 from sim.robot.robot import Robot
@@ -55,20 +55,12 @@ def compare(options: Table1Options) -> None:
     with options.watching.audience() as audience, shown(page), folder.held():
         table = Table1(load(options.scenario or SCENARIO) if options.seed is None else _searched(options.seed), chains)
         print_table1(page, table)
-        page.found |= table.summary() | {"folder": str(folder.out)}
-        page.show()
-        with folder.complete() as hidden:
-            write_log(table.log, hidden / "log.parquet")
-            write_summary(hidden / "summary.json", table.summary())
-        page.end()
-        attempts = Attempts(f"the table is printed, and with the log in {folder.out}", folder)
-        if options.watching.rerun:
-            from experiments.recording import table1_recording
-            from experiments.results.streams import write_streams
+        files, hint = {"log.parquet": partial(write_log, table.log)}, options.watching.hint(folder.out)
+        with saved(page, folder, table.summary(), files, hint) as attempts:
+            if options.watching.rerun:
+                from experiments.recording import table1_recording
 
-            attempts.attempt("the recording", lambda: write_streams(table1_recording.record_table1(table, audience), folder))
-        page.print(f"written to {folder.out}{options.watching.hint(folder.out)}", soft_wrap=True)
-        attempts.close()
+                attempts.recording(lambda: table1_recording.record_table1(table, audience))
 
 
 def _over_motions(options: Table1Options, motions: int) -> None:
@@ -82,20 +74,8 @@ def _over_motions(options: Table1Options, motions: int) -> None:
         with progress_of("drawing and identifying motions") as progress:
             found = Table1Motions(motions, options.seed or 0, progress=progress)
             print_motions(page, found)
-        page.found |= found.summary() | {"folder": str(folder.out)}
-        page.show()
-        with folder.complete() as hidden:
-            write_summary(hidden / "summary.json", found.summary())
-        page.end()
-        attempts = Attempts(f"the table is printed, and in {folder.out}", folder)
-        attempts.attempt("motions.png", lambda: _draw(folder, found))
-        page.print(f"written to {folder.out}: the picture is motions.png", soft_wrap=True)
-        attempts.close()
-
-
-def _draw(folder: ResultsFolder, found: Table1Motions) -> None:
-    with folder.more() as hidden:
-        (hidden / "motions.png").write_bytes(picture(found))
+        with saved(page, folder, found.summary(), {}, ": the picture is motions.png") as attempts:
+            attempts.file("motions.png", lambda: picture(found))
 
 
 def search(options: SearchOptions) -> None:
@@ -131,19 +111,11 @@ def table2(options: Table2Options) -> None:
             closing(Table2(described, progress, recording.watch if recording else None)) as table,
         ):
             print_table2(page, table)
-            page.found |= table.summary() | {"folder": str(folder.out)}
-        page.show()
-        with folder.complete() as hidden:
-            for i in range(len(table.run.seeds)):
-                write_log(table.run.alone(i), hidden / f"log{i}.parquet")
-            write_summary(hidden / "summary.json", table.summary())
-        page.end()
-        attempts = Attempts(f"the table is printed, and with the logs in {folder.out}", folder)
-        if recording:
-            from experiments.recording.table2_recording import finish_table2
-            from experiments.results.streams import write_streams
+            summary = table.summary()
+        files = {f"log{i}.parquet": partial(write_log, table.run.alone(i)) for i in range(len(table.run.seeds))}
+        with saved(page, folder, summary, files, watching.hint(folder.out)) as attempts:
+            if recording:
+                from experiments.recording.table2_recording import finish_table2
 
-            attempts.attempt("the recording", lambda: write_streams(finish_table2(recording, table), folder))
-            doubt_window(page, options.inner, recording)
-        page.print(f"written to {folder.out}{watching.hint(folder.out)}", soft_wrap=True)
-        attempts.close()
+                attempts.recording(lambda: finish_table2(recording, table))
+                doubt_window(page, options.inner, recording)

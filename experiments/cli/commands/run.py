@@ -1,6 +1,7 @@
 """The command that simulates a scenario."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from rich.text import Text
@@ -10,6 +11,7 @@ from experiments.cli.commands.inner import doubt_window, recording_of, require_w
 from experiments.cli.options.run import Run
 from experiments.cli.page import Page, new_page, shown
 from experiments.cli.progress import stages_of
+from experiments.cli.saving import saved, write_scenario
 from experiments.errors import ExperimentError
 from experiments.identification.log_warnings import warnings_of_log
 from experiments.identification.parameters import Parameters
@@ -19,9 +21,7 @@ from experiments.identification.subject import Subject, absolute
 from experiments.identification.warnings import FILE, LOG, warnings_of_robot
 from experiments.plugin_tables import plugin_conflicts
 from experiments.reports.printed import print_fit
-from experiments.results.attempts import Attempts
 from experiments.results.folder import ResultsFolder
-from experiments.results.summaries import write_summary
 from experiments.study.method import Method
 from identify.files.log_file import write_log
 from sim.drives import IdealDrive
@@ -29,7 +29,7 @@ from sim.errors import RobotError
 from sim.robot.robot import Robot
 from sim.scenario.ripple import Ripple
 from sim.scenario.scenario import Scenario
-from sim.scenario.scenario_file import load, to_toml
+from sim.scenario.scenario_file import load
 from sim.trajectories import Quintic
 
 LEFT_OUT = ("out", "force", "json", "watching", "yes")
@@ -51,20 +51,16 @@ def run(options: Run) -> None:
         recording = recording_of(made.scenario, audience, options.inner, subject) if watching.rerun else None
         with stages_of(name) as told:
             watch = recording.watch if recording else None
-            ran = replace(made, progress=lambda share: told(f"simulating, {share:.0%}"), watch=watch)
+            ran = replace(made, progress=lambda share: told(f"simulating, {share:.0%}", share), watch=watch)
             _ = ran.fit
-        _show_run(page, ran)
-        _save_run(folder, page, ran)
-        page.end()
-        with Attempts(f"the estimates are printed, and with the log in {folder.out}", folder) as attempts:
+        _print_run(page, ran)
+        files = {"log.parquet": partial(write_log, ran.run.alone()), "scenario.toml": partial(write_scenario, ran.scenario)}
+        with saved(page, folder, ran.summary(), files, watching.hint(folder.out)) as attempts:
             if recording:
-                from experiments.results.streams import write_streams
-
-                attempts.attempt("the recording", lambda: write_streams(recording.finish(ran), folder))
+                attempts.recording(lambda: recording.finish(ran))
                 doubt_window(page, options.inner, recording)
                 if ran.fit.logs.long:
                     page.print("the identification is not recorded: the rows of so long a log are not kept")
-            page.print(f"written to {folder.out}{watching.hint(folder.out)}", soft_wrap=True)
 
 
 def _read(options: Run) -> tuple[Path, ...]:
@@ -100,22 +96,11 @@ def _described(page: Page, options: Run) -> ScenarioRun:
     return ScenarioRun(scenario, request)
 
 
-def _show_run(page: Page, ran: ScenarioRun) -> None:
-    """Show the estimates."""
+def _print_run(page: Page, ran: ScenarioRun) -> None:
+    """Print the estimates, and what to check."""
     print_fit(page, ran.fit, f"Scenario {ran.scenario.name}")
     of_log = warnings_of_log(ran.run.alone(), ran.fit.subject.tree)
     page.warn({LOG: of_log, FILE: [*warnings_of_robot(ran.run.robots[0]), *plugin_conflicts()]})
-    page.found |= ran.summary()
-    page.show()
-
-
-def _save_run(folder: ResultsFolder, page: Page, ran: ScenarioRun) -> None:
-    """Write log, scenario and summary."""
-    with folder.complete() as hidden:
-        write_log(ran.run.alone(), hidden / "log.parquet")
-        (hidden / "scenario.toml").write_text(to_toml(ran.scenario), encoding="utf-8")
-        write_summary(hidden / "summary.json", ran.summary())
-    page.found["folder"] = str(folder.out)
 
 
 def _with_robot(page: Page, scenario: Scenario, robot: str | None) -> Scenario:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from experiments.cli.options.study import Study
 from experiments.cli.page import new_page, shown
+from experiments.cli.progress import runs_of
 from experiments.errors import StudyError
 from experiments.recording.audience import Audience
 from experiments.results.folder import ResultsFolder
@@ -19,7 +20,6 @@ from experiments.study.shard_file import arrays
 from experiments.study.statistics import cells
 from experiments.study.store import Store
 from experiments.study.study_file import load_study, names
-from experiments.study.study_progress import watching as counting
 from experiments.study.study_results import write_results
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def study(options: Study) -> None:
         recording = _recording(store, audience) if watching.rerun else None
         receive = partial(_show, store, recording) if recording and audience else None
         if pool is not None:
-            with counting(store.study, sum(len(r) for r in store.missing(runs))) as watch:
+            with runs_of(store.study.name, sum(len(r) for r in store.missing(runs))) as watch:
                 run_missing(store, pool, runs, watch, receive)
         write_results(page, store, folder, recording)
 

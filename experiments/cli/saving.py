@@ -1,0 +1,50 @@
+"""Results that are complete: shown and saved, all of them, before anything that only shows them."""
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from experiments.cli.page import Page
+from experiments.results.attempts import Attempts
+from experiments.results.folder import ResultsFolder
+from experiments.results.summaries import write_summary
+from sim.scenario.scenario import Scenario
+from sim.scenario.scenario_file import to_toml
+
+Files = Mapping[str, Callable[[Path], object]]
+"""What writes the files of an experiment, by their names."""
+
+
+@contextmanager
+def saved(page: Page, folder: ResultsFolder, summary: dict[str, Any], files: Files, hint: str) -> Iterator[Attempts]:
+    """Show what is printed, save the results, and give what tries their views in the block; then say where they are.
+
+    Parameters
+    ----------
+    page : Page
+        What is printed.
+    folder : ResultsFolder
+        Where the results go.
+    summary : dict
+        What summary.json says.
+    files : mapping of str to callable
+        Logs, scenarios and the like that belong to the results.
+    hint : str
+        How to go on, said behind the name of the folder.
+    """
+    page.found |= summary | {"folder": str(folder.out)}
+    page.show()
+    with folder.complete() as hidden:
+        for name, write in files.items():
+            write(hidden / name)
+        write_summary(hidden / "summary.json", summary)
+    page.end()
+    with Attempts(f"what was found is printed, and in {folder.out}", folder) as attempts:
+        yield attempts
+        page.print(f"written to {folder.out}{hint}", soft_wrap=True)
+
+
+def write_scenario(scenario: Scenario, path: Path) -> None:
+    """Write a scenario as TOML."""
+    path.write_text(to_toml(scenario), encoding="utf-8", errors="backslashreplace")
