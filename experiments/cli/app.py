@@ -87,9 +87,10 @@ def _require_memory() -> None:
 
 def _parsed(words: list[str]) -> Callable[[], None]:
     """Return the command that words name, with its options."""
-    from experiments.cli.wrong_words import refused, require_command
+    from experiments.cli.wrong_words import refused, require_command, require_once
 
     require_command(words, COMMANDS)
+    require_once(words)
     with refused(words, COMMANDS):
         made: Callable[[], None] = APP.cli(prog="idbench", description=DESCRIPTION, args=words)
     return made

@@ -42,6 +42,16 @@ def require_command(words: Sequence[str], commands: Mapping[str, type]) -> None:
     raise ExperimentError(f"no command {words[0]!r}{did_you_mean(words[0], commands)}; known: {', '.join(commands)}")
 
 
+def require_once(words: Sequence[str]) -> None:
+    """Raise ExperimentError if an option stands twice: the parser would take the last, and drop the others."""
+    places = [k for k, word in enumerate(words) if word.startswith("--") and word != "--"]
+    options = [words[k].partition("=")[0].replace("_", "-") for k in places]
+    if twice := next((option for k, option in enumerate(options) if option in options[:k]), None):
+        given = [_given(twice, words[k:]) for k, option in zip(places, options, strict=True) if option == twice]
+        once = " ".join([twice, *(value for values in given for value in values)])
+        raise ExperimentError(f"{twice} is given twice: give it once, and all its values if it takes several: {once}")
+
+
 def _said(event: parser.ParseErrorEvent, words: Sequence[str], commands: Mapping[str, type]) -> str:
     """Return what is wrong, and what to type instead."""
     name = words[0]

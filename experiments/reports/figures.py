@@ -46,9 +46,9 @@ def torques_figure(one: HeldOut) -> str:
             predicted = np.where(rows.valid[own], rows.predicted(X)[own], np.nan)
             panel.plot(rows.time[own], predicted, color=_color(model), lw=1.0, label=model)
         validation = one.torques[models[0]]
-        joint = one.fit.subject.robot.joints[j]
-        panel.set_title(f"{joint}: {validation.rms[j]:.2g} N m off, {percentage(validation.percent[j])} %", loc="left")
-    _last(panels, "time [s]", "torque [N m]")
+        joint, (force, _) = one.fit.subject.robot.joints[j], one.fit.subject.units(j)
+        panel.set_title(f"{joint}: {validation.rms[j]:.2g} {force} off, {percentage(validation.percent[j])} %", loc="left")
+    _last(panels, "time [s]", f"torque [{_units(one.fit)[0]}]")
     _legend(figure, panels[0])
     return svg(figure)
 
@@ -100,7 +100,8 @@ def friction_figure(fit: Fit) -> str:
             beyond = np.where(inside, np.nan, line.torque)
             panel.plot(line.v, beyond, ":", color=_color("power"), lw=1.6, label=label and "beyond the speeds of the log")
         panel.set_title(f"{fit.subject.robot.joints[j]}: {' + '.join(fit.subject.laws.names[j])}", loc="left")
-    _last(panels, "velocity [rad/s]", "friction [N m]")
+    force, velocity = _units(fit)
+    _last(panels, f"velocity [{velocity}]", f"friction [{force}]")
     _legend(figure, panels[0])
     return svg(figure)
 
@@ -128,6 +129,12 @@ def spectra_figure(fit: Fit) -> str:
     _last(panels, "frequency [Hz]", "")
     _legend(figure, panels[0])
     return svg(figure)
+
+
+def _units(fit: Fit) -> tuple[str, str]:
+    """Return the units of the torques and velocities of all joints: those of slides stand beside those of hinges."""
+    each = [fit.subject.units(j) for j in range(fit.basis.n)]
+    return ", ".join(dict.fromkeys(force for force, _ in each)), ", ".join(dict.fromkeys(f"{way}/s" for _, way in each))
 
 
 def _panels(count: int, height: float) -> tuple[Figure, list[Axes]]:

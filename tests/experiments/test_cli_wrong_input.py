@@ -33,6 +33,11 @@ def test_an_output_folder_that_cannot_be_written_is_told(tmp_path, complaint):
         (["table1", "--seed", "1", "--scenario", "x.toml"], "name two trajectories: give one"),
         (["table1", "--scenario", "nowhere.toml"], "cannot read scenario nowhere.toml"),
         (["view", "README.md"], "there is no recording README.md"),
+        (
+            ["identify", "a.csv", "--validate", "b.csv", "--validate=c.csv"],
+            "give it once, and all its values if it takes several: --validate b.csv c.csv",
+        ),
+        (["run", "ideal", "--torque_delay", "1", "--torque-delay", "2"], "--torque-delay is given twice"),
     ],
 )
 def test_more_wrong_input_is_one_line(args, message, tmp_path, monkeypatch, complaint):

@@ -169,6 +169,30 @@ def test_a_full_disk_in_each_view(most, lost, kept, logs, tmp_path):
     assert lost - there
 
 
+WRITTEN = ("arm.xml", "arm.urdf", "arm.json", "arm.py")
+"""Files for other software."""
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("lost", ["report.html", "recording.rrd", *WRITTEN])
+def test_a_disk_that_is_full_for_one_file_leaves_the_others(lost, idbench, logs, tmp_path, monkeypatch):
+    def full(path, write):
+        if path.name == lost:
+            raise OSError(28, "No space left on device")
+        return write
+
+    for name in ("write_text", "write_bytes"):
+        write = getattr(Path, name)
+        monkeypatch.setattr(Path, name, lambda path, *args, _write=write, **options: full(path, _write)(path, *args, **options))
+    targets = ["--write", *(f"found/{name}" for name in WRITTEN)]
+    code, out, err = idbench("identify", logs / "first.parquet", *WORDS, "--out", "found", *targets)
+    assert (code, len(err.splitlines()), "explicit: good" in out) == (2, 1, True)
+    assert "No space left on device" in err
+    there = {path.name for path in (tmp_path / "found").iterdir()} - {NAME}
+    gone = set(RECORDING) if lost == "recording.rrd" else {lost}
+    assert there == {"summary.json", "log.parquet", "report.html", *RECORDING, *WRITTEN} - gone
+
+
 def test_json_is_whole_whatever_fails(idbench, logs, monkeypatch):
     monkeypatch.setattr("experiments.reports.page.rendered", broken)
     code, out, err = idbench("identify", logs / "first.parquet", *WORDS, "--out", "found", "--no-rerun", "--json")
