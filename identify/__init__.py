@@ -19,11 +19,9 @@ from identify.basis import CoulombFriction as CoulombFriction
 from identify.basis import Offset as Offset
 from identify.basis import OfJoints as OfJoints
 from identify.basis import Parameter as Parameter
-from identify.basis import ScaraLinks as ScaraLinks
 from identify.basis import ShapedFriction as ShapedFriction
 from identify.basis import TreeLinks as TreeLinks
 from identify.basis import ViscousFriction as ViscousFriction
-from identify.basis import scara as scara
 from identify.basis import tree_basis as tree_basis
 from identify.data.encoder_step import encoder_steps as encoder_steps
 from identify.data.kinematics import Joint as Joint
@@ -86,9 +84,9 @@ from identify.models import ExplicitModel as ExplicitModel
 from identify.models import ImplicitModel as ImplicitModel
 from identify.models import PowerModel as PowerModel
 from identify.parameters.base_parameters import BaseParameters as BaseParameters
-from identify.parameters.base_parameters import transfer as transfer
 from identify.parameters.consistent import Consistent as Consistent
 from identify.parameters.consistent import consistent_parameters as consistent_parameters
+from identify.parameters.scara import scara as scara
 from identify.rows.chain import Chain as Chain
 from identify.rows.chains import CHAINS as CHAINS
 from identify.rows.chains import idbench_chain as idbench_chain

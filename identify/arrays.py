@@ -1,6 +1,6 @@
 """The array type that every stage shares."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TypeAlias
 
 import numpy as np
@@ -10,24 +10,24 @@ from identify.errors import SettingError
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
-Columns: TypeAlias = Mapping[tuple[int, str], Array]
-"""Columns of an observation matrix that are not identically zero: (row of an instant, parameter) -> signal (..., time)."""
+Columns: TypeAlias = Mapping[tuple[int, int], Array]
+"""Columns of an observation matrix that are not identically zero: (row of an instant, place in X) -> signal (..., time)."""
 
-HELD = ""
-"""In the place of a parameter's name: what torques have beside W X, the part of parameters that are known."""
+HELD = -1
+"""In the place of a place in X: what torques have beside W X, the part of parameters that are known."""
 
 Multipliers: TypeAlias = Mapping[tuple[int, int], Array | float]
 """B of a model, where it is not 0: (row of an instant, joint) -> what the row multiplies the torque of the joint by: a signal
 (..., time), or a constant."""
 
 
-def combined(columns: Columns, names: Sequence[str], X: Array, total: Array) -> Array:
-    """Add columns times their parameters X, shape (..., p), of these names, to `total`, shape (..., row, time); return it.
+def combined(columns: Columns, X: Array, total: Array) -> Array:
+    """Add columns times their parameters X, shape (..., p), to `total`, shape (..., row, time); return it.
 
     Those that are held count once.
     """
-    for (row, name), column in columns.items():
-        total[..., row, :] += column if name == HELD else column * X[..., names.index(name), None]
+    for (row, place), column in columns.items():
+        total[..., row, :] += column if place == HELD else column * X[..., place, None]
     return total
 
 

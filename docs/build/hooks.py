@@ -21,7 +21,7 @@ COMMANDS = (
 
 KINDS_OF_NAMES = (
     ("Logs", ("MotionLog", "TorqueChannel", "encoder_steps", "smoothed_log")),
-    ("Robots", ("scara", "tree_basis", "Basis", "Parameter", "KinematicTree", "Joint", "BaseParameters", "transfer")),
+    ("Robots", ("scara", "tree_basis", "Basis", "Parameter", "KinematicTree", "Joint", "BaseParameters")),
     ("Identification", ("identify", "identify_each", "attempt_each", "estimate", "Problem", "Estimate", "Status")),
 )
 

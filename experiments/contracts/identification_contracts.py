@@ -80,15 +80,16 @@ def block_keeps_its_identities(block: Any, _: Example) -> None:
     logged = {"temperature": 30.0 + q, "payload": np.ones_like(q[:1])}
     at, ahead = State(q, qd, lambda _: qdd, logged), State(q + 1j * SMALL * qd, qd + 1j * SMALL * qdd, lambda x: x, logged)
     explicit = block.explicit(at)
-    names = [parameter.name for parameter in block.parameters(2)]
-    require({name for _, name in explicit} == set(names), "explicit columns are not those of its parameters")
+    parameters = block.parameters(2)
+    require({parameter for _, parameter in explicit} == set(parameters), "explicit columns are not those of its parameters")
     implicit = _sum(_rate(block.momentum, ahead), block.remainder(at))
-    for address in explicit.keys() | implicit.keys():
-        require_equal(explicit.get(address, 0.0), implicit.get(address, 0.0) + 0 * q[0], f"the column {address}", atol=1e-10)
+    for row, parameter in explicit.keys() | implicit.keys():
+        one, other = (columns.get((row, parameter), 0.0) for columns in (explicit, implicit))
+        require_equal(one, other + 0 * q[0], f"the column of {parameter.name} in row {row}", atol=1e-10)
     power = _sum(_rate(block.energy, ahead), block.dissipation(at))
-    for name in names:
-        work = sum(qd[row] * x for (row, p), x in explicit.items() if p == name)
-        require_equal(power[0, name], work, f"the power of {name}", atol=1e-10)
+    for parameter in parameters:
+        work = sum(qd[row] * x for (row, p), x in explicit.items() if p == parameter)
+        require_equal(power[0, parameter], work, f"the power of {parameter.name}", atol=1e-10)
 
 
 def _rate(columns: Callable[[State], Mapping[Any, Array]], ahead: State) -> dict[Any, Array]:

@@ -6,20 +6,20 @@ from importlib.metadata import version
 import numpy as np
 
 from experiments.identification.fit import Fit
+from identify import Parameter
 from identify.data.kinematics import INERTIAL
 
 ABOUT = (
     "tau = D(q, qd, qdd) X: X are `parameters`, each the sum of standard parameters in `made_of`. D has the columns of the "
-    "standard parameters `column`: those of links from the tree (inertia about the origin of the link's frame and in its axes, "
-    "first moments, mass), Ia: qdd of its joint, Fv: qd, Fs: sign(qd), off: 1."
+    "standard parameters `column`, over `scale`: those of links from the tree (inertia about the origin of the link's frame "
+    "and in its axes, first moments, mass), Ia: qdd of its joint, Fv: qd, Fs: sign(qd), off: 1."
 )
 
 
 def json_text(fit: Fit, model: str) -> str:
     """Return the text: parameters, sigma, covariance, the tree of links, and which columns the regressor has."""
     subject, estimate = fit.subject, fit.estimates[model]
-    base, standard = subject.base, subject.grouping.standard.names
-    columns = {} if base is None else {n: standard[k] for n, k in zip(base.names, base.kept, strict=True)}
+    standard = subject.grouping.standard
     parameters = [
         {
             "name": p.name,
@@ -28,15 +28,16 @@ def json_text(fit: Fit, model: str) -> str:
             "unit": p.unit,
             "kind": p.kind,
             "joint": p.joint,
-            "column": columns.get(p.name),
-            "made_of": _made_of(fit, p.name),
+            "column": standard.names[standard.places[p]],
+            "scale": p.scale,
+            "made_of": _made_of(fit, p),
         }
         for p, x, s in zip(fit.basis.parameters, estimate.X, estimate.best_sigma, strict=True)
     ]
     content = {
         "format": "idbench base parameters 1",
         "version": version("idbench"),
-        "about": ABOUT if base else "parameters of the paper's closed form of the SCARA (Eq. 5)",
+        "about": ABOUT,
         "robot": subject.tree.name,
         "model": model,
         "estimator": fit.request.estimator,
@@ -62,10 +63,8 @@ def json_text(fit: Fit, model: str) -> str:
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
 
 
-def _made_of(fit: Fit, name: str) -> dict[str, float] | None:
+def _made_of(fit: Fit, parameter: Parameter) -> dict[str, float]:
     """Return the standard parameters of a base parameter, and their factors."""
-    base = fit.subject.base
-    if base is None:
-        return None
-    row = base.K[base.names.index(name)]
+    base = fit.subject.grouping
+    row = base.K[base.parameters.index(parameter)]
     return {base.standard.names[k]: float(row[k]) for k in np.flatnonzero(row)}

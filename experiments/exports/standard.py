@@ -1,11 +1,15 @@
 """Standard parameters that make exactly the torques of an estimate."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from experiments.errors import ExperimentError
 from experiments.exports.friction_terms import TERMS
 from experiments.identification.fit import Fit
-from identify import Array, transfer
+
+if TYPE_CHECKING:
+    from identify import Array
 
 KNOWN = ("Ia", "Fv", "Fs", "off", *TERMS, *(letters for _, settings in TERMS.values() for letters in settings.values()))
 """Beginnings of the names of the laws that a controller's function has, beside the links."""
@@ -19,11 +23,9 @@ def standard_of(fit: Fit, model: str) -> dict[str, float]:
     """
     subject, estimate = fit.subject, fit.estimates[model]
     grouping = subject.grouping
-    X = np.zeros(len(subject.whole.names))
-    X[[subject.whole.names.index(name) for name in estimate.names]] = estimate.X
-    base = X if subject.base else transfer(subject.tree, subject.whole, grouping.basis) @ X
     values: Array = np.zeros(len(grouping.standard.names))
-    values[list(grouping.kept)] = base
+    for parameter, x in zip(estimate.problem.basis.parameters, estimate.X, strict=True):
+        values[grouping.standard.places[parameter]] = x / parameter.scale
     return dict(zip(grouping.standard.names, map(float, values), strict=True))
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from experiments.identification.subject import Subject
-from identify import Array, Consistent, Estimate, consistent_parameters, transfer
+from identify import Array, Consistent, Estimate, consistent_parameters
 from identify.parameters.consistent import NEAR
 from identify.parameters.priors import Prior
 from sim.robot.tree import standard_parameters
@@ -22,9 +22,8 @@ def consistent_of(subject: Subject, estimate: Estimate, prior: Prior = "pullback
     """Return the physically consistent standard parameters that agree best with an estimate."""
     given, grouping = standard_parameters(subject.robot), subject.grouping
     values = np.array([given.get(name, 0.0) for name in grouping.standard.names])
-    T = _to_base(subject)
     X, C = _of_all(subject, estimate)
-    return consistent_parameters(grouping, T @ X, T @ C @ T.T, values, prior=prior, weight=weight)
+    return consistent_parameters(grouping, X, C, values, prior=prior, weight=weight)
 
 
 def made_consistent(subject: Subject, estimate: Estimate, prior: Prior) -> Estimate:
@@ -33,9 +32,7 @@ def made_consistent(subject: Subject, estimate: Estimate, prior: Prior) -> Estim
     Its covariance stays: where the estimate is consistent already nothing moves, and elsewhere it is too large, not too small.
     """
     found = consistent_of(subject, estimate, prior)
-    whole = np.linalg.lstsq(_to_base(subject), found.base)[0]
-    names = subject.whole.names
-    X = np.array([whole[names.index(name)] for name in estimate.names])
+    X = found.base[_places(subject, estimate)]
     return replace(estimate, X=X, honest=estimate.best_covariance, whiten=None)
 
 
@@ -49,18 +46,15 @@ def words_of_consistency(before: dict[str, Estimate], after: dict[str, Estimate]
         yield f"{model}: moved to where bodies can exist: {most}"
 
 
-def _to_base(subject: Subject) -> Array:
-    """Return what makes base parameters of those that could be identified."""
-    if subject.base is not None:
-        return np.eye(len(subject.grouping.names))
-    return transfer(subject.tree, subject.whole, subject.grouping.basis)
+def _places(subject: Subject, estimate: Estimate) -> list[int]:
+    """Return where what was identified stands among all that could be."""
+    return [subject.grouping.basis.places[parameter] for parameter in estimate.problem.basis.parameters]
 
 
 def _of_all(subject: Subject, estimate: Estimate) -> tuple[Array, Array]:
     """Return estimate and covariance with the parameters that were left out: they are zero, and known to be."""
-    names, C = subject.whole.names, estimate.best_covariance
-    place = [names.index(name) for name in estimate.names]
-    X, sure = np.zeros(len(names)), SURE * np.sqrt(np.diagonal(C).min())
-    whole = sure**2 * np.eye(len(names))
+    C, place, p = estimate.best_covariance, _places(subject, estimate), len(subject.grouping.names)
+    X, sure = np.zeros(p), SURE * np.sqrt(np.diagonal(C).min())
+    whole = sure**2 * np.eye(p)
     X[place], whole[np.ix_(place, place)] = estimate.X, C
     return X, whole

@@ -216,11 +216,11 @@ class Fit:
         models = {name: summarize(e, truth) for name, e in self.estimates.items()}
         for name, share in self.explained.items():
             models[name]["explained_share"] = [finite(x) for x in share]
-        delay, base, cutoff = self.delay, self.subject.base, getattr(self.processing.operator, "cutoff", None)
+        delay, cutoff = self.delay, getattr(self.processing.operator, "cutoff", None)
         return {
             "parameters": list(self.basis.names),
             "units": list(self.basis.units),
-            "made_of": None if base is None else base.groupings,
+            "made_of": self.subject.grouping.groupings,
             "truth": truth,
             "robot": self.subject.name,
             "chain": self.request.chain,

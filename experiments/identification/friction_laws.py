@@ -81,10 +81,9 @@ class FrictionLaws:
         """The laws as options name them."""
         return tuple(f"{j + 1}={'+'.join(own) or 'none'}" for j, own in enumerate(self.names))
 
-    def blocks(self, leave: Sequence[str] = ()) -> tuple[AbstractBlock, ...]:
-        """Return the blocks of all joints, without those that are in another basis already."""
-        every = [name for name in dict.fromkeys(chain(*self.names)) if name not in leave]
-        return tuple(self._block(name) for name in every)
+    def blocks(self) -> tuple[AbstractBlock, ...]:
+        """Return the blocks of all joints."""
+        return tuple(map(self._block, dict.fromkeys(chain(*self.names))))
 
     def _block(self, name: str) -> AbstractBlock:
         joints = tuple(j for j, own in enumerate(self.names) if name in own)

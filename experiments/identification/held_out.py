@@ -130,10 +130,10 @@ class HeldOut:
 
 def _without(log: MotionLog, qd: Array, basis: Basis, lost: Mapping[str, float]) -> MotionLog:
     """Return a log without the torques of laws of friction that a simulated robot does not have."""
-    if not (there := [name for name in lost if name in basis.names]):
+    if not (there := [parameter for parameter in basis.parameters if parameter.name in lost]):
         return log
     q, v, conditions = log.q.T, np.ascontiguousarray(qd.T), {name: x.T for name, x in log.conditions.items()}
     state = State(q, v, lambda _: np.gradient(v, 1 / log.fs, axis=-1), conditions)
-    laws, X = basis.renamed({name: name for name in there}), np.array([lost[name] for name in there])
-    tau = log.tau * np.asarray(log.torque.gain) - combined(laws.explicit(state), laws.names, X, np.zeros(q.shape)).T
+    laws, X = basis.of(there), np.array([lost[parameter.name] for parameter in there])
+    tau = log.tau * np.asarray(log.torque.gain) - combined(laws.explicit(state), X, np.zeros(q.shape)).T
     return replace(log, tau=tau, torque=replace(log.torque, gain=1.0))

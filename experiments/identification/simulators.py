@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from experiments.identification.subject import Subject
-from identify import AbstractLoop, AbstractPlant, Array, IdentificationError, MotionLog, Simulated, transfer
+from identify import AbstractLoop, AbstractPlant, Array, IdentificationError, MotionLog, Simulated
 from sim.encoders import ExactEncoder
 from sim.engine.shooting import shoot
 from sim.engine.simulation import simulate
@@ -59,10 +59,9 @@ class Fields:
         IdentificationError
             If a parameter is of a law of friction that the simulated robot does not have.
         """
-        names, grouping = self.subject.whole.names, self.subject.grouping
-        place = [names.index(name) for name in self.subject.basis.names]
-        whole = np.zeros((len(X), len(names)))
-        whole[:, place] = X
+        grouping = self.subject.grouping
+        base = np.zeros((len(X), len(grouping.names)))
+        base[:, [grouping.basis.places[parameter] for parameter in self.subject.basis.parameters]] = X
         given = np.array([self._given.get(name, 0.0) for name in grouping.standard.names])
         unknown = [name for name in grouping.standard.names if name not in self._given]
         if unknown and exact:
@@ -71,8 +70,7 @@ class Fields:
                 "which does without them, an estimator that does not simulate, or leave these laws out"
             )
         # Robot by robot: a product of all of them at once would have other bits for other numbers of robots.
-        base = np.matmul(self._to_base, whole[..., None])
-        standard = given + np.matmul(self._back, base - grouping.base(given)[:, None])[..., 0]
+        standard = given + np.matmul(self._back, (base - grouping.base(given))[..., None])[..., 0]
         try:
             values = dict(zip(grouping.standard.names, standard.T, strict=True))
             return model_fields(self.robot, {name: x for name, x in values.items() if name in self._given})
@@ -82,13 +80,6 @@ class Fields:
     @cached_property
     def _given(self) -> dict[str, float]:
         return standard_parameters(self.robot)
-
-    @cached_property
-    def _to_base(self) -> Array:
-        subject = self.subject
-        if subject.base is not None:
-            return np.eye(len(subject.grouping.names))
-        return transfer(subject.tree, subject.whole, subject.grouping.basis)
 
     @cached_property
     def _back(self) -> Array:

@@ -9,17 +9,17 @@ from typing import Self, final
 import numpy as np
 
 from experiments.errors import ExperimentError
-from experiments.identification.friction_laws import STANDARD, FrictionLaws, law_of
+from experiments.identification.friction_laws import FrictionLaws, law_of
 from experiments.identification.parameters import Parameters
-from identify import BLOCKS, AbstractJointLaw, BaseParameters, Basis, KinematicTree, scara, tree_basis
+from identify import BLOCKS, AbstractJointLaw, BaseParameters, Basis, KinematicTree, tree_basis
+from identify.parameters.scara import in_letters_of_the_paper
 from sim.frictions import AbstractFrictionLaw
 from sim.robot.mounting import PLAIN, Mounting
 from sim.robot.robot import FILES, Robot
-from sim.robot.scara import scara_truth
 from sim.robot.tree import kinematic_tree, standard_parameters
 
-CLOSED_FORM = "scara"
-"""The robot whose basis is the paper's, in closed form."""
+SCARA = "scara"
+"""The robot of the paper, which is taken where none is named."""
 
 
 @final
@@ -37,7 +37,7 @@ class Subject:
         How it is mounted, and which of its joints move.
     """
 
-    name: str = CLOSED_FORM
+    name: str = SCARA
     asked: Parameters = Parameters()  # noqa: RUF009  # frozen
     mounting: Mounting = PLAIN
 
@@ -58,8 +58,9 @@ class Subject:
 
     @cached_property
     def grouping(self) -> BaseParameters:
-        """How its standard parameters are grouped."""
-        return BaseParameters.of(self.tree, self._with_laws(tree_basis(self.tree, self.laws.blocks())))
+        """How its standard parameters are grouped; those of the SCARA in the letters of the paper."""
+        standard = self._with_laws(tree_basis(self.tree, self.laws.blocks()))
+        return BaseParameters.of(self.tree, standard, in_letters_of_the_paper(self.tree) if self.name == SCARA else None)
 
     def without(self, names: Sequence[str]) -> Self:
         """Return the robot with more parameters left out, as if they were zero."""
@@ -89,43 +90,24 @@ class Subject:
         return ("N", "m") if self.tree.joints[j].kind == "slide" else ("N m", "rad")
 
     @cached_property
-    def base(self) -> BaseParameters | None:
-        """The grouping, where its base parameters are what is identified; None for the closed form."""
-        as_shipped = self.name == CLOSED_FORM and self.mounting.plain
-        return None if as_shipped and self.asked.armature == "file" and self.laws.standard else self.grouping
-
-    @cached_property
-    def whole(self) -> Basis:
-        """What could be identified."""
-        if self.base is not None:
-            return self.base.basis
-        basis = scara()
-        for block in self.laws.blocks(leave=STANDARD):
-            basis = basis + block
-        return self._with_laws(basis)
-
-    @cached_property
     def basis(self) -> Basis:
         """What is identified."""
-        if missing := [name for name in self.asked.without if name not in self.whole.names]:
+        whole = self.grouping.basis
+        if missing := [name for name in self.asked.without if name not in whole.names]:
             laws = "" if self.laws.standard else f" with --friction {' '.join(self.asked.friction)}"
             raise ExperimentError(
-                f"--without: there is no parameter {', '.join(missing)}{laws}; there are {', '.join(self.whole.names)}"
+                f"--without: there is no parameter {', '.join(missing)}{laws}; there are {', '.join(whole.names)}"
             )
-        return self.whole.without(*self.asked.without) if self.asked.without else self.whole
+        return whole.without(*self.asked.without) if self.asked.without else whole
 
     def truth(self, robot: Robot, friction: AbstractFrictionLaw | None = None) -> dict[str, float]:
         """Return the true value of every parameter of the basis for `robot`, this one as it is simulated, with its friction.
 
         What the simulated robot does not have, such as an offset, is zero.
         """
-        laws = friction.truth(robot) if friction else {}
-        if self.base is None:
-            known = scara_truth(robot) | laws
-        else:
-            standard = standard_parameters(robot) | laws
-            values = np.array([standard.get(name, 0.0) for name in self.base.standard.names])
-            known = dict(zip(self.base.names, map(float, self.base.base(values)), strict=True))
+        standard = standard_parameters(robot) | (friction.truth(robot) if friction else {})
+        values = np.array([standard.get(name, 0.0) for name in self.grouping.standard.names])
+        known = dict(zip(self.grouping.names, map(float, self.grouping.base(values)), strict=True))
         return {name: known.get(name, 0.0) for name in self.basis.names}
 
     def _with_laws(self, basis: Basis) -> Basis:

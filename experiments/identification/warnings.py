@@ -222,8 +222,6 @@ def _work(log: MotionLog) -> float:
 def _left_open(fit: Fit) -> list[str]:
     """Return which base parameters the log leaves open so far that a brisk motion shows it, and the moves to make."""
     subject, (model, estimate) = fit.subject, next(iter(fit.estimates.items()))
-    if subject.base is None:
-        return []
     shares = brisk_shares(subject.tree, fit.basis, estimate.X, estimate.best_sigma)
     names = [name for name, share in zip(fit.basis.names, shares, strict=True) if share > OPEN]
     if not names:
@@ -236,7 +234,7 @@ def helpful_moves(subject: Subject, log: MotionLog, names: Sequence[str]) -> str
     """Return what would show parameters that a log hides: joints that never move, or else moves; empty if that is not known."""
     if still := resting(log, subject.tree):
         return f"{', '.join(still)} never moves in this log: move it"
-    return _moves(subject, names) if subject.base is not None else ""
+    return _moves(subject, names)
 
 
 def _moves(subject: Subject, names: Sequence[str]) -> str:

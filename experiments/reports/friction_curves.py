@@ -68,7 +68,7 @@ class FrictionCurves:
         """The same of all joints, log by log, shape (joint, row) each."""
         found, (laws, X) = [], self._laws
         for rows, signals in zip(self.fit.problem.parts, self.fit.problem.signals, strict=True):
-            friction = combined(laws.explicit(signals.state), laws.names, X, np.zeros(signals.state.q.shape))
+            friction = combined(laws.explicit(signals.state), X, np.zeros(signals.state.q.shape))
             residual = rows.Y - rows.predicted(self.X)
             left = np.stack([residual[rows.group == j] for j in range(self.fit.basis.n)])
             qd, chain = filtered(signals, self.fit.processing)["qd"], self.fit.processing
@@ -89,13 +89,13 @@ class FrictionCurves:
     def _at(self, j: int, v: Array, load: float) -> Array:
         """Return the law of a joint at velocities, in the middle of its positions, under a load."""
         laws, X = self._laws
-        blocks = tuple(_loaded(block, load) for block in laws.blocks)
         state = self.fit.problem.signals[0].state
         q = np.repeat(np.median(state.q, axis=-1)[:, None], len(v), axis=1)
         conditions = {name: np.repeat(np.median(x, axis=-1)[:, None], len(v), axis=1) for name, x in state.conditions.items()}
         moving = State(q, np.tile(v, (len(q), 1)), np.zeros_like, conditions)
-        columns = replace(laws, blocks=blocks).explicit(moving)
-        return combined(columns, laws.names, X, np.zeros(q.shape))[j]
+        for block in laws.blocks:
+            laws = laws.exchanged(block, _loaded(block, load))
+        return combined(laws.explicit(moving), X, np.zeros(q.shape))[j]
 
     def _loads(self, j: int) -> list[float]:
         """Return the loads at which a law of a joint is drawn: one, if it depends on none."""
@@ -110,11 +110,8 @@ class FrictionCurves:
     def _laws(self) -> tuple[Basis, Array]:
         """The laws of friction of the joints, and their parameters."""
         basis = self.fit.basis
-        names = [p.name for p in basis.parameters if p.kind in FRICTIONS and p.joint is not None]
-        laws = basis.renamed({name: name for name in names})
-        own = tuple(b for b in laws.blocks if {p.name for p in b.parameters(basis.n)} & set(laws.kept_names))
-        laws = replace(laws, blocks=own, order=(), held={})
-        return laws, np.array([self.X[basis.names.index(name)] for name in laws.names])
+        laws = basis.of([p for p in basis.parameters if p.kind in FRICTIONS and p.joint is not None])
+        return laws, self.X[[basis.places[parameter] for parameter in laws.parameters]]
 
 
 @dataclass(frozen=True)

@@ -83,9 +83,9 @@ def _held_out(one: HeldOut, attempts: Attempts) -> tuple[str, str, list[str], li
 
 
 def _parameters(fit: Fit, table: EstimatesTable) -> Iterator[list[str]]:
-    base = fit.subject.base
+    made = fit.subject.grouping.groupings
     for (name, *cells), unit in zip(table.rows(), fit.basis.units, strict=True):
-        yield [f"{name} [{unit}]", *cells, base.groupings[name] if base else ""]
+        yield [f"{name} [{unit}]", *cells, made[name]]
 
 
 def _logs(fit: Fit) -> Iterator[list[Any]]:

@@ -29,8 +29,6 @@ from identify.basis.joint_law import AbstractFriction as AbstractFriction
 from identify.basis.joint_law import AbstractJointLaw as AbstractJointLaw
 from identify.basis.of_joints import OfJoints as OfJoints
 from identify.basis.parameter import Parameter as Parameter
-from identify.basis.scara_links import ScaraLinks as ScaraLinks
-from identify.basis.scara_links import scara as scara
 from identify.basis.spring import Spring as Spring
 from identify.basis.tree_basis import tree_basis as tree_basis
 from identify.basis.tree_links import TreeLinks as TreeLinks
@@ -40,7 +38,6 @@ BLOCKS: PluginTable[AbstractBlock] = PluginTable(
     "blocks",
     AbstractBlock,  # type: ignore[type-abstract]  # only asked whether an instance is one
     {
-        "scara": ScaraLinks,
         "viscous": ViscousFriction,
         "coulomb": CoulombFriction,
         "offset": Offset,

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 from typing import final
 
-from identify.arrays import Columns
-from identify.basis.block import AbstractConservativeBlock
+from identify.basis.block import AbstractConservativeBlock, BlockColumns
 from identify.basis.parameter import Parameter
 from identify.signals.state import State
 
@@ -26,24 +25,28 @@ class Armature(AbstractConservativeBlock):
 
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return Ia of each joint that has one."""
-        return tuple(Parameter(f"Ia{j + 1}", j, "rotor inertia", "kg m^2") for j in self._numbers(n))
+        return tuple(map(_rotor, self._numbers(n)))
 
-    def explicit(self, state: State) -> Columns:
+    def explicit(self, state: State) -> BlockColumns:
         """Return qdd (Eq. 5, 6)."""
-        return {(j, f"Ia{j + 1}"): state.qdd[..., j, :] for j in self._numbers(state.n)}
+        return {(j, _rotor(j)): state.qdd[..., j, :] for j in self._numbers(state.n)}
 
-    def momentum(self, state: State) -> Columns:
+    def momentum(self, state: State) -> BlockColumns:
         """Return qd (Eq. 9)."""
-        return {(j, f"Ia{j + 1}"): state.qd[..., j, :] for j in self._numbers(state.n)}
+        return {(j, _rotor(j)): state.qd[..., j, :] for j in self._numbers(state.n)}
 
-    def remainder(self, state: State) -> Columns:
+    def remainder(self, state: State) -> BlockColumns:
         """Return no columns."""
         del state
         return {}
 
-    def energy(self, state: State) -> Columns:
+    def energy(self, state: State) -> BlockColumns:
         """Return qd^2 / 2 (Eq. 10)."""
-        return {(0, f"Ia{j + 1}"): 0.5 * state.qd[..., j, :] ** 2 for j in self._numbers(state.n)}
+        return {(0, _rotor(j)): 0.5 * state.qd[..., j, :] ** 2 for j in self._numbers(state.n)}
 
     def _numbers(self, n: int) -> tuple[int, ...]:
         return tuple(range(n)) if self.joints is None else self.joints
+
+
+def _rotor(j: int) -> Parameter:
+    return Parameter("Ia", j, "rotor inertia", "kg m^2")

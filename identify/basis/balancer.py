@@ -5,8 +5,8 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Array, Columns
-from identify.basis.block import AbstractConservativeBlock
+from identify.arrays import Array
+from identify.basis.block import AbstractConservativeBlock, BlockColumns
 from identify.basis.parameter import Parameter
 from identify.errors import require_positive
 from identify.signals.state import State
@@ -49,27 +49,30 @@ class Balancer(AbstractConservativeBlock):
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return F0 and Kb, and Fg of one with gas."""
         del n
-        names = {"F0": "N", "Kb": "N/m", **({"Fg": "N"} if self.volume is not None else {})}
-        return tuple(Parameter(f"{x}{self.joint + 1}", self.joint, "stiffness", unit) for x, unit in names.items())
+        return tuple(map(self._parameter, ("F0", "Kb", *(("Fg",) if self.volume is not None else ()))))
 
-    def explicit(self, state: State) -> Columns:
+    def explicit(self, state: State) -> BlockColumns:
         """Return forces times dl/dq."""
         return self.remainder(state)
 
-    def momentum(self, state: State) -> Columns:
+    def momentum(self, state: State) -> BlockColumns:
         """Return no columns."""
         del state
         return {}
 
-    def remainder(self, state: State) -> Columns:
+    def remainder(self, state: State) -> BlockColumns:
         """Return forces times dl/dq."""
         length, slope = self._length(state.q[..., self.joint, :])
-        return {(self.joint, name): force * slope for name, force in self._forces(length - self._least).items()}
+        forces = self._forces(length - self._least)
+        return {(self.joint, self._parameter(x)): force * slope for x, force in forces.items()}
 
-    def energy(self, state: State) -> Columns:
+    def energy(self, state: State) -> BlockColumns:
         """Return the integrals of the forces over the length."""
         length, _ = self._length(state.q[..., self.joint, :])
-        return {(0, name): work for name, work in self._works(length - self._least).items()}
+        return {(0, self._parameter(x)): work for x, work in self._works(length - self._least).items()}
+
+    def _parameter(self, letters: str) -> Parameter:
+        return Parameter(letters, self.joint, "stiffness", "N/m" if letters == "Kb" else "N")
 
     @property
     def _least(self) -> float:
@@ -84,13 +87,11 @@ class Balancer(AbstractConservativeBlock):
 
     def _forces(self, stroke: Array) -> dict[str, Array]:
         gas = {} if self.volume is None else {"Fg": (self.volume / (self.volume - stroke)) ** self.kappa}
-        each = {"F0": np.ones_like(stroke), "Kb": stroke, **gas}
-        return {f"{x}{self.joint + 1}": force for x, force in each.items()}
+        return {"F0": np.ones_like(stroke), "Kb": stroke, **gas}
 
     def _works(self, stroke: Array) -> dict[str, Array]:
         gas = {}
         if self.volume is not None:
             V, k = self.volume, self.kappa
             gas = {"Fg": -V * np.log(1 - stroke / V) if k == 1 else V / (k - 1) * ((1 - stroke / V) ** (1 - k) - 1)}
-        each = {"F0": stroke, "Kb": stroke**2 / 2, **gas}
-        return {f"{x}{self.joint + 1}": work for x, work in each.items()}
+        return {"F0": stroke, "Kb": stroke**2 / 2, **gas}

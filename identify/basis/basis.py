@@ -1,6 +1,6 @@
 """A robot as identification sees it: a sum of column blocks."""
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self, final
@@ -9,7 +9,7 @@ import numpy as np
 
 from identify.arrays import HELD, Array, Columns
 from identify.basis.block import AbstractBlock, Narrowing
-from identify.basis.parameter import RIGID, Parameter
+from identify.basis.parameter import Kind, Parameter
 from identify.blame import expect
 from identify.errors import PluginError, SettingError
 from identify.signals.state import State
@@ -26,114 +26,46 @@ class Basis:
         Number of joints.
     blocks : tuple of AbstractBlock
         The blocks; no two may have a parameter in common.
-    order : tuple of str
-        Parameters to be put first, in this order; those of the blocks that it leaves out follow as they come.
-    kept : mapping of str to str, optional
-        Parameters of the blocks that stay, and what they are called here; all, by their own names, by default.
+    kept : tuple of Parameter, optional
+        The p parameters, in the order of X; all of the blocks by default.
     slides : tuple of int
         Joints that slide, from 0: their frictions and rotors have units of translation.
-    held : mapping of str to Array or float
-        Parameters of the blocks that are known, shape (...): their torques are no part of W X, but stand in `HELD`.
+    held : mapping of Parameter to Array or float
+        Parameters that are known, shape (...): their torques are no part of W X, but stand in `HELD`.
 
     Raises
     ------
     SettingError
-        If a parameter appears twice, or `order` or `kept` name one that no block has.
+        If a parameter appears twice, two have one name, or `kept` has one that no block has.
     """
 
     n: int
     blocks: tuple[AbstractBlock, ...]
-    order: tuple[str, ...] = ()
-    kept: Mapping[str, str] | None = None
+    kept: tuple[Parameter, ...] | None = None
     slides: tuple[int, ...] = ()
-    held: Mapping[str, Array | float] = field(default_factory=dict)
+    held: Mapping[Parameter, Array | float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        names = list(self._own)
-        every = [parameter.name for block in self.blocks for parameter in block.parameters(self.n)]
-        if twice := sorted({name for name in every if every.count(name) > 1}):
+        every = [parameter for block in self.blocks for parameter in block.parameters(self.n)]
+        if twice := sorted({p.name for p in every if every.count(p) > 1}):
             raise SettingError(f"parameters {', '.join(twice)} come from two blocks: leave one of them out")
-        if unknown := [name for name in (*self.order, *(self.kept or ())) if name not in names]:
-            raise SettingError(f"there is no parameter {', '.join(unknown)} in this basis; there are {', '.join(names)}")
-
-    def __add__(self, block: AbstractBlock) -> Self:
-        kept = None if self.kept is None else {**self.kept, **{p.name: p.name for p in block.parameters(self.n)}}
-        return replace(self, blocks=(*self.blocks, block), kept=kept)
-
-    def holding(self, **values: Array | float) -> Self:
-        """Return the basis with parameters that are known to have these values, and are not identified."""
-        own = {new: old for old, new in self._renamed.items()}
-        held = {own[name]: value for name, value in values.items()}
-        return replace(self, held={**self.held, **held}).without(*values)
-
-    @property
-    def believed(self) -> dict[str, Array | float]:
-        """Where parameters are believed to be that enter nonlinearly, shape (...); their columns are slopes there."""
-        found = {name: value for block in self.blocks for name, value in block.believed(self.n).items()}
-        return {self._renamed[name]: value for name, value in found.items() if name in self._renamed}
-
-    @property
-    def kept_names(self) -> Mapping[str, str]:
-        """Parameters of the blocks that stay, and what they are called here."""
-        return self._renamed
-
-    @property
-    def adaptive(self) -> bool:
-        """Whether some columns depend on parameters, so that the basis holds about an estimate alone."""
-        return any(block.adaptive for block in self.blocks)
-
-    def adapted(self, X: Array) -> Self:
-        """Return the basis, linear about an estimate X, shape (..., p)."""
-        return replace(self, blocks=tuple(block.adapted(self, X) for block in self.blocks))
-
-    def value(self, name: str, X: Array) -> Array | None:
-        """Return the estimate, in X, of the parameter that a block calls `name`, shape (...); None if it is not identified."""
-        new = self._renamed.get(name)
-        return None if new is None else X[..., self.names.index(new)]
-
-    def rigid(self) -> Self:
-        """Return the basis of the rigid bodies and rotors alone."""
-        own = [name for name in self._renamed if self._own[name].kind in RIGID]
-        held = {name: value for name, value in self.held.items() if self._own[name].kind in RIGID}
-        blocks = [b for b in self.blocks if {p.name for p in b.parameters(self.n)} & {*own, *held}]
-        return replace(self, blocks=tuple(blocks), order=(), kept={name: self._renamed[name] for name in own}, held=held)
-
-    def renamed(self, kept: Mapping[str, str]) -> Self:
-        """Return the basis with these parameters alone, by new names; blocks are spared the work for others.
-
-        Parameters
-        ----------
-        kept : mapping of str to str
-            Parameters of this basis, and what they are called from now on.
-
-        Raises
-        ------
-        SettingError
-            If it names a parameter that there is not.
-        """
-        if unknown := [name for name in kept if name not in self.names]:
-            raise SettingError(f"there is no parameter {', '.join(unknown)}; there are {', '.join(self.names)}")
-        own = {new: old for old, new in self._renamed.items()}
-        names = frozenset([*(own[name] for name in kept), *self.held])
-        blocks = tuple(block.narrowed(names) if isinstance(block, Narrowing) else block for block in self.blocks)
-        return replace(self, blocks=blocks, order=(), kept={own[name]: new for name, new in kept.items()})
-
-    def without(self, *names: str) -> Self:
-        """Return the basis without some of its parameters, which then count as zero."""
-        self.renamed({name: name for name in names})  # complains of those that there are not
-        if not set(self.names) - set(names):
-            raise SettingError(f"without {', '.join(names)} there is no parameter left")
-        return self.renamed({name: name for name in self.names if name not in names})
+        if unknown := [p.name for p in self.parameters if p not in every]:
+            raise SettingError(
+                f"no block has the parameters {', '.join(unknown)}; they have {', '.join(p.name for p in every)}"
+            )
+        if twice := sorted({name for name in self.names if self.names.count(name) > 1}):
+            raise SettingError(f"two parameters are called {', '.join(twice)}: give one of them other letters")
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """The p parameters, in the order of X."""
-        return tuple(replace(self._own[name], name=new) for name, new in self._renamed.items())
+        every = [p for block in self.blocks for p in block.parameters(self.n)] if self.kept is None else self.kept
+        return tuple(p.of_a_slide() if p.joint in self.slides else p for p in every)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the p parameters, in the order of X."""
-        return tuple(self._renamed.values())
+        return tuple(parameter.name for parameter in self.parameters)
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -141,16 +73,75 @@ class Basis:
         return tuple(parameter.unit for parameter in self.parameters)
 
     @cached_property
-    def _own(self) -> dict[str, Parameter]:
-        """The parameters of the blocks, by their names there."""
-        every = [parameter for block in self.blocks for parameter in block.parameters(self.n)]
-        return {p.name: p.of_a_slide() if p.joint in self.slides else p for p in every}
+    def places(self) -> dict[Parameter, int]:
+        """Where the parameters stand in X."""
+        return {parameter: k for k, parameter in enumerate(self.parameters)}
 
-    @cached_property
-    def _renamed(self) -> dict[str, str]:
-        """What each parameter of the blocks is called here, in the order of X."""
-        kept = {name: name for name in dict.fromkeys((*self.order, *self._own))} if self.kept is None else self.kept
-        return {name: kept[name] for name in dict.fromkeys((*self.order, *kept)) if name in kept}
+    def __add__(self, block: AbstractBlock) -> Self:
+        kept = None if self.kept is None else (*self.kept, *block.parameters(self.n))
+        return replace(self, blocks=(*self.blocks, block), kept=kept)
+
+    def of(self, parameters: Sequence[Parameter]) -> Self:
+        """Return the basis with these parameters alone, in this order; blocks are spared the work for others."""
+        asked = {*parameters, *self.held}
+        blocks = (block.narrowed(asked) if isinstance(block, Narrowing) else block for block in self.blocks)
+        there = tuple(block for block in blocks if asked.intersection(block.parameters(self.n)))
+        return replace(self, blocks=there, kept=tuple(parameters))
+
+    def only(self, kinds: Container[Kind]) -> Self:
+        """Return the basis with the parameters of some kinds alone, those that are held too."""
+        held = {parameter: value for parameter, value in self.held.items() if parameter.kind in kinds}
+        return replace(self, held=held).of([parameter for parameter in self.parameters if parameter.kind in kinds])
+
+    def named(self, *names: str) -> list[Parameter]:
+        """Return parameters by their names; raise SettingError if there is no such one."""
+        if unknown := [name for name in names if name not in self.names]:
+            raise SettingError(f"there is no parameter {', '.join(unknown)}; there are {', '.join(self.names)}")
+        return [self.parameters[self.names.index(name)] for name in names]
+
+    def without(self, *names: str) -> Self:
+        """Return the basis without some of its parameters, which then count as zero."""
+        out = self.named(*names)
+        if not set(self.parameters) - set(out):
+            raise SettingError(f"without {', '.join(names)} there is no parameter left")
+        return self.of([parameter for parameter in self.parameters if parameter not in out])
+
+    def holding(self, **values: Array | float) -> Self:
+        """Return the basis with parameters that are known to have these values, and are not identified."""
+        held = {p: value / p.scale for p, value in zip(self.named(*values), values.values(), strict=True)}
+        return replace(self, held={**self.held, **held}).without(*values)
+
+    def linearized_at(self, X: Array) -> Self:
+        """Return the basis, linear about an estimate X, shape (..., p)."""
+        return replace(self, blocks=tuple(block.adapted(self, X) for block in self.blocks))
+
+    def exchanged(self, old: AbstractBlock, new: AbstractBlock) -> Self:
+        """Return the basis with another block of the same parameters in the place of one."""
+        return replace(self, blocks=tuple(new if block is old else block for block in self.blocks))
+
+    @property
+    def adaptive(self) -> bool:
+        """Whether some columns depend on parameters, so that the basis holds about an estimate alone."""
+        return any(block.adaptive for block in self.blocks)
+
+    def split(self) -> tuple[Self, Self]:
+        """Return the basis of the blocks that depend on no estimate, with all that is held, and that of the others."""
+        adaptive = {parameter for block in self.blocks if block.adaptive for parameter in block.parameters(self.n)}
+        fixed = [parameter for parameter in self.parameters if parameter not in adaptive]
+        rest = [parameter for parameter in self.parameters if parameter in adaptive]
+        return self.of(fixed), replace(self, held={}).of(rest)
+
+    @property
+    def believed(self) -> dict[int, Array | float]:
+        """Where parameters are believed to be that enter nonlinearly, shape (...), by their places: columns are slopes."""
+        found = {parameter: value for block in self.blocks for parameter, value in block.believed(self.n).items()}
+        return {k: found[parameter] for parameter, k in self.places.items() if parameter in found}
+
+    def value(self, parameter: Parameter, X: Array) -> Array | None:
+        """Return the estimate, in X, of a parameter as its block has it, shape (...); None if it is not identified."""
+        if (place := self.places.get(parameter)) is None:
+            return None
+        return X[..., place] / self.parameters[place].scale
 
     def explicit(self, state: State) -> Columns:
         """Return the columns of the joint torques (Eq. 5, 6)."""
@@ -174,29 +165,29 @@ class Basis:
 
     def _sum(self, state: State, function: str) -> Columns:
         """Return what a column function of every block gives, together."""
-        names, shape, total = self._renamed, (*state.q.shape[:-2], state.q.shape[-1]), dict[tuple[int, str], Array]()
+        shape, total = (*state.q.shape[:-2], state.q.shape[-1]), dict[tuple[int, int], Array]()
         for block in self.blocks:
-            held = self._held_of(block)
-            found = getattr(block, function)(state)
+            held, found = self._held_of(block), getattr(block, function)(state)
             if not isinstance(found, Mapping):
                 raise PluginError(
                     f"plug-in {type(block).__name__}.{function} returned {found!r:.60}, expected a mapping of columns"
                 )
-            for (row, name), signal in found.items():
-                if name in names:
+            for (row, parameter), signal in found.items():
+                if (place := self.places.get(parameter)) is not None:
                     if np.shape(signal) != shape:
-                        expect(block, f"{function} for {name}", signal, shape)
-                    total[row, names[name]] = signal
-                if name in held:
-                    total[row, HELD] = total.get((row, HELD), 0.0) + np.asarray(held[name])[..., None] * signal
+                        expect(block, f"{function} for {parameter.name}", signal, shape)
+                    scale = self.parameters[place].scale
+                    total[row, place] = signal if scale == 1 else signal / scale
+                if parameter in held:
+                    total[row, HELD] = total.get((row, HELD), 0.0) + np.asarray(held[parameter])[..., None] * signal
         return total
 
-    def _held_of(self, block: AbstractBlock) -> dict[str, Array | float]:
+    def _held_of(self, block: AbstractBlock) -> dict[Parameter, Array | float]:
         """Return what the columns of a block that are no part of W X are multiplied by.
 
         With a slope F g'(b) as the column of b, F g(b) + F g'(b) (b - b0) has - F g'(b) b0 that depends on no parameter.
         """
-        own = {p.name for p in block.parameters(self.n)} if self.held else set()
-        believed = block.believed(self.n)
-        found = {name: value for name, value in self.held.items() if name in own}
-        return found | {name: -np.asarray(value) for name, value in believed.items() if name in self._renamed}
+        own = block.parameters(self.n) if self.held else ()
+        found = {parameter: self.held[parameter] for parameter in own if parameter in self.held}
+        believed = block.believed(self.n).items()
+        return found | {parameter: -np.asarray(value) for parameter, value in believed if parameter in self.places}

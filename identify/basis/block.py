@@ -1,15 +1,18 @@
 """Column blocks: what a robot's basis is a sum of."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Protocol, final, runtime_checkable
+from collections.abc import Mapping, Set
+from typing import TYPE_CHECKING, Protocol, TypeAlias, final, runtime_checkable
 
-from identify.arrays import Array, Columns
+from identify.arrays import Array
 from identify.basis.parameter import Parameter
 from identify.signals.state import State
 
 if TYPE_CHECKING:
     from identify.basis.basis import Basis
+
+BlockColumns: TypeAlias = Mapping[tuple[int, Parameter], Array]
+"""Columns of a block that are not identically zero: (row of an instant, parameter) -> signal (..., time)."""
 
 
 class AbstractBlock(ABC):
@@ -28,23 +31,23 @@ class AbstractBlock(ABC):
         """Return the parameters of this block for a robot of `n` joints."""
 
     @abstractmethod
-    def explicit(self, state: State) -> Columns:
+    def explicit(self, state: State) -> BlockColumns:
         """Return the columns D(q, qd, qdd) of the joint torques (Eq. 5, 6)."""
 
     @abstractmethod
-    def momentum(self, state: State) -> Columns:
+    def momentum(self, state: State) -> BlockColumns:
         """Return the columns M_i(q) qd of the momenta, still to be differentiated (Eq. 9)."""
 
     @abstractmethod
-    def remainder(self, state: State) -> Columns:
+    def remainder(self, state: State) -> BlockColumns:
         """Return the columns R_i(q, qd) of the torques that are not the derivative of a momentum (Eq. 8, 9)."""
 
     @abstractmethod
-    def energy(self, state: State) -> Columns:
+    def energy(self, state: State) -> BlockColumns:
         """Return the columns h_i(q, qd) of kinetic plus potential energy in row 0, still to be differentiated (Eq. 10)."""
 
     @abstractmethod
-    def dissipation(self, state: State) -> Columns:
+    def dissipation(self, state: State) -> BlockColumns:
         """Return the columns of the dissipated power qd' Gamma_f in row 0 (Eq. 10)."""
 
     @property
@@ -53,11 +56,11 @@ class AbstractBlock(ABC):
         return False
 
     def adapted(self, basis: "Basis", X: Array) -> "AbstractBlock":
-        """Return the block about an estimate X, shape (..., p), in a basis that has it: ``basis.value(name, X)`` is a value."""
+        """Return the block about an estimate X, shape (..., p), in a basis that has it: ``basis.value(parameter, X)``."""
         del basis, X
         return self
 
-    def believed(self, n: int) -> Mapping[str, Array | float]:
+    def believed(self, n: int) -> Mapping[Parameter, Array | float]:
         """Return where parameters are believed to be that enter nonlinearly, shape (...): their columns are slopes there."""
         del n
         return {}
@@ -67,15 +70,15 @@ class AbstractBlock(ABC):
 class Narrowing(Protocol):
     """A block that can spare itself the columns that nobody asks for."""
 
-    def narrowed(self, names: frozenset[str]) -> AbstractBlock:
-        """Return the block without the work for parameters that are not in `names`."""
+    def narrowed(self, parameters: Set[Parameter]) -> AbstractBlock:
+        """Return the block without the work for other parameters."""
 
 
 class AbstractConservativeBlock(AbstractBlock):
     """A block that stores energy and dissipates none: rigid bodies, rotors, springs."""
 
     @final
-    def dissipation(self, state: State) -> Columns:
+    def dissipation(self, state: State) -> BlockColumns:
         """Return no columns."""
         del state
         return {}

@@ -5,8 +5,8 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Array, Columns
-from identify.basis.block import AbstractBlock
+from identify.arrays import Array
+from identify.basis.block import AbstractBlock, BlockColumns
 from identify.basis.parameter import Parameter
 from identify.data.kinematics import Coupling
 from identify.signals.state import State
@@ -32,29 +32,29 @@ class Coupled(AbstractBlock):
     coupling: Coupling
 
     def parameters(self, n: int) -> tuple[Parameter, ...]:
-        """Return those of the block, with the name of the coupling for the number of the joint."""
+        """Return those of the block, of the drive instead of a joint."""
         del n
-        return tuple(replace(p, name=self._name(p), joint=None) for p in self.block.parameters(1))
+        return tuple(map(self._own, self.block.parameters(1)))
 
-    def explicit(self, state: State) -> Columns:
+    def explicit(self, state: State) -> BlockColumns:
         """Return the columns of the joint torques."""
         return self._of_joints(self.block.explicit(self._motor(state)))
 
-    def momentum(self, state: State) -> Columns:
+    def momentum(self, state: State) -> BlockColumns:
         """Return the columns of the momenta."""
         return self._of_joints(self.block.momentum(self._motor(state)))
 
-    def remainder(self, state: State) -> Columns:
+    def remainder(self, state: State) -> BlockColumns:
         """Return the columns of the torques that are no derivative of a momentum."""
         return self._of_joints(self.block.remainder(self._motor(state)))
 
-    def energy(self, state: State) -> Columns:
+    def energy(self, state: State) -> BlockColumns:
         """Return the columns of the energy."""
-        return {(row, self._names[name]): x for (row, name), x in self.block.energy(self._motor(state)).items()}
+        return {(row, self._own(p)): x for (row, p), x in self.block.energy(self._motor(state)).items()}
 
-    def dissipation(self, state: State) -> Columns:
+    def dissipation(self, state: State) -> BlockColumns:
         """Return the columns of the dissipated power."""
-        return {(row, self._names[name]): x for (row, name), x in self.block.dissipation(self._motor(state)).items()}
+        return {(row, self._own(p)): x for (row, p), x in self.block.dissipation(self._motor(state)).items()}
 
     def _motor(self, state: State) -> State:
         """Return the motion of the motor."""
@@ -64,17 +64,13 @@ class Coupled(AbstractBlock):
 
         return State(along(state.q), along(state.qd), lambda _: along(state.qdd))
 
-    def _of_joints(self, columns: Columns) -> Columns:
+    def _of_joints(self, columns: BlockColumns) -> BlockColumns:
         found = {}
-        for (_, name), column in columns.items():
+        for (_, parameter), column in columns.items():
             for j, weight in enumerate(self.coupling.weights):
                 if weight:
-                    found[j, self._names[name]] = weight * column
+                    found[j, self._own(parameter)] = weight * column
         return found
 
-    def _name(self, parameter: Parameter) -> str:
-        return f"{parameter.symbol}_{self.coupling.name}"
-
-    @property
-    def _names(self) -> dict[str, str]:
-        return {p.name: self._name(p) for p in self.block.parameters(1)}
+    def _own(self, parameter: Parameter) -> Parameter:
+        return replace(parameter, joint=None, drive=self.coupling.name)

@@ -9,7 +9,7 @@ import numpy as np
 from identify.arrays import Array, combined
 from identify.basis.basis import Basis
 from identify.basis.joint_law import AbstractJointLaw
-from identify.basis.parameter import Kind
+from identify.basis.parameter import Kind, Parameter
 from identify.signals.state import State
 
 
@@ -47,16 +47,13 @@ class DriveGains(AbstractJointLaw):
         """Return the torque of the model, with the other sign; before there is one, ones."""
         if self.model is None or self.X is None:
             return {"kg": np.ones_like(state.qd)}
-        return {"kg": -combined(self.model.explicit(state), self.model.names, self.X, np.zeros(state.q.shape))}
+        return {"kg": -combined(self.model.explicit(state), self.X, np.zeros(state.q.shape))}
 
-    def believed(self, n: int) -> Mapping[str, Array | float]:
+    def believed(self, n: int) -> Mapping[Parameter, Array | float]:
         """Return ones."""
-        return {f"kg{j + 1}": 1.0 for j in range(n)} if self.model is not None else {}
+        return dict.fromkeys(self.parameters(n), 1.0) if self.model is not None else {}
 
     def adapted(self, basis: Basis, X: Array) -> Self:
         """Return the gains about an estimate."""
-        blocks = tuple(block for block in basis.blocks if not isinstance(block, DriveGains))
-        own = {p.name for block in blocks for p in block.parameters(basis.n)}
-        kept = {name: new for name, new in basis.kept_names.items() if name in own}
-        model = replace(basis, blocks=blocks, order=(), kept=kept)
-        return replace(self, model=model, X=np.stack([X[..., basis.names.index(name)] for name in model.names], axis=-1))
+        model = basis.of([parameter for parameter in basis.parameters if parameter not in self.parameters(basis.n)])
+        return replace(self, model=model, X=X[..., [basis.places[parameter] for parameter in model.parameters]])

@@ -6,8 +6,8 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from identify.arrays import Array, Columns
-from identify.basis.block import AbstractBlock
+from identify.arrays import Array
+from identify.basis.block import AbstractBlock, BlockColumns
 from identify.basis.parameter import Kind, Parameter
 from identify.blame import expect
 from identify.errors import SettingError
@@ -31,36 +31,36 @@ class AbstractJointLaw(AbstractBlock):
     @final
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return the parameters of each joint."""
-        return tuple(Parameter(f"{x}{j + 1}", j, *what) for j in range(n) for x, what in self.letters().items())
+        return tuple(Parameter(x, j, *what) for j in range(n) for x, what in self.letters().items())
 
     @final
-    def explicit(self, state: State) -> Columns:
+    def explicit(self, state: State) -> BlockColumns:
         """Return the torques: joint j's parameters in row j."""
         return self.remainder(state)
 
     @final
-    def momentum(self, state: State) -> Columns:
+    def momentum(self, state: State) -> BlockColumns:
         """Return no columns."""
         del state
         return {}
 
     @final
-    def remainder(self, state: State) -> Columns:
+    def remainder(self, state: State) -> BlockColumns:
         """Return the torques: joint j's parameters in row j."""
         found = self._checked(state)
-        return {(j, f"{x}{j + 1}"): torque[..., j, :] for j in range(state.n) for x, torque in found.items()}
+        return {(p.joint or 0, p): found[p.symbol][..., p.joint, :] for p in self.parameters(state.n)}
 
     @final
-    def energy(self, state: State) -> Columns:
+    def energy(self, state: State) -> BlockColumns:
         """Return no columns."""
         del state
         return {}
 
     @final
-    def dissipation(self, state: State) -> Columns:
+    def dissipation(self, state: State) -> BlockColumns:
         """Return qd_j times the torques of joint j, in row 0."""
         found = {x: state.qd * torque for x, torque in self._checked(state).items()}
-        return {(0, f"{x}{j + 1}"): power[..., j, :] for j in range(state.n) for x, power in found.items()}
+        return {(0, p): found[p.symbol][..., p.joint, :] for p in self.parameters(state.n)}
 
     def _checked(self, state: State) -> dict[str, Array]:
         """Return the torques; raise SettingError if one is not finite, PluginError if it is no array like the velocities."""

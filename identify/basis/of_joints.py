@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Self, final
 
-from identify.arrays import Array, Columns
-from identify.basis.block import AbstractBlock
+from identify.arrays import Array
+from identify.basis.block import AbstractBlock, BlockColumns
 from identify.basis.parameter import Parameter
 from identify.signals.state import State
 
@@ -33,25 +33,25 @@ class OfJoints(AbstractBlock):
         """Return those of the joints."""
         return tuple(p for p in self.block.parameters(n) if p.joint in self.joints)
 
-    def explicit(self, state: State) -> Columns:
+    def explicit(self, state: State) -> BlockColumns:
         """Return the columns of the joint torques."""
-        return self._of(state, self.block.explicit(state))
+        return self._of(self.block.explicit(state))
 
-    def momentum(self, state: State) -> Columns:
+    def momentum(self, state: State) -> BlockColumns:
         """Return the columns of the momenta."""
-        return self._of(state, self.block.momentum(state))
+        return self._of(self.block.momentum(state))
 
-    def remainder(self, state: State) -> Columns:
+    def remainder(self, state: State) -> BlockColumns:
         """Return the columns of the torques that are no derivative of a momentum."""
-        return self._of(state, self.block.remainder(state))
+        return self._of(self.block.remainder(state))
 
-    def energy(self, state: State) -> Columns:
+    def energy(self, state: State) -> BlockColumns:
         """Return the columns of the energy."""
-        return self._of(state, self.block.energy(state))
+        return self._of(self.block.energy(state))
 
-    def dissipation(self, state: State) -> Columns:
+    def dissipation(self, state: State) -> BlockColumns:
         """Return the columns of the dissipated power."""
-        return self._of(state, self.block.dissipation(state))
+        return self._of(self.block.dissipation(state))
 
     @property
     def adaptive(self) -> bool:
@@ -62,14 +62,12 @@ class OfJoints(AbstractBlock):
         """Return the block about an estimate."""
         return replace(self, block=self.block.adapted(basis, X))
 
-    def believed(self, n: int) -> Mapping[str, Array | float]:
+    def believed(self, n: int) -> Mapping[Parameter, Array | float]:
         """Return where parameters of the joints are believed to be that enter nonlinearly."""
-        own = {p.name for p in self.parameters(n)}
-        return {name: value for name, value in self.block.believed(n).items() if name in own}
+        return {parameter: value for parameter, value in self.block.believed(n).items() if parameter.joint in self.joints}
 
-    def _of(self, state: State, columns: Columns) -> Columns:
-        own = {p.name for p in self.parameters(state.n)}
-        return {address: column for address, column in columns.items() if address[1] in own}
+    def _of(self, columns: BlockColumns) -> BlockColumns:
+        return {address: column for address, column in columns.items() if address[1].joint in self.joints}
 
 
 def inner_of(block: AbstractBlock) -> AbstractBlock:

@@ -1,6 +1,6 @@
 """What a parameter of a robot is."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal, Self, final
 
 Kind = Literal[
@@ -23,6 +23,9 @@ BODY: frozenset[Kind] = frozenset({"inertia", "first moment", "mass"})
 RIGID: frozenset[Kind] = BODY | {"rotor inertia"}
 """Kinds of parameters of what has inertia."""
 
+FRICTION: frozenset[Kind] = frozenset({"viscous friction", "Coulomb friction", "friction", "shape of friction"})
+"""Kinds of parameters of what resists motion: their torques turn with the velocity, which those of bodies do not."""
+
 NOT_NEGATIVE: frozenset[Kind] = frozenset({"rotor inertia", "viscous friction", "Coulomb friction"})
 """Kinds whose values cannot be below zero."""
 
@@ -35,32 +38,42 @@ OF_A_SLIDE = {"N m": "N", "N m s/rad": "N s/m", "kg m^2": "kg"}
 class Parameter:
     """A parameter of a robot's model, such as the viscous friction of joint 2.
 
+    Two are the same if letters, joint and drive are: a name is only how one is written.
+
     Parameters
     ----------
-    name : str
-        Its name in tables, such as Fv2.
+    symbol : str
+        Letters of what it is, such as Fv.
     joint : int, optional
         Its joint, or the joint that moves its link, from 0; None if it belongs to no joint.
     kind : str
         What it measures.
     unit : str
         Its SI unit.
+    drive : str
+        Name of the drive that it belongs to, if that turns with several joints.
+    grouped : bool
+        Whether others are grouped with it: ZZ of joint 1 is written ZZR1 then.
+    scale : float
+        What it is over what its block has: the paper's LMX2 is L times the first moment.
+    label : str
+        Letters that are written instead of its symbol.
     """
 
-    name: str
+    symbol: str
     joint: int | None
-    kind: Kind
-    unit: str
+    kind: Kind = field(compare=False)
+    unit: str = field(compare=False)
+    drive: str = ""
+    grouped: bool = field(default=False, compare=False)
+    scale: float = field(default=1.0, compare=False)
+    label: str = field(default="", compare=False)
 
     @property
-    def symbol(self) -> str:
-        """The name without the number of the joint, from 1, at its end: Fv of Fv2."""
-        return self.name if self.joint is None else self.name.removesuffix(str(self.joint + 1))
-
-    def regrouped(self) -> Self:
-        """Return this parameter after others were grouped with it: ZZ1 becomes ZZR1."""
-        number = self.name[len(self.symbol) :]
-        return replace(self, name=f"{self.symbol}R{number}")
+    def name(self) -> str:
+        """What it is called in tables, such as Fv2."""
+        letters = (self.label or self.symbol) + "R" * self.grouped
+        return f"{letters}_{self.drive}" if self.drive else letters if self.joint is None else f"{letters}{self.joint + 1}"
 
     def of_a_slide(self) -> Self:
         """Return this parameter with the unit that it has where the joint slides."""

@@ -1,16 +1,16 @@
 """What the last link holds."""
 
+from collections.abc import Set
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self, final
 
 import numpy as np
 
-from identify.arrays import Columns
-from identify.basis.block import AbstractConservativeBlock
+from identify.basis.block import AbstractConservativeBlock, BlockColumns
 from identify.basis.parameter import Parameter
 from identify.basis.tree_links import TreeLinks
-from identify.data.kinematics import INERTIAL, KinematicTree
+from identify.data.kinematics import KinematicTree
 from identify.errors import SettingError
 from identify.signals.state import State
 
@@ -32,52 +32,53 @@ class PayloadLink(AbstractConservativeBlock):
         The robot.
     link : int
         Number of the joint whose link holds it, from 0.
-    only : frozenset of str, optional
+    only : frozenset of Parameter, optional
         Parameters whose columns are computed; all by default.
     """
 
     tree: KinematicTree
     link: int
-    only: frozenset[str] | None = None
+    only: frozenset[Parameter] | None = None
 
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return the ten parameters; raise SettingError unless the tree has `n` joints."""
         own = [p for p in self._links.parameters(n) if p.joint == self.link]
         if not own:
             raise SettingError(f"joint {self.tree.joints[self.link].name} moves no link with mass that could hold a payload")
-        return tuple(replace(p, name=f"{letters}L", joint=None) for letters, p in zip(INERTIAL, own, strict=True))
+        return tuple(map(_own, own))
 
-    def narrowed(self, names: frozenset[str]) -> Self:
+    def narrowed(self, parameters: Set[Parameter]) -> Self:
         """Return this block without the work for other parameters."""
-        return replace(self, only=names)
+        return replace(self, only=frozenset(parameters))
 
-    def explicit(self, state: State) -> Columns:
+    def explicit(self, state: State) -> BlockColumns:
         """Return D of the payload (Eq. 5, 6)."""
         return self._held(state, self._links.explicit(state))
 
-    def momentum(self, state: State) -> Columns:
+    def momentum(self, state: State) -> BlockColumns:
         """Return its momenta (Eq. 9)."""
         return self._held(state, self._links.momentum(state))
 
-    def remainder(self, state: State) -> Columns:
+    def remainder(self, state: State) -> BlockColumns:
         """Return its torques that are no derivative of a momentum (Eq. 8, 9)."""
         return self._held(state, self._links.remainder(state))
 
-    def energy(self, state: State) -> Columns:
+    def energy(self, state: State) -> BlockColumns:
         """Return its energy (Eq. 10)."""
         return self._held(state, self._links.energy(state))
 
-    def _held(self, state: State, columns: Columns) -> Columns:
+    def _held(self, state: State, columns: BlockColumns) -> BlockColumns:
         share = state.condition(HELD_SHARE)[..., 0, :]
         if not np.any(share):
             return {}
-        return {(row, self._names[name]): share * column for (row, name), column in columns.items()}
-
-    @cached_property
-    def _names(self) -> dict[str, str]:
-        return {f"{letters}{self.link + 1}": f"{letters}L" for letters in INERTIAL}
+        return {(row, _own(parameter)): share * column for (row, parameter), column in columns.items()}
 
     @cached_property
     def _links(self) -> TreeLinks:
-        asked = [name for name, own in self._names.items() if self.only is None or own in self.only]
-        return TreeLinks(self.tree, frozenset(asked))
+        own = (p for p in TreeLinks(self.tree).parameters(self.tree.n) if p.joint == self.link)
+        return TreeLinks(self.tree, frozenset(p for p in own if self.only is None or _own(p) in self.only))
+
+
+def _own(parameter: Parameter) -> Parameter:
+    """Return the parameter of the payload that is what one of the link is: MXL of MX6."""
+    return replace(parameter, symbol=f"{parameter.symbol}L", joint=None)

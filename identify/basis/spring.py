@@ -5,8 +5,8 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Array, Columns
-from identify.basis.block import AbstractConservativeBlock
+from identify.arrays import Array
+from identify.basis.block import AbstractConservativeBlock, BlockColumns
 from identify.basis.parameter import Parameter
 from identify.errors import SettingError
 from identify.signals.state import State
@@ -30,24 +30,24 @@ class Spring(AbstractConservativeBlock):
 
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return K of each joint that has a spring."""
-        return tuple(Parameter(f"K{j + 1}", j, "stiffness", "N m/rad") for j in self._numbers(n))
+        return tuple(map(_stiffness, self._numbers(n)))
 
-    def explicit(self, state: State) -> Columns:
+    def explicit(self, state: State) -> BlockColumns:
         """Return q - rest."""
         return self.remainder(state)
 
-    def momentum(self, state: State) -> Columns:
+    def momentum(self, state: State) -> BlockColumns:
         """Return no columns."""
         del state
         return {}
 
-    def remainder(self, state: State) -> Columns:
+    def remainder(self, state: State) -> BlockColumns:
         """Return q - rest."""
-        return {(j, f"K{j + 1}"): self._bent(state, j) for j in self._numbers(state.n)}
+        return {(j, _stiffness(j)): self._bent(state, j) for j in self._numbers(state.n)}
 
-    def energy(self, state: State) -> Columns:
+    def energy(self, state: State) -> BlockColumns:
         """Return (q - rest)^2 / 2."""
-        return {(0, f"K{j + 1}"): 0.5 * self._bent(state, j) ** 2 for j in self._numbers(state.n)}
+        return {(0, _stiffness(j)): 0.5 * self._bent(state, j) ** 2 for j in self._numbers(state.n)}
 
     def _bent(self, state: State, j: int) -> Array:
         if len(self.rest) not in (1, state.n):
@@ -56,3 +56,7 @@ class Spring(AbstractConservativeBlock):
 
     def _numbers(self, n: int) -> tuple[int, ...]:
         return tuple(range(n)) if self.joints is None else self.joints
+
+
+def _stiffness(j: int) -> Parameter:
+    return Parameter("K", j, "stiffness", "N m/rad")

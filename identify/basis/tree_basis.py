@@ -31,9 +31,9 @@ def tree_basis(tree: KinematicTree, laws: tuple[AbstractBlock, ...] = (ViscousFr
     springs = (Spring(rest, tuple(sprung)),) if sprung else ()
     blocks = TreeLinks(tree), Armature(driven), *springs, *laws, *_of_couplings(tree, laws)
     parameters = [parameter for block in blocks for parameter in block.parameters(tree.n)]
-    order = tuple(parameter.name for parameter in sorted(parameters, key=lambda p: -1 if p.joint is None else p.joint))
+    kept = tuple(sorted(parameters, key=lambda p: -1 if p.joint is None else p.joint))
     slides = tuple(j for j, joint in enumerate(tree.joints) if joint.kind == "slide")
-    return Basis(tree.n, blocks, order, slides=slides)
+    return Basis(tree.n, blocks, kept, slides)
 
 
 def _of_couplings(tree: KinematicTree, laws: tuple[AbstractBlock, ...]) -> Iterator[AbstractBlock]:

@@ -1,20 +1,22 @@
 """The links of any tree of hinges and slides."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from dataclasses import dataclass, replace
-from typing import Self, final
+from functools import cache
+from typing import Self, TypeAlias, final
 
 import numpy as np
 
-from identify.arrays import Columns
-from identify.basis.block import AbstractConservativeBlock
+from identify.basis.block import AbstractConservativeBlock, BlockColumns
 from identify.basis.body_regressor import KINDS, Wrench, energy
 from identify.basis.parameter import Parameter
 from identify.basis.terms import Term, is_zero, minus
 from identify.basis.twists import Twists
-from identify.data.kinematics import INERTIAL, KinematicTree
+from identify.data.kinematics import KinematicTree
 from identify.errors import SettingError
 from identify.signals.state import State
+
+Pairs: TypeAlias = tuple[tuple[int, int], ...]
 
 
 @final
@@ -31,36 +33,36 @@ class TreeLinks(AbstractConservativeBlock):
     ----------
     tree : KinematicTree
         The robot.
-    only : frozenset of str, optional
+    only : frozenset of Parameter, optional
         Parameters whose columns are computed; all by default.
     """
 
     tree: KinematicTree
-    only: frozenset[str] | None = None
+    only: frozenset[Parameter] | None = None
 
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return ten parameters for each link that has mass; raise SettingError unless the tree has `n` joints."""
         if n != self.tree.n:
             raise SettingError(f"robot {self.tree.name!r} has {self.tree.n} joints, not {n}")
-        return tuple(Parameter(f"{x}{j + 1}", j, *what) for j in self._massive for x, what in KINDS.items())
+        return tuple(parameter for j in self._massive for parameter in _parameters(j))
 
-    def narrowed(self, names: frozenset[str]) -> Self:
+    def narrowed(self, parameters: Set[Parameter]) -> Self:
         """Return this block without the work for other parameters."""
-        return replace(self, only=names)
+        return replace(self, only=frozenset(parameters))
 
-    def explicit(self, state: State) -> Columns:
+    def explicit(self, state: State) -> BlockColumns:
         """Return D (Eq. 5, 6)."""
         at = state.shared(self.tree, self._twists)
         force = {j: Wrench.inertial(at.velocity[j], at.acceleration[j], at.up[j]) for j in self._massive}
         return self._columns(state, self._pairs, lambda i, j, x: force[j].along(at.unit[j][i], x))
 
-    def momentum(self, state: State) -> Columns:
+    def momentum(self, state: State) -> BlockColumns:
         """Return M_i(q) qd (Eq. 9)."""
         at = state.shared(self.tree, self._twists)
         momentum = {j: Wrench.momentum(at.velocity[j]) for j in self._massive}
         return self._columns(state, self._pairs, lambda i, j, x: momentum[j].along(at.unit[j][i], x))
 
-    def remainder(self, state: State) -> Columns:
+    def remainder(self, state: State) -> BlockColumns:
         """Return R_i(q, qd) = -dT_i/dq + dU_i/dq (Eq. 8, 9)."""
         at = state.shared(self.tree, self._twists)
         momentum = {j: Wrench.momentum(at.velocity[j]) for j in self._massive}
@@ -71,7 +73,7 @@ class TreeLinks(AbstractConservativeBlock):
 
         return self._columns(state, self._pairs, column)
 
-    def energy(self, state: State) -> Columns:
+    def energy(self, state: State) -> BlockColumns:
         """Return h_i(q, qd) (Eq. 10)."""
         at = state.shared(self.tree, self._twists)
         stored = {j: energy(at.velocity[j], at.up[j], at.height[j]) for j in self._massive}
@@ -85,16 +87,23 @@ class TreeLinks(AbstractConservativeBlock):
         return tuple(j for j, joint in enumerate(self.tree.joints) if joint.massive)
 
     @property
-    def _pairs(self) -> tuple[tuple[int, int], ...]:
+    def _pairs(self) -> Pairs:
         """(joint, link that it moves)."""
         return tuple((i, j) for j in self._massive for i in self.tree.ancestors(j))
 
-    def _columns(self, state: State, rows: tuple[tuple[int, int], ...], column: Callable[[int, int, int], Term]) -> Columns:
+    def _columns(
+        self, state: State, rows: tuple[tuple[int, int], ...], column: Callable[[int, int, int], Term]
+    ) -> BlockColumns:
         """Return the columns of (row, link) that are asked for and not zero at all times."""
         shape, found = state.q[..., 0, :].shape, {}
         for i, j in rows:
-            for x, letter in enumerate(INERTIAL):
-                name = f"{letter}{j + 1}"
-                if (self.only is None or name in self.only) and not is_zero(term := column(i, j, x)):
-                    found[i, name] = np.broadcast_to(term, shape)
+            for x, parameter in enumerate(_parameters(j)):
+                if (self.only is None or parameter in self.only) and not is_zero(term := column(i, j, x)):
+                    found[i, parameter] = np.broadcast_to(term, shape)
         return found
+
+
+@cache
+def _parameters(j: int) -> tuple[Parameter, ...]:
+    """Return the ten parameters of a link."""
+    return tuple(Parameter(x, j, *what) for x, what in KINDS.items())

@@ -4,10 +4,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 import scipy
 
 from identify.arrays import HELD, Array
 from identify.basis.basis import Basis
+from identify.basis.parameter import FRICTION
 from identify.rows.linearization import observation
 from identify.rows.noise_propagation import NoiseLevels
 from identify.signals.state import State
@@ -82,12 +84,9 @@ class Information:
         return np.asarray(np.linalg.inv(S) * self.fs / self.rate)
 
     @cached_property
-    def _place(self) -> dict[str, int]:
-        return {name: i for i, name in enumerate(self.basis.names)}
-
-    @cached_property
-    def _frictions(self) -> frozenset[str]:
-        return frozenset(p.name for p in self.basis.parameters if "friction" in p.kind)
+    def _frictions(self) -> npt.NDArray[np.bool_]:
+        """Which parameters are of friction, shape (p,)."""
+        return np.array([parameter.kind in FRICTION for parameter in self.basis.parameters])
 
     def slope(self, motion: Array, of_rows: Array, of_torques: Array) -> Array:
         """Return how sums of products with columns grow with positions, velocities and accelerations.
@@ -104,7 +103,7 @@ class Information:
         Array, shape (3, time, joint)
             Derivatives of the sum over the row and the parameter.
         """
-        n, place = self.basis.n, self._place
+        n = self.basis.n
         steps = np.array([STEP, STEP, 1.0])
         copies = np.broadcast_to(motion, (3 * n + 1, *motion.shape)).copy()
         for order in range(3):
@@ -112,12 +111,12 @@ class Information:
                 copies[1 + order * n + j, order, :, j] += steps[order]
         weight, sums, weighted = self.weight(motion), np.zeros((3 * n + 1, motion.shape[-2])), np.zeros(motion.shape[-2:])
         q, qd, qdd = _states(copies)
-        for (row, name), column in self.basis.explicit(State(q, qd, lambda _: qdd)).items():
-            if name == HELD:
+        for (row, place), column in self.basis.explicit(State(q, qd, lambda _: qdd)).items():
+            if place == HELD:
                 continue
-            fading = of_rows[:, row, place[name]].copy()
-            whole = of_torques[:, row, place[name]]
-            if name in self._frictions:
+            fading = of_rows[:, row, place].copy()
+            whole = of_torques[:, row, place]
+            if self._frictions[place]:
                 fading, whole = fading + whole, np.zeros_like(whole)
             sums += column * (weight[:, row] * fading + whole)
             weighted[:, row] += column[0] * fading
@@ -134,8 +133,7 @@ class Information:
 
     def torques(self, motion: Array, W: Array, X: Array) -> Array:
         """Return what each parameter adds to the torques, shape (..., time, joint, p), frictions fading at low speed."""
-        frictions = np.array([name in self._frictions for name in self.basis.names])
-        return W * X * np.where(frictions, self.weight(motion)[..., None], 1.0)
+        return W * X * np.where(self._frictions, self.weight(motion)[..., None], 1.0)
 
 
 def _states(motion: Array) -> tuple[Array, Array, Array]:

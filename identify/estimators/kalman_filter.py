@@ -193,15 +193,15 @@ class _Filter:
 
     def _acceleration(self, k: int, q: Array, qd: Array, X: Array) -> tuple[Array, Array]:
         """Return accelerations of points, shape (joint, point), and M^-1 at the first."""
-        n, names = self.basis.n, self.basis.names
+        n = self.basis.n
         bias = np.zeros_like(q)
-        for (row, name), column in self.basis.explicit(State(q, qd, lambda _: np.zeros_like(q))).items():
-            bias[row] += column * (1.0 if name == HELD else X[names.index(name)])
+        for (row, place), column in self.basis.explicit(State(q, qd, lambda _: np.zeros_like(q))).items():
+            bias[row] += column * (1.0 if place == HELD else X[place])
         unit = np.eye(n)[:, :, None]
         turned = np.broadcast_to(q, (n, *q.shape))
         M = np.zeros((n, n, q.shape[-1]))
-        for (row, name), column in self.basis.momentum(State(turned, unit + np.zeros_like(turned), lambda x: x)).items():
-            M[:, row] += column * (1.0 if name == HELD else X[names.index(name)])
+        for (row, place), column in self.basis.momentum(State(turned, unit + np.zeros_like(turned), lambda x: x)).items():
+            M[:, row] += column * (1.0 if place == HELD else X[place])
         M = np.moveaxis(M, -1, 0)
         found = np.linalg.solve(M, (self.tau[:, k, None] - bias).T[..., None])[..., 0].T
         return np.asarray(found, dtype=np.float64), np.linalg.inv(M[0])

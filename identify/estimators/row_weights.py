@@ -84,7 +84,7 @@ class RowWeights:
         signals, linear = rows.signals, self.noise.linear(rows.signals)
         speed = rectified(smoothed(signals.state.qd, signals.fs), self.noise.levels.position[..., None] * signals.gain)
         columns = self.model.c(linear.basis, replace(signals.state, qd=speed))
-        return rows.measurement(combined(columns, linear.basis.names, linear.X, np.zeros(rows.inside.shape)))
+        return rows.measurement(combined(columns, linear.X, np.zeros(rows.inside.shape)))
 
     def _variance(self, rows: RowMap) -> Array:
         return self.noise.covariance(rows).variance + self.bias(rows) ** 2

@@ -13,7 +13,7 @@ from identify.basis.basis import Basis
 from identify.basis.friction.shape import ShapedFriction, with_settings
 from identify.basis.joint_law import AbstractFriction, AbstractJointLaw
 from identify.basis.of_joints import OfJoints
-from identify.basis.parameter import Kind
+from identify.basis.parameter import Kind, Parameter
 from identify.estimators.problem import Problem
 from identify.rows.factors import Factors, Status
 from identify.rows.rows import Rows
@@ -80,19 +80,24 @@ def _estimate(factors: Factors, basis: Basis) -> Array:
     X, shapes = factors.fit(2).X, basis.believed
     if np.isfinite(X).all():
         return X
-    rest = [name for name in basis.names if name not in shapes]
+    rest = _rest(basis)
     plain = np.empty_like(X)
-    plain[..., [basis.names.index(name) for name in rest]] = factors.only(rest, shapes).fit(2).X
-    for name, value in shapes.items():
-        plain[..., basis.names.index(name)] = value
+    plain[..., rest] = factors.only(rest, shapes).fit(2).X
+    for place, value in shapes.items():
+        plain[..., place] = value
     return np.where(np.isfinite(X).all(axis=-1, keepdims=True), X, plain)
+
+
+def _rest(basis: Basis) -> list[int]:
+    """Return the places of what is linear."""
+    return [place for place in basis.places.values() if place not in basis.believed]
 
 
 def _step(rows: "AdaptiveRows", here: Basis, X: Array, cost: Array) -> tuple[Basis, Array]:
     """Return the basis about an estimate, or a share of the way there if that explains more, and its misfit, shape (...)."""
     share = np.ones(cost.shape)
     for smaller in SHARES:
-        ahead = here.adapted(_between(here, X, share))
+        ahead = here.linearized_at(_between(here, X, share))
         found = rows.misfit(ahead)
         if not (worse := found > cost).any():
             break
@@ -103,9 +108,8 @@ def _step(rows: "AdaptiveRows", here: Basis, X: Array, cost: Array) -> tuple[Bas
 def _between(basis: Basis, X: Array, share: Array) -> Array:
     """Return X with the shapes of friction moved by a share of their step alone."""
     found = X.copy()
-    for name, old in basis.believed.items():
-        i = basis.names.index(name)
-        found[..., i] = old + share * (X[..., i] - old)
+    for place, old in basis.believed.items():
+        found[..., place] = old + share * (X[..., place] - old)
     return found
 
 
@@ -129,33 +133,32 @@ class AdaptiveRows:
 
     def factors(self, basis: Basis) -> Factors:
         """Return the factors with the laws of a basis in the place of those of the problem."""
-        key = id(basis)
-        if key not in self._known:
-            laws = replace(basis, blocks=tuple(b for b in basis.blocks if b.adaptive), order=(), kept=None, held={})
-            own = [name for name in basis.names if name in laws.names]
-            moving = self._rows_of(laws.renamed({name: name for name in own}))
-            fixed = self._fixed
+        if not self._last or self._last[0] is not basis:
+            laws, fixed = basis.split()[1], self._fixed
+            moving = self._rows_of(laws)
             W = np.concatenate([fixed.W, moving.W], axis=-1)
-            names = (*fixed.names, *moving.names)
-            order = [names.index(name) for name in basis.names]
-            rows = replace(fixed, Y=fixed.Y + moving.Y - self._measured, W=W[..., order], names=basis.names)
-            self._known[key] = basis, rows.factors
-        return self._known[key][1]
+            kept = [basis.places[parameter] for parameter in (*self._rest.parameters, *laws.parameters)]
+            rows = replace(fixed, Y=fixed.Y + moving.Y - self._measured, W=W[..., np.argsort(kept)], names=basis.names)
+            self._last[:] = basis, rows.factors
+        return self._last[1]
 
     def misfit(self, basis: Basis) -> Array:
         """Return what is left with the shapes of friction where they are believed to be, shape (...)."""
-        shapes = basis.believed
-        return misfit(self.factors(basis).only([name for name in basis.names if name not in shapes], shapes))
+        return misfit(self.factors(basis).only(_rest(basis), basis.believed))
 
     @cached_property
-    def _known(self) -> dict[int, tuple[Basis, Factors]]:
-        return {}
+    def _last(self) -> list[Any]:
+        """The basis that was asked for last, and its factors."""
+        return []
+
+    @cached_property
+    def _rest(self) -> Basis:
+        """What does not depend on an estimate."""
+        return self.problem.basis.split()[0]
 
     @cached_property
     def _fixed(self) -> Rows:
-        basis = self.problem.basis
-        adaptive = {p.name for block in basis.blocks if block.adaptive for p in block.parameters(basis.n)}
-        return self._rows_of(basis.without(*(name for name in basis.names if name in adaptive)))
+        return self._rows_of(self._rest)
 
     @cached_property
     def _measured(self) -> Array:
@@ -173,13 +176,12 @@ def misfit(factors: Factors) -> Array:
 
 def _scanned(rows: AdaptiveRows, basis: Basis, count: int) -> Basis:
     """Return the basis with other shapes where they explain more, joint by joint; the same if there are none."""
-    for k, block in enumerate(basis.blocks):
+    for block in basis.blocks:
         inner, joints = (block.block, block.joints) if isinstance(block, OfJoints) else (block, tuple(range(basis.n)))
         if isinstance(inner, ShapedFriction):
             found = _best(rows, basis, inner, joints, count)
             if found is not inner:
-                made = replace(block, block=found) if isinstance(block, OfJoints) else found
-                basis = replace(basis, blocks=(*basis.blocks[:k], made, *basis.blocks[k + 1 :]))
+                basis = basis.exchanged(block, replace(block, block=found) if isinstance(block, OfJoints) else found)
     return basis
 
 
@@ -200,18 +202,18 @@ def _best(rows: AdaptiveRows, basis: Basis, shaped: ShapedFriction, joints: Sequ
     grid = [dict(zip(settings, at, strict=True)) for at in product(*(shape.grid(each) for shape in shaped.shapes))]
     here = [{name: x[..., None] for name, x in shaped.at_joints(n).items()}] if shaped.values else []
     candidates = Candidates(shaped.law, (*grid, *here))
-    rest = basis.without(*(p.name for p in shaped.parameters(n) if p.name in basis.names))
-    factors, shapes = rows.factors(rest + OfJoints(candidates, tuple(joints))), rest.believed
-    plain = [name for name in rest.names if name not in shapes]
+    rest = basis.of([parameter for parameter in basis.parameters if parameter not in shaped.parameters(n)])
+    there = rest + OfJoints(candidates, tuple(joints))
+    factors, shapes, plain = rows.factors(there), rest.believed, _rest(rest)
     chosen = np.full((*factors.R.shape[:-3], n), len(grid), dtype=np.intp)
     for run in np.ndindex(chosen.shape[:-1]):
         alone = Factors(factors.R[run], factors.rows[run], factors.names)
-        at = {name: np.asarray(value)[run] if np.ndim(value) else value for name, value in shapes.items()}
+        at = {place: np.asarray(value)[run] if np.ndim(value) else value for place, value in shapes.items()}
         found = dict.fromkeys(joints, len(grid)) if here else {}
         for j in joints if here else (*joints, *joints):  # at first, a second time beside what the others have
-            others = [f"{shaped.law.symbol}@{i}:{k + 1}" for k, i in found.items() if k != j]
-            own = [f"{shaped.law.symbol}@{i}:{j + 1}" for i in range(len(candidates.grid))]
-            costs = np.array([misfit(alone.only([*plain, *others, name], at)) for name in own])
+            others = [there.places[candidates.parameter(i, k)] for k, i in found.items() if k != j]
+            own = [there.places[candidates.parameter(i, j)] for i in range(len(candidates.grid))]
+            costs = np.array([misfit(alone.only([*plain, *others, place], at)) for place in own])
             costs[: len(grid)] -= _below(costs[: len(grid)]) if len(settings) == 1 else 0.0
             found[j] = int(np.argmin(costs))
         chosen[run][list(found)] = list(found.values())
@@ -246,6 +248,10 @@ class Candidates(AbstractJointLaw):
     def letters(self) -> Mapping[str, tuple[Kind, str]]:
         """Return a name for each of the settings."""
         return {f"{self.law.symbol}@{i}:": (self.law.kind, self.law.unit) for i in range(len(self.grid))}
+
+    def parameter(self, i: int, j: int) -> Parameter:
+        """Return the parameter of one of the settings at a joint."""
+        return Parameter(list(self.letters())[i], j, self.law.kind, self.law.unit)
 
     def torques(self, state: State) -> Mapping[str, Array]:
         """Return the torque with each of the settings."""

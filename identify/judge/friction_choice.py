@@ -150,7 +150,7 @@ class _Choice:
     def _drives(self, search: "_Search", own: Sequence[str], j: int) -> bool:
         """Return whether the last law of a joint has a size below zero: a law of another form, stood on its head."""
         block = self.candidates[own[-1]] if own else None
-        return isinstance(block, ShapedFriction) and search.products.value(f"{block.law.symbol}{j + 1}") < 0
+        return isinstance(block, ShapedFriction) and search.products.value(block.law.symbol, j) < 0
 
     def _needed(self, laws: Sequence[tuple[str, ...]], j: int) -> tuple[str, ...]:
         """Return the laws of a joint without those that gain nothing beside the others."""

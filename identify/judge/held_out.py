@@ -64,7 +64,7 @@ class HeldOut:
         """Return the products of a problem's rows, and of those that candidates for further laws have."""
         X, basis, places = start.factors.fit(2).X, start.basis, dict[tuple[str, int], list[list[int]]]()
         for law, block in candidates.items():
-            there = {p.joint for p in block.parameters(basis.n) if p.name in basis.names}
+            there = {parameter.joint for parameter in block.parameters(basis.n) if parameter in basis.places}
             shaped, first = _at_all_shapes(block), len(basis.names)
             made = OfJoints(shaped.adapted(start.basis, X), tuple(j for j in range(basis.n) if j not in there))
             basis = basis + made
@@ -81,9 +81,10 @@ class HeldOut:
         weight = start.factors.rows / np.maximum(level, 1e-300)
         return cls(start, _held(joined, speed), weight, len(start.names), places)
 
-    def value(self, name: str) -> float:
-        """Return the estimate of a parameter without further laws."""
-        return float(self.start.factors.fit(2).X[self.start.names.index(name)])
+    def value(self, letters: str, j: int) -> float:
+        """Return the estimate of a parameter of a joint without further laws."""
+        place = next(k for p, k in self.start.basis.places.items() if (p.symbol, p.joint) == (letters, j))
+        return float(self.start.factors.fit(2).X[place])
 
     def sigmas(self, law: str, j: int) -> float:
         """Return how many sigma the parameters of a law are away from zero, at the shapes that explain most."""

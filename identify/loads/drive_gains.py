@@ -83,7 +83,7 @@ def identify_drive_gains(robot: LoadedRobot) -> GainEstimate:
         problem = settled(Problem(logs, basis, ExplicitModel(), robot.chain))
         basis = problem.basis
         start = np.concatenate([problem.factors.fit(2).X, np.ones(n)])
-        with_gains = problem.with_basis((basis + DriveGains()).adapted(start))
+        with_gains = problem.with_basis((basis + DriveGains()).linearized_at(start))
         with_gains.factors.together.check()
         found = with_gains.factors.fit(2)
         step = found.X[-n:]

@@ -114,7 +114,7 @@ def with_known_robot(robot: LoadedRobot, names: tuple[str, ...], X: Array, covar
     """
     basis, logs = robot.basis, marked(robot.loaded, 1.0)
     found = with_robot_held(robot, dict(zip(names, map(float, X), strict=True)))
-    of_robot = Problem(logs, basis.renamed({name: name for name in names}), ExplicitModel(), robot.chain).rows
+    of_robot = Problem(logs, basis.of(basis.named(*names)), ExplicitModel(), robot.chain).rows
     rows = found.problem.rows
     slope = np.zeros((len(found.names), len(names)))
     if found.influence is not None:
@@ -153,7 +153,7 @@ def difference(robot: LoadedRobot) -> Payload:
             "torques rests: take another way"
         )
     first = Problem(marked(robot.without, 0.0), robot.robot.basis, ExplicitModel(), robot.chain).rows
-    own = robot.basis.renamed({name: name for name in robot.names})
+    own = robot.basis.of(robot.basis.named(*robot.names))
     problem = Problem(marked(robot.loaded, 1.0), own, ExplicitModel(), robot.chain)
     rows = problem.rows  # what is known of the payload is out of their Y
     Y, W = rows.Y - first.Y, rows.W

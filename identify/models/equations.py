@@ -19,8 +19,8 @@ class Equations:
         The log's.
     B : mapping of (int, int) to Array or float
         (row of an instant, joint) -> what the row multiplies the torque of the joint by.
-    c, e : mapping of (int, str) to Array
-        (row, parameter) -> column that is used as it is, and column that is still to be differentiated, shape (..., time).
+    c, e : mapping of (int, int) to Array
+        (row, place in X) -> column that is used as it is, and column that is still to be differentiated, shape (..., time).
     names : tuple of str
         Names of the parameters X.
     """
@@ -63,8 +63,8 @@ class Equations:
         return weight
 
     @cached_property
-    def addresses(self) -> tuple[tuple[int, str], ...]:
-        """(row, parameter) of every column of c + s e that is not zero at all times; k of them, those that are held first."""
+    def addresses(self) -> tuple[tuple[int, int], ...]:
+        """(row, place in X) of every column of c + s e that is not zero at all times; k of them, those that are held first."""
         return tuple(sorted(dict.fromkeys((*self.c, *self.e)), key=lambda address: address[1] != HELD))
 
     @cached_property
@@ -77,4 +77,4 @@ class Equations:
 
     def predicted(self, X: Array) -> Array:
         """Return (c + s e) X at every sample, shape (..., row, time), for parameters of shape (..., p)."""
-        return combined(self.rates, self.names, X, combined(self.c, self.names, X, np.zeros(self.y.shape)))
+        return combined(self.rates, X, combined(self.c, X, np.zeros(self.y.shape)))

@@ -1,6 +1,7 @@
 """Base parameters: the combinations of standard parameters that a motion can identify."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self, final
 
@@ -8,8 +9,8 @@ import numpy as np
 
 from identify.arrays import HELD, Array
 from identify.basis.basis import Basis
+from identify.basis.parameter import FRICTION, Parameter
 from identify.data.kinematics import KinematicTree
-from identify.errors import SettingError
 from identify.signals.state import State
 
 STATES = 56
@@ -27,14 +28,8 @@ DEPENDENT = 1e-3
 Descriptions round angles: of the arms of example-robot-data, columns that are dependent in the robot leave up to 3e-6 where
 angles have four digits after the point (1.5708), up to 6e-4 with two (1.57); none that is independent leaves less than 0.09."""
 
-ALIKE = 1e-6
-"""Two bases make the same torques if they differ by less than this share of the largest."""
-
-SHOWN = 1e-5
-"""Coefficients below this share of the first are left out where a grouping is printed: they come from rounded angles."""
-
-NEGLIGIBLE = 1e-8
-"""Coefficients below this share of the largest of their grouping are rounding."""
+GROUPED = 1e-5
+"""Coefficients below this share of the largest of their grouping come from rounded angles: nothing is grouped by them."""
 
 ROUNDING = 1e-13
 """Sums below this share of their terms are zero but for rounding."""
@@ -61,37 +56,49 @@ class BaseParameters:
         Numbers of the parameters that stay, from 0.
     K : Array, shape (b, p)
         What each base parameter is made of.
+    parameters : tuple of Parameter
+        The base parameters.
     """
 
     standard: Basis
     kept: tuple[int, ...]
     K: Array
+    parameters: tuple[Parameter, ...]
 
     @classmethod
-    def of(cls, tree: KinematicTree, standard: Basis) -> Self:
-        """Return the grouping of a robot's standard parameters."""
-        W = _explicit_columns(tree, standard)
-        large = _large(tree, standard, np.linalg.norm(W, axis=0))
-        R: Array = np.linalg.qr(W / large, mode="r")  # type: ignore[assignment]  # mode "r" gives R alone
-        kept = _independent(R)
-        K: Array = np.linalg.lstsq(R[:, kept], R, rcond=None)[0] * large / large[kept][:, None]
-        K[np.abs(K) < NEGLIGIBLE * np.abs(K).max(axis=1, keepdims=True)] = 0.0
-        K[:, np.linalg.norm(R, axis=0) <= DEPENDENT] = 0.0
-        K[:, kept] = np.eye(len(kept))
-        return cls(standard, tuple(kept), K)
+    def of(cls, tree: KinematicTree, standard: Basis, written: Mapping[Parameter, Parameter] | None = None) -> Self:
+        """Return the grouping of a robot's standard parameters; some are `written` with other letters, and to another scale.
 
-    @property
-    def basis(self) -> Basis:
-        """The basis of the base parameters, whose columns are those of the parameters that stay."""
-        names = self.standard.names
-        return self.standard.renamed({names[k]: name for k, name in zip(self.kept, self.names, strict=True)})
+        What resists motion is never grouped with what has inertia, weight or springs: its torques turn with the velocity.
+        """
+        W = _explicit_columns(tree, standard)
+        large, count = _large(tree, standard, np.linalg.norm(W, axis=0)), len(standard.names)
+        resists = np.array([parameter.kind in FRICTION for parameter in standard.parameters])
+        K, kept = np.zeros((count, count)), list[int]()
+        for group in (~resists, resists):
+            own = np.flatnonzero(group)
+            first, part = _grouped(W[:, own] / large[own])
+            stay = own[first]
+            K[np.ix_(stay, own)] = part * large[own] / large[stay][:, None]
+            kept.extend(int(k) for k in stay)
+        kept.sort()
+        K = K[kept]
+        K[np.abs(K) < GROUPED * np.abs(K).max(axis=1, keepdims=True)] = 0.0
+        several = np.count_nonzero(K, axis=1) > 1
+        parameters = [(written or {}).get(p, p) for p in (standard.parameters[k] for k in kept)]
+        K *= np.array([parameter.scale for parameter in parameters])[:, None]
+        named = (replace(parameter, grouped=bool(more)) for parameter, more in zip(parameters, several, strict=True))
+        return cls(standard, tuple(kept), K, tuple(named))
 
     @cached_property
+    def basis(self) -> Basis:
+        """The basis of the base parameters, whose columns are those of the parameters that stay."""
+        return self.standard.of(self.parameters)
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the base parameters: ZZ1 becomes ZZR1 where others are grouped with it."""
-        parameters = [self.standard.parameters[k] for k in self.kept]
-        grouped = np.count_nonzero(self.K, axis=1) > 1
-        return tuple((p.regrouped() if more else p).name for p, more in zip(parameters, grouped, strict=True))
+        return self.basis.names
 
     @property
     def without_effect(self) -> tuple[str, ...]:
@@ -105,14 +112,13 @@ class BaseParameters:
 
     def grouping(self, i: int) -> str:
         """Return what base parameter `i` is made of, such as ZZ1 + Ia1 + 0.25 M2."""
-        shown = np.flatnonzero(np.abs(self.K[i]) > SHOWN * np.abs(self.K[i]).max())
-        first, *others = [self.kept[i], *(k for k in shown if k != self.kept[i])]
-        terms = [self.standard.names[first]]
-        for k in others:
+        places = [self.kept[i], *(int(k) for k in np.flatnonzero(self.K[i]) if k != self.kept[i])]
+        text = ""
+        for k in places:
             c = self.K[i, k]
             size = "" if np.isclose(abs(c), 1, rtol=1e-6) else f"{abs(c):.6g} "
-            terms.append(f"{'-' if c < 0 else '+'} {size}{self.standard.names[k]}")
-        return " ".join(terms)
+            text += f" {'-' if c < 0 else '+'} {size}{self.standard.names[k]}"
+        return text.removeprefix(" + ")
 
     def base(self, standard: Array) -> Array:
         """Return the base values of standard values, shape (..., p); sums that are rounding alone are zero."""
@@ -134,21 +140,6 @@ class BaseParameters:
         return np.asarray(standard) + scale * np.linalg.lstsq(K, base - self.base(standard), rcond=None)[0]
 
 
-def transfer(tree: KinematicTree, start: Basis, end: Basis) -> Array:
-    """Return T so that T X are the parameters of the basis `end` that make the torques of X in the basis `start`.
-
-    Raises
-    ------
-    SettingError
-        If the columns of one do not span those of the other.
-    """
-    A, B = _explicit_columns(tree, end), _explicit_columns(tree, start)
-    T: Array = np.asarray(np.linalg.lstsq(A, B, rcond=None)[0], dtype=np.float64)
-    if np.abs(A @ T - B).max() > ALIKE * np.abs(B).max():
-        raise SettingError(f"the parameters {', '.join(start.names)} do not describe robot {tree.name!r} as its links do")
-    return T
-
-
 def _explicit_columns(tree: KinematicTree, basis: Basis) -> Array:
     """Return the columns of the explicit model at random states, shape (joint x state, p)."""
     return np.moveaxis(columns_at(basis, random_states(tree, _count(tree))), 1, -1).reshape(-1, len(basis.names))
@@ -160,9 +151,9 @@ def columns_at(basis: Basis, states: Array) -> Array:
     W = np.zeros((basis.n, len(basis.names), q.shape[-1]))
     rng = np.random.default_rng(SEED)
     logged = {"temperature": rng.uniform(0, 60, q.shape), "payload": rng.integers(0, 2, (1, q.shape[-1])).astype(np.float64)}
-    for (row, name), signal in basis.explicit(State(q, qd, lambda _: qdd, logged)).items():
-        if name != HELD:
-            W[row, basis.names.index(name)] = signal
+    for (row, place), signal in basis.explicit(State(q, qd, lambda _: qdd, logged)).items():
+        if place != HELD:
+            W[row, place] = signal
     return W
 
 
@@ -175,6 +166,16 @@ def random_states(tree: KinematicTree, count: int) -> Array:
     ends = np.array([[low, high], [-SPEED * np.ones(tree.n), SPEED * np.ones(tree.n)], [-ACCELERATION * np.ones(tree.n)] * 2])
     ends[2, 1] = ACCELERATION
     return ends[:, 0, :, None] + rng.random((3, tree.n, count)) * (ends[:, 1] - ends[:, 0])[..., None]
+
+
+def _grouped(W: Array) -> tuple[list[int], Array]:
+    """Return which columns stay, and what makes all of them of those."""
+    R: Array = np.linalg.qr(W, mode="r")  # type: ignore[assignment]  # mode "r" gives R alone
+    kept = _independent(R)
+    K: Array = np.asarray(np.linalg.lstsq(R[:, kept], R, rcond=None)[0], dtype=np.float64)
+    K[:, np.linalg.norm(R, axis=0) <= DEPENDENT] = 0.0
+    K[:, kept] = np.eye(len(kept))
+    return kept, K
 
 
 def _independent(R: Array) -> list[int]:

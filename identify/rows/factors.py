@@ -206,13 +206,12 @@ class Factors:
         R = triangular(np.concatenate([part.R for part in parts], axis=-2))
         return cls(R, np.sum([part.rows for part in parts], axis=0), parts[0].names)
 
-    def only(self, names: Sequence[str], known: Mapping[str, Array | float] | None = None) -> Self:
-        """Return the factors of the rows with these parameters alone; of the others those `known`, shape (...), count in Y."""
+    def only(self, places: Sequence[int], known: Mapping[int, Array | float] | None = None) -> Self:
+        """Return the factors of rows with the parameters at some places; of others those `known`, shape (...), count in Y."""
         R = self.R.copy()
-        for name, value in (known or {}).items():
-            R[..., -1] -= np.asarray(value)[..., None, None] * R[..., self.names.index(name)]
-        kept = [*(self.names.index(name) for name in names), -1]
-        return type(self)(triangular(R[..., kept]), self.rows, tuple(names))
+        for place, value in (known or {}).items():
+            R[..., -1] -= np.asarray(value)[..., None, None] * R[..., place]
+        return type(self)(triangular(R[..., [*places, -1]]), self.rows, tuple(self.names[place] for place in places))
 
     @cached_property
     def together(self) -> Factor:

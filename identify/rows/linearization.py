@@ -98,9 +98,9 @@ def slopes(
     turned = np.concatenate([q + still, q + still, q + q_steps, q - q_steps])
     moved = np.concatenate([slides + qd_steps, slides - qd_steps, qd + still, qd + still])
     there = State(turned, moved, lambda _: np.broadcast_to(qdd, turned.shape), conditions or {})
-    faster, slower, ahead, behind = np.split(combined(basis.explicit(there), basis.names, X, np.zeros_like(turned)), 4)
+    faster, slower, ahead, behind = np.split(combined(basis.explicit(there), X, np.zeros_like(turned)), 4)
     at_rest = State(q + still, unit + still, lambda x: x, conditions or {})
-    inertia = combined(basis.momentum(at_rest), basis.names, X, np.zeros_like(at_rest.q))
+    inertia = combined(basis.momentum(at_rest), X, np.zeros_like(at_rest.q))
     found = inertia, (faster - slower) / (2 * STEP_QD), (ahead - behind) / (2 * STEP_Q)
     return Slopes(*(np.moveaxis(x, 0, -2) for x in found))
 
@@ -108,9 +108,9 @@ def slopes(
 def observation(basis: Basis, q: Array, qd: Array, qdd: Array) -> Array:
     """Return D(q, qd, qdd) of a motion, shape (..., joint, time), at every instant, shape (..., time, joint, p)."""
     found = np.zeros((*q.shape[:-2], q.shape[-1], basis.n, len(basis.names)))
-    for (row, name), column in basis.explicit(State(q, qd, lambda _: qdd)).items():
-        if name != HELD:
-            found[..., row, basis.names.index(name)] = column
+    for (row, place), column in basis.explicit(State(q, qd, lambda _: qdd)).items():
+        if place != HELD:
+            found[..., row, place] = column
     return found
 
 
@@ -118,7 +118,7 @@ def friction_jumps(basis: Basis, X: Array, q: Array) -> Array:
     """Return the torque by which friction jumps where joints at positions q, shape (joint,), turn, shape (joint,) [N m]."""
     still = np.zeros((basis.n, 1))
     there = [State(q[:, None], still + v, lambda _: still) for v in (SLIDING, -SLIDING)]
-    ahead, back = (combined(basis.explicit(state), basis.names, X, np.zeros_like(still)) for state in there)
+    ahead, back = (combined(basis.explicit(state), X, np.zeros_like(still)) for state in there)
     return np.abs(ahead - back)[:, 0]
 
 

@@ -57,13 +57,12 @@ class Rows:
         y, columns = _mapped(equations, to_rows)
         _require_finite(columns, equations)
         n, count, p = equations.kinds, to_rows.grid.count, len(equations.names)
-        held = [row for row, name in equations.addresses if name == HELD]
+        held = [row for row, place in equations.addresses if place == HELD]
         y[..., held, :] -= columns[..., : len(held), :]
         places = equations.addresses[len(held) :]
         W = np.zeros((*y.shape[:-2], n, p, count))
-        W[..., [row for row, _ in places], [equations.names.index(name) for _, name in places], :] = columns[
-            ..., len(held) :, :
-        ]
+        rows, columns_of = np.array(places, dtype=np.intp).reshape(-1, 2).T
+        W[..., rows, columns_of, :] = columns[..., len(held) :, :]
         W = np.moveaxis(W, -1, -3).reshape(*y.shape[:-2], count * n, p)
         time, valid = np.repeat(to_rows.time, n), in_order(to_rows.outside) > 0
         return cls(in_order(y), W, valid, time, n, equations.names, (to_rows,))
@@ -152,6 +151,6 @@ def _require_finite(columns: Array, equations: Equations) -> None:
     if np.isfinite(columns).all():
         return
     finite = np.isfinite(columns).reshape(-1, *columns.shape[-2:])
-    lost = [name for i, (_, name) in enumerate(equations.addresses) if not finite[:, i].all()]
-    names = ", ".join(dict.fromkeys(lost))
+    lost = [place for i, (_, place) in enumerate(equations.addresses) if not finite[:, i].all()]
+    names = ", ".join(dict.fromkeys("what is known" if place == HELD else equations.names[place] for place in lost))
     raise SettingError(f"the columns of {names} are not finite on this motion: correct the block that makes them")

@@ -5,8 +5,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Self, TypeVar
 
-import numpy as np
-
 from identify.arrays import Array
 from identify.errors import LogError
 
@@ -56,17 +54,6 @@ class State:
         """Joint accelerations [rad/s^2], shape (..., joint, time); only the explicit model asks for them."""
         return self.s(self.qd)
 
-    def cos_sin(self, joint: int) -> tuple[Array, Array]:
-        """Return cosine and sine of the position of `joint`, from 0, shape (..., time) each."""
-        if joint not in self._turned:
-            angle = self.q[..., joint, :]
-            self._turned[joint] = np.cos(angle), np.sin(angle)
-        return self._turned[joint]
-
-    @cached_property
-    def _turned(self) -> dict[int, tuple[Array, Array]]:
-        return {}
-
     def shared(self, key: object, make: Callable[[Self], T]) -> T:
         """Return `make(self)`, computed once for all that ask with the same `key`."""
         if key not in self._shared:
@@ -75,7 +62,6 @@ class State:
 
     def forget(self) -> None:
         """Drop what was computed once for all: it takes far more memory than the motion, and is not needed twice."""
-        self._turned.clear()
         self._shared.clear()
 
     @cached_property

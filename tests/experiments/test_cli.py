@@ -77,7 +77,6 @@ def test_list_shows_every_plugin_with_a_line(capsys):
     assert main(["list"]) == 0
     printed = capsys.readouterr().out
     for name in (
-        "scara",
         "coulomb",
         "explicit",
         "butterworth",

@@ -33,7 +33,7 @@ def test_laws_are_named_for_all_joints_or_for_one():
     ("text", "message"),
     [
         ("stribek", r"no law 'stribek' .did you mean 'stribeck'"),
-        ("standard+scara", "scara is no law of a joint's friction"),
+        ("standard+spring", "spring is no law of a joint's friction"),
         ("3=load", "there is no joint '3'; there are 1 to 2: hip, knee"),
         ("ankle=load", "there is no joint 'ankle'"),
         ("stribeck:fast", "'fast' is no vs of stribeck"),

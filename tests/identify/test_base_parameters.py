@@ -43,8 +43,8 @@ def inertial(tree):
 
 def columns(basis, q, qd, qdd):
     W = np.zeros((basis.n, q.shape[-1], len(basis.names)))
-    for (row, name), signal in basis.explicit(State(q, qd, lambda _: qdd)).items():
-        W[row, :, basis.names.index(name)] = signal
+    for (row, k), signal in basis.explicit(State(q, qd, lambda _: qdd)).items():
+        W[row, :, k] = signal
     return W.reshape(-1, len(basis.names))
 
 
@@ -229,7 +229,7 @@ def test_parameters_whose_names_end_in_no_digit_are_grouped():
             return Parameter("wind", None, "other", "N m"), Parameter("draught", None, "other", "N m")
 
         def explicit(self, state):
-            return {(0, name): np.ones_like(state.q[..., 0, :]) for name in ("wind", "draught")}
+            return {(0, parameter): np.ones_like(state.q[..., 0, :]) for parameter in self.parameters(1)}
 
         momentum = energy = lambda self, state: {}
         remainder = explicit

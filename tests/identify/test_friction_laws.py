@@ -42,8 +42,8 @@ def motion(seed=0, fs=FS, duration=T):
 def rigid(q, qd, qdd, basis=None, values=X):
     """Return the torques of a basis with these parameters."""
     basis, total = basis or scara(), np.zeros_like(q)
-    for (row, name), column in basis.explicit(State(q, qd, lambda _: qdd)).items():
-        total[row] += values[basis.names.index(name)] * column
+    for (row, k), column in basis.explicit(State(q, qd, lambda _: qdd)).items():
+        total[row] += values[k] * column
     return total
 
 
@@ -101,7 +101,7 @@ def test_the_column_of_a_shape_is_its_slope():
     v, vs, size = qd, np.array([[0.2], [0.4]]), np.array([[0.7], [-0.2]])
     slope = size * 2 * v**2 / vs**3 * np.exp(-((v / vs) ** 2)) * np.sign(v)
     np.testing.assert_allclose(law.torques(State(q, qd, np.zeros_like))["vs"], slope, atol=1e-7)
-    assert law.believed(2) == {"vs1": 0.2, "vs2": 0.4}
+    assert {p.name: x for p, x in law.believed(2).items()} == {"vs1": 0.2, "vs2": 0.4}
 
 
 @pytest.mark.thorough
@@ -124,7 +124,7 @@ def test_a_shape_has_one_minimum_out_of_several():
     wrong = replace(law, size=np.array([-0.5, -0.5]), values={"vs": np.array([1.0, 1.0])})
     problem = Problem((made(stribeck_law, 0.002),), scara() + wrong, ExplicitModel(), idbench_chain())
     found = settled(problem)
-    assert found.basis.believed["vs1"] == pytest.approx(0.3, rel=0.05)
+    assert found.basis.believed[found.basis.names.index("vs1")] == pytest.approx(0.3, rel=0.05)
 
 
 def test_laws_of_single_joints():

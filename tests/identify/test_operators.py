@@ -18,10 +18,10 @@ TRIM = 3.0
 
 def sentence(y=None, weight=None, t=T):
     """A sentence of two rows that is true for X: y = c X_a + (d/dt e) X_b, with smooth signals known in closed form."""
-    c = {(0, "a"): np.cos(3 * t), (1, "a"): np.sin(2 * t)}
-    e = {(0, "b"): np.sin(4 * t), (1, "b"): np.cos(t), (1, "a"): np.sin(t)}
-    rate = {(0, "b"): 4 * np.cos(4 * t), (1, "b"): -np.sin(t), (1, "a"): np.cos(t)}
-    exact = np.stack([X[0] * c[0, "a"] + X[1] * rate[0, "b"], X[0] * (c[1, "a"] + rate[1, "a"]) + X[1] * rate[1, "b"]])
+    c = {(0, 0): np.cos(3 * t), (1, 0): np.sin(2 * t)}
+    e = {(0, 1): np.sin(4 * t), (1, 1): np.cos(t), (1, 0): np.sin(t)}
+    rate = {(0, 1): 4 * np.cos(4 * t), (1, 1): -np.sin(t), (1, 0): np.cos(t)}
+    exact = np.stack([X[0] * c[0, 0] + X[1] * rate[0, 1], X[0] * (c[1, 0] + rate[1, 0]) + X[1] * rate[1, 1]])
     return equations(exact if y is None else y, c, e, np.ones((2, len(t))) if weight is None else weight, t)
 
 

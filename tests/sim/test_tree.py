@@ -53,8 +53,8 @@ def written(tmp_path):
 def torques(robot, basis, X, states):
     q, qd, qdd = states
     found = np.zeros(q.shape)
-    for (row, name), signal in basis.explicit(State(q, qd, lambda _: qdd)).items():
-        found[row] += signal * X[basis.names.index(name)]
+    for (row, k), signal in basis.explicit(State(q, qd, lambda _: qdd)).items():
+        found[row] += signal * X[k]
     return found
 
 

@@ -13,7 +13,7 @@ from experiments.identification.defaults import CHAIN
 from experiments.identification.load import in_band
 from experiments.identification.reading import ReadOptions
 from experiments.identification.request import Request
-from experiments.identification.subject import CLOSED_FORM, Subject, absolute
+from experiments.identification.subject import SCARA, Subject, absolute
 from identify import ESTIMATORS, MODELS
 from identify.signals.masks import NoMask
 from sim.scenario.scenario_file import load
@@ -27,7 +27,7 @@ def read_options(options: LogOptions) -> ReadOptions:
 def request_of(options: Identify, stated: Mapping[str, Any]) -> Request:
     """Return what is asked for, the robot by default that which the folder of a run states."""
     _require_label(options.label)
-    robot = stated.get("robot", CLOSED_FORM) if options.robot is None else absolute(options.robot)
+    robot = stated.get("robot", SCARA) if options.robot is None else absolute(options.robot)
     own = options.log[0] / "scenario.toml"
     loops = options.loop or ([str(own)] if len(options.log) == 1 and own.is_file() else [])
     request = Request(

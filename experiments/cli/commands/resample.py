@@ -9,7 +9,7 @@ from experiments.cli.options.log import Export, Resample
 from experiments.cli.page import new_page, shown
 from experiments.errors import ExperimentError
 from experiments.identification.reading import channel_of, columns_of, stated_by
-from experiments.identification.subject import CLOSED_FORM
+from experiments.identification.subject import SCARA
 from experiments.results.writing import folder_for, new_file, require_free
 from identify import MotionLog
 from identify.data.resample import Repaired
@@ -64,8 +64,8 @@ def export(options: Export) -> None:
 
 def _robot_of(folder: Path) -> str:
     """Return the option that names the robot of a results folder, where it is not the one by default."""
-    robot = stated_by(folder).get("robot", CLOSED_FORM)
-    return "" if robot == CLOSED_FORM else f" --robot {shlex.quote(robot)}"
+    robot = stated_by(folder).get("robot", SCARA)
+    return "" if robot == SCARA else f" --robot {shlex.quote(robot)}"
 
 
 def _write(log: MotionLog, path: Path, joints: tuple[str, ...] = ()) -> None:

@@ -45,7 +45,7 @@ def describe(options: DescribeRobot) -> None:
 
 def _summary(subject: Subject, truth: dict[str, float]) -> dict[str, Any]:
     """Return what --json says of a robot."""
-    base, tree = subject.base, subject.tree
+    tree = subject.tree
     return {
         "robot": subject.name,
         "joints": [
@@ -56,7 +56,7 @@ def _summary(subject: Subject, truth: dict[str, float]) -> dict[str, Any]:
             {"name": p.name, "unit": p.unit, "kind": p.kind, "joint": p.joint, "value": truth[p.name]}
             for p in subject.basis.parameters
         ],
-        "made_of": None if base is None else base.groupings,
+        "made_of": subject.grouping.groupings,
     }
 
 
@@ -75,15 +75,13 @@ def _print_joints(page: Console, subject: Subject) -> None:
 
 
 def _print_parameters(page: Console, subject: Subject, truth: dict[str, float]) -> None:
-    basis, base = subject.basis, subject.base
+    basis, base = subject.basis, subject.grouping
     grid = new_table("", ["of the file", "unit"])
-    if base is not None:
-        grid.add_column("made of")
-    made = base.groupings if base else {}
+    grid.add_column("made of")
     for parameter, unit in zip(basis.names, basis.units, strict=True):
-        grid.add_row(parameter, f"{truth[parameter]:.5g}", unit, *([made[parameter]] if made else []))
+        grid.add_row(parameter, f"{truth[parameter]:.5g}", unit, base.groupings[parameter])
     print_titled(page, f"{len(basis.names)} parameters that a motion can identify", grid)
-    if base is not None and base.without_effect:
+    if base.without_effect:
         page.print(Text(f"no motion shows {', '.join(base.without_effect)}"), soft_wrap=True)
     page.print()
 

@@ -9,7 +9,7 @@ import numpy as np
 from identify.arrays import Array, combined
 from identify.basis.basis import Basis
 from identify.basis.joint_law import AbstractJointLaw
-from identify.basis.parameter import Kind
+from identify.basis.parameter import RIGID, Kind
 from identify.signals.state import State
 
 
@@ -45,7 +45,7 @@ class LoadFriction(AbstractJointLaw):
         """Return the torque that each joint carries [N m], shape (..., joint, time)."""
         if self.bodies is None or self.X is None:
             return state.qdd
-        return combined(self.bodies.explicit(state), self.bodies.names, self.X, np.zeros(state.q.shape))
+        return combined(self.bodies.explicit(state), self.X, np.zeros(state.q.shape))
 
     @property
     def adaptive(self) -> bool:
@@ -54,8 +54,8 @@ class LoadFriction(AbstractJointLaw):
 
     def adapted(self, basis: Basis, X: Array) -> Self:
         """Return the law with the load of an estimate."""
-        bodies = basis.rigid()
-        x = np.stack([X[..., basis.names.index(name)] for name in bodies.names], axis=-1)
+        bodies = basis.only(RIGID)
+        x = X[..., [basis.places[parameter] for parameter in bodies.parameters]]
         known = np.isfinite(x).all(axis=-1, keepdims=True)
         if self.X is None and not known.any():
             return self

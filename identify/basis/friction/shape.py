@@ -1,6 +1,6 @@
 """Friction laws with parameters that enter nonlinearly."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NamedTuple, Self, final
@@ -10,7 +10,7 @@ import numpy as np
 from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.basis.joint_law import AbstractFriction, AbstractJointLaw
-from identify.basis.parameter import Kind
+from identify.basis.parameter import Kind, Parameter
 from identify.signals.state import State
 
 STEP = 1e-4
@@ -84,10 +84,10 @@ class ShapedFriction(AbstractJointLaw):
             found[shape.letters] = size * slope
         return found
 
-    def believed(self, n: int) -> Mapping[str, Array | float]:
+    def believed(self, n: int) -> Mapping[Parameter, Array | float]:
         """Return b0."""
-        at = self.at_joints(n)
-        return {f"{s.letters}{j + 1}": at[s.setting][..., j] for s in self.shapes for j in range(n)}
+        at, found = self.at_joints(n), {s.letters: s.setting for s in self.shapes}
+        return {p: at[found[p.symbol]][..., p.joint] for p in self.parameters(n) if p.symbol in found}
 
     @property
     def adaptive(self) -> bool:
@@ -96,12 +96,12 @@ class ShapedFriction(AbstractJointLaw):
 
     def adapted(self, basis: Basis, X: Array) -> Self:
         """Return the law, linear about an estimate."""
-        n, at = basis.n, self.at_joints(basis.n)
-        size = _joints(n, X, lambda j: basis.value(f"{self.law.symbol}{j + 1}", X), self.size)
+        at, known = self.at_joints(basis.n), {p: basis.value(p, X) for p in self.parameters(basis.n)}
+        size = _joints(basis.n, X, self.law.symbol, known, self.size)
         values = {}
         for shape in self.shapes:
             old = at[shape.setting]
-            new = _joints(n, X, partial(_named, basis, X, shape.letters), old)
+            new = _joints(basis.n, X, shape.letters, known, old)
             low, high = np.maximum(old / FACTOR, shape.range[0]), np.minimum(old * FACTOR, shape.range[1])
             values[shape.setting] = np.clip(new, low, high)
         return replace(self, size=size, values=values)
@@ -127,14 +127,10 @@ def with_settings(law: AbstractFriction, settings: Mapping[str, Any]) -> Abstrac
     return found
 
 
-def _named(basis: Basis, X: Array, letters: str, j: int) -> Array | None:
-    return basis.value(f"{letters}{j + 1}", X)
-
-
-def _joints(n: int, X: Array, value: Callable[[int], Array | None], default: Array | float) -> Array:
+def _joints(n: int, X: Array, letters: str, known: Mapping[Parameter, Array | None], default: Array | float) -> Array:
     """Return a value of every joint, shape (..., joint), that of `default` where there is none or it is not finite."""
     found = np.array(np.broadcast_to(default, (*X.shape[:-1], n)), dtype=np.float64)
-    for j in range(n):
-        if (x := value(j)) is not None:
-            found[..., j] = np.where(np.isfinite(x), x, found[..., j])
+    for parameter, x in known.items():
+        if parameter.symbol == letters and x is not None:
+            found[..., parameter.joint] = np.where(np.isfinite(x), x, found[..., parameter.joint])
     return found

@@ -1,15 +1,17 @@
 """Friction that joints with one motor have in common."""
 
 from dataclasses import dataclass
-from typing import final
+from typing import TYPE_CHECKING, final
 
 import numpy as np
 
-from identify.arrays import Array, Columns
-from identify.basis.block import AbstractBlock
+from identify.basis.block import AbstractBlock, BlockColumns
 from identify.basis.parameter import Parameter
 from identify.data.kinematics import Coupling
 from identify.signals.state import State
+
+if TYPE_CHECKING:
+    from identify.arrays import Array
 
 
 @final
@@ -31,34 +33,34 @@ class TiedFriction(AbstractBlock):
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return Fsx."""
         del n
-        return (Parameter(self._name, None, "friction", "N m"),)
+        return (self._own,)
 
-    def explicit(self, state: State) -> Columns:
+    def explicit(self, state: State) -> BlockColumns:
         """Return the signs of the velocities of the other joints."""
         return self.remainder(state)
 
-    def momentum(self, state: State) -> Columns:
+    def momentum(self, state: State) -> BlockColumns:
         """Return no columns."""
         del state
         return {}
 
-    def remainder(self, state: State) -> Columns:
+    def remainder(self, state: State) -> BlockColumns:
         """Return the signs of the velocities of the other joints."""
         weights = np.array(self.coupling.weights)
         each = weights[:, None] * np.sign(state.qd)
         others = np.sum(each, axis=-2, keepdims=True) - each
-        return {(int(j), self._name): weights[j] * others[..., j, :] for j in np.flatnonzero(weights)}
+        return {(int(j), self._own): weights[j] * others[..., j, :] for j in np.flatnonzero(weights)}
 
-    def energy(self, state: State) -> Columns:
+    def energy(self, state: State) -> BlockColumns:
         """Return no columns."""
         del state
         return {}
 
-    def dissipation(self, state: State) -> Columns:
+    def dissipation(self, state: State) -> BlockColumns:
         """Return the power of the torques."""
         power: Array = np.sum([state.qd[..., j, :] * x for (j, _), x in self.remainder(state).items()], axis=0)
-        return {(0, self._name): power}
+        return {(0, self._own): power}
 
     @property
-    def _name(self) -> str:
-        return f"Fsx_{self.coupling.name}"
+    def _own(self) -> Parameter:
+        return Parameter("Fsx", None, "friction", "N m", self.coupling.name)
