@@ -5,8 +5,11 @@ from pathlib import Path
 
 from experiments.exports.base_json import json_text
 from experiments.exports.controller import python_text
+from experiments.exports.standard import require_known
 from experiments.identification.consistent_robot import Written
 from experiments.identification.fit import Fit
+from experiments.identification.subject import Subject
+from sim.robot.rewrite import rewritten
 
 Exported = tuple[str, list[str]]
 """A file's text, and what is to be known of it."""
@@ -26,8 +29,9 @@ def urdf(fit: Fit, model: str, path: Path) -> Exported:
     from sim.robot.write_urdf import urdf_text
 
     written, subject = Written(fit, model), fit.subject
-    rotors = [name for name, value in written.values.items() if name.startswith("Ia") and value]
-    lost = [f"{', '.join(rotors)} have no place in a URDF: rotors are left out of {path}"] if rotors else []
+    drives = [p.name for p in subject.grouping.standard.parameters if p.kind in ("rotor inertia", "stiffness")]
+    left = [name for name in drives if written.values.get(name)]
+    lost = [f"{', '.join(left)} have no place in a URDF: rotors and springs are left out of {path}"] if left else []
     turned = [float(x) for x in subject.tree.gravity] != EARTH
     aside = [f"gravity {subject.tree.gravity.tolist()} has no place in a URDF"] if turned else []
     text = urdf_text(subject.name, subject.robot, subject.tree, written.values, subject.mounting)
@@ -45,10 +49,20 @@ def controller(fit: Fit, model: str, path: Path) -> Exported:
     return python_text(fit, model, path), []
 
 
-EXPORTS: dict[str, tuple[str, Callable[[Fit, str, Path], Exported]]] = {
-    ".xml": ("the robot", mjcf),
-    ".urdf": ("the robot", urdf),
-    ".json": ("base parameters and regressor", base_parameters),
-    ".py": ("the inverse dynamics, for a controller,", controller),
+def require_written_back(subject: Subject, path: Path) -> None:
+    """Raise BenchError if the file of a robot cannot be written with parameters of one's own choice."""
+    rewritten(subject.name, {}, path.absolute().parent, subject.mounting)
+
+
+def require_nothing(subject: Subject, path: Path) -> None:
+    """Accept all robots."""
+    del subject, path
+
+
+EXPORTS: dict[str, tuple[str, Callable[[Fit, str, Path], Exported], Callable[[Subject, Path], None]]] = {
+    ".xml": ("the robot", mjcf, require_written_back),
+    ".urdf": ("the robot", urdf, require_written_back),
+    ".json": ("base parameters and regressor", base_parameters, require_nothing),
+    ".py": ("the inverse dynamics, for a controller,", controller, require_known),
 }
-"""What is written, by the ending of the name of its file."""
+"""What is written, by the ending of the name of its file, and what asks before the work whether a robot can be."""

@@ -7,12 +7,14 @@ import numpy as np
 from experiments.errors import ExperimentError
 from experiments.exports.friction_terms import TERMS
 from experiments.identification.fit import Fit
+from experiments.identification.subject import Subject
+from identify.basis.parameter import BODY
 
 if TYPE_CHECKING:
     from identify import Array
 
 KNOWN = ("Ia", "Fv", "Fs", "off", *TERMS, *(letters for _, settings in TERMS.values() for letters in settings.values()))
-"""Beginnings of the names of the laws that a controller's function has, beside the links."""
+"""Letters of the laws that a controller's function has, beside the links."""
 
 
 def standard_of(fit: Fit, model: str) -> dict[str, float]:
@@ -29,16 +31,12 @@ def standard_of(fit: Fit, model: str) -> dict[str, float]:
     return dict(zip(grouping.standard.names, map(float, values), strict=True))
 
 
-def require_known(fit: Fit, target: object) -> None:
-    """Raise ExperimentError if the estimate has a law of friction that a controller's function does not."""
-    kinds = {p.name for p in fit.subject.grouping.standard.parameters if p.kind not in LINKS}
-    strange = sorted(name for name in kinds if name.rstrip("0123456789") not in KNOWN)
+def require_known(subject: Subject, target: object) -> None:
+    """Raise ExperimentError if a robot has what a controller's function does not: springs, other laws, coupled drives."""
+    strange = [p for p in subject.grouping.standard.parameters if p.kind not in BODY and (p.symbol not in KNOWN or p.drive)]
     if strange:
+        names = ", ".join(parameter.name for parameter in strange[:6])
         raise ExperimentError(
-            f"{target}: the function of a controller has links, rotors, laws of friction and offsets of joints, not "
-            f"{', '.join(strange[:6])}: leave out what makes them (--add, --friction, --coupling)"
+            f"{target}: the function of a controller has links, rotors, laws of friction and offsets of joints, not {names}: "
+            "write the .json, which has all columns, or leave out what makes them (--add, --friction, --coupling, springs)"
         )
-
-
-LINKS = ("inertia", "first moment", "mass")
-"""Kinds of the parameters of links."""

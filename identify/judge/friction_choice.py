@@ -125,8 +125,8 @@ class _Choice:
             found = [_best(tried, j) for j in range(len(laws))]
             if not any(found):
                 break
-            laws = self._better(laws, found)
-            if max(map(len, laws)) == most:
+            before, laws = laws, self._better(laws, found)
+            if laws == before or max(map(len, laws)) == most:
                 break
         laws = [self._needed(laws, j) if len(own) > 1 else own for j, own in enumerate(laws)]
         kept = (replace(score, taken=score.law in laws[score.joint]) for score in scores.values())
@@ -134,18 +134,23 @@ class _Choice:
 
     def _better(self, laws: Sequence[tuple[str, ...]], found: Sequence[Sequence[str]]) -> list[tuple[str, ...]]:
         """Return the laws with one more of each joint: of its best two that which is better with shapes of its own."""
-        each = []
-        for rank in (0, 1):
-            more = [(*own, names[min(rank, len(names) - 1)]) if names else own for own, names in zip(laws, found, strict=True)]
-            each.append(more)
-        if each[0] == each[1]:
-            return each[0]
-        searches = [self._search(more, {}) for more in each]
-        chosen, n = list[tuple[str, ...]](), len(laws)
-        for j in range(n):
-            marks = [(self._drives(search, more[j], j), search.error(j)) for search, more in zip(searches, each, strict=True)]
-            chosen.append(each[0][j] if marks[0] <= marks[1] else each[1][j])
-        return chosen
+        first = [(*own, names[0]) if names else own for own, names in zip(laws, found, strict=True)]
+        solvable = bool(np.isfinite(self._search(first, {}).errors).all())
+        # Where one law cannot be solved for, it must not decide about those of other joints.
+        others = first if solvable else list(laws)
+        shaped = [any(isinstance(self.candidates[name], ShapedFriction) for name in names[:2]) for names in found]
+        plain = (solvable and not own for own in shaped)
+        each = enumerate(zip(found, plain, strict=True))
+        return [first[j] if only or not names else self._best_of(others, laws[j], names, j) for j, (names, only) in each]
+
+    def _best_of(self, others: Sequence[tuple[str, ...]], own: tuple[str, ...], names: Sequence[str], j: int) -> tuple[str, ...]:
+        """Return the laws of a joint with the better of its best two, beside those of others; as they are if none can be."""
+        marks = [(True, np.inf, own)]
+        for name in names[:2]:
+            more = [*others[:j], (*own, name), *others[j + 1 :]]
+            search = self._search(more, {})
+            marks.append((self._drives(search, more[j], j), float(search.errors[j]), more[j]))
+        return min((mark for mark in marks if np.isfinite(mark[1]) or mark[2] == own), key=lambda mark: mark[:2])[2]
 
     def _drives(self, search: "_Search", own: Sequence[str], j: int) -> bool:
         """Return whether the last law of a joint has a size below zero: a law of another form, stood on its head."""
@@ -195,6 +200,8 @@ class _Search:
     def score(self, j: int, name: str) -> LawScore:
         """Return what a law gains at a joint."""
         (before, left_open), (after, more_open) = self._errors(j, None), self._errors(j, name)
+        if not np.isfinite(after).all():  # nothing that could be solved
+            return LawScore(j, name, -np.inf, -np.inf, 0.0, -np.inf, -np.inf, taken=False)
         ratio = np.log(np.maximum(before, TINY) / np.maximum(after, TINY))[:-1]
         spread = float(np.std(ratio, ddof=1) / np.sqrt(FOLDS))
         deviations = float(ratio.mean() / spread) if spread > 0 else 0.0
@@ -205,9 +212,10 @@ class _Search:
         beyond = 1 - (after[-1] - EXCUSED * (more_open[-1] - left_open[-1])) / max(before[-1], TINY)
         return LawScore(j, name, share, deviations, self.products.sigmas(name, j), least, float(beyond), taken=False)
 
-    def error(self, j: int) -> float:
-        """Return the squared error of a joint on stretches that were not fitted, without further laws."""
-        return float(self._errors(j, None)[0][:-1].sum())
+    @property
+    def errors(self) -> Array:
+        """Squared error of each joint on stretches that were not fitted, without further laws, shape (joint,)."""
+        return np.array([self._errors(j, None)[0][:-1].sum() for j in range(self.products.start.basis.n)])
 
     def _errors(self, j: int, law: str | None) -> Array:
         """Return squared errors of a joint in every stretch and in the fastest motion, and what sigma makes, (2, FOLDS + 1)."""
@@ -227,7 +235,7 @@ class _Search:
         """
         products = self.products
         judged, fitted = products.held[fold][j], products.fitted(fold, j)
-        least, best, spread = np.inf, 0.0, 0.0
+        least, best, spread = np.inf, np.inf, 0.0
         # The fastest motion has had no say in the shapes: they are those that fit the slower best.
         every = [[]] if law is None else products.places[law, j] if fold == FOLDS else products.likely(law, j)
         for own in every:

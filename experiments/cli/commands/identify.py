@@ -49,7 +49,7 @@ def identify(options: Identify) -> None:
     command, read = command_of("identify", options, "log", LEFT_OUT), _read(options, request)
     whole = command_of("identify", options, "log", LEFT_OUT, absolute=True)
     folder = ResultsFolder(options.out, "identify", whole, options.force, read) if options.out else None
-    require_targets(options, folder, read)
+    require_targets(options, request.subject, folder, read)
     require_layer(options, request.label, command)
     with ExitStack() as stack:
         stack.enter_context(shown(page))

@@ -13,6 +13,7 @@ from experiments.errors import ExperimentError, ResultsError
 from experiments.exports.exports import EXPORTS
 from experiments.identification.fit import Fit
 from experiments.identification.judgement import Judgement
+from experiments.identification.subject import Subject
 from experiments.recording.audience import Audience
 from experiments.results.attempts import Attempts
 from experiments.results.folder import RECORDING, ResultsFolder
@@ -134,7 +135,7 @@ def view_all(shown: Shown, attempts: Attempts) -> None:
 
 def _export(shown: Shown, option: str, path: Path) -> None:
     """Write a file for other software, with the parameters of the first model that has an estimate."""
-    what, render = EXPORTS[path.suffix]
+    what, render, _ = EXPORTS[path.suffix]
     text, warnings = render(shown.fit, shown.fit.leading, path)
     if shown.folder and shown.folder.goes_beside(path, option):
         shown.folder.add(path.name, text)
@@ -150,7 +151,7 @@ def _targets(options: Identify) -> list[tuple[str, Path]]:
     return [*own, *(("--write", path) for path in options.write)]
 
 
-def require_targets(options: Identify, folder: ResultsFolder | None, read: Sequence[Path]) -> None:
+def require_targets(options: Identify, subject: Subject, folder: ResultsFolder | None, read: Sequence[Path]) -> None:
     """Raise ExperimentError if what is asked for cannot be written there; before the work, not after it."""
     for option, path in _targets(options):
         if option == "--write-mjcf" and path.suffix != ".xml":
@@ -159,6 +160,7 @@ def require_targets(options: Identify, folder: ResultsFolder | None, read: Seque
             raise ExperimentError(f"--write {path}: its name must end with {', '.join(EXPORTS)}")
         if not (folder and folder.goes_beside(path, option)):
             require_free(path, option, force=options.force, read=read)
+        EXPORTS[path.suffix][2](subject, path)
     targets = [path.absolute() for _, path in _targets(options)]
     if twice := next((path for k, path in enumerate(targets) if path in targets[:k]), None):
         raise ResultsError(f"{twice} is to be written twice: give each file a name of its own")
