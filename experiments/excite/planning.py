@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from experiments.errors import ExperimentError
-from identify import Array, FirLowPass, NoiseLevels, ReversalMask
+from identify import Array, FirLowPass, NoiseLevels
 from identify.design.information import Information
 from identify.design.plan import Plan
 from identify.parameters.base_parameters import random_states
@@ -34,7 +34,6 @@ PASS = FirLowPass().cutoff
 def plan_for(design: "Design") -> Plan:
     """Return what the search minimises; raise ExperimentError if the motion is too short for the parameters."""
     _require_enough(design)
-    _require_sliding(design)
     moves = max(1, round(design.duration * design.frequency))
     if moves > MANY:
         raise ExperimentError(f"{moves} periods of {design.frequency:g} Hz are more than {MANY}: give a shorter --duration")
@@ -70,17 +69,6 @@ def _inertia(design: "Design") -> Array:
     """Return M(q), on average over postures."""
     q, qd, qdd = random_states(design.subject.tree, POSTURES)
     return np.asarray(slopes(design.subject.basis, design.X, q, qd, qdd, qd).inertia.mean(axis=-1))
-
-
-def _require_sliding(design: "Design") -> None:
-    """Raise ExperimentError if a joint is so slow that masks leave out all of its rows."""
-    threshold, robot = 1.5 * ReversalMask().threshold, design.subject.robot
-    for joint, most in zip(robot.joints, design.limits.velocity, strict=True):
-        if most < threshold:
-            raise ExperimentError(
-                f"{joint} may move at {most:g} rad/s or m/s at most: below {threshold:g} it counts as standing, and nothing is "
-                "told of it; raise its velocity, or weld it"
-            )
 
 
 def _require_enough(design: "Design") -> None:

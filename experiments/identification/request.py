@@ -39,6 +39,8 @@ class Request:
         The closed loops in which the logs were recorded, for estimators that simulate them: one for each log.
     start : {"least-squares", "file"}
         Where estimators begin that simulate or filter: at the least-squares estimate, or at the parameters of the robot's file.
+    mask_speed : tuple of float
+        Speeds up to which joints count as standing or turning, of all or of each [rad/s, m/s]; by default they follow the log.
     consistent : {"no", "pullback", "entropic"}
         Whether estimates are moved to the nearest physically consistent parameters.
 
@@ -58,9 +60,18 @@ class Request:
     loops: tuple[Scenario, ...] = ()
     start: Start = "least-squares"
     consistent: Consistency = "no"
+    mask_speed: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         _ = self.subject.basis, self.processing, self.solver, [MODELS.create(name) for name in self.models]
+        if self.mask_speed and not isinstance(self.processing.mask, ReversalMask):
+            raise ExperimentError(
+                f"--mask-speed {' '.join(f'{x:g}' for x in self.mask_speed)}: --chain {self.chain} with these options masks "
+                "nothing; leave it out"
+            )
+        n, given = self.subject.robot.n, " ".join(f"{x:g}" for x in self.mask_speed)
+        if len(self.mask_speed) not in (0, 1, n) or not all(0 < x < np.inf for x in self.mask_speed):
+            raise ExperimentError(f"--mask-speed {given} must be one speed above 0 for all {n} joints, or one for each")
         if self.start != "least-squares" and not self.solver.begins:
             raise ExperimentError(
                 f"--start {self.start}: {self.estimator} needs no start; leave it out, or take --estimator IV or DIDIM"
@@ -70,8 +81,10 @@ class Request:
     def processing(self) -> Chain:
         """The chain."""
         chain = self.method[0] if self.method else CHAINS.create(self.chain)
-        if (couplings := self.subject.tree.couplings) and isinstance(chain.mask, ReversalMask):
-            chain = replace(chain, mask=replace(chain.mask, couplings=tuple(c.weights for c in couplings)))
+        if isinstance(chain.mask, ReversalMask):
+            couplings = tuple(c.weights for c in self.subject.tree.couplings)
+            mask = replace(chain.mask, couplings=couplings, threshold=self.mask_speed or chain.mask.threshold)
+            chain = replace(chain, mask=mask)
         return chain if self.trim is None else replace(chain, trim=self.trim)
 
     @property

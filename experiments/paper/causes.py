@@ -22,6 +22,7 @@ from identify import (
     scara,
 )
 from identify.models import AbstractModel
+from identify.rows.chains import SCHOOL
 
 COMPARED: dict[str, AbstractModel] = {"explicit": ExplicitModel(), "power": PowerModel()}
 """The implicit model's errors are the explicit one's to a few percent of themselves."""
@@ -36,7 +37,7 @@ def _unfiltered(chain: Chain) -> Chain:
 
 
 def _masked(chain: Chain) -> Chain:
-    return replace(chain, mask=ReversalMask())
+    return replace(chain, mask=ReversalMask(SCHOOL))
 
 
 CHANGES: dict[str, tuple[Callable[[Chain], Chain], ...]] = {

@@ -39,9 +39,9 @@ NOTABLE = 0.2
 def record_excited(found: Excited, audience: Audience | None = None) -> list[tuple[str, Stream]]:
     """Return the stream of the recording, by the name of its file."""
     scenario, robot = found.scenario, found.design.subject.robot
-    base = Base(recording_id(scenario.name, to_toml(scenario).encode()), robot, SHOWN, ("planned",), audience)
-    base.stream.describe(scenario=to_toml(scenario), seed=str(found.design.seed), fs_hz=f"{scenario.fs:g}")
     _, motion = found.planned(SHOWN)
+    base = Base(recording_id(scenario.name, to_toml(scenario).encode()), robot, SHOWN, ("planned",), motion.qd, audience)
+    base.stream.describe(scenario=to_toml(scenario), seed=str(found.design.seed), fs_hz=f"{scenario.fs:g}")
     base.make_room(motion.q)
     curves = {"q/designed": motion.q, "qd/designed": motion.qd, "qdd/designed": motion.qdd}
     base.add(0, curves, {"planned": motion.q}, motion.qd)

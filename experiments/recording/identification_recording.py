@@ -55,11 +55,13 @@ class RunRecording:
         subject: Subject | None = None,
     ) -> None:
         self._audience, written = audience, to_toml(scenario)
-        self.base = Base(recording_id(scenario.name, written.encode()), scenario.real_robot, scenario.fs, ROLES, audience)
+        robot, fs = scenario.real_robot, scenario.fs
+        planned = scenario.trajectory.sample(robot, fs)
+        self.base = Base(recording_id(scenario.name, written.encode()), robot, fs, ROLES, planned.qd, audience)
         self.base.stream.describe(scenario=written, seed=str(scenario.seed), fs_hz=f"{scenario.fs:g}")
         if audience:  # so that the view holds the whole motion from the beginning
-            self.base.make_room(scenario.trajectory.sample(scenario.real_robot, scenario.fs).q)
-            joints = parts(scenario.real_robot.joints)
+            self.base.make_room(planned.q)
+            joints = parts(robot.joints)
             subject = Subject(scenario.robot) if subject is None else subject
             self.base.live = LiveIdentification(self.base.stream, subject, CHAIN, scenario.channel, scenario.fs, joints)
         self.watch = Watch(self.base.stretch, audience.every if audience else UNWATCHED, window)
@@ -82,10 +84,11 @@ class RunRecording:
 def record_log(fit: Fit, audience: Audience | None = None) -> list[tuple[str, Stream]]:
     """Return the streams of an identified log's recording, by the name of their file."""
     log, robot = fit.logs.fitted[0], fit.subject.robot
-    base = Base(recording_id("log", log.q.tobytes() + log.tau.tobytes()), robot, log.fs, ("measured",), audience)
+    qd = measured_state(log, fit.processing).qd.T
+    base = Base(recording_id("log", log.q.tobytes() + log.tau.tobytes()), robot, log.fs, ("measured",), qd, audience)
     channel = log.torque
     base.stream.describe(fs_hz=f"{log.fs:g}", torque=channel.meaning, torque_delay_s=f"{channel.delay:g}")
-    base.replay(log, {}, measured_state(log, fit.processing).qd.T)
+    base.replay(log, {}, qd)
     base.end(log.q)
     base.finish(about("log", "", ("measured",)))
     return [(BASE, base.stream), layer(base.stream.name, fit, robot.joints, base.stream.paths, audience)]

@@ -5,13 +5,10 @@ import numpy.typing as npt
 
 from experiments.recording.columns import time_columns
 from experiments.recording.stream import Stream
-from identify import Array, ReversalMask
+from identify import Array
 
-STILL = 1e-3
-"""Speed [rad/s] up to which a joint counts as standing: a 16-bit encoder shows one step of it in a tenth of a second."""
-
-SLOW = ReversalMask().threshold
-"""Speed [rad/s] up to which its friction is in warning."""
+STILL = 0.01
+"""Share of the speed up to which a joint turns, up to which it stands: a 16-bit encoder shows one step of it in 0.1 s."""
 
 
 class Lanes:
@@ -39,13 +36,15 @@ class Lanes:
             self._stream.states(path, time_columns(t[changed], self._fs), now[1 + changed].tolist())
 
 
-def joint_states(qd: Array, limited: Array | None, before: float) -> npt.NDArray[np.str_]:
+def joint_states(qd: Array, slow: float, limited: Array | None, before: float) -> npt.NDArray[np.str_]:
     """Return what a joint does: it slides, turns or stands, or its drive is at a limit, whatever it does.
 
     Parameters
     ----------
     qd : Array, shape (time,)
         Velocity [rad/s].
+    slow : float
+        Speed [rad/s] up to which it turns.
     limited : Array, shape (time,), optional
         Share of each sample for which the drive was at its limit of current or voltage.
     before : float
@@ -53,7 +52,7 @@ def joint_states(qd: Array, limited: Array | None, before: float) -> npt.NDArray
     """
     speed = np.abs(qd)
     turns = np.concatenate([[before], qd[:-1]]) * qd < 0  # a fast joint turns between two samples
-    states = np.where(speed <= STILL, "stands", np.where(turns | (speed <= SLOW), "reversal", "slides"))
+    states = np.where(speed <= STILL * slow, "stands", np.where(turns | (speed <= slow), "reversal", "slides"))
     return states if limited is None else np.where(limited > 0, "saturated", states)
 
 

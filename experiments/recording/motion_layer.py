@@ -15,6 +15,7 @@ from experiments.recording.layouts import tabs
 from experiments.recording.stream import Stream
 from experiments.style import GREY, WIDTHS, joint_colors, kind_colors
 from identify import Array, MotionLog
+from identify.signals.masks.reversal import slow_speed
 from sim.drives.electric import BetweenEdges
 from sim.engine.watch import Inner, Stretch
 from sim.robot.robot import Robot
@@ -42,16 +43,20 @@ class Base:
         Sampling frequency [Hz].
     roles : tuple of str
         Arms that are drawn, of `arm.ROLES`.
+    qd : Array, shape (time, joint)
+        Velocities of the whole motion, planned or measured [rad/s]: they say which are slow.
     audience : Audience, optional
         Who watches.
     """
 
-    def __init__(self, name: str, robot: Robot, fs: float, roles: tuple[str, ...], audience: Audience | None = None) -> None:
+    def __init__(
+        self, name: str, robot: Robot, fs: float, roles: tuple[str, ...], qd: Array, audience: Audience | None = None
+    ) -> None:
         self.stream, self._audience = Stream(name, audience), audience
         self.inner: Stream | None = None
         self.live: LiveIdentification | None = None
         self._shown = 0
-        self._joints, self._fs, self._roles = parts(robot.joints), fs, roles
+        self._joints, self._fs, self._roles, self._slow = parts(robot.joints), fs, roles, slow_speed(qd.T)
         for number, joint in enumerate(self._joints):  # for layouts, which see entities alone, in the order of their names
             self.stream.keep(f"joints/{number:03}/{joint}", rr.TextDocument(joint))
         self._arm, self._lanes = Arm(self.stream, robot, roles), Lanes(self.stream, fs)
@@ -97,7 +102,7 @@ class Base:
             self._curves(self.stream, path, times if path in LOGGED else times[:1], values)
         self._arm.move(times[:1], poses)
         for j, joint in enumerate(self._joints):
-            states = joint_states(qd[:, j], None if limited is None else limited[:, j], self._turning[j])
+            states = joint_states(qd[:, j], self._slow[j], None if limited is None else limited[:, j], self._turning[j])
             self._lanes.send(f"state/{joint}", t, states)
         self._turning = qd[-1]
         there = self.stream.shown | (self.inner.paths if self.inner else set())

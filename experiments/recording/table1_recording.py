@@ -16,7 +16,9 @@ from sim.scenario.scenario_file import to_toml
 def record_table1(table: Table1, audience: Audience | None = None) -> list[tuple[str, Stream]]:
     """Return the streams of the recording of `table`, by the name of their file."""
     log, reference, scenario = table.log, table.reference, table.scenario
-    base = Base(recording_id(scenario.name, to_toml(scenario).encode()), table.robot, log.fs, ("measured",), audience)
+    base = Base(
+        recording_id(scenario.name, to_toml(scenario).encode()), table.robot, log.fs, ("measured",), reference.qd, audience
+    )
     base.stream.describe(scenario=to_toml(scenario), seed=str(scenario.seed), fs_hz=f"{log.fs:g}")
     planned = {"q/planned": reference.q, "qd/planned": reference.qd, "qdd/planned": reference.qdd}
     base.replay(log, planned, reference.qd)

@@ -23,6 +23,9 @@ FAR, APART, SMALL = 15.0, 3.0, 1e-2
 this share of that. Where torques do not belong to the motion, parameters of zero, with which nothing moves, are as good as any.
 Noise alone, of a 10-bit encoder, takes a fit 7 sigma far."""
 
+NOTHING = 0.9
+"""Share of the rms torque above which noise that is found leaves nothing to the motion: less than a fifth of its square."""
+
 MOST = 2e9
 """Bytes that the equations of all motions may take."""
 
@@ -98,6 +101,8 @@ class MaximumLikelihood(AbstractEstimator):
             again = GeneralizedLeastSquares().solve(Problem(tuple(later), problem.basis, problem.model, problem.chain))
             X, sigma = again.X, again.sigma
         _require_near(found, X, sigma, problem.names)
+        if (found.levels.torque > NOTHING * rms).all():
+            raise IdentificationError(f"the motion explains none of the torques, which are all noise to it: {CHECK}")
         return found
 
 

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, Self
 
+import numpy as np
+
 from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.data.motion_log import MotionLog
@@ -98,7 +100,7 @@ class Problem:
         every = self._pieces
         count = min(SAMPLED, len(every))
         some = [every[i * len(every) // count] for i in range(count)]
-        return tuple(self.chain.signals(log.part(*piece)) for log, piece in some)
+        return tuple(chain.signals(log.part(*piece)) for chain, log, piece in some)
 
     @cached_property
     def parts(self) -> tuple[Rows, ...]:
@@ -110,8 +112,8 @@ class Problem:
         if not self.long:
             yield from self.parts
             return
-        for log, piece in self._pieces:
-            yield self._rows_of(self.chain.signals(log.part(*piece)))
+        for chain, log, piece in self._pieces:
+            yield self._rows_of(chain.signals(log.part(*piece)))
 
     @cached_property
     def share(self) -> float:
@@ -247,9 +249,11 @@ class Problem:
         return {signals: Linearization(signals, self.basis, self._fit.X) for signals in self.signals}
 
     @cached_property
-    def _pieces(self) -> list[tuple[MotionLog, tuple[int, int]]]:
-        """The log, first sample and end of every piece of long logs."""
-        return [(log, piece) for log in self.logs for piece in self.chain.pieces(log, piece_of(log))]
+    def _pieces(self) -> list[tuple[Chain, MotionLog, tuple[int, int]]]:
+        """The chain, its mask suited to the whole log, the log, first sample and end of every piece of long logs."""
+        suited = [replace(self.chain, mask=self.chain.mask.suited(_speeds(log, self.chain))) for log in self.logs]
+        each = zip(suited, self.logs, strict=True)
+        return [(chain, log, piece) for chain, log in each for piece in chain.pieces(log, piece_of(log))]
 
     @cached_property
     def _long_factors(self) -> tuple[Factors, Factors]:
@@ -259,6 +263,12 @@ class Problem:
 
     def _scaled(self, rows: Rows) -> Factors:
         return rows.factors if self.row_weights is None else rows.factors_of(self.row_weights.of(rows))
+
+
+def _speeds(log: MotionLog, chain: Chain) -> Array:
+    """Return the velocities of a log, shape (joint, time), without anything else that its signals keep."""
+    q = chain.prefilter.apply(np.ascontiguousarray(np.swapaxes(log.q, -1, -2)), log.fs)
+    return chain.differentiator.derivative(q, log.fs)
 
 
 def _alike(one: MotionLog, other: MotionLog) -> bool:

@@ -143,8 +143,10 @@ class _Choice:
         each = enumerate(zip(found, plain, strict=True))
         return [first[j] if only or not names else self._best_of(others, laws[j], names, j) for j, (names, only) in each]
 
-    def _best_of(self, others: Sequence[tuple[str, ...]], own: tuple[str, ...], names: Sequence[str], j: int) -> tuple[str, ...]:
-        """Return the laws of a joint with the better of its best two, beside those of others; as they are if none can be."""
+    def _best_of(
+        self, others: Sequence[tuple[str, ...]], own: tuple[str, ...], names: Sequence[str], j: int
+    ) -> tuple[str, ...]:
+        """Return the laws of a joint with the better of its best two; as they are if neither can be solved for."""
         marks = [(True, np.inf, own)]
         for name in names[:2]:
             more = [*others[:j], (*own, name), *others[j + 1 :]]

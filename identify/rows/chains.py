@@ -10,6 +10,9 @@ from identify.signals.masks import NoMask, ReversalMask
 from identify.signals.prefilters import ButterworthPrefilter, NoPrefilter
 from identify.signals.torques import AsLogged, ByChannel
 
+SCHOOL = 0.1
+"""Speed [rad/s] up to which the paper's school leaves the SCARA's instants out."""
+
 
 def paper_chain() -> Chain:
     """The paper's own steps: Butterworth on q and tau, 2-point differences, Matlab's IIR decimate (sections 6.2, 7.2)."""
@@ -23,7 +26,7 @@ def idbench_chain() -> Chain:
 
 def paper_masked_chain() -> Chain:
     """The paper's own steps, with the instants near reversals and standstill left out, as its school does."""
-    return replace(paper_chain(), mask=ReversalMask())
+    return replace(paper_chain(), mask=ReversalMask(SCHOOL))
 
 
 def unfiltered_chain() -> Chain:

@@ -69,7 +69,8 @@ class Signals:
         """Weights of the instants, between 0 and 1, shape (..., joint, time)."""
         if self.weights_of is not None:
             return self.weights_of.weight
-        return expect(self.mask, "weight", self.mask.weight(self.state.qd, self.fs), self.state.q.shape)
+        weight = self.mask.suited(self.state.qd).weight(self.state.qd, self.fs)
+        return expect(self.mask, "weight", weight, self.state.q.shape)
 
     def s(self, x: Array) -> Array:
         """Return dx/dt of `x`, shape (..., time)."""

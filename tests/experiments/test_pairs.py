@@ -20,6 +20,7 @@ NONE = ""
 OPTIONS = {
     "chain": [NONE, "--chain paper", "--chain-file chain.toml"],
     "cutoff": [NONE, "--cutoff 8"],
+    "mask-speed": [NONE, "--mask-speed 0.05"],
     "model": [NONE, "--model explicit", "--model power"],
     "estimator": ["--estimator WLS", "--estimator OLS", NONE, "--estimator IV"],
     "start": [NONE, "--start file"],

@@ -21,6 +21,7 @@ from identify import (
     NoMask,
     PowerModel,
     Problem,
+    ReversalMask,
     Rows,
     SettingError,
     TorqueChannel,
@@ -177,6 +178,7 @@ def test_no_row_looks_further_than_the_declared_halo(operator, model, channel, l
     """One sample of position or torque is disturbed: rows that move are within the halo, and some do."""
     chain = replace(idbench_chain(), operator=OPERATORS.create(operator))
     k, q, tau = 900, log.q[:1800].copy(), log.tau[:1800].copy()
+    chain = replace(chain, mask=ReversalMask(0.1))  # whose speeds do not follow the log
     before = rows_of(MotionLog(100.0, q, tau, channel), model, chain)
     for signal in (q, tau):
         signal[k] += 0.5

@@ -13,7 +13,7 @@ from experiments.errors import ExperimentError
 from experiments.identification.reading import ReadOptions, read
 from experiments.identification.request import Request
 from experiments.recording.audience import Audience
-from identify import IdentificationError, MotionLog
+from identify import IdentificationError, MotionLog, measured_state
 from identify.files.log_file import CSV
 
 if TYPE_CHECKING:
@@ -148,7 +148,8 @@ class Follower:
 
         subject, name = self.request.subject, f"following-{self.path.stem}"
         if self.audience:
-            self._base = Base(name, subject.robot, log.fs, ("measured",), self.audience)
+            qd = measured_state(log, self.request.processing).qd.T
+            self._base = Base(name, subject.robot, log.fs, ("measured",), qd, self.audience)
         stream = self._base.stream if self._base else Stream(name)
         joints = parts(subject.robot.joints)
         self._live = LiveIdentification(stream, subject, self.request.chain, log.torque, log.fs, joints)

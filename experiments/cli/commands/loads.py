@@ -168,7 +168,7 @@ def _loaded(options: LoadOptions) -> tuple[LoadJudgement, list[str]]:
         raise ExperimentError("--robot is missing: the file that describes the arm, or the name of one that ships")
     known = known_of(options.known.mass, options.known.at, options.known.inertia)
     subject = Subject(absolute(options.robot), options.parameters, options.mounting.mounting)
-    request = Request(subject, models=("explicit",), estimator=options.estimator)
+    request = Request(subject, models=("explicit",), estimator=options.estimator, mask_speed=options.mask_speed)
     if options.cutoff is not None:
         request = in_band(request, options.cutoff)
     paths, band = (*options.unloaded, *options.log), options.cutoff is None

@@ -39,6 +39,7 @@ def request_of(options: Identify, stated: Mapping[str, Any]) -> Request:
         loops=tuple(map(load, loops)),
         start=options.start,
         consistent=options.consistent,
+        mask_speed=options.mask_speed,
     )
     if options.loop and "loop" not in request.solver.needs:
         raise ExperimentError(

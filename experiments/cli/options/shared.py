@@ -8,7 +8,7 @@ import tyro
 from experiments.identification.defaults import ESTIMATOR
 from experiments.identification.parameters import Parameters
 from experiments.identification.read_options import ColumnOptions, MountingOptions
-from experiments.option_types import Delay, Folder, Hertz, Json, Robot, Torque
+from experiments.option_types import Delay, Each, Folder, Hertz, Json, Robot, Torque
 from experiments.recording.audience import Watching
 
 Watched = Annotated[Watching, tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes]
@@ -51,6 +51,9 @@ class LogOptions(WrittenOptions):
     """How the robot is mounted."""
     parameters: Asked = Parameters()  # noqa: RUF009  # frozen
     """Which parameters are asked for."""
+    mask_speed: Each = ()
+    """Speeds up to which a joint counts as standing or turning, of all joints or of each [rad/s, of slides m/s]: its friction
+    is not judged there. By default 5 % of its own rms speed, and above the noise of its velocity."""
     cutoff: Hertz = None
     """Band of the fit [Hz]; by default 5, or what a short log needs."""
     estimator: str = ESTIMATOR

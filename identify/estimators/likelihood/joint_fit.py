@@ -38,7 +38,7 @@ UNKNOWN = 5.0
 NEAR = 5.0
 """How far velocities may then be from differences of the positions, over what noise and accelerations make of these."""
 
-MASK = ReversalMask(threshold=0.1, width=0.02, taper=0.02)
+MASK = ReversalMask(width=0.02, taper=0.02)
 """Where the sign of a velocity is no model of friction."""
 
 

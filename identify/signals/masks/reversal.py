@@ -1,15 +1,41 @@
 """Mask of velocity reversals and standstill."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
-from typing import final
+from typing import Self, final
 
 import numpy as np
 import scipy
 
 from identify.arrays import Array
-from identify.errors import require_not_negative, require_positive
+from identify.errors import SettingError, require_not_negative, require_positive
 from identify.signals.masks.mask import AbstractMask
+
+SLOW = 0.05
+"""Share of a joint's rms speed up to which it counts as turning: 0.1 rad/s of the SCARA's 2 rad/s."""
+
+LEAST = 1e-12
+"""Speed below which there is none."""
+
+NOISY = 4.0
+"""Standard deviations of the noise of velocities up to which their sign is not known."""
+
+THIRD = 3
+"""Order of the differences of velocities in which motion vanishes beside noise."""
+
+QUIET = 0.8
+"""Quantile of the absolute third differences of velocities that tells their noise: most of any motion is smooth."""
+
+
+def slow_speed(qd: Array) -> Array:
+    """Return the speed up to which a joint stands or turns, from velocities of shape (..., time): of its own, above noise."""
+    rms = np.sqrt(np.mean(qd**2, axis=-1))
+    if qd.shape[-1] <= THIRD:
+        return np.maximum(SLOW * rms, LEAST)
+    kinks = np.abs(np.diff(qd, THIRD, axis=-1))
+    size = scipy.special.ndtri((1 + QUIET) / 2) * np.sqrt(scipy.special.comb(2 * THIRD, THIRD))
+    noise = np.quantile(kinks, QUIET, axis=-1) / size
+    return np.maximum(np.maximum(SLOW * rms, NOISY * noise), LEAST)
 
 
 @final
@@ -22,8 +48,9 @@ class ReversalMask(AbstractMask):
 
     Parameters
     ----------
-    threshold : float
-        A joint stands or turns while |qd| is at most this [rad/s], and where the sign of qd changes.
+    threshold : float, tuple of float or Array, shape (..., joint), optional
+        A joint stands or turns while |qd| is at most this [rad/s, of slides m/s], of all joints or of each, and where the sign
+        of qd changes. By default it follows each joint's own speeds and their noise: `slow_speed`.
     width : float
         The instants this close [s] to such a one are left out as well: as far as differences look across the kink.
     taper : float
@@ -33,29 +60,44 @@ class ReversalMask(AbstractMask):
         are left out as well.
     """
 
-    threshold: float = 0.1
+    threshold: float | tuple[float, ...] | Array | None = None
     width: float = 0.03
     taper: float = 0.1
     couplings: tuple[tuple[float, ...], ...] = ()
 
     def __post_init__(self) -> None:
-        require_positive(threshold=self.threshold)
+        for value in () if self.threshold is None else np.ravel(self.threshold):
+            require_positive(threshold=float(value))
         require_not_negative(width=self.width, taper=self.taper)
 
     def halo(self, fs: float) -> float:
         """Return the width, the taper, and the sample next to them."""
         return (self._reach(fs) + 2 * self._half(fs) + 1) / fs
 
+    def suited(self, qd: Array) -> Self:
+        """Return this mask with the slow speeds of a motion, where nothing else is said."""
+        return replace(self, threshold=slow_speed(qd)) if self.threshold is None else self
+
     def weight(self, qd: Array, fs: float) -> Array:
         """Return 1 where the joint slides, 0 where it stands or turns, and what is between near there."""
-        weight = self._weight(qd, fs)
+        slow = self._slow(qd)
+        weight = self._weight(qd, slow, fs)
         for coupling in self.couplings:
-            motor = self._weight(np.sum(np.array(coupling)[:, None] * qd, axis=-2, keepdims=True), fs)
-            weight = np.where(np.array(coupling)[:, None] != 0, np.minimum(weight, motor), weight)
+            turns = np.array(coupling)[:, None]
+            motor = np.sum(turns * qd, axis=-2, keepdims=True)
+            least = np.max(np.abs(turns[:, 0]) * slow, axis=-1, keepdims=True)
+            weight = np.where(turns != 0, np.minimum(weight, self._weight(motor, least, fs)), weight)
         return weight
 
-    def _weight(self, qd: Array, fs: float) -> Array:
-        slides = np.abs(qd) > self.threshold
+    def _slow(self, qd: Array) -> Array:
+        """Return the speed up to which each joint stands or turns, shape (..., joint)."""
+        threshold = np.asarray(self.suited(qd).threshold, dtype=np.float64)
+        if threshold.size and threshold.shape[-1:] not in ((), (1,), (qd.shape[-2],)):
+            raise SettingError(f"{len(threshold)} speeds of a mask for {qd.shape[-2]} joints: give one, or one each")
+        return np.broadcast_to(threshold, qd.shape[:-1])
+
+    def _weight(self, qd: Array, slow: Array, fs: float) -> Array:
+        slides = np.abs(qd) > slow[..., None]
         turns = np.signbit(qd[..., 1:]) != np.signbit(qd[..., :-1])  # a fast joint turns between two samples
         slides[..., 1:] &= ~turns
         slides[..., :-1] &= ~turns
