@@ -17,7 +17,7 @@ from sim.errors import BenchError
 from sim.frictions import CoulombViscous
 from sim.robot.payload import Payload
 from sim.robot.robot import Robot
-from sim.robot.tree import standard_parameters
+from sim.robot.tree import kinematic_tree, standard_parameters
 from sim.robot.varied import model_fields
 from sim.scenario.measurement import TorqueMeasurement
 from sim.scenario.ripple import Ripple
@@ -202,6 +202,12 @@ def _require_matching(scenario: Scenario, log: MotionLog, subject: Subject) -> N
     if other.joints != subject.robot.joints:
         raise IdentificationError(
             f"{name} moves robot {scenario.robot}, whose joints are {', '.join(other.joints)}: it is none of {subject.name}"
+        )
+    if missing := {c.name for c in subject.tree.couplings} - {c.name for c in kinematic_tree(other).couplings}:
+        names = " and ".join(sorted(missing))
+        raise IdentificationError(
+            f"{name} moves robot {scenario.robot}, whose file has no drive {names}: write a file with it (--coupling describes it "
+            "in the fit alone), or leave --loop or --coupling out"
         )
     if abs(scenario.fs / log.fs - 1) > SAME:
         raise IdentificationError(f"{name} runs at {scenario.fs:g} Hz, the log has {log.fs:g} Hz: write the log's fs into it")
