@@ -206,8 +206,8 @@ def _require_matching(scenario: Scenario, log: MotionLog, subject: Subject) -> N
     if missing := {c.name for c in subject.tree.couplings} - {c.name for c in kinematic_tree(other).couplings}:
         names = " and ".join(sorted(missing))
         raise IdentificationError(
-            f"{name} moves robot {scenario.robot}, whose file has no drive {names}: write a file with it (--coupling describes it "
-            "in the fit alone), or leave --loop or --coupling out"
+            f"{name} moves robot {scenario.robot}, whose file has no drive {names}: write a file with it (--coupling describes "
+            "it in the fit alone), or leave --loop or --coupling out"
         )
     if abs(scenario.fs / log.fs - 1) > SAME:
         raise IdentificationError(f"{name} runs at {scenario.fs:g} Hz, the log has {log.fs:g} Hz: write the log's fs into it")

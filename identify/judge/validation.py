@@ -13,6 +13,7 @@ from identify.data.motion_log import MotionLog
 from identify.errors import LogError
 from identify.estimators.problem import Problem
 from identify.judge.diagnosis import instants
+from identify.judge.judged_rows import as_judged, shares
 from identify.judge.row_noise import row_noise
 from identify.models.explicit import ExplicitModel
 from identify.rows.noise_propagation import torque_paths
@@ -42,6 +43,8 @@ HELD_OUT = 0.25
 @dataclass(frozen=True, eq=False)
 class Validation:
     """Torques measured and predicted at the rows of a chain, joint by joint; all arrays have the shape (joint,).
+
+    Rows of which the mask takes a part count as that part of a row, so that a constant has its own size.
 
     Parameters
     ----------
@@ -108,7 +111,8 @@ class Validation:
 def validate(held_out: Problem, X: Array, covariance: Array | None = None) -> Validation:
     """Return how well the parameters `X`, with their `covariance`, predict the torques of a log, by the explicit model.
 
-    Both sides go through the same chain. What its mask leaves out is judged apart.
+    Both sides go through the same chain. Where a joint turns or stands is judged apart, also where the mask of the chain leaves
+    nothing out: figures of fits with and without friction are comparable. A joint that never moves counts then, all the time.
 
     Parameters
     ----------
@@ -131,22 +135,22 @@ def validate(held_out: Problem, X: Array, covariance: Array | None = None) -> Va
             f"a motion is judged by itself, not {len(held_out.logs)} of shape {held_out.logs[0].q.shape}: give them one by one"
         )
     held_out.require_rows("a motion is judged by its rows, and ")
-    signals, chain, basis = held_out.signals[0], held_out.chain, held_out.basis
-    rows = held_out.with_model(ExplicitModel()).parts[0]
+    judged = as_judged(held_out)
+    signals, chain, basis, rows = judged.signals[0], judged.chain, judged.basis, judged.parts[0]
     left = instants(signals, basis, ExplicitModel(), chain, X)
     moving = [_Joint.of(rows, X, j) for j in range(basis.n)]
     standing = chain.operator.map(left.equations, left.equations.weighted_as(1.0 - signals.weight), chain.grid(signals.log))
-    still = np.where(standing.outside > 0, rows.by_kind(standing.measurement(left.everywhere)), np.nan)
+    still = rows.by_kind(standing.measurement(left.everywhere)), shares(standing), standing.outside > 0
     rms, level, R2, correlation, count = zip(*(joint.judged() for joint in moving), strict=True)
     if 0 in count:
         raise LogError(
             f"joint {count.index(0) + 1} never moves in this log, as far as the mask of the chain sees: use a motion in which "
-            "all joints do"
+            "all joints do, or a lower --mask-speed"
         )
     bound = _bound(chain.operator, signals.fs) / np.sqrt(count)
     noise = row_noise(left, signals, chain) * [joint.unmasked for joint in moving]
     left_open = [joint.open(covariance) for joint in moving]
-    still_rms = [_rms(x[np.isfinite(x)]) for x in still]
+    still_rms = [_rms_of(*(x[j] for x in still)) for j in range(basis.n)]
     return Validation(*map(np.array, (rms, level, R2, still_rms, correlation, bound, count, noise, left_open)))
 
 
@@ -169,37 +173,52 @@ def _bound(operator: AbstractOperator, fs: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Joint:
-    """The rows of a joint: torque, residual, W, whether they are valid, and the spread that white noise would have in them."""
+    """The rows of a joint: torque, residual, W, and which are valid.
+
+    `spread` is what white noise would have in them, `share` what the mask leaves of a constant.
+    """
 
     y: Array
     rho: Array
     W: Array
     valid: npt.NDArray[np.bool_]
     spread: Array
+    share: Array
 
     @classmethod
     def of(cls, rows: Rows, X: Array, joint: int) -> "_Joint":
         own = rows.group == joint
         spread = np.sqrt(torque_paths(rows.maps[0]).covariance(np.ones(rows.kinds)).variance[own])
-        return cls(rows.Y[own], (rows.Y - rows.predicted(X))[own], rows.W[own], rows.valid[own], spread)
+        share = shares(rows.maps[0])[joint]
+        return cls(rows.Y[own], (rows.Y - rows.predicted(X))[own], rows.W[own], rows.valid[own], spread, share)
 
     def judged(self) -> tuple[float, float, float, float, int]:
         """Return the rms of residual and torque, R2, correlation, and the number of valid rows."""
-        rho, y = self.rho[self.valid], self.y[self.valid]
+        rho, y, share = self.rho[self.valid], self.y[self.valid], self.share[self.valid]
         if not len(rho):
             return np.nan, np.nan, np.nan, np.nan, 0
-        spread = float(np.sum((y - y.mean()) ** 2))
-        return _rms(rho), _rms(y), 1 - float(rho @ rho) / max(spread, 1e-300), self._correlation(), len(rho)
+        mean = float(share @ y) / self.rows
+        spread = float(np.sum((y - mean * share) ** 2))
+        return self._rms(rho), self._rms(y), 1 - float(rho @ rho) / max(spread, 1e-300), self._correlation(), len(rho)
+
+    @property
+    def rows(self) -> float:
+        """How many rows there are, those of which a part is masked by their part."""
+        return max(float(np.sum(self.share[self.valid] ** 2)), 1e-300)
+
+    def _rms(self, x: Array) -> float:
+        """Return the rms of what valid rows have, as if nothing of them were masked."""
+        return sqrt(float(np.sum(x**2)) / self.rows)
 
     @property
     def unmasked(self) -> float:
         """The rms of rows of white noise over that of rows of which the mask takes nothing."""
-        return float(np.sqrt((self.spread[self.valid] ** 2).mean()) / self.spread.max())
+        return self._rms(self.spread[self.valid]) / float(self.spread.max())
 
     def open(self, covariance: Array | None) -> float:
         """Return the rms over the rows of the sigma of W X."""
         W = self.W[self.valid]
-        return 0.0 if covariance is None else float(np.sqrt(np.mean(np.sum(W @ covariance * W, axis=1))))
+        return 0.0 if covariance is None else sqrt(float(np.sum(W @ covariance * W)) / self.rows)
 
     def _correlation(self) -> float:
         """Return the sum of products of residuals with later ones that departs most from that of noise, as a correlation.
@@ -217,5 +236,7 @@ class _Joint:
         return max(departures, key=abs) / sqrt(max(int(np.count_nonzero(self.valid)), 1))
 
 
-def _rms(x: Array) -> float:
-    return float(np.sqrt(np.mean(x**2))) if len(x) else np.nan
+def _rms_of(x: Array, share: Array, there: npt.NDArray[np.bool_]) -> float:
+    """Return the rms of rows of which the mask leaves shares; NaN if there are none."""
+    rows = float(np.sum(share[there] ** 2))
+    return sqrt(float(np.sum(x[there] ** 2)) / rows) if rows > 0 else np.nan

@@ -1,15 +1,29 @@
 """Judging on unseen motion: known errors come out as what they are."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from identify import ExplicitModel, LogError, MotionLog, Problem, TorqueChannel, idbench_chain, scara, split, validate
+from identify import (
+    ExplicitModel,
+    LogError,
+    MotionLog,
+    NoMask,
+    Problem,
+    ReversalMask,
+    TorqueChannel,
+    idbench_chain,
+    scara,
+    split,
+    validate,
+)
 
 CHANNEL = TorqueChannel("instantaneous")
 
 
-def judged(log, X, covariance=None):
-    return validate(Problem((log,), scara(), ExplicitModel(), idbench_chain()), X, covariance)
+def judged(log, X, covariance=None, chain=None):
+    return validate(Problem((log,), scara(), ExplicitModel(), chain or idbench_chain()), X, covariance)
 
 
 def test_the_truth_foretells_ideal_data(log, truth):
@@ -23,6 +37,22 @@ def test_a_gain_error_is_told_in_percent(log, truth):
     found = judged(log, 1.05 * truth)
     np.testing.assert_allclose(found.percent, 5, rtol=1e-3)
     assert not found.white.any()
+
+
+@pytest.mark.parametrize("mask", [ReversalMask(), ReversalMask(0.5), NoMask()])
+def test_a_constant_error_has_its_own_size(log, truth, mask):
+    """What rows lose to the mask is given back, where joints move and where they stand."""
+    off = MotionLog(log.fs, log.q, log.tau + [1.0, 0.1], CHANNEL)
+    found = judged(off, truth, chain=replace(idbench_chain(), mask=mask))
+    np.testing.assert_allclose(found.rms, [1.0, 0.1], rtol=1e-3)
+    assert (found.standing > [0.7, 0.07]).all()  # friction of the ideal robot comes on top
+
+
+def test_fits_with_and_without_a_mask_are_judged_on_the_same_rows(log, truth):
+    wrong = truth * [1, 1, 1, 1, 0.9, 1, 1, 1]
+    masked, bare = (judged(log, wrong, chain=replace(idbench_chain(), mask=mask)) for mask in (ReversalMask(), NoMask()))
+    np.testing.assert_array_equal(masked.rms, bare.rms)
+    np.testing.assert_array_equal(masked.R2, bare.R2)
 
 
 def test_noise_is_told_by_its_rms_and_is_white(log, truth, rng):

@@ -61,7 +61,7 @@ def _with_chain(options: Identify, request: Request) -> Request:
     if options.chain_file is not None:
         name, chain = chain_of(options.chain_file)
         return replace(request, chain=name, method=(chain, ESTIMATORS.create(request.estimator)))
-    if options.parameters.armature == "none" and options.chain == CHAIN:
+    if options.parameters.armature == "none" and options.chain == CHAIN and not options.mask_speed:
         # Behind the gears next to no friction is left that turns with the velocity: nothing to mask.
         request = replace(request, method=(replace(request.processing, mask=NoMask()), request.solver))
     return request if options.cutoff is None else in_band(request, options.cutoff)
