@@ -126,19 +126,6 @@ class BaseParameters:
         total, size = values @ self.K.T, np.abs(values) @ np.abs(self.K.T)
         return np.where(np.abs(total) > ROUNDING * size, total, 0.0)
 
-    def nearest(self, base: Array, standard: Array, scale: Array) -> Array:
-        """Return the standard values with the base values `base` that lie nearest to `standard`, in units of `scale`.
-
-        Parameters
-        ----------
-        base : Array, shape (b,)
-            What they shall give.
-        standard, scale : Array, shape (p,)
-            Where to stay near, and what counts as far.
-        """
-        K = self.K * scale
-        return np.asarray(standard) + scale * np.linalg.lstsq(K, base - self.base(standard), rcond=None)[0]
-
 
 def _explicit_columns(tree: KinematicTree, basis: Basis) -> Array:
     """Return the columns of the explicit model at random states, shape (joint x state, p)."""

@@ -68,7 +68,35 @@ def test_impossible_estimates_get_the_nearest_possible_bodies_and_are_told(arm):
     found = consistent_parameters(grouping, base, np.diag(sigma**2), X)
     assert found.distance == pytest.approx(10, rel=1e-3)
     assert found.base[i] == pytest.approx(0, abs=1e-6)
-    assert found.agrees == (len(base) > 60)  # 10^2 is within 0.999 of chi^2 with 62 degrees of freedom, not with 8
+    assert not found.agrees  # 10^2 is beyond 0.999 of chi^2, also with the 44 degrees of freedom of the Panda's bodies
+    others = np.array([name not in ("Fs1",) for name in grouping.names])
+    np.testing.assert_allclose(found.departure[others], 0, atol=1e-3)
+
+
+@pytest.mark.parametrize("prior", ["pullback", "entropic"])
+@pytest.mark.parametrize("mass", [1e-3, 1e-6, 1e-9, 1e-12])
+def test_a_last_body_of_next_to_nothing_does_not_keep_the_estimate_away(arm, mass, prior):
+    """The file has a dot where the tool is; friction, which no body is coupled to, does not move at all, though correlated."""
+    grouping, X = arm
+    rng, base, given = np.random.default_rng(0), grouping.base(X), X.copy()
+    last = [grouping.standard.names.index(f"{x}{grouping.standard.n}") for x in INERTIAL]
+    given[last] *= mass / X[last[-1]]
+    sigma = 1e-3 * np.maximum(np.abs(base), 0.01)
+    correlated = np.eye(len(base)) + 0.1 * rng.normal(size=(len(base), len(base)))
+    C = correlated @ correlated.T * np.outer(sigma, sigma)
+    estimate = base + np.linalg.cholesky(C) @ rng.normal(size=len(base))
+    found = consistent_parameters(grouping, estimate, C, given, prior=prior)
+    assert np.abs(found.departure).max() < 0.25  # as with the file's own body
+    friction = [i for i, name in enumerate(grouping.names) if name.startswith(("Fv", "Fs"))]
+    np.testing.assert_array_equal(found.base[friction], estimate[friction])
+
+
+def test_what_the_solver_leaves_far_outside_is_no_result(monkeypatch, arm):
+    grouping, X = arm
+    moved = lambda self, standard: 1.1 * standard  # noqa: E731
+    monkeypatch.setattr("identify.parameters.bodies.Bodies.projected", moved)
+    with pytest.raises(IdentificationError, match="the solver left bodies that cannot exist"):
+        consistent_parameters(grouping, grouping.base(X), 1e-6 * np.eye(len(grouping.names)), X)
 
 
 def test_a_link_too_slender_for_its_inertia_is_moved_as_little_as_its_sigma_asks():
