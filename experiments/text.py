@@ -12,6 +12,9 @@ from rich.measure import Measurement
 from rich.table import Column, Table
 from rich.text import Text
 
+UNBELIEVED = 1e-15
+"""Probability below which its size says nothing."""
+
 WORTHLESS = 999.0
 """Percentages from here on all say the same."""
 
@@ -76,6 +79,11 @@ def percent(share: float) -> str:
 def percentage(x: float) -> str:
     """Return a percentage without a sign, to two digits; empty if it is not known."""
     return f"{x:.2g}" if x < 100 else f"{x:.0f}" if x < WORTHLESS else f">{WORTHLESS:g}" if x >= WORTHLESS else ""
+
+
+def probability(p: float) -> str:
+    """Return a probability to two digits, down to what nobody believes."""
+    return f"{p:.2g}" if p >= UNBELIEVED else f"below {UNBELIEVED:g}"
 
 
 def error_percentage(share: float) -> str:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from experiments.identification.judgement import Judgement
+from experiments.identification.lack import advice_on_lack
 from experiments.identification.log_warnings import unusable, warnings_of_log
 from experiments.identification.remedies import Remedies, delay_advice
 from experiments.identification.warnings import (
@@ -41,6 +42,7 @@ def checks(judgement: Judgement, *, delay: bool) -> dict[str, list[str]]:
         # Friction absorbs a wrong delay, and the verdict may be good: the log itself is asked.
         found[DELAY] += delay_advice(result) if delay else ()
         found[MODEL] += () if judgement.good else Remedies(hardest).options()
+    found[MODEL] += advice_on_lack(result.lack, result.subject.robot.joints)
     return found
 
 

@@ -1,6 +1,6 @@
 """Logs identified by some models: the estimates, and what follows from them."""
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any, Self, final
 
@@ -8,11 +8,13 @@ import numpy as np
 
 from experiments.identification.consistent_estimate import made_consistent
 from experiments.identification.friction_choice import chosen_friction
+from experiments.identification.lack import advice_on_lack
 from experiments.identification.logs import Logs
 from experiments.identification.request import Request
 from experiments.identification.subject import Subject
 from experiments.results.summaries import finite, summarize
 from identify import (
+    ESTIMATORS,
     MODELS,
     AbstractEstimator,
     Array,
@@ -26,6 +28,7 @@ from identify import (
     encoder_steps,
 )
 from identify.judge.friction_choice import FrictionChoice
+from identify.judge.lack_of_fit import Lack, lack_of_fit
 from identify.rows.rows import Rows
 from identify.telling import stage
 
@@ -55,8 +58,20 @@ def fit(request: Request, logs: Logs) -> "Fit":
         found = _fit(replace(found.request, subject=found.subject.without(leading.hidden)), logs)
         leading = next(iter(found.outcomes.values()))
     if not found.estimates and isinstance(leading, IdentificationError):
-        raise leading
+        raise _with_its_cause(found, leading)
     return replace(found, choice=choice, hidden=tuple(hidden))
+
+
+def _with_its_cause(found: "Fit", error: IdentificationError) -> IdentificationError:
+    """Return why nothing was estimated, with what least squares leaves over, if that hangs on the motion."""
+    if isinstance(error, ExcitationError):
+        return error
+    try:
+        lack = lack_of_fit(found.problem, ESTIMATORS.create("GLS").solve(found.problem.explicit).X)
+    except IdentificationError:
+        return error
+    causes = list(advice_on_lack(lack, found.subject.robot.joints))
+    return IdentificationError(f"{error}; with GLS, {'; '.join(causes)}") if causes else error
 
 
 def _fit(request: Request, logs: Logs) -> "Fit":
@@ -125,6 +140,14 @@ class Fit:
     def solver(self) -> AbstractEstimator:
         """The estimator."""
         return self.request.solver
+
+    @cached_property
+    def lack(self) -> tuple[Lack, ...]:
+        """What the torques hang on beside the parameters, the surest first; nothing where there are too few rows to tell."""
+        try:
+            return lack_of_fit(self.problem, self.estimates[self.leading].X)
+        except IdentificationError:
+            return ()
 
     @cached_property
     def truth(self) -> dict[str, float] | None:
@@ -229,6 +252,7 @@ class Fit:
             "torque": self._channel(0),
             "found_delay": None if delay is None else {"delay": delay[0], "sigma": delay[1]},
             "noise": self.noise,
+            "lack_of_fit": [asdict(lack) for lack in self.lack],
             "models": models,
             "failures": self.failures,
             "hidden": list(self.hidden),

@@ -6,9 +6,13 @@ from functools import cached_property
 from math import isfinite
 
 from experiments.identification.fit import Fit
+from experiments.identification.lack import lacking
 from experiments.identification.warnings import FLAGS, doubtful, used
 from experiments.text import WORTHLESS, number, percent, percentage
 from identify import Estimate
+
+ABOUT = "~"
+"""Mark of a standard error that does not hold what the model is wrong by."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +31,8 @@ class EstimatesTable:
     def heads(self) -> list[tuple[str, str]]:
         """The two lines above each column but the first."""
         known = self.fit.truth is not None
-        what = "X", "%e" if known else "sigma", "%sigma"
+        about = ABOUT if lacking(self.fit.lack) else ""
+        what = "X", "%e" if known else f"{about}sigma", f"{about}%sigma"
         return [("true", "X")] * known + [(model, each) for model in self.fit.estimates for each in what]
 
     def rows(self) -> Iterator[list[str]]:
@@ -54,7 +59,10 @@ class EstimatesTable:
     @cached_property
     def legend(self) -> str:
         """What the marks mean that are used."""
-        return "; ".join(f"{flag} {FLAGS[flag]}" for flag in used(self._marks))
+        marks = [f"{flag} {FLAGS[flag]}" for flag in used(self._marks)]
+        return "; ".join(
+            marks + [f"{ABOUT} of noise alone: the fit lacks something, errors are larger"] * bool(lacking(self.fit.lack))
+        )
 
     @cached_property
     def _marks(self) -> dict[str, list[tuple[str, str, str]]]:

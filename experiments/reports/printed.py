@@ -12,6 +12,7 @@ from experiments.identification.fit import Fit
 from experiments.identification.held_out import HeldOut
 from experiments.identification.iterations import words_of_iterations
 from experiments.identification.judgement import Unjudged
+from experiments.identification.lack import words_of_lack
 from experiments.identification.remedies import SURE
 from experiments.reports.estimates import EstimatesTable
 from experiments.text import WORTHLESS, new_table, percentage, print_titled
@@ -61,6 +62,7 @@ def _told(fit: Fit) -> Iterator[str]:
             words += f"; what follows judges them at {1e3 * channel.delay:.4g} ms: give --torque-delay {1e-3 * delay:.4g}"
         yield words
     yield _noise(fit)
+    yield words_of_lack(fit.lack, fit.subject)
     yield from words_of_iterations(fit)
     if fit.request.consistent != "no":
         before = {name: e for name, e in fit.unconstrained.items() if isinstance(e, Estimate)}

@@ -40,7 +40,7 @@ class GeneralizedLeastSquares(AbstractEstimator):
 
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate; of logs too long for their rows to be kept, pieces count as independent."""
-        whitened = _Whitened(problem)
+        whitened = Whitened(problem)
         parts = [triangular(whitened(rows)) for rows in problem.every_part()]
         factor = Factor(triangular(np.concatenate(parts, axis=-2)), problem.factors.together.rows, problem.names)
         solvable = (problem.factors.together.status == Status.OK) & factor.determined
@@ -80,7 +80,7 @@ def _shares(problem: Problem) -> Array:
     return likely(units, joined, np.broadcast_to(start, (*joined[0].shape[:-2], 3)), np.full(3, LEAST))
 
 
-class _Whitened:
+class Whitened:
     """Rows [W Y] made independent, and C^-1 W, log by log, W without the bias of noise in it."""
 
     def __init__(self, problem: Problem) -> None:
@@ -91,6 +91,10 @@ class _Whitened:
         """Return L^-1 [W Y] of the rows of one log, or of a piece of it."""
         whitening, W = self._of(rows)
         return whitening.whiten(np.concatenate([W, rows.Y[..., None]], axis=-1))
+
+    def whiten(self, rows: Rows, x: Array) -> Array:
+        """Return L^-1 x of further columns x of the rows of one log, shape (..., r, m)."""
+        return self._of(rows)[0].whiten(x)
 
     def solved(self, rows: Rows) -> Array:
         """Return C^-1 W of the rows of all logs, or of a piece of one."""

@@ -1,0 +1,50 @@
+"""What a fit lacks, in words, and what to try."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from experiments.identification.subject import Subject
+from experiments.text import probability
+from identify.judge.lack_of_fit import WRONG, Lack
+
+TRY: Mapping[str, str] = {
+    "velocity": "--friction auto, or {joint}=standard+stribeck",
+    "position": "{joint}=standard+cogging with --friction, a spring in the robot's file, or a straighter encoder",
+    "load": "--friction auto, or {joint}=standard+load",
+    "time": "a log of a warm robot, a shorter one, or {joint}=standard+temperature with the temperature in the log",
+}
+"""What to try by what a torque hangs on."""
+
+
+def lacking(found: Sequence[Lack]) -> tuple[Lack, ...]:
+    """Return what is beyond doubt, of every joint what is surest."""
+    first: dict[int, Lack] = {}
+    for lack in found:
+        if lack.p < WRONG:
+            first.setdefault(lack.joint, lack)
+    return tuple(first.values())
+
+
+def words_of_lack(found: Sequence[Lack], subject: Subject) -> str:
+    """Return what the test says, in a line."""
+    if not found:
+        return "lack of fit: not tested, there are too few rows"
+    if not (wrong := lacking(found)):
+        return f"lack of fit: none over velocity, position, load and time (p = {probability(found[0].p)})"
+    joints = subject.robot.joints
+    each = (
+        f"{joints[x.joint]} over its {x.over} ({x.size:.2g} {subject.units(x.joint)[0]} rms, p = {probability(x.p)})"
+        for x in wrong
+    )
+    return f"lack of fit: {'; '.join(each)}: sigma is too small"
+
+
+def advice_on_lack(found: Sequence[Lack], joints: Sequence[str]) -> Iterator[str]:
+    """Yield what to try, joint by joint of the same cause."""
+    wrong = lacking(found)
+    for over in dict.fromkeys(lack.over for lack in wrong):
+        names = ", ".join(joints[lack.joint] for lack in wrong if lack.over == over)
+        first = next(lack.joint for lack in wrong if lack.over == over)
+        yield (
+            f"what is left of the torque of {names} hangs on {over}, which no parameter explains: errors are larger than "
+            f"sigma; try {TRY[over].format(joint=first + 1)}"
+        )

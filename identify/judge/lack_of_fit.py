@@ -1,0 +1,162 @@
+"""Whether what a fit leaves over hangs on the motion: a test of lack of fit, joint by joint, and what it hangs on."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+import scipy
+
+from identify.arrays import Array
+from identify.errors import IdentificationError
+from identify.estimators.generalized_least_squares import Whitened
+from identify.estimators.problem import Problem
+from identify.models.explicit import ExplicitModel
+from identify.rows.rows import Rows
+from identify.signals.signals import Signals
+
+BINS = 8
+"""Stretches of equal numbers of instants into which each joint's motion is cut: fewer miss a bump, more need longer logs."""
+
+WRONG = 1e-3
+"""p value, of all that is asked together, below which a fit lacks something."""
+
+DEPENDENT = 1e-6
+"""Share of a column's square below which what the parameters leave of it is rounding."""
+
+
+@final
+@dataclass(frozen=True)
+class Lack:
+    """What a joint's torque hangs on, beside the parameters.
+
+    Parameters
+    ----------
+    joint : int
+        Of the torque.
+    over : str
+        "velocity", "position", "load", "time", or a name of the log's conditions.
+    p : float
+        Probability that noise alone shows as much, anywhere where it was looked for.
+    size : float
+        Rms of it in the torque [N m].
+    """
+
+    joint: int
+    over: str
+    p: float
+    size: float
+
+
+def lack_of_fit(problem: Problem, X: Array) -> tuple[Lack, ...]:
+    """Return what the explicit model leaves over that hangs on velocity, position, load or time, the surest first.
+
+    Rows of one run are made independent by the covariance that noise gives them; what they leave is regressed on functions of
+    one variable of one joint, constant in each of `BINS` stretches. The reduction of the sum of squares is distributed as chi^2
+    if noise alone is left (the F test of added regressors: N. R. Draper and H. Smith, "Applied Regression Analysis", Wiley
+    1998, chapter 6); p values are multiplied by the number of tests (Bonferroni). Of long logs some pieces are looked at.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was fitted; one run.
+    X : Array, shape (p,)
+        The estimate.
+
+    Raises
+    ------
+    IdentificationError
+        If there are too few rows, or the covariance of the rows is singular.
+    """
+    explicit = problem.with_model(ExplicitModel())
+    whitened = Whitened(explicit)
+    parts = explicit.parts
+    own, y, raw = (np.concatenate(x) for x in zip(*(_whitened(whitened, rows) for rows in parts), strict=True))
+    Q, R = np.linalg.qr(own)
+    left = y - Q @ (Q.T @ y)
+    freedom = len(y) - own.shape[1] - BINS
+    if freedom < BINS:
+        raise IdentificationError(f"{len(y)} rows for {own.shape[1]} parameters are too few to test what is left over")
+    level = max(1.0, float(left @ left) / freedom)
+    found = list[tuple[float, Lack]]()
+    variables = _variables(parts, problem, X)
+    for (joint, over), functions in variables.items():
+        made = [_rows_of(rows, joint, f) for rows, f in zip(parts, functions, strict=True)]
+        E = np.concatenate([whitened.whiten(rows, x) for rows, x in zip(parts, made, strict=True)])
+        log_p, b = _tested(E, Q, left, level)
+        size = np.concatenate(made) @ b - raw @ np.linalg.lstsq(R, Q.T @ (E @ b), rcond=None)[0]
+        there = np.concatenate([rows.valid & (rows.group == joint) for rows in parts])
+        p = min(1.0, float(np.exp(log_p)) * len(variables))
+        found.append((log_p, Lack(joint, over, p, float(np.sqrt(np.mean(size[there] ** 2))) if there.any() else 0.0)))
+    return tuple(lack for _, lack in sorted(found, key=lambda each: each[0]))
+
+
+def _tested(E: Array, Q: Array, left: Array, level: float) -> tuple[float, Array]:
+    """Return the logarithm of the p value of columns E beside those of Q, and what multiplies them."""
+    beside = E - Q @ (Q.T @ E)
+    scale = np.maximum(np.linalg.norm(E, axis=0), 1e-300)
+    U, s, V = np.linalg.svd(beside / scale, full_matrices=False)
+    kept = s > np.sqrt(DEPENDENT)
+    z = U[:, kept].T @ left
+    b = (V[kept].T @ (z / s[kept])) / scale
+    return float(scipy.stats.chi2.logsf(z @ z / level, kept.sum())) if kept.any() else 0.0, b
+
+
+def _whitened(whitened: Whitened, rows: Rows) -> tuple[Array, Array, Array]:
+    """Return W and Y made independent, and W as it is."""
+    z = whitened(rows)
+    return z[..., :-1], z[..., -1], rows.W
+
+
+def _rows_of(rows: Rows, joint: int, functions: Array) -> Array:
+    """Return the rows of functions that are torques of a joint, shape (r, function)."""
+    (to_rows,) = rows.maps
+    found = np.zeros((len(functions), len(rows.time) // rows.kinds, rows.kinds))
+    found[..., joint] = to_rows.outside[joint] * to_rows.kernel.apply(to_rows.inside[joint] * functions)
+    return found.reshape(len(functions), -1).T
+
+
+Variable = Callable[[Signals, Array, int], tuple[Array, Array]]
+"""Returns, of signals, the torques that the model gives and a joint, a variable and what its stretches are multiplied by."""
+
+
+def _velocity(signals: Signals, tau: Array, j: int) -> tuple[Array, Array]:
+    return signals.state.qd[j], np.ones(tau.shape[-1])
+
+
+def _position(signals: Signals, tau: Array, j: int) -> tuple[Array, Array]:
+    return signals.state.q[j], np.ones(tau.shape[-1])
+
+
+def _load(signals: Signals, tau: Array, j: int) -> tuple[Array, Array]:
+    return np.abs(tau[j]), np.sign(signals.state.qd[j])
+
+
+def _time(signals: Signals, tau: Array, j: int) -> tuple[Array, Array]:
+    return np.arange(tau.shape[-1]) / signals.fs, np.sign(signals.state.qd[j])
+
+
+OVER: Mapping[str, Variable] = {"velocity": _velocity, "position": _position, "load": _load, "time": _time}
+
+
+def _variables(parts: tuple[Rows, ...], problem: Problem, X: Array) -> dict[tuple[int, str], list[Array]]:
+    """Return the functions of every joint and variable, part by part, shape (function, time) each."""
+    signals = [rows.maps[0].signals for rows in parts]
+    torques = [ExplicitModel().equations(problem.basis, one).predicted(X) for one in signals]
+    found = dict[tuple[int, str], list[Array]]()
+    for j in range(problem.basis.n):
+        for over, of in OVER.items():
+            made, begin = list[tuple[Array, Array]](), 0.0
+            for one, tau in zip(signals, torques, strict=True):
+                x, factor = of(one, tau, j)
+                made.append((x + (begin if over == "time" else 0.0), factor))
+                begin += tau.shape[-1] / one.fs
+            seen = np.concatenate([x[one.weight[j] > 0] for (x, _), one in zip(made, signals, strict=True)])
+            if len(seen) and seen.max() > seen.min():
+                found[j, over] = _stretches(made, np.quantile(seen, np.linspace(0, 1, BINS + 1)[1:-1]))
+    return found
+
+
+def _stretches(made: list[tuple[Array, Array]], edges: Array) -> list[Array]:
+    places = [np.searchsorted(edges, x) for x, _ in made]
+    return [np.array([(at == k) * factor for k in range(BINS)]) for at, (_, factor) in zip(places, made, strict=True)]
