@@ -31,6 +31,9 @@ WIDTH = 11.0
 FEW = 2
 """Joints from which on panels stand in two columns."""
 
+OUTSIDE = 1e6
+"""Per cent of a parameter's value beyond which it is drawn no farther: a friction that was moved to zero has none."""
+
 
 def torques_figure(one: HeldOut) -> str:
     """Return measured and predicted torques on a held-out log, joint by joint."""
@@ -53,6 +56,11 @@ def torques_figure(one: HeldOut) -> str:
     return svg(figure)
 
 
+def _share(x: Array, size: Array) -> Array:
+    """Return x in per cent of a size, far outside of the picture where that is next to nothing."""
+    return np.clip(100 * x / size, -OUTSIDE, OUTSIDE)
+
+
 def parameters_figure(fit: Fit) -> str:
     """Return estimates with intervals, over the size of each: those of the first model, and how others differ."""
     names = fit.basis.names
@@ -63,12 +71,12 @@ def parameters_figure(fit: Fit) -> str:
     at = np.arange(len(names))
     for i, model in enumerate(models):
         estimate = fit.estimates[model]
-        off, half = 100 * (estimate.X - leading) / size, 100 * SIGMAS * estimate.best_sigma / size
+        off, half = _share(estimate.X - leading, size), _share(SIGMAS * estimate.best_sigma, size)
         x = at + 0.22 * (i - (len(models) - 1) / 2)
         panel.errorbar(x, off, half, fmt="o", ms=2.5, lw=1.2, color=_color(model), label=model)
     if fit.truth is not None:
         true = np.array(list(fit.truth.values()))
-        panel.plot(at, 100 * (true - leading) / size, "_", ms=9, color="black", label="true")
+        panel.plot(at, _share(true - leading, size), "_", ms=9, color="black", label="true")
     panel.set_yscale("symlog", linthresh=1.0, linscale=0.6)
     panel.set_ylim(-300, 300)
     panel.set_yticks([-100, -10, -1, 0, 1, 10, 100], ["-100", "-10", "-1", "0", "1", "10", "100"])

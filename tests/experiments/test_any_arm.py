@@ -79,7 +79,7 @@ def test_round_trip_from_file_to_file(arm, tmp_path):
     path.write_text(Written(arm.fit, "explicit").text(tmp_path))
     made = Robot.load(str(path))
     truth, written = standard_parameters(subject.robot), standard_parameters(made)
-    base = [subject.base.base(np.array([x[n] for n in subject.base.standard.names])) for x in (truth, written)]
+    base = [subject.grouping.base(np.array([x[n] for n in subject.grouping.standard.names])) for x in (truth, written)]
     sigma = arm.fit.estimates["explicit"].corrected_sigma
     assert np.abs((base[1] - base[0]) / sigma).max() < 4
     again = replace(scenario(subject.name, 6, 7), robot=str(path))

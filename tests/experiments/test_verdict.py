@@ -148,4 +148,4 @@ def test_a_single_wild_sample_does_not_excuse_itself_by_the_sigma_it_makes(pair)
         return wild
 
     hit = [torques(pair[0], struck), pair[1]]
-    assert validated(hit).verdicts["explicit"].word in {"fair", "poor"}
+    assert validated(hit).verdicts["explicit"].word in {"fair", "unsure", "poor"}
