@@ -143,10 +143,10 @@ class Fit:
 
     @cached_property
     def lack(self) -> tuple[Lack, ...]:
-        """What the torques hang on beside the parameters, the surest first; nothing where there are too few rows to tell."""
+        """What the torques hang on beside the parameters, the surest first; nothing where the rows cannot tell."""
         try:
             return lack_of_fit(self.problem, self.estimates[self.leading].X)
-        except IdentificationError:
+        except (IdentificationError, np.linalg.LinAlgError):  # an estimate is not lost because its test is
             return ()
 
     @cached_property

@@ -27,7 +27,7 @@ def lacking(found: Sequence[Lack]) -> tuple[Lack, ...]:
 def words_of_lack(found: Sequence[Lack], subject: Subject) -> str:
     """Return what the test says, in a line."""
     if not found:
-        return "lack of fit: not tested, there are too few rows"
+        return "lack of fit: not tested, the rows are too few or do not allow it"
     if not (wrong := lacking(found)):
         return f"lack of fit: none over velocity, position, load and time (p = {probability(found[0].p)})"
     joints = subject.robot.joints

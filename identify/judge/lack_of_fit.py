@@ -35,7 +35,7 @@ class Lack:
     joint : int
         Of the torque.
     over : str
-        "velocity", "position", "load", "time", or a name of the log's conditions.
+        "velocity", "position", "load" or "time": a name of `OVER`.
     p : float
         Probability that noise alone shows as much, anywhere where it was looked for.
     size : float
@@ -74,9 +74,10 @@ def lack_of_fit(problem: Problem, X: Array) -> tuple[Lack, ...]:
     own, y, raw = (np.concatenate(x) for x in zip(*(_whitened(whitened, rows) for rows in parts), strict=True))
     Q, R = np.linalg.qr(own)
     left = y - Q @ (Q.T @ y)
-    freedom = len(y) - own.shape[1] - BINS
+    used = int(np.count_nonzero(own.any(axis=1)))  # rows that the mask takes are zero
+    freedom = used - own.shape[1] - BINS
     if freedom < BINS:
-        raise IdentificationError(f"{len(y)} rows for {own.shape[1]} parameters are too few to test what is left over")
+        raise IdentificationError(f"{used} rows for {own.shape[1]} parameters are too few to test what is left over")
     level = max(1.0, float(left @ left) / freedom)
     found = list[tuple[float, Lack]]()
     variables = _variables(parts, problem, X)
