@@ -64,10 +64,10 @@ def fit(request: Request, logs: Logs) -> "Fit":
 
 def _with_its_cause(found: "Fit", error: IdentificationError) -> IdentificationError:
     """Return why nothing was estimated, with what least squares leaves over, if that hangs on the motion."""
-    if isinstance(error, ExcitationError):
+    if isinstance(error, ExcitationError) or found.solver.filtered:
         return error
     try:
-        lack = lack_of_fit(found.problem, ESTIMATORS.create("GLS").solve(found.problem.explicit).X)
+        lack = lack_of_fit(found.problem, ESTIMATORS.create("GLS").fit(found.problem.explicit).X)
     except IdentificationError:
         return error
     causes = list(advice_on_lack(lack, found.subject.robot.joints))
@@ -146,7 +146,7 @@ class Fit:
         """What the torques hang on beside the parameters, the surest first; nothing where the rows cannot tell."""
         try:
             return lack_of_fit(self.problem, self.estimates[self.leading].X)
-        except (IdentificationError, np.linalg.LinAlgError):  # an estimate is not lost because its test is
+        except IdentificationError:  # an estimate is not lost because its test is
             return ()
 
     @cached_property

@@ -1,10 +1,12 @@
 """Identification while the rows come in: estimates and residuals that grow, for who watches; nothing of it is kept."""
 
+import sys
 from collections.abc import Sequence
 
 import numpy as np
 import rerun as rr
 
+from experiments.faults import reason, report
 from experiments.identification.fit import Fit, fit
 from experiments.identification.logs import Logs
 from experiments.identification.request import Request
@@ -50,7 +52,7 @@ class LiveIdentification:
         self._stream, self._channel, self._fs = stream, channel, fs
         self._request = Request(subject, chain=chain, estimator=ESTIMATOR, name=LABEL)
         self._joints, self._q, self._tau = joints, list[Array](), list[Array]()
-        self._identified, self._shown = 0, dict[str, float]()
+        self._identified, self._shown, self._broken = 0, dict[str, float](), False
         self.fit: Fit | None = None
 
     def grow(self, q: Array, tau: Array) -> bool:
@@ -58,18 +60,28 @@ class LiveIdentification:
         self._q.append(q)
         self._tau.append(tau)
         samples = sum(map(len, self._q))
-        if samples < GROWTH * self._identified:
+        if self._broken or samples < GROWTH * self._identified:
             return False
         self._identified = samples
         try:
             log = MotionLog(self._fs, np.concatenate(self._q), np.concatenate(self._tau), self._channel)
-            self.fit = fit(self._request, Logs((log,)))
+            self._identify(log)
         except IdentificationError:  # too short yet, or not yet excited
             return False
+        except Exception as error:  # the run is not lost because what is shown of it is
+            self._broken = True
+            sys.stderr.write(
+                f"idbench: nothing more is identified while the robot moves ({reason(error)}; its traceback is in "
+                f"{report(error)}); the work goes on\n"
+            )
+            return False
+        return True
+
+    def _identify(self, log: MotionLog) -> None:
+        self.fit = fit(self._request, Logs((log,)))
         with self._stream.draft():
             for form, estimate in self.fit.estimates.items():
                 self._show(form, estimate, float(log.t[-1]))
-        return True
 
     def _show(self, form: str, estimate: Estimate, now: float) -> None:
         at, color = f"identify/{LABEL}/{form}", FORMS.get(form, GREY)

@@ -72,6 +72,8 @@ def lack_of_fit(problem: Problem, X: Array) -> tuple[Lack, ...]:
     whitened = Whitened(explicit)
     parts = explicit.parts
     own, y, raw = (np.concatenate(x) for x in zip(*(_whitened(whitened, rows) for rows in parts), strict=True))
+    if not (np.isfinite(own).all() and np.isfinite(y).all()):
+        raise IdentificationError("the covariance of the rows is singular, so that they cannot be tested for what is left over")
     Q, R = np.linalg.qr(own)
     left = y - Q @ (Q.T @ y)
     used = int(np.count_nonzero(own.any(axis=1)))  # rows that the mask takes are zero

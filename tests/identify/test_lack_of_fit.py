@@ -65,3 +65,11 @@ def test_too_short_a_log_is_not_tested(exact):
     short = exact.part(0, round(1.5 * exact.fs))
     with pytest.raises(IdentificationError, match=r"too few|do not determine"):
         found(short, 0)
+
+
+def test_a_robot_at_rest_cannot_be_tested(exact):
+    """Its positions do not change: the covariance of its rows has no size."""
+    still = MotionLog(exact.fs, np.zeros((500, 2)), np.zeros((500, 2)), exact.torque)
+    problem = Problem((still,), scara(), ExplicitModel(), CHAINS.create("idbench"))
+    with pytest.raises(IdentificationError, match=r"left over"):
+        lack_of_fit(problem, np.zeros(len(scara().names)))

@@ -48,3 +48,17 @@ def test_nothing_of_it_is_kept(grown, tmp_path, reading):
     assert reading.entities(tmp_path / "kept.rrd") - {"__properties"} == {"about"}
     assert "identify/so-far/explicit/estimate/ZZR1" in stream.shown
     assert "identify/so-far/explicit/estimate/ZZR1" not in stream.paths
+
+
+def test_a_fault_in_it_is_told_once_and_the_run_goes_on(table1, monkeypatch, capsys, tmp_path):
+    def broken(request, logs):
+        raise np.linalg.LinAlgError("on purpose")
+
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr("experiments.recording.live_layer.fit", broken)
+    log = table1.log
+    live = LiveIdentification(Stream("broken"), Subject(), "idbench", log.torque, log.fs, JOINTS)
+    assert not any([live.grow(log.q[k : k + 500], log.tau[k : k + 500]) for k in range(0, 2000, 500)])
+    assert len(told := capsys.readouterr().err.splitlines()) == 1
+    assert "LinAlgError: on purpose" in told[0]
+    assert "the work goes on" in told[0]
