@@ -58,7 +58,7 @@ def test_a_fault_in_it_is_told_once_and_the_run_goes_on(table1, monkeypatch, cap
     monkeypatch.setattr("experiments.recording.live_layer.fit", broken)
     log = table1.log
     live = LiveIdentification(Stream("broken"), Subject(), "idbench", log.torque, log.fs, JOINTS)
-    assert not any([live.grow(log.q[k : k + 500], log.tau[k : k + 500]) for k in range(0, 2000, 500)])
+    assert not any(live.grow(log.q[k : k + 500], log.tau[k : k + 500]) for k in range(0, 2000, 500))
     assert len(told := capsys.readouterr().err.splitlines()) == 1
     assert "LinAlgError: on purpose" in told[0]
     assert "the work goes on" in told[0]
