@@ -11,6 +11,7 @@ from identify import MotionLog, Problem
 from identify.blame import blamed
 from identify.judge.friction_choice import FrictionChoice, choose_friction
 from identify.models.explicit import ExplicitModel
+from identify.signals.masks import NoMask
 
 
 def chosen_friction(request: Request, logs: tuple[MotionLog, ...], most: int | None = None) -> tuple[Request, FrictionChoice]:
@@ -19,11 +20,12 @@ def chosen_friction(request: Request, logs: tuple[MotionLog, ...], most: int | N
     At most so many are added to a joint.
     """
     subject = request.subject
-    candidates = {name: law_of(name) for name in COMPARED if name != "temperature" or "temperature" in logs[0].conditions}
+    seen = {"temperature": "temperature" in logs[0].conditions, "tanh": isinstance(request.processing.mask, NoMask)}
+    candidates = {name: law_of(name) for name in COMPARED if seen.get(name, True)}
     with blamed():
         problem = Problem(logs, subject.basis, ExplicitModel(), request.processing)
         choice = choose_friction(problem, candidates, most=most)
-    asked = replace(subject.asked, friction=subject.laws.with_more(choice.laws).texts)
+    asked = replace(subject.asked, friction=subject.laws.chosen(choice.laws, choice.idle).texts)
     return replace(request, subject=replace(subject, asked=asked)), choice
 
 
@@ -32,10 +34,11 @@ def words(choice: FrictionChoice, laws: Sequence[Sequence[str]], joints: Sequenc
     said = []
     for j, joint in enumerate(joints):
         taken = {score.law: score for score in choice.scores if score.joint == j and score.taken}
+        instead = ", in the place of coulomb" if choice.idle[j] else ""
         why = ", ".join(f"{law} takes {100 * score.share:.0f} %" for law, score in taken.items())
         said.append(
             f"friction of {joint}: {' + '.join(laws[j])}"
-            + (f" ({why} of the squared error of motion not fitted)" if why else "")
+            + (f" ({why} of the squared error of motion not fitted{instead})" if why else "")
         )
     return said
 

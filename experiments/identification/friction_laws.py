@@ -27,8 +27,9 @@ NUMBERS = (float, Array | float)
 BEYOND, LARGEST = 100.0, 1e6
 """How far beyond the range in which a shape is looked for it may be given, and the largest of other settings."""
 
-COMPARED = ("offset", "asymmetric-viscous", "load", "stribeck", "arctan", "temperature")
-"""What `auto` compares, beside viscous and Coulomb friction; temperature where the log has it."""
+COMPARED = ("offset", "asymmetric-viscous", "load", "stribeck", "arctan", "tanh", "temperature")
+"""What `auto` compares, beside viscous and Coulomb friction; temperature where the log has it, and tanh, which differs from
+Coulomb friction at rest alone, where no mask takes that out."""
 
 
 @final
@@ -71,10 +72,13 @@ class FrictionLaws:
         """Whether all joints have viscous and Coulomb friction, and may have more."""
         return all(set(STANDARD) <= set(own) for own in self.names)
 
-    def with_more(self, more: Sequence[Sequence[str]]) -> "FrictionLaws":
-        """Return these laws and more, joint by joint, all chosen."""
-        pairs = zip(self.names, more, strict=True)
-        return FrictionLaws(tuple((*own, *(name for name in others if name not in own)) for own, others in pairs))
+    def chosen(self, more: Sequence[Sequence[str]], idle: Sequence[Sequence[str]]) -> "FrictionLaws":
+        """Return these laws and more, joint by joint, without those of some letters."""
+        found = list[tuple[str, ...]]()
+        for own, others, out in zip(self.names, more, idle, strict=True):
+            kept = [name for name in own if getattr(law_of(name), "symbol", "") not in out]
+            found.append((*kept, *(name for name in others if name not in kept)))
+        return FrictionLaws(tuple(found))
 
     @property
     def texts(self) -> tuple[str, ...]:

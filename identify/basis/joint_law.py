@@ -88,6 +88,9 @@ class AbstractFriction(AbstractJointLaw):
     kind: ClassVar[Kind] = "friction"
     """What the parameter measures."""
 
+    replaces: ClassVar[str] = ""
+    """Letters of the law in whose place this one stands, if it stands in the place of one."""
+
     @abstractmethod
     def force(self, q: Array, qd: Array) -> Array:
         """Return the friction torque of a unit parameter, (..., joint, time), positive when it resists qd > 0."""

@@ -2,17 +2,17 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
-from identify.arrays import Array
 from identify.basis.block import AbstractBlock
 from identify.basis.friction.shape import ShapedFriction
+from identify.basis.friction.smooth_coulomb import TanhFriction
 from identify.basis.of_joints import OfJoints
 from identify.estimators.problem import Problem
 from identify.estimators.settle import settled
-from identify.judge.held_out import FOLDS, TINY, HeldOut, sigma_squares, solved, squares
+from identify.judge.held_out import HeldOut
+from identify.judge.law_score import LawScore, LawSearch, gain
 
 SURE = 1.5
 """A law is taken when what it gains is this many times the standard deviation of that over the stretches."""
@@ -26,45 +26,8 @@ SOLID = 0.3
 WORSE = 0.25
 """Share of the squared error that a law may add at speeds above those of a fit: an eighth of the error."""
 
-EXCUSED = 2.0
-"""Squares at speeds above those of a fit that sigma makes, in multiples of what it makes on average, are no fault of a law."""
-
 WORTH = 0.02
 """Least share of a joint's squared error that a law must take: less is of no use, and of a chain's own errors."""
-
-
-@dataclass(frozen=True)
-class LawScore:
-    """What a law changes on motion that was not fitted.
-
-    Parameters
-    ----------
-    joint : int
-        From 0.
-    law : str
-        Its name.
-    share : float
-        Of the joint's squared error, how much it takes; negative if it adds to it.
-    deviations : float
-        What it takes of the logarithm of the squared errors of the stretches, on average, in standard deviations of that.
-    sigmas : float
-        How many sigma its parameter is away from zero, with independent rows.
-    least : float
-        Share that it takes without the stretch in which it takes most.
-    beyond : float
-        Share that it takes of the squared error at speeds above those of a fit.
-    taken : bool
-        Whether the joint has it in the end.
-    """
-
-    joint: int
-    law: str
-    share: float
-    deviations: float
-    sigmas: float
-    least: float
-    beyond: float
-    taken: bool
 
 
 @dataclass(frozen=True)
@@ -77,10 +40,13 @@ class FrictionChoice:
         Names, joint by joint.
     scores : tuple of LawScore
         What was compared, in the order in which it was decided.
+    idle : tuple of tuple of str
+        Letters of laws of the basis in whose place the joint has another, joint by joint.
     """
 
     laws: tuple[tuple[str, ...], ...]
     scores: tuple[LawScore, ...]
+    idle: tuple[tuple[str, ...], ...] = ()
 
 
 def choose_friction(problem: Problem, candidates: Mapping[str, AbstractBlock], *, most: int | None = None) -> FrictionChoice:
@@ -89,7 +55,7 @@ def choose_friction(problem: Problem, candidates: Mapping[str, AbstractBlock], *
     Stretches of the logs are left out one by one (cross-validation), and the fastest motion of each joint once more. A law is
     added where it takes `WORTH` of the squared error, `SURE` times the standard deviation of that, its parameter is `PLAIN`
     sigma away from zero, and it does no harm to the fastest motion; the one that takes most first. In the end those are dropped
-    again that others have made idle.
+    again that others have made idle; so is Coulomb friction, where a law without its jump stands in its place.
 
     Parameters
     ----------
@@ -129,8 +95,11 @@ class _Choice:
             if laws == before or max(map(len, laws)) == most:
                 break
         laws = [self._needed(laws, j) if len(own) > 1 else own for j, own in enumerate(laws)]
+        for j in range(len(laws)):
+            if score := self._in_place(laws, j):
+                laws[j], scores[j, score.law] = (*laws[j], score.law), score
         kept = (replace(score, taken=score.law in laws[score.joint]) for score in scores.values())
-        return FrictionChoice(tuple(laws), tuple(kept))
+        return FrictionChoice(tuple(laws), tuple(kept), tuple(self._idle(laws, j) for j in range(len(laws))))
 
     def _better(self, laws: Sequence[tuple[str, ...]], found: Sequence[Sequence[str]]) -> list[tuple[str, ...]]:
         """Return the laws with one more of each joint: of its best two that which is better with shapes of its own."""
@@ -154,7 +123,7 @@ class _Choice:
             marks.append((self._drives(search, more[j], j), float(search.errors[j]), more[j]))
         return min((mark for mark in marks if np.isfinite(mark[1]) or mark[2] == own), key=lambda mark: mark[:2])[2]
 
-    def _drives(self, search: "_Search", own: Sequence[str], j: int) -> bool:
+    def _drives(self, search: LawSearch, own: Sequence[str], j: int) -> bool:
         """Return whether the last law of a joint has a size below zero: a law of another form, stood on its head."""
         block = self.candidates[own[-1]] if own else None
         return isinstance(block, ShapedFriction) and search.products.value(block.law.symbol, j) < 0
@@ -170,13 +139,49 @@ class _Choice:
                 laws = [*laws[:j], rest, *laws[j + 1 :]]
         return own
 
-    def _search(self, laws: Sequence[tuple[str, ...]], candidates: Mapping[str, AbstractBlock]) -> "_Search":
-        """Return the comparison of further laws, beside these with their own shapes."""
-        basis = self.problem.basis
+    def _in_place(self, laws: Sequence[tuple[str, ...]], j: int) -> LawScore | None:
+        """Return what tanh gains in the place of Coulomb friction, if it predicts motion better that was not fitted.
+
+        Beside it, as laws are compared at first, the two share what they explain. Fast motion is not asked: there both are the
+        same.
+        """
+        for name, block in self.candidates.items():
+            gone = [] if any(map(self._replaced, laws[j])) else self._letters(j, self._replaced(name))
+            if not gone or not (isinstance(block, ShapedFriction) and isinstance(block.law, TanhFriction)):
+                continue
+            more = [*laws[:j], (*laws[j], name), *laws[j + 1 :]]
+            before, after = (s.squares(j) for s in (self._search(laws, {}), self._search(more, {}, gone)))
+            share, deviations, least = gain(before, after)
+            if np.isfinite(after).all() and share > WORTH and deviations > SURE:
+                return LawScore(j, name, share, deviations, np.nan, least, np.nan, taken=True)
+        return None
+
+    def _replaced(self, name: str) -> str:
+        """Return the letters in whose place a candidate stands."""
+        block = self.candidates[name]
+        return block.law.replaces if isinstance(block, ShapedFriction) else ""
+
+    def _letters(self, j: int, letters: str) -> list[str]:
+        return [p.name for p in self.problem.basis.parameters if p.joint == j and p.symbol == letters]
+
+    def _idle(self, laws: Sequence[tuple[str, ...]], j: int) -> tuple[str, ...]:
+        """Return the letters of laws of the basis without which a joint that has others in their place is predicted as well."""
+        letters = {self._replaced(name) for name in laws[j]}
+        names = [name for x in letters for name in self._letters(j, x)]
+        if not names:
+            return ()
+        with_it, without = (self._search(laws, {}, gone).errors[j] for gone in ([], names))
+        return tuple(letters) if (1 - WORTH) * without < with_it else ()
+
+    def _search(
+        self, laws: Sequence[tuple[str, ...]], candidates: Mapping[str, AbstractBlock], gone: Sequence[str] = ()
+    ) -> LawSearch:
+        """Return the comparison of further laws, beside these with their own shapes, without some parameters."""
+        basis = self.problem.basis.without(*gone) if gone else self.problem.basis
         for name in dict.fromkeys(name for own in laws for name in own):
             joints = tuple(j for j, own in enumerate(laws) if name in own)
             basis = basis + OfJoints(self.candidates[name], joints)
-        return _Search(HeldOut.of(settled(self.problem.with_basis(basis)), candidates))
+        return LawSearch(HeldOut.of(settled(self.problem.with_basis(basis)), candidates))
 
 
 def _worth(score: LawScore) -> bool:
@@ -188,62 +193,3 @@ def _best(tried: Mapping[tuple[int, str], LawScore], j: int) -> list[str]:
     """Return the laws that are worth it at a joint, that which gains most first."""
     worth = {name: score.share for (joint, name), score in tried.items() if joint == j and _worth(score)}
     return sorted(worth, key=lambda name: -worth[name])
-
-
-@dataclass(frozen=True, eq=False)
-class _Search:
-    products: HeldOut
-
-    @property
-    def places(self) -> list[tuple[int, str]]:
-        """Joints and laws that are compared."""
-        return [(j, name) for name, j in self.products.places]
-
-    def score(self, j: int, name: str) -> LawScore:
-        """Return what a law gains at a joint."""
-        (before, left_open), (after, more_open) = self._errors(j, None), self._errors(j, name)
-        if not np.isfinite(after).all():  # nothing that could be solved
-            return LawScore(j, name, -np.inf, -np.inf, 0.0, -np.inf, -np.inf, taken=False)
-        ratio = np.log(np.maximum(before, TINY) / np.maximum(after, TINY))[:-1]
-        spread = float(np.std(ratio, ddof=1) / np.sqrt(FOLDS))
-        deviations = float(ratio.mean() / spread) if spread > 0 else 0.0
-        share = float(1 - after[:-1].sum() / max(before[:-1].sum(), TINY))
-        others = np.delete(np.arange(FOLDS), np.argmax((before - after)[:-1]))
-        least = float(1 - after[others].sum() / max(before[others].sum(), TINY))
-        # What the noise of the fit makes farther out is no fault of the law.
-        beyond = 1 - (after[-1] - EXCUSED * (more_open[-1] - left_open[-1])) / max(before[-1], TINY)
-        return LawScore(j, name, share, deviations, self.products.sigmas(name, j), least, float(beyond), taken=False)
-
-    @property
-    def errors(self) -> Array:
-        """Squared error of each joint on stretches that were not fitted, without further laws, shape (joint,)."""
-        return np.array([self._errors(j, None)[0][:-1].sum() for j in range(self.products.start.basis.n)])
-
-    def _errors(self, j: int, law: str | None) -> Array:
-        """Return squared errors of a joint in every stretch and in the fastest motion, and what sigma makes, (2, FOLDS + 1)."""
-        key = law, j
-        if key not in self._known:
-            self._known[key] = np.array([self._predicted(j, law, k) for k in range(FOLDS + 1)]).T
-        return self._known[key]
-
-    @cached_property
-    def _known(self) -> dict[tuple[str | None, int], Array]:
-        return {}
-
-    def _predicted(self, j: int, law: str | None, fold: int) -> tuple[float, float]:
-        """Return the squared error of a joint in a stretch, by a fit of the rest, and what sigma makes of it in fast motion.
-
-        Shapes are those that fit the rest best.
-        """
-        products = self.products
-        judged, fitted = products.held[fold][j], products.fitted(fold, j)
-        least, best, spread = np.inf, np.inf, 0.0
-        # The fastest motion has had no say in the shapes: they are those that fit the slower best.
-        every = [[]] if law is None else products.places[law, j] if fold == FOLDS else products.likely(law, j)
-        for own in every:
-            columns = [*range(products.p), *own]
-            X = solved(fitted, columns)
-            if (misfit := squares(fitted, columns, X)) < least:
-                least, best = misfit, squares(judged, columns, X)
-                spread = sigma_squares(fitted, judged, columns) if fold == FOLDS else 0.0
-        return best, spread

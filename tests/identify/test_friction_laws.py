@@ -11,6 +11,7 @@ from identify import (
     ExplicitModel,
     LogError,
     MotionLog,
+    NoMask,
     OfJoints,
     PowerModel,
     Problem,
@@ -190,3 +191,16 @@ def test_the_load_is_all_torque_but_friction():
 def test_a_law_with_known_shapes_is_linear():
     found = identify(made(stribeck_law), scara() + StribeckFriction(vs=np.array([[0.3], [0.25]])), ExplicitModel())
     assert found.X[-2:] == pytest.approx([0.3, 0.15], rel=0.02)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("smooth", [True, False])
+def test_friction_without_a_jump_takes_the_place_of_coulomb(smooth):
+    """Where no mask takes the instants at rest, in which alone the two differ."""
+    law = (
+        (lambda q, qd, load: X[[2, 7]][:, None] * (np.tanh(qd / 0.05) - np.sign(qd))) if smooth else (lambda q, qd, load: 0 * q)
+    )
+    problem = Problem((made(law, 0.02),), scara(), ExplicitModel(), replace(idbench_chain(), mask=NoMask()))
+    found = choose_friction(problem, {each: BLOCKS.create(each) for each in ("offset", "stribeck", "tanh")})
+    assert found.laws == (("tanh",),) * 2 if smooth else ((), ())
+    assert found.idle == (("Fs",),) * 2 if smooth else ((), ())

@@ -25,6 +25,7 @@ class TanhFriction(AbstractFriction):
 
     symbol: ClassVar[str] = "Ft"
     unit: ClassVar[str] = "N m"
+    replaces: ClassVar[str] = "Fs"
 
     vt: Array | float = 0.1
 
@@ -47,6 +48,7 @@ class ArctanFriction(AbstractFriction):
 
     symbol: ClassVar[str] = "Fat"
     unit: ClassVar[str] = "N m"
+    replaces: ClassVar[str] = "Fs"
 
     vat: Array | float = 0.1
 
