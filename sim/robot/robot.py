@@ -1,9 +1,11 @@
 """A robot: a compiled MuJoCo model of one arm and what the bench asks of it."""
 
+import shlex
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import count
 from pathlib import Path
 from typing import Self
 from xml.etree import ElementTree
@@ -48,9 +50,16 @@ class Robot:
 
     def __post_init__(self) -> None:
         simple = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
-        other = [_called(self.model, j) for j in range(self.model.njnt) if self.model.jnt_type[j] not in simple]
+        other = [self.model.joint(j) for j in range(self.model.njnt) if self.model.jnt_type[j] not in simple]
         if other:
-            raise RobotError(f"robot {self.name!r}: only hinge and slide joints can be simulated, not {', '.join(other)}")
+            called = ", ".join(
+                f"{joint.name!r} of body {self.model.body(self.model.jnt_bodyid[joint.id]).name!r}" for joint in other
+            )
+            hold = " ".join(shlex.quote(f"{joint.name}=0") for joint in other)
+            raise RobotError(
+                f"robot {self.name!r}: a joint must turn about or slide along one axis, which {called} does not (its body "
+                f"floats or turns freely): --lock {hold} holds it where the file has it"
+            )
         if not self.model.njnt:
             raise RobotError(f"robot {self.name!r} has no joints")
 
@@ -107,6 +116,7 @@ class Robot:
         try:
             spec, notes = _read(path)
             spec.compiler.fusestatic = False  # bodies stay those of the file
+            _name_joints(spec)
             return spec, tuple(notes)
         except RobotError as error:
             raise RobotError(f"robot {name!r}: {error}") from None
@@ -158,7 +168,7 @@ class Robot:
     @cached_property
     def joints(self) -> tuple[str, ...]:
         """Names of the joints."""
-        return tuple(self.model.joint(j).name or f"joint {j + 1}" for j in range(self.n))
+        return tuple(self.model.joint(j).name for j in range(self.n))
 
     @cached_property
     def motors(self) -> Motors:
@@ -234,10 +244,12 @@ def _smaller_side(limits: Array) -> float:
     return min(-low, high) if low < 0 < high else max(abs(low), abs(high))
 
 
-def _called(model: mujoco.MjModel, joint: int) -> str:
-    """Return what a joint is called, or the body that it moves."""
-    kind = mujoco.mjtJoint(model.jnt_type[joint]).name.removeprefix("mjJNT_").lower()
-    return f"{model.joint(joint).name or kind} of body {model.body(model.jnt_bodyid[joint]).name!r}"
+def _name_joints(spec: mujoco.MjSpec) -> None:
+    """Give every joint without a name one that can be said, by its number."""
+    taken = {joint.name for joint in spec.joints}
+    for number, joint in enumerate(spec.joints, start=1):
+        if not joint.name:
+            joint.name = next(name for i in count() if (name := f"joint{number}" + "_" * i) not in taken)
 
 
 def _way_out(reason: str) -> str:

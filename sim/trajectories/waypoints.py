@@ -6,7 +6,7 @@ from sim.errors import ScenarioError
 from sim.robot.motors import Array
 
 DRAWS = 10000
-"""Draws after which no waypoint is believed to exist."""
+"""Draws of all joints, and then of single ones, after which no waypoint is believed to exist."""
 
 
 def draw_waypoint(
@@ -30,10 +30,14 @@ def draw_waypoint(
         If there is no such waypoint.
     """
     low, high = ranges[:, 0] + clearance, ranges[:, 1] - clearance
-    for _ in range(DRAWS if (low < high).all() and np.isfinite(ranges).all() else 0):
-        point = rng.uniform(low, high)
-        if (np.abs(neighbours - point) >= smallest_move).all():
-            return point
+    if (low < high).all() and np.isfinite(ranges).all():
+        point, far = np.zeros(len(ranges)), np.zeros(len(ranges), dtype=np.bool_)
+        for k in range(2 * DRAWS):
+            # All joints of a hand are seldom right in one draw: then those that are wrong are drawn again.
+            point = np.where(far & (k > DRAWS), point, rng.uniform(low, high))
+            far = np.asarray((np.abs(neighbours - point) >= smallest_move).all(axis=0))
+            if far.all():
+                return point
     narrow = int(np.argmin(high - low))
     raise ScenarioError(
         f"no waypoint is {np.max(smallest_move):g} rad from its neighbours and {np.max(clearance):g} rad inside the ranges of "

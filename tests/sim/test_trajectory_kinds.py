@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 
 from sim.errors import ScenarioError
+from sim.robot.robot import Robot
 from sim.trajectories import TRAJECTORIES, Quintic, RandomMoves, TimeOptimal
 
 POINTS = ((0.0, 0.0), (1.5, -1.0), (1.4, 1.0), (-1.0, 0.9))
@@ -61,6 +63,16 @@ def test_random_moves_repeat_themselves_and_keep_their_settings(robot):
     assert (np.abs(np.diff(planned.waypoints, axis=0)) >= 0.6).all()
     assert (planned.durations >= 0.3).all()
     assert planned.dwells[0] == planned.dwells[-1] == 1.0
+
+
+def test_a_hand_has_random_moves_too():
+    """Sixteen joints that all move a quarter of their range are never drawn together."""
+    joint = '<body><joint type="hinge" limited="true" range="-10 20"/><geom size="0.1"/></body>'
+    robot = Robot("hand", mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{16 * joint}</worldbody></mujoco>"))
+    points = RandomMoves(moves=3).plan(robot).waypoints
+    assert (np.abs(np.diff(points, axis=0)) >= np.radians(30) / 4).all()
+    assert (points > np.radians(-10)).all()
+    assert (points < np.radians(20)).all()
 
 
 @pytest.mark.parametrize(

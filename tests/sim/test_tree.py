@@ -7,6 +7,7 @@ import pytest
 from identify import BaseParameters, State, tree_basis
 from sim.errors import RobotError
 from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
+from sim.robot.mounting import Mounting
 from sim.robot.rewrite import rewritten
 from sim.robot.robot import Robot
 from sim.robot.tree import kinematic_tree, standard_parameters
@@ -93,8 +94,8 @@ PAIR = '<geom size="0.1"/><body name="b" pos="1 0 0"><joint name="second"/><geom
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (one('<freejoint name="float"/>'), "only hinge and slide joints can be simulated, not float of body 'a'"),
-        (one('<joint name="ball" type="ball"/>'), "only hinge and slide joints can be simulated, not ball"),
+        (one('<freejoint name="float"/>'), r"'float' of body 'a' does not .* --lock float=0 holds it"),
+        (one('<joint name="ball" type="ball"/>'), r"'ball' of body 'a' does not"),
         (
             one('<joint name="first"/>', '<equality><connect name="loop" body1="b" anchor="0 0 0"/></equality>', PAIR),
             r"connect 'loop' \(a and b\) closes a chain|connect 'loop' \(b and world\) closes a chain",
@@ -119,6 +120,20 @@ PAIR = '<geom size="0.1"/><body name="b" pos="1 0 0"><joint name="second"/><geom
 def test_what_is_no_open_tree_is_refused_by_name(text, message, written):
     with pytest.raises(RobotError, match=message):
         kinematic_tree(Robot.load(written(text)))
+
+
+def test_a_floating_base_is_held_and_joints_without_names_get_some(written):
+    """The robot is then that which stands on the ground."""
+    base, rest = '<body><freejoint/><geom size="0.1"/>', f'<body pos="1 0 0"><joint axis="0 1 0"/>{PAIR}</body></body>'
+    path = written(f"<mujoco><worldbody>{base}{rest}</worldbody></mujoco>")
+    with pytest.raises(RobotError, match="--lock joint1=0 holds it"):
+        Robot.load(path)
+    held = Robot.load(path, Mounting(lock=(("joint1", 0.0),)).edit)
+    assert held.joints == ("joint2", "second")
+    fixed = Robot.load(written(f"<mujoco><worldbody><body>{rest}</worldbody></mujoco>"))
+    assert fixed.joints == ("joint1", "second")
+    q = np.random.default_rng(0).standard_normal((3, 5, 2))
+    np.testing.assert_allclose(inverse_dynamics(held, *q), inverse_dynamics(fixed, *q), atol=1e-12)
 
 
 @pytest.mark.parametrize(
