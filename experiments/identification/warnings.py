@@ -7,6 +7,7 @@ import numpy as np
 from experiments.identification.fit import Fit
 from experiments.identification.log_warnings import resting, warnings_of_base
 from experiments.identification.subject import Subject
+from experiments.identification.unlike_file import unlike_file
 from identify import MotionLog, brisk_shares, showing_moves
 from identify.basis.parameter import NOT_NEGATIVE
 from sim.robot.robot import Robot
@@ -24,9 +25,6 @@ ENOUGH = 4
 
 MUCH_LONGER = 100
 """Times from which on the length of a log is not what is wrong with it."""
-
-FAR_OFF = 30.0
-"""Factor between measured and expected torques that no missing rotor or friction makes in the joint that carries most."""
 
 FAR = 4.0
 """Errors of more than so many sigma are marked: normal ones come once in 16 000."""
@@ -47,7 +45,7 @@ LOG, DELAY, FILE, MOTION, MODEL = "the log", "the torque's delay", "the robot's 
 
 def warnings_of_result(fit: Fit) -> dict[str, list[str]]:
     """Return what no healthy identification shows, and what the log leaves open, by what it is about."""
-    log, motion, model = [*wrong_sign(fit), *wrong_unit(fit)], list[str](), list[str]()
+    log, motion, model = [*wrong_sign(fit), *unlike_file(fit)], list[str](), list[str]()
     negative = {name: _negative(fit, name) for name in fit.estimates}
     linked = list(_link_side(fit)) if not log else []
     model += linked
@@ -157,19 +155,6 @@ def _badly_explained(fit: Fit, name: str) -> Iterator[str]:
 
 def _share(share: float) -> str:
     return f"{100 * share:.0f} %" if share > 0 else "nothing"
-
-
-def wrong_unit(fit: Fit) -> list[str]:
-    """Return whether torques are far from what the robot's file says of the same motion, as those in other units are."""
-    subject, R = fit.subject, fit.problem.factors.R
-    if subject.robot.weightless:
-        return []
-    filed = R[..., :-1] @ np.array(list(subject.truth(subject.robot).values()))
-    sizes = zip(np.linalg.norm(R[..., -1], axis=-1), np.linalg.norm(filed, axis=-1), strict=True)
-    measured, expected = max(sizes, key=lambda pair: float(pair[1]))  # the joint of which the file expects most
-    if not expected or 1 / FAR_OFF < measured / expected < FAR_OFF:
-        return []
-    return [f"the torques are {measured / expected:.2g} times what the robot's file says of this motion: are they in N m?"]
 
 
 def hidden_notes(fit: Fit) -> list[str]:

@@ -11,8 +11,9 @@ from experiments.identification.fit import fit
 from experiments.identification.log_warnings import warnings_of_log
 from experiments.identification.logs import Logs
 from experiments.identification.request import Request
+from experiments.identification.unlike_file import unlike_file
 from experiments.identification.verdict import GOOD, WORDS, Verdict
-from experiments.identification.warnings import LOG, MODEL, wrong_sign, wrong_unit
+from experiments.identification.warnings import LOG, MODEL, wrong_sign
 from experiments.text import error_percentage
 from identify import Array, Estimate, ExplicitModel, IdentificationError, MotionLog, Problem, validate
 from identify.loads.drive_gains import read_with
@@ -101,7 +102,7 @@ class LoadJudgement:
             alone = fit(replace(self.request, models=("explicit",)), Logs((log,)))
         except IdentificationError:  # too short for a fit of its own
             return found
-        return [*found, *wrong_sign(alone), *wrong_unit(alone)]
+        return [*found, *wrong_sign(alone), *unlike_file(alone)]
 
     def _of_fit(self) -> Iterator[str]:
         """Yield which logs the estimate of all does not explain."""

@@ -23,9 +23,17 @@ class EstimatesTable:
     ----------
     fit : Fit
         The identification.
+    models : tuple of str, optional
+        Those that are shown; all of it by default.
     """
 
     fit: Fit
+    models: tuple[str, ...] = ()
+
+    @property
+    def estimates(self) -> dict[str, Estimate]:
+        """Of the models that are shown."""
+        return {name: self.fit.estimates[name] for name in self.models or self.fit.estimates}
 
     @property
     def heads(self) -> list[tuple[str, str]]:
@@ -33,26 +41,26 @@ class EstimatesTable:
         known = self.fit.truth is not None
         about = ABOUT if lacking(self.fit.lack) else ""
         what = "X", "%e" if known else f"{about}sigma", f"{about}%sigma"
-        return [("true", "X")] * known + [(model, each) for model in self.fit.estimates for each in what]
+        return [("true", "X")] * known + [(model, each) for model in self.estimates for each in what]
 
     def rows(self) -> Iterator[list[str]]:
         """Yield the cells of every parameter, its name first; marks stand behind what is doubtful."""
         for i, name in enumerate(self.fit.basis.names):
-            each = (self._cells(model, estimate, i) for model, estimate in self.fit.estimates.items())
+            each = (self._cells(model, estimate, i) for model, estimate in self.estimates.items())
             yield [name, *self._true(i), *(cell for cells in each for cell in cells)]
 
     def short(self) -> Iterator[list[str]]:
         """Yield the truth and the estimates alone, with all marks."""
         for i, name in enumerate(self.fit.basis.names):
-            values = (f"{e.X[i]:.4g}{''.join(self._marks[m][i]).strip()}" for m, e in self.fit.estimates.items())
+            values = (f"{e.X[i]:.4g}{''.join(self._marks[m][i]).strip()}" for m, e in self.estimates.items())
             yield [name, *self._true(i), *values]
 
     def whole(self) -> Iterator[list[str]]:
         """Yield the cells of what is said of each fit as a whole."""
-        estimates, before = self.fit.estimates.values(), [""] * (self.fit.truth is not None)
+        estimates, before = self.estimates.values(), [""] * (self.fit.truth is not None)
         every = {"Cond(W)": [f"{e.condition_number:.1f}" for e in estimates], "rows": [f"{e.row_count}" for e in estimates]}
         for j in range(self.fit.basis.n):
-            every[f"tau{j + 1} explained"] = [_explained(share[j]) for share in self.fit.explained.values()]
+            every[f"tau{j + 1} explained"] = [_explained(self.fit.explained[model][j]) for model in self.estimates]
         for name, cells in every.items():
             yield [name, *before, *(cell for first in cells for cell in (first, "", ""))]
 
@@ -66,7 +74,7 @@ class EstimatesTable:
 
     @cached_property
     def _marks(self) -> dict[str, list[tuple[str, str, str]]]:
-        return doubtful(self.fit)
+        return {model: marks for model, marks in doubtful(self.fit).items() if model in self.estimates}
 
     def _true(self, i: int) -> list[str]:
         return [] if self.fit.truth is None else [f"{list(self.fit.truth.values())[i]:g}"]

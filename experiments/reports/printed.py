@@ -1,6 +1,7 @@
 """Identifications as text."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import zip_longest
 from math import isfinite, log2, pi
 
 from rich.console import Console
@@ -15,21 +16,22 @@ from experiments.identification.judgement import Unjudged
 from experiments.identification.lack import words_of_lack
 from experiments.identification.remedies import SURE
 from experiments.reports.estimates import EstimatesTable
+from experiments.reports.leading import in_lines, leading
 from experiments.text import WORTHLESS, new_table, percentage, print_titled
 from identify import AsLogged, Estimate
 
 
-def print_fit(console: Console, fit: Fit, title: str) -> None:
-    """Print truth, if it is known, and of each model estimate, error or sigma, %sigma, Cond(W) and what is explained.
+def print_fit(console: Console, fit: Fit, title: str, whole: tuple[str, ...]) -> None:
+    """Print truth, if it is known, and of models estimate, error or sigma, %sigma, Cond(W) and what is explained.
 
-    Sigma is the corrected one; the paper's is in the summary.
+    Those that are not among the `whole` ones have a line each. Sigma is the corrected one; the paper's is in the summary.
     """
-    table = EstimatesTable(fit)
+    table = EstimatesTable(fit, whole)
     what = f"{title}: chain {fit.request.chain}, {fit.request.estimator}"
     print_titled(console, what, _grid(table), 1 + (fit.truth is not None))
     if table.legend:
         console.print(Text(table.legend))
-    for words in _told(fit):
+    for words in (*(in_lines(fit, whole) if len(whole) < len(fit.estimates) else ()), *_told(fit)):
         console.print(Text(words), soft_wrap=True)
     if len(fit.logs.fitted) > 1 and fit.torque_errors:
         _print_logs(console, fit)
@@ -38,12 +40,26 @@ def print_fit(console: Console, fit: Fit, title: str) -> None:
 
 def _grid(table: EstimatesTable) -> Table:
     """Return the table of the parameters, and of the fit as a whole."""
-    grid = new_table("", [f"{first}\n{second}" for first, second in table.heads])
-    for cells in table.rows():
+    heads, rows = [f"{first}\n{second}" for first, second in table.heads], list(table.rows())
+    if len(table.estimates) < len(table.fit.estimates):
+        return _halved(heads, rows)
+    grid = new_table("", heads)
+    for cells in rows:
         grid.add_row(*cells)
     grid.add_section()
     for cells in table.whole():
         grid.add_row(*cells)
+    return grid
+
+
+def _halved(heads: list[str], rows: list[list[str]]) -> Table:
+    """Return a long table of few columns with its second half beside the first."""
+    grid, half = new_table("", heads), (len(rows) + 1) // 2
+    grid.add_column("", no_wrap=True)
+    for heading in heads:
+        grid.add_column(heading, justify="right", no_wrap=True)
+    for left, right in zip_longest(rows[:half], rows[half:], fillvalue=()):
+        grid.add_row(*left, *right)
     return grid
 
 
@@ -61,6 +77,7 @@ def _told(fit: Fit) -> Iterator[str]:
         if abs(delay - 1e3 * channel.delay) > SURE * sigma:
             words += f"; what follows judges them at {1e3 * channel.delay:.4g} ms: give --torque-delay {1e-3 * delay:.4g}"
         yield words
+    yield from _rotors(fit)
     yield _noise(fit)
     yield words_of_lack(fit.lack, fit.subject)
     yield from words_of_iterations(fit)
@@ -78,6 +95,18 @@ def _print_logs(console: Console, fit: Fit) -> None:
     print_titled(console, f"what the {model} model leaves of each log while joints move: rms torque error [N m, N]", grid)
 
 
+def _rotors(fit: Fit) -> Iterator[str]:
+    """Yield why no joint has the inertia of a rotor, if none has."""
+    asked, filed = fit.subject.asked.armature, bool(fit.subject.robot.model.dof_armature.any())
+    if asked == "none":
+        words = "no armature is identified and reversals are not masked, as where torques are measured at the links"
+        yield f"{words} (--armature none)" + ("" if filed else "; the robot's file has none either")
+    elif asked == "file" and not filed:
+        yield (
+            "no armature is identified, as the robot's file has none: behind gears rotors weigh more than links, --armature all"
+        )
+
+
 def _noise(fit: Fit) -> str:
     """Return the noise of a log in words, joint by joint."""
     torque, position = (" ".join("?" if x is None else f"{x:.2g}" for x in fit.noise[name]) for name in ("torque", "position"))
@@ -92,12 +121,17 @@ def _noise(fit: Fit) -> str:
     return f"{words}; encoder steps {' '.join(f'{x:.3g}' if x else '?' for x in steps)} {length} ({bits} bits)"
 
 
-def print_held_out(console: Console, one: HeldOut | Unjudged) -> None:
-    """Print how well torques of a held-out log are predicted, what the simulated robot does on it, and verdicts."""
+def print_held_out(console: Console, one: HeldOut | Unjudged, whole: Sequence[str]) -> None:
+    """Print how well torques of a held-out log are predicted, what the simulated robot does on it, and verdicts.
+
+    Of several models of which not all are shown `whole` that which predicts best has the table.
+    """
     if isinstance(one, Unjudged):
         console.print(Text(f"not judged on {one.title}: {one.why}\n"), soft_wrap=True)
         return
-    torques, joints = one.torques, one.fit.subject.robot.joints
+    best = leading({model: validation.rms for model, validation in one.torques.items()})
+    torques = one.torques if len(whole) == len(one.torques) else {best: one.torques[best]}
+    joints = one.fit.subject.robot.joints
     simulated = any(one.position_error(model) is not None for model in torques)
     heads = [f"{model}\n{what}" for model in torques for what in ("rms", "%", "R2", "q rms")[: 3 + simulated]]
     grid, first = new_table("", ["noise of\nthe log %", *heads]), next(iter(torques.values()))

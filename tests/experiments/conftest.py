@@ -2,12 +2,15 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from experiments.cli import main
 from identify import MotionLog
 from identify.files.log_file import read_log, write_log
 from sim.engine.simulation import simulate
+from sim.robot.inverse_dynamics import inverse_dynamics
+from sim.robot.robot import Robot
 from sim.scenario.scenario_file import load, to_toml
 
 
@@ -84,3 +87,21 @@ def arm(tmp_path):
         trajectory = replace(arm.trajectory, moves=moves, seed=seed)
         (tmp_path / f"{name}.toml").write_text(to_toml(replace(arm, name=name, fs=250.0, trajectory=trajectory)))
     return tmp_path / "arm.xml"
+
+
+@pytest.fixture(scope="session")
+def four_joints(tmp_path_factory):
+    """A folder with a log of four joints, log.csv, and their robot's file, arm.xml."""
+    folder, body, end = tmp_path_factory.mktemp("many"), "", ""
+    for j, axis in enumerate(("0 0 1", "0 1 0", "0 1 0", "1 0 0")):
+        body += f'<body pos="0.3 0 0"><joint name="j{j}" axis="{axis}" damping="0.1"/><geom size="0.1" pos="0.1 0 0.05"/>'
+        end += "</body>"
+    (folder / "arm.xml").write_text(f"<mujoco><worldbody>{body}{end}</worldbody></mujoco>")
+    t, rng = np.arange(0, 12, 0.01), np.random.default_rng(0)
+    w, a = 2 * np.pi * np.array([0.3, 0.7, 1.1])[:, None, None], rng.uniform(-0.5, 0.5, (3, 1, 4))
+    turned = w * t[:, None] + rng.uniform(0, 6, (3, 1, 4))
+    q, qd, qdd = (np.sum(x, axis=0) for x in (a * np.sin(turned), a * w * np.cos(turned), -a * w**2 * np.sin(turned)))
+    tau = inverse_dynamics(Robot.load(str(folder / "arm.xml")), q, qd, qdd) + 0.1 * rng.standard_normal(q.shape)
+    heads = ",".join(["t", *(f"q{j}" for j in range(1, 5)), *(f"tau{j}" for j in range(1, 5))])
+    np.savetxt(folder / "log.csv", np.column_stack([t, q, tau]), delimiter=",", header=heads, comments="")
+    return folder

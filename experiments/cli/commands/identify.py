@@ -1,6 +1,7 @@
 """The command that identifies logs: request, logs, fit, judgement, printed and saved; then views, each of which may fail."""
 
 import tempfile
+from collections.abc import Sequence
 from contextlib import ExitStack, nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +27,7 @@ from experiments.identification.log_warnings import warnings_of_log
 from experiments.identification.reading import file_of, stated_by
 from experiments.identification.request import Request
 from experiments.recording.audience import Audience
+from experiments.reports.leading import shown_whole
 from experiments.reports.printed import print_fit, print_held_out
 from experiments.results.attempts import Attempts
 from experiments.results.folder import ResultsFolder
@@ -65,7 +67,7 @@ def identify(options: Identify) -> None:
             judgement = attempts.attempt("the verdict", lambda: _judged(result, options))
             if judgement is None:
                 return
-            _show_judgement(page, judgement)
+            _show_judgement(page, judgement, shown_whole(result, options.model is not None))
             for log in judgement.failures:
                 attempts.failed(log.title, log.why, log.traceback)
             with stages_of("checking"):
@@ -123,7 +125,7 @@ def _truth(stated: dict[str, Any], request: Request) -> dict[str, float] | None:
 
 def _show_fit(page: Page, result: Fit, options: Identify, log: Path) -> None:
     """Show the estimates."""
-    print_fit(page, result, ", ".join(map(str, options.log)))
+    print_fit(page, result, ", ".join(map(str, options.log)), shown_whole(result, options.model is not None))
     notes, choice, subject = list(result.logs.notes), result.choice, result.subject
     if choice is not None:
         notes += words(choice, subject.laws.names, subject.robot.joints)
@@ -135,10 +137,10 @@ def _show_fit(page: Page, result: Fit, options: Identify, log: Path) -> None:
     page.found |= {"iterations": iterations(result), "notes": notes}
 
 
-def _show_judgement(page: Page, judgement: Judgement) -> None:
+def _show_judgement(page: Page, judgement: Judgement, whole: Sequence[str]) -> None:
     """Show verdicts on the held-out logs."""
     for one in judgement.on:
-        print_held_out(page, one)
+        print_held_out(page, one, whole)
     page.show()
     page.found |= judgement.summary()
 

@@ -32,7 +32,7 @@ def request_of(options: Identify, stated: Mapping[str, Any]) -> Request:
     loops = options.loop or ([str(own)] if len(options.log) == 1 and own.is_file() else [])
     request = Request(
         Subject(robot, options.parameters, options.mounting.mounting),
-        tuple(MODELS) if options.model == "all" else (options.model,),
+        tuple(MODELS) if options.model in (None, "all") else (options.model,),
         options.chain,
         options.estimator,
         name=options.label,

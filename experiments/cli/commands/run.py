@@ -20,6 +20,7 @@ from experiments.identification.scenario_run import ScenarioRun
 from experiments.identification.subject import Subject, absolute
 from experiments.identification.warnings import FILE, LOG, warnings_of_robot
 from experiments.plugin_tables import plugin_conflicts
+from experiments.reports.leading import shown_whole
 from experiments.reports.printed import print_fit
 from experiments.results.folder import ResultsFolder
 from experiments.study.method import Method
@@ -98,7 +99,7 @@ def _described(page: Page, options: Run) -> ScenarioRun:
 
 def _print_run(page: Page, ran: ScenarioRun) -> None:
     """Print the estimates, and what to check."""
-    print_fit(page, ran.fit, f"Scenario {ran.scenario.name}")
+    print_fit(page, ran.fit, f"Scenario {ran.scenario.name}", shown_whole(ran.fit, asked=False))
     of_log = warnings_of_log(ran.run.alone(), ran.fit.subject.tree)
     page.warn({LOG: of_log, FILE: [*warnings_of_robot(ran.run.robots[0]), *plugin_conflicts()]})
 

@@ -28,8 +28,8 @@ class Identify(LogOptions, Command, action="identify:identify"):
     """Signal processing."""
     chain_file: File = None
     """TOML file with settings of the chain: chain = "idbench", then tables such as [operator] with cutoff = 20.0."""
-    model: str = "all"
-    """all, explicit, implicit or power."""
+    model: str | None = None
+    """all, explicit, implicit or power; by default all, of which the screen shows the best, where joints are many."""
     loop: Scenarios = ()
     """Scenarios that describe the closed loop of each log, for IV, DIDIM, CLIE and CLOE: robot, motion, controller, timing,
     drive. Of a run's folder its own."""

@@ -1,0 +1,44 @@
+"""Tables of many joints: one model leads, the others have a line each; asked for, they are shown whole."""
+
+import json
+
+import numpy as np
+import pytest
+
+from experiments.cli import main
+from experiments.reports.leading import leading
+
+
+def test_the_best_leads_and_of_equals_the_first():
+    errors = {"a": np.array([1.0, 2.0, np.nan]), "b": np.array([0.995, 1.99, 1.0]), "c": np.array([3.0, 0.4, 1.0])}
+    assert leading({name: errors[name] for name in "ab"}) == "a"
+    assert leading({name: errors[name] for name in "ba"}) == "b"
+    assert leading(errors) == "c"  # 3 times more in one joint, 5 times less in another
+    assert leading({"a": errors["a"]}) == "a"
+
+
+@pytest.mark.parametrize("asked", [[], ["--model", "all"], ["--model", "power"]])
+def test_of_many_joints_one_model_is_shown_whole(four_joints, asked, tmp_path, capsys):
+    assert (
+        main(
+            [
+                "identify",
+                str(four_joints / "log.csv"),
+                "--robot",
+                str(four_joints / "arm.xml"),
+                "--torque",
+                "instantaneous",
+                *asked,
+                "--no-rerun",
+                "--out",
+                str(tmp_path / "found"),
+            ]
+        )
+        == 0
+    )
+    lines = capsys.readouterr().out.splitlines()
+    names = json.loads((tmp_path / "found" / "summary.json").read_text())["parameters"]
+    rows = [line for line in lines if line.split() and line.split()[0] in names]
+    assert len(rows) == (len(names) if asked else len(names) // 2 + len(names) % 2)
+    told = [line.partition(":")[0] for line in lines if "Cond(W)" in line and line[0] != " "]
+    assert told == ([] if asked else ["explicit", "implicit", "power"])
