@@ -25,7 +25,7 @@ def chosen_friction(request: Request, logs: tuple[MotionLog, ...], most: int | N
     with blamed():
         problem = Problem(logs, subject.basis, ExplicitModel(), request.processing)
         choice = choose_friction(problem, candidates, most=most)
-    asked = replace(subject.asked, friction=subject.laws.chosen(choice.laws, choice.idle).texts)
+    asked = replace(subject.asked, friction=subject.laws.chosen(choice.laws, choice.idle).texts(subject.robot.joints))
     return replace(request, subject=replace(subject, asked=asked)), choice
 
 

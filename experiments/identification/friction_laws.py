@@ -80,10 +80,9 @@ class FrictionLaws:
             found.append((*kept, *(name for name in others if name not in kept)))
         return FrictionLaws(tuple(found))
 
-    @property
-    def texts(self) -> tuple[str, ...]:
-        """The laws as options name them."""
-        return tuple(f"{j + 1}={'+'.join(own) or 'none'}" for j, own in enumerate(self.names))
+    def texts(self, joints: Sequence[str]) -> tuple[str, ...]:
+        """Return the laws as options name them."""
+        return tuple(f"{said(j, joints)}={'+'.join(own) or 'none'}" for j, own in enumerate(self.names))
 
     def blocks(self) -> tuple[AbstractBlock, ...]:
         """Return the blocks of all joints."""
@@ -163,6 +162,11 @@ def law_of(name: str, option: str = "--friction") -> AbstractBlock:
         return found
     except (ValueError, TypeError) as error:
         raise ExperimentError(f"{option} {name}: {value!r} is no {settings[0]} of {kind}: {error}") from error
+
+
+def said(j: int, joints: Sequence[str]) -> str:
+    """Return how an option names a joint: by its number, unless some joint is called like that."""
+    return joints[j] if str(j + 1) in joints else str(j + 1)
 
 
 def _joint(text: str, where: str, joints: Sequence[str]) -> int:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from experiments.identification.friction_laws import said
 from experiments.identification.subject import Subject
 from experiments.text import probability
 from identify.judge.lack_of_fit import WRONG, Lack
@@ -46,5 +47,5 @@ def advice_on_lack(found: Sequence[Lack], joints: Sequence[str]) -> Iterator[str
         first = next(lack.joint for lack in wrong if lack.over == over)
         yield (
             f"what is left of the torque of {names} hangs on {over}, which no parameter explains: errors are larger than "
-            f"sigma; try {TRY[over].format(joint=first + 1)}"
+            f"sigma; try {TRY[over].format(joint=said(first, joints))}"
         )

@@ -105,3 +105,21 @@ def four_joints(tmp_path_factory):
     heads = ",".join(["t", *(f"q{j}" for j in range(1, 5)), *(f"tau{j}" for j in range(1, 5))])
     np.savetxt(folder / "log.csv", np.column_stack([t, q, tau]), delimiter=",", header=heads, comments="")
     return folder
+
+
+@pytest.fixture(scope="session")
+def series():
+    """Return a function that makes q, qd and qdd of Fourier series within ranges and speeds, shape (time, joint) each."""
+
+    def made(rng, t, ranges, fast):
+        n = len(fast)
+        w = (2 * np.pi * 0.1 * np.arange(1, 7) + rng.uniform(0, 0.05, (n, 6)))[..., None]
+        a, b = rng.normal(size=(2, n, 6))[..., None]
+        s, c = np.sin(w * t), np.cos(w * t)
+        q, qd, qdd = (np.sum(x, axis=1).T for x in (a * s + b * c, w * (a * c - b * s), -w * w * (a * s + b * c)))
+        middle, half = (q.max(axis=0) + q.min(axis=0)) / 2, np.ptp(q, axis=0) / 2
+        low, high = ranges
+        size = np.minimum(0.8 * (high - low) / 2 / half, 0.8 * fast / np.abs(qd).max(axis=0))
+        return (low + high) / 2 + size * (q - middle), size * qd, size * qdd
+
+    return made

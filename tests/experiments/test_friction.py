@@ -23,7 +23,9 @@ def test_laws_are_named_for_all_joints_or_for_one():
     assert found.names == ((), ("viscous", "coulomb", "load"))
     assert not found.standard
     assert all(isinstance(block, OfJoints) and block.joints == (1,) for block in found.blocks())
-    assert FrictionLaws.of(found.texts, JOINTS) == found
+    assert FrictionLaws.of(found.texts(JOINTS), JOINTS) == found
+    numbers = ("2", "joint 1")  # of which the first is called like the number of the second
+    assert FrictionLaws.of(found.texts(numbers), numbers) == found
     assert FrictionLaws.of(("auto",), JOINTS).auto
     (block,) = FrictionLaws.of(("stribeck:0.2",), JOINTS).blocks()
     assert block == StribeckFriction(0.2)
