@@ -50,6 +50,11 @@ def pytest_xdist_auto_num_workers() -> int:
     return len(os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)) + 1
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Let a test write what the pages show, instead of holding it against that."""
+    parser.addoption("--write-results", action="store_true", help="write what is measured into docs/results")
+
+
 @pytest.fixture(scope="session")
 def truth() -> np.ndarray:
     return X.copy()

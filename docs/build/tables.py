@@ -19,7 +19,7 @@ from excitation_tables import coarse, criteria, foretold, motions, ranks
 from results import DOCS, RESULTS, Cell, Column, by_settings, cells, coverage, keep, table, typical
 
 sys.path.insert(0, str(DOCS.parent))
-PAGES = ("answers.md", "estimators.md", "excitation.md", "noise.md", "table2.md")
+PAGES = ("answers.md", "any-arm.md", "estimators.md", "excitation.md", "noise.md", "table2.md")
 MARK = re.compile(r"<!-- table: ([\w-]+) -->\n.*?<!-- end -->", re.DOTALL)
 
 I, P = "idbench", "paper"
@@ -106,7 +106,27 @@ def _causes(form: str) -> Callable[[], Iterator[str]]:
     return made
 
 
+def _zoo() -> Iterator[str]:
+    """Yield the table of robots of other people, a row each."""
+    head = ["", "file", "joints", "parameters", "within 2 sigma", "written files off by", "seconds"]
+
+    def rows() -> Iterator[Sequence[str]]:
+        for one in json.loads((RESULTS / "zoo.json").read_text()):
+            shares = f"{100 * one['inside']:.0f} %", f"{100 * one['files']:.2f} %"
+            yield [
+                one["what"],
+                f"`{one['file']}`",
+                f"{one['joints']}",
+                f"{one['parameters']}",
+                *shares,
+                f"{one['seconds']:.1f}",
+            ]
+
+    yield from table(head, rows())
+
+
 TABLES: dict[str, Callable[[], Iterator[str]]] = {
+    "zoo": _zoo,
     "encoder": lambda: _usual("encoder", "lines (counts)", _lines, FOUR),
     "torque-noise": lambda: _usual("torque-noise", "rms [N m]", _one("torque.noise"), FOUR),
     "birdy": lambda: _usual("birdy", "position [rad], torque [N m]", _birdy, FOUR),
