@@ -12,6 +12,7 @@ from experiments.identification.lack import advice_on_lack
 from experiments.identification.logs import Logs
 from experiments.identification.request import Request
 from experiments.identification.subject import Subject
+from experiments.identification.suited_mask import with_suited_mask
 from experiments.results.summaries import finite, summarize
 from identify import (
     ESTIMATORS,
@@ -51,6 +52,7 @@ def fit(request: Request, logs: Logs) -> "Fit":
     if request.subject.laws.auto:
         with stage("laws of friction"):
             request, choice = chosen_friction(request, logs.fitted)
+    request, raised = with_suited_mask(request, logs.fitted)
     found, hidden = _fit(request, logs), list[str]()
     leading = next(iter(found.outcomes.values()))
     while isinstance(leading, ExcitationError) and leading.hidden and len(leading.hidden) < len(found.basis.names):
@@ -59,7 +61,7 @@ def fit(request: Request, logs: Logs) -> "Fit":
         leading = next(iter(found.outcomes.values()))
     if not found.estimates and isinstance(leading, IdentificationError):
         raise _with_its_cause(found, leading)
-    return replace(found, choice=choice, hidden=tuple(hidden))
+    return replace(found, choice=choice, hidden=tuple(hidden), raised=raised)
 
 
 def _with_its_cause(found: "Fit", error: IdentificationError) -> IdentificationError:
@@ -111,6 +113,8 @@ class Fit:
         What was compared, where laws of friction were chosen.
     hidden : tuple of str
         Parameters that were left out because the logs do not show them.
+    raised : tuple of int
+        Joints whose mask was made to reach farther, since their friction in slow motion is not that of faster motion.
     """
 
     request: Request
@@ -120,6 +124,7 @@ class Fit:
     outcomes: Outcomes
     choice: FrictionChoice | None = None
     hidden: tuple[str, ...] = ()
+    raised: tuple[int, ...] = ()
 
     @property
     def subject(self) -> Subject:
@@ -256,6 +261,7 @@ class Fit:
             "models": models,
             "failures": self.failures,
             "hidden": list(self.hidden),
+            "mask_speed": list(self.request.mask_speed),
             "cutoff": cutoff,
             "logs": [self._of_log(k) for k in range(len(self.logs.fitted))],
         }

@@ -78,6 +78,9 @@ def _told(fit: Fit) -> Iterator[str]:
             words += f"; what follows judges them at {1e3 * channel.delay:.4g} ms: give --torque-delay {1e-3 * delay:.4g}"
         yield words
     yield from _rotors(fit)
+    if fit.raised:
+        each = ", ".join(f"{fit.subject.robot.joints[j]} {fit.request.mask_speed[j]:.2g}" for j in fit.raised)
+        yield f"left out, as friction is another one than in faster motion: up to {each} rad/s (--mask-speed says other speeds)"
     yield _noise(fit)
     yield words_of_lack(fit.lack, fit.subject)
     yield from words_of_iterations(fit)

@@ -11,9 +11,8 @@ from identify.arrays import Array
 from identify.errors import SettingError, require_not_negative, require_positive
 from identify.signals.masks.mask import AbstractMask
 
-SLOW = 0.1
-"""Share of a joint's rms speed up to which it counts as turning: at half of it a fit predicts the wrist of a slow KUKA
-KR300 up to a third worse, at double no better."""
+SLOW = 0.05
+"""Share of a joint's rms speed up to which it counts as turning: 0.1 rad/s of the SCARA's 2 rad/s."""
 
 LEAST = 1e-12
 """Speed below which there is none."""
