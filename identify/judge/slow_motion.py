@@ -16,6 +16,9 @@ BANDS = np.array([1.0, 2.0, 3.0, 4.0])
 EXCESS = 1.5
 """Rms of what is left in a band, in multiples of that of faster motion, from which on it costs more than it tells."""
 
+INDEPENDENT = 0.5
+"""Share of the rows that count as independent, as neighbours share noise: with all, ten times too many masks are raised."""
+
 CERTAIN = 1e-3
 """Probability that noise alone makes as much, below which it is believed."""
 
@@ -69,4 +72,4 @@ def _wrong(some: Array, fast: Array) -> bool:
     if len(some) < 2 or len(fast) < 2 * len(BANDS) or not fast.any():
         return False
     ratio = float(np.mean(some**2) / np.mean(fast**2))
-    return ratio > EXCESS**2 and float(scipy.stats.f.sf(ratio, len(some), len(fast))) < CERTAIN
+    return ratio > EXCESS**2 and float(scipy.stats.f.sf(ratio, INDEPENDENT * len(some), INDEPENDENT * len(fast))) < CERTAIN

@@ -53,7 +53,8 @@ class LogOptions(WrittenOptions):
     """Which parameters are asked for."""
     mask_speed: Each = ()
     """Speeds up to which a joint counts as standing or turning, of all joints or of each [rad/s, of slides m/s]: its friction
-    is not judged there. By default a tenth of its own rms speed, and above the noise of its velocity."""
+    is not judged there. By default 5 % of its own rms speed, above the noise of its velocity, and
+    as far as its friction is surely another one than in faster motion, up to a fifth of that speed."""
     cutoff: Hertz = None
     """Band of the fit [Hz]; by default 5, or what a short log needs."""
     estimator: str = ESTIMATOR
