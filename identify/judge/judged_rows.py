@@ -17,10 +17,15 @@ FEW = 0.1
 
 
 def as_judged(problem: Problem) -> Problem:
-    """Return a problem by the explicit model whose mask leaves reversals out, also where its own leaves nothing out."""
-    if not isinstance(problem.chain.mask, NoMask):
+    """Return a problem by the explicit model whose mask leaves reversals out as that of a log does for which nothing is said."""
+    mask = problem.chain.mask
+    if isinstance(mask, NoMask):
+        usual: AbstractMask = _WhereItMoves()
+    elif isinstance(mask, ReversalMask) and mask.threshold is not None:
+        usual = replace(mask, threshold=None)
+    else:
         return problem.with_model(ExplicitModel())
-    return Problem(problem.logs, problem.basis, ExplicitModel(), replace(problem.chain, mask=_WhereItMoves()))
+    return Problem(problem.logs, problem.basis, ExplicitModel(), replace(problem.chain, mask=usual))
 
 
 def shares(rows: RowMap) -> Array:
