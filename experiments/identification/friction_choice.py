@@ -25,6 +25,9 @@ def chosen_friction(request: Request, logs: tuple[MotionLog, ...], most: int | N
     with blamed():
         problem = Problem(logs, subject.basis, ExplicitModel(), request.processing)
         choice = choose_friction(problem, candidates, most=most)
+    # A motor that turns with several joints has the laws that all of them have: theirs stay.
+    turned = {j for coupling in subject.tree.couplings for j, weight in enumerate(coupling.weights) if weight}
+    choice = replace(choice, idle=tuple(() if j in turned else own for j, own in enumerate(choice.idle)))
     asked = replace(subject.asked, friction=subject.laws.chosen(choice.laws, choice.idle).texts(subject.robot.joints))
     return replace(request, subject=replace(subject, asked=asked)), choice
 

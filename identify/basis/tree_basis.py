@@ -12,6 +12,7 @@ from identify.basis.friction.coulomb import CoulombFriction
 from identify.basis.friction.tied import TiedFriction
 from identify.basis.friction.viscous import ViscousFriction
 from identify.basis.joint_law import AbstractFriction
+from identify.basis.of_joints import OfJoints
 from identify.basis.spring import Spring
 from identify.basis.tree_links import TreeLinks
 from identify.data.kinematics import KinematicTree
@@ -37,12 +38,18 @@ def tree_basis(tree: KinematicTree, laws: tuple[AbstractBlock, ...] = (ViscousFr
 
 
 def _of_couplings(tree: KinematicTree, laws: tuple[AbstractBlock, ...]) -> Iterator[AbstractBlock]:
-    """Yield what drives that turn with several joints have: rotor, spring, laws of friction that are of motion alone."""
+    """Yield what drives that turn with several joints have: rotor, spring, and laws of friction that all these joints have.
+
+    Those are laws of motion alone: a load is a joint's.
+    """
     for coupling in tree.couplings:
         if coupling.armature:
             yield Coupled(Armature(), coupling)
         if coupling.spring is not None:
             yield Coupled(Spring((coupling.spring,)), coupling)
-        yield from (Coupled(law, coupling) for law in laws if isinstance(law, AbstractFriction))
-        if any(isinstance(law, CoulombFriction) for law in laws) and np.count_nonzero(coupling.weights) > 1:
+        turned = set(np.flatnonzero(coupling.weights).tolist())
+        inner = [law.block if isinstance(law, OfJoints) and turned <= set(law.joints) else law for law in laws]
+        own = [law for law in inner if isinstance(law, AbstractFriction)]
+        yield from (Coupled(law, coupling) for law in own)
+        if any(isinstance(law, CoulombFriction) for law in own) and len(turned) > 1:
             yield TiedFriction(coupling)

@@ -13,6 +13,7 @@ from identify.estimators.problem import Problem
 from identify.estimators.settle import settled
 from identify.judge.held_out import HeldOut
 from identify.judge.law_score import LawScore, LawSearch, gain
+from identify.signals.masks import NoMask
 
 SURE = 1.5
 """A law is taken when what it gains is this many times the standard deviation of that over the stretches."""
@@ -55,7 +56,8 @@ def choose_friction(problem: Problem, candidates: Mapping[str, AbstractBlock], *
     Stretches of the logs are left out one by one (cross-validation), and the fastest motion of each joint once more. A law is
     added where it takes `WORTH` of the squared error, `SURE` times the standard deviation of that, its parameter is `PLAIN`
     sigma away from zero, and it does no harm to the fastest motion; the one that takes most first. In the end those are dropped
-    again that others have made idle; so is Coulomb friction, where a law without its jump stands in its place.
+    again that others have made idle; so is Coulomb friction, where a law without its jump stands in its place and nothing is
+    masked.
 
     Parameters
     ----------
@@ -165,7 +167,12 @@ class _Choice:
         return [p.name for p in self.problem.basis.parameters if p.joint == j and p.symbol == letters]
 
     def _idle(self, laws: Sequence[tuple[str, ...]], j: int) -> tuple[str, ...]:
-        """Return the letters of laws of the basis without which a joint that has others in their place is predicted as well."""
+        """Return the letters of laws of the basis without which a joint that has others in their place is predicted as well.
+
+        None where a mask takes the instants near rest: without its jump friction would be too small there.
+        """
+        if not isinstance(self.problem.chain.mask, NoMask):
+            return ()
         letters = {self._replaced(name) for name in laws[j]}
         names = [name for x in letters for name in self._letters(j, x)]
         if not names:

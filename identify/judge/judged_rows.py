@@ -17,7 +17,7 @@ FEW = 0.1
 
 
 def as_judged(problem: Problem) -> Problem:
-    """Return a problem by the explicit model whose mask leaves reversals out as that of a log does for which nothing is said."""
+    """Return a problem by the explicit model whose mask leaves reversals out as it does where no speed is given."""
     mask = problem.chain.mask
     if isinstance(mask, NoMask):
         usual: AbstractMask = _WhereItMoves()
