@@ -1,10 +1,13 @@
 """Drives that turn with several joints, and springs, against MuJoCo's own torques."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
 
-from identify import ExplicitModel, tree_basis
+from identify import ExplicitModel, OfJoints, tree_basis
+from identify.basis import CoulombFriction, ViscousFriction
 from identify.signals.state import State
 from sim.errors import RobotError
 from sim.robot.mounting import Mounting, coupled
@@ -70,6 +73,19 @@ def test_a_coupling_keeps_the_identities_of_a_block(wrist, rng):
             power = power + qd[row] * explicit.get((row, k), 0.0)
         stored = np.imag(energy.get((0, k), 0j)) / h + dissipation.get((0, k), 0.0)
         np.testing.assert_allclose(power, stored + 0 * q[0], atol=1e-12)
+
+
+@pytest.mark.parametrize(("joints", "kept"), [((0, 1, 2), True), ((1, 2), True), ((0, 1), False)])
+def test_a_coupled_motor_has_the_friction_that_all_its_joints_have(wrist, joints, kept):
+    """Also where a further joint, with which it does not turn, has another."""
+    tree = kinematic_tree(Robot.load(wrist))
+    (coupling,) = tree.couplings
+    first = replace(tree.joints[0], name="base", parent=-1)
+    rest = [replace(joint, parent=joint.parent + 1) for joint in tree.joints]
+    longer = replace(tree, joints=(first, *rest), couplings=(replace(coupling, weights=(0.0, *coupling.weights)),))
+    names = tree_basis(longer, (ViscousFriction(), OfJoints(CoulombFriction(), joints))).names
+    found = {name for name in names if "motor" in name} - {"Ia_motor", "K_motor"}
+    assert found == {"Fv_motor"} | ({"Fs_motor", "Fsx_motor"} if kept else set())
 
 
 def test_a_file_with_couplings_and_springs_comes_back(wrist):
