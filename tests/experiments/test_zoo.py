@@ -241,17 +241,24 @@ def test_the_page_says_what_is_measured(root, series, pytestconfig):
 WAYS = {
     "default": ["--write", "a.urdf", "b.json", "c.py", "--write-mjcf", "d.xml"],
     "rotors": ["--armature", "all", "--estimator", "WLS"],
-    "stribeck": ["--friction", "standard+stribeck", "--model", "explicit"],
+    "stribeck": ["--friction", "standard+stribeck", "--model", "explicit", "--estimator", "WLS"],
     "auto": ["--friction", "auto", "--model", "explicit", "--estimator", "WLS"],
     "consistent": ["--consistent", "entropic", "--model", "explicit", "--estimator", "WLS"],
 }
+
+
+MANY = 8
+"""Joints from which on three have a Stribeck speed that is looked for: of a hand's sixteen it takes five minutes."""
 
 
 @pytest.mark.parametrize("way", WAYS)
 def test_every_way_ends_with_a_result(real, way, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     write_log(real.log, tmp_path / "log.csv")
-    code = main(["identify", "log.csv", "--robot", real.subject.name, "--torque", "instantaneous", "--no-rerun", *WAYS[way]])
+    words = WAYS[way]
+    if way == "stribeck" and len(real.joints) > MANY:
+        words = ["--friction", "standard", *(f"{j}=standard+stribeck" for j in (1, 2, 3)), *words[2:]]
+    code = main(["identify", "log.csv", "--robot", real.subject.name, "--torque", "instantaneous", "--no-rerun", *words])
     assert not code, capsys.readouterr().err
     shown = capsys.readouterr().out
     word = re.search(r"explicit: (good|fair|unsure|poor): ", shown)
