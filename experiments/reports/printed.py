@@ -79,8 +79,9 @@ def _told(fit: Fit) -> Iterator[str]:
         yield words
     yield from _rotors(fit)
     if fit.raised:
-        each = ", ".join(f"{fit.subject.robot.joints[j]} {fit.request.mask_speed[j]:.2g}" for j in fit.raised)
-        yield f"left out, as friction is another one than in faster motion: up to {each} rad/s (--mask-speed says other speeds)"
+        joints, speeds = fit.subject.robot.joints, fit.request.mask_speed
+        each = ", ".join(f"{joints[j]} up to {speeds[j]:.2g} {fit.subject.units(j)[1]}/s" for j in fit.raised)
+        yield f"slow motion is left out, as its friction is not that of faster motion: {each} (--mask-speed gives other speeds)"
     yield _noise(fit)
     yield words_of_lack(fit.lack, fit.subject)
     yield from words_of_iterations(fit)
