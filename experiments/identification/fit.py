@@ -12,7 +12,7 @@ from experiments.identification.lack import advice_on_lack
 from experiments.identification.logs import Logs
 from experiments.identification.request import Request
 from experiments.identification.subject import Subject
-from experiments.identification.suited_mask import with_suited_mask
+from experiments.identification.suited_mask import suited_mask
 from experiments.results.summaries import finite, summarize
 from identify import (
     ESTIMATORS,
@@ -52,12 +52,17 @@ def fit(request: Request, logs: Logs) -> "Fit":
     if request.subject.laws.auto:
         with stage("laws of friction"):
             request, choice = chosen_friction(request, logs.fitted)
-    request, raised = with_suited_mask(request, logs.fitted)
-    found, hidden = _fit(request, logs), list[str]()
+    problem = request.problem(logs.fitted)
+    speeds, raised = suited_mask(problem)
+    if raised:
+        request = replace(request, mask_speed=speeds)
+        problem = request.problem(logs.fitted)
+    found, hidden = _fit(request, logs, problem), list[str]()
     leading = next(iter(found.outcomes.values()))
     while isinstance(leading, ExcitationError) and leading.hidden and len(leading.hidden) < len(found.basis.names):
         hidden += leading.hidden
-        found = _fit(replace(found.request, subject=found.subject.without(leading.hidden)), logs)
+        request = replace(found.request, subject=found.subject.without(leading.hidden))
+        found = _fit(request, logs, request.problem(logs.fitted))
         leading = next(iter(found.outcomes.values()))
     if not found.estimates and isinstance(leading, IdentificationError):
         raise _with_its_cause(found, leading)
@@ -76,8 +81,7 @@ def _with_its_cause(found: "Fit", error: IdentificationError) -> IdentificationE
     return IdentificationError(f"{error}; with GLS, {'; '.join(causes)}") if causes else error
 
 
-def _fit(request: Request, logs: Logs) -> "Fit":
-    problem = request.problem(logs.fitted)
+def _fit(request: Request, logs: Logs, problem: Problem) -> "Fit":
     plain = attempt_each(problem, {name: MODELS.create(name) for name in request.models}, request.solver)
     return Fit(request, logs, problem, plain, {name: _moved(request, outcome) for name, outcome in plain.items()})
 
