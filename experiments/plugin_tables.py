@@ -1,4 +1,4 @@
-"""Every plug-in point: what can be combined."""
+"""Every point where parts can be exchanged: what can be combined."""
 
 from typing import Any
 
@@ -14,10 +14,10 @@ from identify import (
     OPERATORS,
     PREFILTERS,
 )
-from identify.plugins import PluginTable
+from identify.plugins import PluginTable, Table
 from sim.scenario.scenario_file import KINDS
 
-TABLES: tuple[PluginTable[Any], ...] = (
+TABLES: tuple[Table[Any], ...] = (
     BLOCKS,
     MODELS,
     PREFILTERS,
@@ -30,9 +30,10 @@ TABLES: tuple[PluginTable[Any], ...] = (
     *KINDS.values(),
     EXCITATIONS,
 )
-"""Every plug-in point."""
+"""All of them; to a `PluginTable` other packages add."""
 
 
 def plugin_conflicts() -> list[str]:
     """Return which plug-ins of other packages cannot be used, since their names are taken."""
-    return [f"{table.point} plug-in {conflict}" for table in TABLES for conflict in table.conflicts]
+    tables = [table for table in TABLES if isinstance(table, PluginTable)]
+    return [f"{table.point} plug-in {conflict}" for table in tables for conflict in table.conflicts]

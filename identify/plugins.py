@@ -1,8 +1,10 @@
-"""Plug-in tables: the names this package knows, and those that other packages add through entry points."""
+"""Tables of parts that can be exchanged: the names this package knows, and those that users and other packages add."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from difflib import get_close_matches
 from functools import cached_property
+from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from typing import Generic, TypeVar
 
@@ -12,20 +14,21 @@ from identify.errors import PluginError, UnknownNameError
 T = TypeVar("T")
 
 
-class PluginTable(Mapping[str, Callable[[], T]], Generic[T]):
-    """Name -> factory of one plug-in point.
+class Table(Mapping[str, Callable[[], T]], Generic[T]):
+    """Name -> factory of one point where parts can be exchanged.
 
-    A factory is called without arguments: a class whose settings all have defaults, or a function. Another package adds
-    to the table through the entry-point group ``idbench.<point>``; what is built in cannot be replaced that way.
+    A factory is called without arguments: a class whose settings all have defaults, or a function.
 
     Parameters
     ----------
     point : str
-        Name of the plug-in point, for example ``"estimators"``.
+        What the parts are, for example ``"models"``.
     kind : type
         What every factory must return an instance of.
     builtin : dict
         The factories of this package.
+    check : callable, optional
+        Raises if a part that was made is not fit.
     """
 
     def __init__(
@@ -34,6 +37,82 @@ class PluginTable(Mapping[str, Callable[[], T]], Generic[T]):
         self.point = point
         self.kind: type[T] = kind
         self._builtin, self._check = builtin, check
+        self._loaded: dict[str, Callable[[], T]] = {}
+
+    @property
+    def builtin(self) -> tuple[str, ...]:
+        """Names of the parts of this package."""
+        return tuple(self._builtin)
+
+    def name_of(self, made: object) -> str:
+        """Return what a part is called: its name in this table, or that of its class."""
+        known = (name for name, make in self._builtin.items() if make is type(made))
+        return next(known, type(made).__name__)
+
+    def __iter__(self) -> Iterator[str]:
+        yield from self._builtin
+        yield from self._loaded
+
+    def __len__(self) -> int:
+        return len(self._builtin) + len(self._loaded)
+
+    def __getitem__(self, name: str) -> Callable[[], T]:
+        factory = self._builtin.get(name) or self._loaded.get(name)
+        if factory is None:
+            raise UnknownNameError(
+                f"no {name!r} among the {self.point}{did_you_mean(str(name), self)}; known: {', '.join(self)}"
+            )
+        return factory
+
+    def load(self, name: str) -> str:
+        """Return a name of this table: the one given, or CLASS of MODULE:CLASS, which the table has from now on.
+
+        Only for names that a user types: a file names no code.
+
+        Raises
+        ------
+        PluginError
+            If the module or the class cannot be imported, or the name is taken.
+        """
+        module, colon, short = name.partition(":")
+        if not colon:
+            return name
+        if short in self._builtin:
+            raise PluginError(f"{name}: {short} is built into the {self.point}, rename the class")
+        with _own_mistakes(f"{name} cannot be loaded"):
+            self._loaded[short] = getattr(import_module(module), short)
+        return short
+
+    def create(self, name: str) -> T:
+        """Return the part `name` with its default settings.
+
+        Raises
+        ------
+        UnknownNameError
+            If no part has that name; the message lists the known ones.
+        PluginError
+            If it cannot be loaded or made, or is not of the kind of this table.
+        """
+        factory = self[name]
+        with _own_mistakes(f"{self.point} plug-in {name!r} cannot be made without arguments"):
+            made = factory()
+        if not isinstance(made, self.kind):
+            raise PluginError(f"{self.point} plug-in {name!r} makes {type(made).__name__}, not {self.kind.__name__}")
+        if self._check is not None:
+            self._check(made)
+        return made
+
+    def summary(self, name: str) -> str:
+        """Return the first line of the docstring of part `name`, or why it cannot be used."""
+        try:
+            self.create(name)
+        except PluginError as error:
+            return f"({error})"
+        return ((self[name].__doc__ or "").strip() or "(undocumented)").splitlines()[0]
+
+
+class PluginTable(Table[T]):
+    """A table to which other packages add, through the entry-point group ``idbench.<point>``; none replaces a built-in name."""
 
     @cached_property
     def _found(self) -> dict[str, list[EntryPoint]]:
@@ -57,74 +136,34 @@ class PluginTable(Mapping[str, Callable[[], T]], Generic[T]):
             *(f"{name} is provided by {_places(entries)}: rename or remove all but one" for name, entries in shared),
         ]
 
-    @property
-    def builtin(self) -> tuple[str, ...]:
-        """Names of the plug-ins of this package."""
-        return tuple(self._builtin)
-
-    def name_of(self, made: object) -> str:
-        """Return what a plug-in is called: its name in this table, or that of its class."""
-        known = (name for name, make in self._builtin.items() if make is type(made))
-        return next(known, type(made).__name__)
-
     def __iter__(self) -> Iterator[str]:
-        yield from self._builtin
+        yield from super().__iter__()
         yield from sorted(self._foreign)
 
     def __len__(self) -> int:
-        return len(self._builtin) + len(self._foreign)
+        return super().__len__() + len(self._foreign)
 
     def __getitem__(self, name: str) -> Callable[[], T]:
-        if name in self._builtin:
-            return self._builtin[name]
-        if name in self._foreign:
-            return self._load(name, self._foreign[name])
-        raise UnknownNameError(f"no {name!r} among the {self.point}{did_you_mean(str(name), self)}; known: {', '.join(self)}")
-
-    def create(self, name: str) -> T:
-        """Return the plug-in `name` with its default settings.
-
-        Raises
-        ------
-        UnknownNameError
-            If no plug-in has that name; the message lists the known ones.
-        PluginError
-            If it cannot be loaded or made, or is not of the kind of this table.
-        """
-        factory = self[name]
-        try:
-            made = factory()
-        except BaseException as error:
-            if not is_mistake(error):
-                raise
-            why = f"{type(error).__name__}: {error}"
-            raise PluginError(f"{self.point} plug-in {name!r} cannot be made without arguments: {why}") from error
-        if not isinstance(made, self.kind):
-            raise PluginError(f"{self.point} plug-in {name!r} makes {type(made).__name__}, not {self.kind.__name__}")
-        if self._check is not None:
-            self._check(made)
-        return made
-
-    def summary(self, name: str) -> str:
-        """Return the first line of the docstring of plug-in `name`, or why it cannot be used."""
-        try:
-            self.create(name)
-        except PluginError as error:
-            return f"({error})"
-        return ((self[name].__doc__ or "").strip() or "(undocumented)").splitlines()[0]
-
-    def _load(self, name: str, entries: list[EntryPoint]) -> Callable[[], T]:
+        if name in self._builtin or name not in self._foreign:
+            return super().__getitem__(name)
+        entries = self._foreign[name]
         if len(entries) > 1:
             raise PluginError(f"{self.point} plug-in {name!r} is provided by {_places(entries)}: rename or remove all but one")
         (entry,) = entries
-        try:
+        with _own_mistakes(f"plug-in {entry.name!r} ({entry.value}) cannot be loaded"):
             factory: Callable[[], T] = entry.load()
-        except BaseException as error:
-            if not is_mistake(error):
-                raise
-            why = f"{type(error).__name__}: {error}"
-            raise PluginError(f"plug-in {entry.name!r} ({entry.value}) cannot be loaded: {why}") from error
         return factory
+
+
+@contextmanager
+def _own_mistakes(what: str) -> Iterator[None]:
+    """Turn what the code of other packages raises by mistake into an error that says what could not be done."""
+    try:
+        yield
+    except BaseException as error:
+        if not is_mistake(error):
+            raise
+        raise PluginError(f"{what}: {type(error).__name__}: {error}") from error
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

@@ -10,7 +10,7 @@ from experiments.contracts.contract import Clause, Example, checked
 from experiments.errors import ExperimentError
 from experiments.plugin_tables import TABLES
 from identify.blame import is_mistake
-from identify.plugins import PluginTable, did_you_mean
+from identify.plugins import Table, did_you_mean
 
 CONTRACTS: Mapping[str, tuple[Clause, ...]] = {
     "blocks": (
@@ -44,7 +44,7 @@ CONTRACTS: Mapping[str, tuple[Clause, ...]] = {
 """Plug-in point -> what its plug-ins are asked, after what every plug-in is."""
 
 
-def found(name: str) -> tuple[PluginTable[Any], Any]:
+def found(name: str) -> tuple[Table[Any], Any]:
     """Return the table and the plug-in of a name, such as TLS, drives/averaged or mybench:TotalLeastSquares.
 
     Raises
@@ -66,7 +66,7 @@ def found(name: str) -> tuple[PluginTable[Any], Any]:
     return there[0], there[0].create(short)
 
 
-def _loaded(name: str) -> tuple[PluginTable[Any], Any]:
+def _loaded(name: str) -> tuple[Table[Any], Any]:
     module, _, attribute = name.partition(":")
     try:
         made = getattr(importlib.import_module(module), attribute)()
@@ -86,6 +86,6 @@ def kept(name: str, example: Example) -> Iterator[tuple[str, str]]:
     yield from keeps(table, plugin, example)
 
 
-def keeps(table: PluginTable[Any], plugin: Any, example: Example) -> Iterator[tuple[str, str]]:
+def keeps(table: Table[Any], plugin: Any, example: Example) -> Iterator[tuple[str, str]]:
     """Yield what a plug-in of a table is asked, and why it does not keep it; empty if it does."""
     yield from checked(plugin, (identification.is_immutable, *CONTRACTS[table.point]), example)

@@ -8,9 +8,9 @@ from typing import Any
 
 from experiments.errors import ExperimentError
 from identify import ALIGNMENTS, CHAINS, DIFFERENTIATORS, MASKS, OPERATORS, PREFILTERS, Chain, IdentificationError, SettingError
-from identify.plugins import PluginTable, did_you_mean
+from identify.plugins import Table, did_you_mean
 
-STAGES: dict[str, PluginTable[Any]] = {
+STAGES: dict[str, Table[Any]] = {
     "prefilter": PREFILTERS,
     "differentiator": DIFFERENTIATORS,
     "alignment": ALIGNMENTS,

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from identify.plugins import PluginTable
+from identify.plugins import Table
 from identify.rows.chain import Chain
 from identify.rows.operators import FirLowPass, IirLowPass, Samples
 from identify.signals.differentiators import CentralDifference
@@ -34,7 +34,7 @@ def unfiltered_chain() -> Chain:
     return replace(idbench_chain(), operator=Samples())
 
 
-CHAINS: PluginTable[Chain] = PluginTable(
+CHAINS: Table[Chain] = Table(
     "chains",
     Chain,
     {

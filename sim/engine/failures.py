@@ -20,7 +20,10 @@ FAST = 10.0
 LEAST = 1.0
 """Speed [rad/s, m/s] that counts as the motion's where it asks for less: joints that stand are pushed by others."""
 
-ADVICE = "the loop is unstable or too weak; lower controller.bandwidth or timing.delay, raise fs, or ask less of the drive"
+ADVICE = (
+    "the loop is unstable or too weak; lower controller.bandwidth or timing.delay, raise fs, ask less of the drive, or, if the "
+    "robot's file has placeholders for friction, state [friction]"
+)
 
 
 class Bounds:

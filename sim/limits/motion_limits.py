@@ -235,7 +235,7 @@ def _positions(robot: Robot, asked: Mapping[str, tuple[float, float]]) -> Array:
             raise ScenarioError(f"limits: position.{name} = [{low:g}, {high:g}] lies outside the range of its file")
     if free := _names(robot, ~np.isfinite(ranges).all(axis=1)):
         raise ScenarioError(
-            f"{free} has no range: write [position] and {robot.joints[int(np.argmax(~np.isfinite(ranges).all(axis=1)))]} = "
+            f"without range: {free}; write [position] and {robot.joints[int(np.argmax(~np.isfinite(ranges).all(axis=1)))]} = "
             "[lowest, highest] into a file and give --limits FILE; leave room for the cables"
         )
     return ranges

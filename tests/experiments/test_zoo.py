@@ -240,10 +240,10 @@ def test_the_page_says_what_is_measured(root, series, pytestconfig):
 
 WAYS = {
     "default": ["--write", "a.urdf", "b.json", "c.py", "--write-mjcf", "d.xml"],
-    "rotors": ["--armature", "all", "--estimator", "WLS"],
-    "stribeck": ["--friction", "standard+stribeck", "--model", "explicit", "--estimator", "WLS"],
-    "auto": ["--friction", "auto", "--model", "explicit", "--estimator", "WLS"],
-    "consistent": ["--consistent", "entropic", "--model", "explicit", "--estimator", "WLS"],
+    "rotors": ["--armature", "all", "--estimator", "WLS", "--write", "c.py", "--write-mjcf", "d.xml"],
+    "stribeck": ["--friction", "standard+stribeck", "--model", "explicit", "--estimator", "WLS", "--write", "b.json", "c.py"],
+    "auto": ["--friction", "auto", "--model", "explicit", "--estimator", "WLS", "--write", "b.json", "c.py"],
+    "consistent": ["--consistent", "entropic", "--model", "explicit", "--estimator", "WLS", "--write", "a.urdf"],
 }
 
 
@@ -260,8 +260,36 @@ def test_every_way_ends_with_a_result(real, way, tmp_path, monkeypatch, capsys):
         words = ["--friction", "standard", *(f"{j}=standard+stribeck" for j in (1, 2, 3)), *words[2:]]
     code = main(["identify", "log.csv", "--robot", real.subject.name, "--torque", "instantaneous", "--no-rerun", *words])
     assert not code, capsys.readouterr().err
+    assert all(Path(file).stat().st_size for file in words if file.startswith(("a.", "b.", "c.", "d.")))
     shown = capsys.readouterr().out
     word = re.search(r"explicit: (good|fair|unsure|poor): ", shown)
     assert word
     # A law that the robot does not have, on all joints, may cost a joint its verdict; the verdict says so.
     assert word[1] == "good" or way == "stribeck"
+
+
+COMMANDS = {
+    "robot": [],
+    "run": ["arm", "--no-rerun", "--robot"],
+    "excite": ["--no-rerun", "--duration", "4", "--velocity", "2", "--acceleration", "10", "--seed", "0"],
+}
+
+
+PLACEHOLDERS = {"run": "state [friction]", "excite": "of its limit"}
+"""What is said of the hand, whose file has a friction of 12 N m for joints of 15 N m and 1e-4 kg m^2."""
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_other_commands_take_it(real, command, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    robot = real.subject.robot
+    free = [joint for joint, ends in zip(robot.joints, robot.ranges, strict=True) if not np.isfinite(ends).all()]
+    Path("limits.toml").write_text("[position]\n" + "".join(f'"{joint}" = [-3.0, 3.0]\n' for joint in free))
+    words = [*COMMANDS[command], real.subject.name] if command == "run" else [real.subject.name, *COMMANDS[command]]
+    code = main([command, *words, *(["--limits", "limits.toml"] if command == "excite" and free else [])])
+    said = capsys.readouterr().err
+    if command in PLACEHOLDERS and real.subject.name.endswith(ROBOTS["a hand"]):
+        assert code == 2
+        assert PLACEHOLDERS[command] in said
+    else:
+        assert code == 0, said

@@ -127,7 +127,7 @@ def test_limits_that_do_not_fit_say_what_to_write(balls, asked, message):
 def test_a_joint_without_a_range_is_asked_for_one(tmp_path):
     path = tmp_path / "free.xml"
     path.write_text(BALLS.replace(' range="-3 3"', ""))
-    with pytest.raises(ScenarioError, match=r"turn has no range: write \[position\] and turn = \[lowest, highest\]"):
+    with pytest.raises(ScenarioError, match=r"without range: turn; write \[position\] and turn = \[lowest, highest\]"):
         limits_of(Robot.load(str(path)), MotionLimits(velocity=(1.0,)))
 
 

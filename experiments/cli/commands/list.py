@@ -7,6 +7,7 @@ from rich.text import Text
 from experiments.cli.options.view import List
 from experiments.cli.page import new_page
 from experiments.plugin_tables import TABLES, plugin_conflicts
+from identify.plugins import PluginTable
 
 
 def list_plugins(options: List) -> None:
@@ -23,6 +24,7 @@ def print_plugins(console: Console) -> None:
         grid = Table.grid(padding=(0, 2))
         for name in table:
             grid.add_row(f"  {name}", Text(table.summary(name)))
-        console.print(Text(f"{table.point} (entry points: idbench.{table.point})", style="bold"), grid, sep="\n")
+        added = f" (entry points: idbench.{table.point})" if isinstance(table, PluginTable) else ""
+        console.print(Text(f"{table.point}{added}", style="bold"), grid, sep="\n")
     for conflict in plugin_conflicts():
         console.print(Text(f"warning: {conflict}"), soft_wrap=True)

@@ -14,7 +14,7 @@ from experiments.identification.load import in_band
 from experiments.identification.reading import ReadOptions
 from experiments.identification.request import Request
 from experiments.identification.subject import SCARA, Subject, absolute
-from identify import ESTIMATORS, MODELS
+from identify import CHAINS, ESTIMATORS, MODELS
 from identify.signals.masks import NoMask
 from sim.scenario.scenario_file import load
 
@@ -32,8 +32,8 @@ def request_of(options: Identify, stated: Mapping[str, Any]) -> Request:
     loops = options.loop or ([str(own)] if len(options.log) == 1 and own.is_file() else [])
     request = Request(
         Subject(robot, options.parameters, options.mounting.mounting),
-        tuple(MODELS) if options.model in (None, "all") else (options.model,),
-        options.chain,
+        tuple(MODELS) if options.model in (None, "all") else (MODELS.load(options.model),),
+        CHAINS.load(options.chain),
         options.estimator,
         name=options.label,
         loops=tuple(map(load, loops)),

@@ -24,6 +24,7 @@ from experiments.reports.leading import shown_whole
 from experiments.reports.printed import print_fit
 from experiments.results.folder import ResultsFolder
 from experiments.study.method import Method
+from identify import CHAINS
 from identify.files.log_file import write_log
 from sim.drives import IdealDrive
 from sim.errors import RobotError
@@ -82,7 +83,7 @@ def _described(page: Page, options: Run) -> ScenarioRun:
             raise ExperimentError("--from: which parameters are identified is the study's; leave --friction and the like out")
     else:
         scenario = _with_robot(page, load(_alone(options.scenario, options.study, options.index)), options.robot)
-        names, name, chosen = (options.chain, options.estimator), "", None
+        names, name, chosen = (CHAINS.load(options.chain), options.estimator), "", None
         parameters = options.parameters
     subject = Subject(scenario.robot, parameters)
     request = Request(

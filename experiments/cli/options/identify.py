@@ -25,11 +25,12 @@ class Identify(LogOptions, Command, action="identify:identify"):
     """The files; their times uniform to 1 %, or --resample. CSV and other text, Parquet, NumPy, Matlab, ROS bags. Or the
     folder of a run, whose recording gets a layer of this identification."""
     chain: str = CHAIN
-    """Signal processing."""
+    """Signal processing, or MODULE:NAME of a chain of yours."""
     chain_file: File = None
     """TOML file with settings of the chain: chain = "idbench", then tables such as [operator] with cutoff = 20.0."""
     model: str | None = None
-    """all, explicit, implicit or power; by default all, of which the screen shows the best, where joints are many."""
+    """all, explicit, implicit, power, or MODULE:CLASS of a model of yours; by default all, of which the screen shows the best,
+    where joints are many."""
     loop: Scenarios = ()
     """Scenarios that describe the closed loop of each log, for IV, DIDIM, CLIE and CLOE: robot, motion, controller, timing,
     drive. Of a run's folder its own."""

@@ -26,7 +26,7 @@ class Run(RecordedOptions, Command, action="run:run"):
     out: Folder = None
     """Folder for summary.json, recording.rrd, log.parquet and scenario.toml; runs/<name of the scenario> by default."""
     chain: str = CHAIN
-    """Signal processing."""
+    """Signal processing, or MODULE:NAME of a chain of yours."""
     estimator: str = ESTIMATOR
     """GLS, ML, OLS, WLS, IRLS, TLS, RLS, IV, DIDIM, CLIE, CLOE, OE, UKF, ML-delay, or of a plug-in: docs/estimators.md."""
     start: Start = "least-squares"

@@ -1,6 +1,6 @@
 """Operators that turn a model into rows, and their table."""
 
-from identify.plugins import PluginTable
+from identify.plugins import Table
 from identify.rows.operators.fir_low_pass import FirLowPass as FirLowPass
 from identify.rows.operators.iir_low_pass import IirLowPass as IirLowPass
 from identify.rows.operators.modulating import ModulatingFunctions as ModulatingFunctions
@@ -8,7 +8,7 @@ from identify.rows.operators.operator import AbstractOperator as AbstractOperato
 from identify.rows.operators.samples import Samples as Samples
 from identify.rows.operators.windows import Windows as Windows
 
-OPERATORS: PluginTable[AbstractOperator] = PluginTable(
+OPERATORS: Table[AbstractOperator] = Table(
     "operators",
     AbstractOperator,  # type: ignore[type-abstract]  # only asked whether an instance is one
     {

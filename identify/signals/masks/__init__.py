@@ -1,11 +1,11 @@
 """Masks, and their table."""
 
-from identify.plugins import PluginTable
+from identify.plugins import Table
 from identify.signals.masks.mask import AbstractMask as AbstractMask
 from identify.signals.masks.no_mask import NoMask as NoMask
 from identify.signals.masks.reversal import ReversalMask as ReversalMask
 
-MASKS: PluginTable[AbstractMask] = PluginTable(
+MASKS: Table[AbstractMask] = Table(
     "masks",
     AbstractMask,  # type: ignore[type-abstract]  # only asked whether an instance is one
     {

@@ -1,12 +1,12 @@
 """What the torque samples of a log mean, and how they are put on the time of the columns."""
 
-from identify.plugins import PluginTable
+from identify.plugins import Table
 from identify.signals.torques.alignment import AsLogged as AsLogged
 from identify.signals.torques.alignment import ByChannel as ByChannel
 from identify.signals.torques.torque import AbstractAlignment as AbstractAlignment
 from identify.signals.torques.torque import Torque as Torque
 
-ALIGNMENTS: PluginTable[AbstractAlignment] = PluginTable(
+ALIGNMENTS: Table[AbstractAlignment] = Table(
     "alignments",
     AbstractAlignment,  # type: ignore[type-abstract]  # only asked whether an instance is one
     {
