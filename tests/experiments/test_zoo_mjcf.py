@@ -1,4 +1,4 @@
-"""Six MJCF files with what such files may have: logs with other inertias, identified and written; truth by mj_inverse."""
+"""Seven MJCF files with what such files may have: logs with other inertias, identified and written; truth by mj_inverse."""
 
 from pathlib import Path
 
@@ -45,6 +45,9 @@ FILES = {
       <geom size=".08" pos=".1 0 .02"/><body pos=".3 0 0">
       <joint name="3" axis="1 0 0" range="-2 2"/><geom size=".06" pos=".1 .02 0"/><body pos=".2 0 0">
       <inertial pos="0 0 0" mass="1e-9" diaginertia="1e-12 1e-12 1e-12"/></body></body></body></body></worldbody></mujoco>""",
+    "cart and pole": """<mujoco><worldbody><body pos="0 0 1"><joint name="rail" type="slide" axis="1 0 0" range="-1.8 1.8"/>
+      <geom type="box" size=".2 .15 .1" mass="1"/><body><joint name="pole" axis="0 1 0" range="-3 3"/>
+      <geom type="capsule" fromto="0 0 0 0 0 1" size=".045" mass=".1"/></body></body></worldbody></mujoco>""",
 }
 INCLUDED = '<mujocoinclude><geom class="big" pos="0.05 0 .2"/><site name="tip" pos="0 0 .4"/></mujocoinclude>'
 
