@@ -11,9 +11,8 @@ from identify.estimators.estimate import Estimate
 from identify.estimators.estimator import AbstractEstimator, Need
 from identify.estimators.problem import Problem
 from identify.estimators.propagated import bias_covariance
-from identify.estimators.restricted_likelihood import likely
+from identify.estimators.restricted_likelihood import alike, likely
 from identify.rows.banded import BandedCovariance
-from identify.rows.block_tridiagonal import Blocks
 from identify.rows.factors import Factor, Status, triangular
 from identify.rows.row_map import RowMap
 from identify.rows.rows import Rows
@@ -73,8 +72,7 @@ def _shares(problem: Problem) -> Array:
     units, joined = [], []
     for rows, better in zip(problem.parts, problem.unbiased_parts, strict=True):
         kept, each = kept_rows(rows.maps[0]), _covariances(problem, rows.maps[0])
-        lags = max(C.bands.shape[-4] for C in each)
-        units.append([Blocks.of(C.kept(kept), lags) for C in each])
+        units.append(alike([C.kept(kept).matrix for C in each]))
         joined.append(better.joined * kept[..., None])
     start = np.array([1.0, 0.1, 0.1])
     return likely(units, joined, np.broadcast_to(start, (*joined[0].shape[:-2], 3)), np.full(3, LEAST))

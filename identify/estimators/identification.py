@@ -14,6 +14,7 @@ from identify.estimators.settle import settled
 from identify.estimators.simulator import Simulation
 from identify.models.explicit import ExplicitModel
 from identify.models.model import AbstractModel
+from identify.one_thread import one_thread
 from identify.rows.chain import Chain
 from identify.rows.chains import idbench_chain
 from identify.telling import stage
@@ -112,7 +113,7 @@ def attempt_each(
     for model in models.values():
         _require(model, AbstractModel, 'a model, such as MODELS.create("power")')
     problems = {name: problem.with_model(model) for name, model in models.items()}
-    with blamed():  # what one model's rows lack, such as the joints of the basis, all lack
+    with one_thread(), blamed():  # what one model's rows lack, such as the joints of the basis, all lack
         for name, each in problems.items():
             with stage(f"rows of the {name} model"):
                 _ = each.parts
@@ -122,6 +123,7 @@ def attempt_each(
     for number, (name, each) in enumerate(problems.items(), 1):
         with stage(f"{name} model, {estimator.called} ({number} of {len(problems)})"):
             found[name] = _outcome(each, estimator, throw)
+    problem.forget()
     return found
 
 
@@ -138,7 +140,7 @@ def estimate(problem: Problem, estimator: AbstractEstimator, *, throw: bool = Tr
         Raise if a run cannot be solved; otherwise the estimate's `status` says it.
     """
     _require(estimator, AbstractEstimator, 'an estimator, such as ESTIMATORS.create("OLS")')
-    with blamed():
+    with one_thread(), blamed():
         if throw and estimator.full_rank:
             problem.factors.together.check()
         return estimator.fit(problem, throw=throw)

@@ -15,7 +15,7 @@ from identify.estimators.noise import noise_of, position_noise
 from identify.estimators.restricted_likelihood import likely_noise
 from identify.estimators.row_weights import RowWeights
 from identify.estimators.simulator import Simulation
-from identify.estimators.unbiased import unbiased
+from identify.estimators.unbiased import unbiased, with_more_noise
 from identify.models.explicit import ExplicitModel
 from identify.models.model import AbstractModel
 from identify.rows.chain import Chain
@@ -128,11 +128,9 @@ class Problem:
 
     def unbiased(self, rows: Rows) -> Rows:
         """Return rows of one log, or of a piece of it, with W less what noise of the positions adds to it on average."""
-
-        def rebuilt(log: MotionLog, signals: Signals) -> Rows:
-            return self._rows_of(self.chain.signals(log, signals))
-
-        return unbiased(rows, self.position_noise, rebuilt)
+        signals = rows.maps[0].signals
+        noisier = self.explicit._noisier.get(signals) or with_more_noise(signals, self.position_noise)
+        return unbiased(rows, self._rows_of(noisier))
 
     @cached_property
     def position_noise(self) -> Array:
@@ -230,6 +228,10 @@ class Problem:
         """Return the problem of other logs, such as those without wild samples."""
         return replace(self, logs=tuple(logs), _signals=(), _explicit=None)
 
+    def forget(self) -> None:
+        """Drop what only the rows of further models would need."""
+        self.explicit.__dict__.pop("_noisier", None)
+
     def _rows_of(self, signals: Signals) -> Rows:
         return self.chain.rows(signals, self.basis, self.model)
 
@@ -247,6 +249,11 @@ class Problem:
     def _linear(self) -> dict[Signals, Linearization]:
         """Linearizations about the signals of all parts."""
         return {signals: Linearization(signals, self.basis, self._fit.X) for signals in self.signals}
+
+    @cached_property
+    def _noisier(self) -> dict[Signals, Signals]:
+        """The signals of all parts with more noise, which all models share."""
+        return {signals: with_more_noise(signals, self.position_noise) for signals in self.signals}
 
     @cached_property
     def _pieces(self) -> list[tuple[Chain, MotionLog, tuple[int, int]]]:

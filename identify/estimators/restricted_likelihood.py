@@ -1,11 +1,14 @@
 """The noise levels that make the rows of the explicit model most likely."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
+import numpy.typing as npt
 
 from identify.arrays import Array
-from identify.rows.block_tridiagonal import Blocks, Cholesky
+from identify.rows.band_matrix import Band, Cholesky
 from identify.rows.factors import Factor, triangular
 from identify.rows.linearization import Linearization
 from identify.rows.noise_propagation import NoiseLevels, NoisyRows, position_paths, torque_paths
@@ -16,8 +19,17 @@ from identify.signals.signals import Signals
 ROUNDS, SETTLED = 20, 0.01
 """Rounds at most, and change, in all that the levels make of the rows, at which they count as found."""
 
-HASTE = 1.5
-"""Power of the ratio by which a level is multiplied: more than 1 is faster, 2 might swing for ever."""
+STILL = 0.02
+"""Change of X, in its sigma, at which the levels count as found."""
+
+HASTY, HASTE = 1, 1.5
+"""Rounds in which a square is multiplied by a power of the ratio: more than 1 is faster, 2 might swing for ever."""
+
+FARTHEST = 64.0
+"""What a square is multiplied or divided by at most in one of the other rounds."""
+
+RIDGE = 1e-6
+"""Share of its own that is added to the information about each square: two that do the same to rows are both left there."""
 
 LOWEST = 1e-3
 """Share of the torque's rms at which its noise begins at least: what begins at nothing hardly grows."""
@@ -35,8 +47,9 @@ def likely_noise(parts: Sequence[Rows], start: NoiseLevels, linear: Callable[[Si
     The covariance of rows is C = sum of sigma_i^2 C_i over the torques and positions of all joints. The likelihood of what the
     parameters leave over is stationary where r' C^-1 C_i C^-1 r = trace of P C_i, with P = C^-1 - C^-1 W (W' C^-1 W)^-1 W' C^-1
     and r the residual (H. D. Patterson and R. Thompson, "Recovery of inter-block information when block sizes are unequal",
-    Biometrika 58 (1971) 545-554). In each round every sigma_i^2 is multiplied by a power of the ratio of the two, which keeps
-    it positive.
+    Biometrika 58 (1971) 545-554). In the first round every sigma_i^2 is multiplied by a power of the ratio of the two; then
+    come Newton's, by average information (A. R. Gilmour, R. Thompson and B. R. Cullis, "Average information REML: an efficient
+    algorithm for variance parameter estimation in linear mixed models", Biometrics 51 (1995) 1440-1450).
 
     Parameters
     ----------
@@ -59,12 +72,12 @@ def likely_noise(parts: Sequence[Rows], start: NoiseLevels, linear: Callable[[Si
     return NoisyRows(NoiseLevels(torque, position), linear)
 
 
-def likely(units: Sequence[list[Blocks]], joined: Sequence[Array], start: Array, least: Array) -> Array:
+def likely(units: Sequence[Sequence[Band]], joined: Sequence[Array], start: Array, least: Array) -> Array:
     """Return the numbers, not below `least`, shape (..., i), with which C = sum of number_i C_i makes rows most likely.
 
     Parameters
     ----------
-    units : sequence of list of Blocks
+    units : sequence of sequence of Band
         C_i, log by log.
     joined : sequence of Array, shape (..., r, p + 1)
         [W Y], log by log.
@@ -73,58 +86,108 @@ def likely(units: Sequence[list[Blocks]], joined: Sequence[Array], start: Array,
     """
     squares = np.maximum(start, least)
     settled = np.zeros(squares.shape[:-1], dtype=bool)
-    for _ in range(ROUNDS):
-        ratio, share = _ratio(units, joined, squares)
-        moved = np.where(settled[..., None], squares, np.maximum(squares * ratio**HASTE, least))
-        settled |= np.max(np.abs(moved / squares - 1) * share, axis=-1) < SETTLED  # each run by itself, as if it were alone
+    for k in range(ROUNDS):
+        slope = _Slope.at(units, joined, squares)
+        moved = np.maximum(squares * (slope.ratio**HASTE if k < HASTY else slope.newton(squares, least)), least)
+        moved = np.where(settled[..., None], squares, moved)
+        settled |= slope.small(squares, moved)  # each run by itself, as if it were alone
         squares = moved
         if settled.all():
             break
     return squares
 
 
-def _units(rows: Rows, linear: Linearization) -> list[Blocks]:
+def _units(rows: Rows, linear: Linearization) -> list[Band]:
     """Return the covariances of rows by unit noise of the torques, and of the positions, joint by joint."""
     (to_rows,) = rows.maps
     each = [*torque_paths(to_rows).each(), *position_paths(to_rows, linear).each()]
-    lags, kept = max(C.bands.shape[-4] for C in each), kept_rows(to_rows)
-    return [Blocks.of(C.kept(kept), lags) for C in each]
+    kept = kept_rows(to_rows)
+    return alike([C.kept(kept).matrix for C in each])
 
 
-def _ratio(units: Sequence[list[Blocks]], joined: Sequence[Array], squares: Array) -> tuple[Array, Array]:
-    """Return r' C^-1 C_i C^-1 r over the trace of P C_i, and that trace's share of all, shape (..., source).
+@dataclass(frozen=True, eq=False)
+class _Slope:
+    """How the likelihood of rows depends on the squares of its levels. Leading axes are runs.
 
-    1 in runs whose rows do not determine the parameters.
+    Parameters
+    ----------
+    found, expected : Array, shape (..., i)
+        r' C^-1 C_i C^-1 r, and the trace of P C_i.
+    bend : Array, shape (..., i, i)
+        Average information, times 2: y' P C_i P C_j P y.
+    moves : Array, shape (..., p, i)
+        What X moves by, in its sigma, for a change of each square.
     """
-    roots = [Cholesky.of(_sum(parts, squares)) for parts in units]
-    white = [root.whiten(parts[0].cut(x)) for root, parts, x in zip(roots, units, joined, strict=True)]
-    names = ("",) * (joined[0].shape[-1] - 1)
-    factor = Factor(triangular(np.concatenate([_rows(z) for z in white], axis=-2)), np.array(0), names)
-    solvable = factor.determined
-    X, inverse = factor.solution(solvable), factor.inverse(solvable)
-    found, expected = np.zeros(squares.shape), np.zeros(squares.shape)
-    for root, parts, z in zip(roots, units, white, strict=True):
-        solved = root.unwhiten(z)
-        of_W, of_Y = solved[..., :-1], solved[..., -1:]
-        left = of_Y - np.matmul(of_W, X[..., None, :, None])
-        expected += root.traces(parts)
-        for i, part in enumerate(parts):
-            found[..., i] += np.sum(left * (part @ left), axis=(-3, -2, -1))
-            taken = np.sum(np.matmul(np.swapaxes(of_W, -1, -2), part @ of_W), axis=-3)
-            expected[..., i] -= np.sum(taken * inverse, axis=(-2, -1))
-    ratio = np.divide(found, expected, out=np.ones_like(found), where=expected > 0)
-    weight = np.maximum(np.nan_to_num(expected * squares), 0.0)
-    total = np.sum(weight, axis=-1, keepdims=True)
-    return ratio, np.divide(weight, total, out=np.zeros_like(weight), where=total > 0)
+
+    found: Array
+    expected: Array
+    bend: Array
+    moves: Array
+
+    @classmethod
+    def at(cls, units: Sequence[Sequence[Band]], joined: Sequence[Array], squares: Array) -> Self:
+        """Return the slopes at squares of levels."""
+        roots = [Cholesky.of(_sum(parts, squares)) for parts in units]
+        white = [root.whiten(x) for root, x in zip(roots, joined, strict=True)]
+        names = ("",) * (joined[0].shape[-1] - 1)
+        factor = Factor(triangular(np.concatenate(white, axis=-2)), np.array(0), names)
+        solvable = factor.determined
+        X, inverse = factor.solution(solvable), factor.inverse(solvable)
+        found, expected = np.zeros(squares.shape), np.zeros(squares.shape)
+        bend, through_W = np.zeros((*squares.shape, squares.shape[-1])), np.zeros(())
+        for root, parts, z in zip(roots, units, white, strict=True):
+            solved, all_of_C = root.unwhiten(z), root.inverse()
+            solved[..., -1:] -= np.matmul(solved[..., :-1], X[..., None])
+            left, products = solved[..., -1], []
+            for i, part in enumerate(parts):
+                product = part @ solved
+                products.append(product[..., -1])
+                found[..., i] += np.sum(left * product[..., -1], axis=-1)
+                taken = np.matmul(np.swapaxes(solved[..., :-1], -1, -2), product[..., :-1])
+                expected[..., i] += all_of_C.trace_with(part) - np.sum(taken * inverse, axis=(-2, -1))
+            w = root.whiten(np.stack(products, axis=-1))
+            bend += np.matmul(np.swapaxes(w, -1, -2), w)
+            through_W = through_W + np.matmul(np.swapaxes(z[..., :-1], -1, -2), w)
+        steps = np.matmul(inverse, through_W)
+        bend -= np.matmul(np.swapaxes(through_W, -1, -2), steps)
+        sigma = np.sqrt(np.diagonal(inverse, axis1=-2, axis2=-1))
+        return cls(found, expected, bend, steps / sigma[..., None])
+
+    @property
+    def ratio(self) -> Array:
+        """What is found over what is expected, shape (..., i); 1 in runs whose rows do not determine the parameters."""
+        return np.divide(self.found, self.expected, out=np.ones_like(self.found), where=self.expected > 0)
+
+    def newton(self, squares: Array, least: Array) -> Array:
+        """Return what squares are multiplied by in a step by average information; those that would go below `least` stay."""
+        held = (squares <= least) & (self.found <= self.expected)
+        free = ~held & np.isfinite(self.found) & (self.expected > 0)
+        both = free[..., :, None] & free[..., None, :]
+        bend = np.where(both, self.bend * squares[..., :, None] * squares[..., None, :], 0.0)
+        own = np.where(free, np.diagonal(bend, axis1=-2, axis2=-1), 1.0)
+        bend = bend + (~free + RIDGE * own)[..., :, None] * np.eye(bend.shape[-1])
+        slope = np.where(free, (self.found - self.expected) * squares, 0.0)
+        step = np.linalg.solve(bend, slope[..., None])[..., 0]
+        return np.clip(1 + step, 1 / FARTHEST, FARTHEST)
+
+    def small(self, squares: Array, moved: Array) -> npt.NDArray[np.bool_]:
+        """Return whether a change of the squares moves neither X, nor sigma, by anything that counts, shape (...)."""
+        weight = np.maximum(np.nan_to_num(self.expected * squares), 0.0)
+        total = np.sum(weight, axis=-1, keepdims=True)
+        share = np.divide(weight, total, out=np.zeros_like(weight), where=total > 0)
+        of_sigma = np.max(np.abs(moved / squares - 1) * share, axis=-1) < SETTLED
+        of_X = np.max(np.abs(np.nan_to_num(np.matmul(self.moves, (moved - squares)[..., None]))), axis=(-2, -1)) < STILL
+        return np.asarray(of_sigma & of_X)
 
 
-def _sum(parts: list[Blocks], squares: Array) -> Blocks:
-    total = parts[0].scaled(squares[..., 0])
+def alike(bands: Sequence[Band]) -> list[Band]:
+    """Return matrices as wide as the widest."""
+    width = max(band.lower.shape[-1] for band in bands)
+    return [Band(band.widened(width)) for band in bands]
+
+
+def _sum(parts: Sequence[Band], squares: Array) -> Band:
+    lower = parts[0].lower * squares[..., 0, None, None]
     for i, part in enumerate(parts[1:], 1):
-        total = total + part.scaled(squares[..., i])
-    return total
-
-
-def _rows(z: Array) -> Array:
-    """Return blocks of rows, shape (..., block, b, m), one below the other."""
-    return z.reshape(*z.shape[:-3], -1, z.shape[-1])
+        lower += part.lower * squares[..., i, None, None]
+    return Band(lower)

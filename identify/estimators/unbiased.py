@@ -1,46 +1,50 @@
 """Rows without the bias that noise of the positions gives W."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from identify.arrays import Array
-from identify.data.motion_log import MotionLog
 from identify.rows.linearization import smoothed
 from identify.rows.rows import Rows
 from identify.signals.signals import Signals
-
-PAIRS = 2
-"""Pairs of noises that are tried: what one leaves of chance is far below the noise itself, as only its squares count."""
 
 SURE = 4.0
 """Speed over the noise of the velocity at which a joint is certain to move the way it seems to."""
 
 
-def unbiased(rows: Rows, level: Array, rebuilt: Callable[[MotionLog, Signals], Rows]) -> Rows:
+def unbiased(rows: Rows, noisier: Rows) -> Rows:
     """Return the rows of one log with W less what noise of the positions adds to it on average.
 
     Columns hold squares of velocities and sines of positions, so that noise does not average out of them. More noise n of the
     same size, put in with either sign, shows how much: W(q + n) + W(q - n) - 2 W(q) holds the squares alone, and its half is,
-    on average, what the log's own noise has added. Every run meets the same n. Joints that hardly move get none: an encoder
-    that stands has no noise, and |qd|, of Coulomb friction, no square.
+    on average, what the log's own noise has added. (One noise is enough: only its squares are left to chance.)
 
     Parameters
     ----------
     rows : Rows
         Of one log.
+    noisier : Rows
+        Those of `with_more_noise`.
+    """
+    return replace(rows, W=2 * rows.W - np.mean(noisier.W, axis=0))
+
+
+def with_more_noise(signals: Signals, level: Array) -> Signals:
+    """Return the signals of two logs, with more noise in the positions, put in with either sign, and with the same mask.
+
+    Every run meets the same noise. Joints that hardly move get none: an encoder that stands has no noise, and |qd|, of Coulomb
+    friction, no square.
+
+    Parameters
+    ----------
+    signals : Signals
+        Of one log.
     level : Array, shape (..., joint)
         Standard deviation of the positions' noise [rad].
-    rebuilt : callable
-        Returns the rows of another log with the mask of given signals.
     """
-    signals = rows.maps[0].signals
-    log, rng, bias = signals.log, np.random.default_rng(0), np.zeros_like(rows.W)
+    log, rng = signals.log, np.random.default_rng(0)
     moves = np.abs(smoothed(signals.state.qd, log.fs)) > SURE * signals.gain * level[..., None]
-    size = np.swapaxes(moves * level[..., None], -1, -2)
-    for _ in range(PAIRS):
-        noise = size * rng.standard_normal(log.q.shape[-2:])
-        for sign in (1.0, -1.0):
-            bias += rebuilt(replace(log, q=log.q + sign * noise), signals).W - rows.W
-    return replace(rows, W=rows.W - bias / (2 * PAIRS))
+    noise = np.swapaxes(moves * level[..., None], -1, -2) * rng.standard_normal(log.q.shape[-2:])
+    q = np.stack([log.q + noise, log.q - noise])
+    return replace(signals, log=replace(log, q=q, tau=np.broadcast_to(log.tau, q.shape)), weights_of=signals)

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
 from identify.arrays import Array
+from identify.rows.band_matrix import Band
 from identify.rows.grid import Grid, windowed
 
 
@@ -79,6 +80,17 @@ class BandedCovariance:
         lags, count, kinds = self.bands.shape[-4:-1]
         by_row = np.swapaxes(rows.reshape(*rows.shape[:-1], count, kinds), -1, -2).astype(np.float64)
         return type(self)(self.bands * _pairs(by_row, lags))
+
+    @property
+    def matrix(self) -> Band:
+        """The covariance, rows in the order of Y."""
+        *runs, lags, count, kinds, _ = self.bands.shape
+        lower = np.zeros((*runs, count, kinds, lags * kinds))
+        # What each row has in common with those of its instant and later ones.
+        later = np.moveaxis(self.bands, (-4, -2), (-2, -3)).reshape(*runs, count, kinds, lags * kinds)
+        for kind in range(kinds):
+            lower[..., kind, : lags * kinds - kind] = later[..., kind, kind:]
+        return Band(lower.reshape(*runs, count * kinds, lags * kinds))
 
     @property
     def variance(self) -> Array:

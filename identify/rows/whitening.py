@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from identify.arrays import Array
+from identify.rows.band_matrix import Cholesky
 from identify.rows.banded import BandedCovariance
-from identify.rows.block_tridiagonal import Blocks, Cholesky
 from identify.rows.noise_propagation import torque_paths
 from identify.rows.row_map import RowMap
 
@@ -33,24 +33,17 @@ class Whitening:
     kept: npt.NDArray[np.bool_]
 
     @cached_property
-    def blocks(self) -> Blocks:
-        """The covariance of the rows that are kept."""
-        return Blocks.of(self.C, self.C.bands.shape[-4])
-
-    @cached_property
     def root(self) -> Cholesky:
-        """Its factor; raise IdentificationError if it is singular."""
-        return Cholesky.of(self.blocks)
+        """The factor of the covariance of the rows that are kept; raise IdentificationError if it is singular."""
+        return Cholesky.of(self.C.matrix)
 
     def whiten(self, x: Array) -> Array:
         """Return L^-1 x of rows x, shape (..., r, m), L L' being their covariance."""
-        z = self.root.whiten(self.blocks.cut(x * self.kept[..., None]))
-        return z.reshape(*z.shape[:-3], -1, z.shape[-1])[..., : x.shape[-2], :]
+        return self.root.whiten(x * self.kept[..., None])
 
     def solve(self, x: Array) -> Array:
         """Return C^-1 x, zero for rows that are left out, shape (..., r, m)."""
-        z = self.root.unwhiten(self.root.whiten(self.blocks.cut(x * self.kept[..., None])))
-        return z.reshape(*z.shape[:-3], -1, z.shape[-1])[..., : x.shape[-2], :] * self.kept[..., None]
+        return self.root.unwhiten(self.whiten(x)) * self.kept[..., None]
 
 
 _KEPT: WeakKeyDictionary[RowMap, npt.NDArray[np.bool_]] = WeakKeyDictionary()

@@ -20,9 +20,9 @@ from identify import (
     scara,
 )
 from identify.estimators.restricted_likelihood import likely_noise
-from identify.estimators.unbiased import unbiased
+from identify.estimators.unbiased import unbiased, with_more_noise
 from identify.rows import long_logs
-from identify.rows.block_tridiagonal import Blocks, Cholesky
+from identify.rows.band_matrix import Band, Cholesky
 from identify.rows.noise_propagation import NoiseLevels, NoisyRows
 from identify.rows.whitening import Whitening, kept_rows
 
@@ -57,7 +57,7 @@ def whitened(log):
     return problem.rows, whitening, dense(whitening.C)
 
 
-def test_block_tridiagonal_algebra_is_that_of_the_whole_matrix(whitened, rng):
+def test_band_algebra_is_that_of_the_whole_matrix(whitened, rng):
     """Products, solutions, and the trace of an inverse times the matrix: the number of its rows."""
     rows, whitening, C = whitened
     kept = np.flatnonzero(whitening.kept)
@@ -65,15 +65,14 @@ def test_block_tridiagonal_algebra_is_that_of_the_whole_matrix(whitened, rng):
     np.testing.assert_allclose(whitening.solve(x)[kept], np.linalg.solve(C, x[kept]), rtol=1e-6, atol=1e-9)
     z = whitening.whiten(x)
     np.testing.assert_allclose(z.T @ z, x[kept].T @ np.linalg.solve(C, x[kept]), rtol=1e-9)
-    blocks = whitening.blocks
-    product = (blocks @ blocks.cut(x * whitening.kept[:, None])).reshape(-1, 3)[: len(x)]
-    np.testing.assert_allclose(product[kept], C @ x[kept], rtol=1e-9, atol=1e-15)
-    assert Cholesky.of(blocks).traces([blocks])[..., 0] == pytest.approx(len(kept))
+    band = whitening.C.matrix
+    np.testing.assert_allclose((band @ (x * whitening.kept[:, None]))[kept], C @ x[kept], rtol=1e-9, atol=1e-15)
+    assert Cholesky.of(band).inverse().trace_with(band) == pytest.approx(len(kept))
 
 
 def test_a_matrix_that_is_not_positive_is_refused():
     with pytest.raises(IdentificationError, match=r"covariance of the rows is singular.*take WLS"):
-        Cholesky.of(Blocks(np.array([[[1.0, 2.0], [2.0, 1.0]]]), np.zeros((0, 2, 2))))
+        Cholesky.of(Band(np.array([[1.0, 2.0], [1.0, 0.0]])))
 
 
 @pytest.mark.parametrize("model", MODELS.builtin)
@@ -128,7 +127,9 @@ def test_no_noise_is_put_in_where_a_joint_stands(log):
     rows = problem.rows
     moves = np.abs(np.gradient(log.q, axis=-2)).max(axis=(-3, -1) if log.q.ndim > 2 else -1) > 0
     near = np.array([moves[(log.t > t - 1) & (log.t < t + 1)].any() for t in rows.time])
-    better = unbiased(rows, np.full(2, 1e-4), problem_rows(problem))
+    better = unbiased(
+        rows, problem.chain.rows(with_more_noise(problem.signals[0], np.full(2, 1e-4)), problem.basis, problem.model)
+    )
     assert np.count_nonzero(~near) > 5
     np.testing.assert_allclose(better.W[..., ~near, :], rows.W[..., ~near, :], atol=1e-12)
     assert np.abs(better.W - rows.W).max() > 1e-6
@@ -137,15 +138,6 @@ def test_no_noise_is_put_in_where_a_joint_stands(log):
 def whitening_of(rows, noise):
     kept = kept_rows(rows)
     return Whitening(noise.covariance(rows).kept(kept), kept)
-
-
-def problem_rows(problem):
-    """Return what makes the rows of another log with given weights."""
-
-    def made(log, signals):
-        return problem.chain.rows(problem.chain.signals(log, signals), problem.basis, problem.model)
-
-    return made
 
 
 @pytest.mark.thorough
@@ -218,10 +210,9 @@ def test_rows_of_one_model_that_are_too_few_leave_the_others(log):
 
 
 def test_one_run_without_a_covariance_leaves_the_others():
-    own = np.stack([np.eye(4)[None], -np.eye(4)[None]])
-    root = Cholesky.of(Blocks(own, np.zeros((2, 0, 4, 4))))
-    np.testing.assert_array_equal(root.inverse[0, 0], np.eye(4))
-    assert np.isnan(root.inverse[1]).all()
+    root = Cholesky.of(Band(np.array([[[4.0]] * 3, [[-1.0]] * 3])))
+    np.testing.assert_array_equal(root.lower[0], [[2.0]] * 3)
+    assert np.isnan(root.lower[1]).all()
 
 
 def test_levels_that_begin_at_nothing_are_found(log):

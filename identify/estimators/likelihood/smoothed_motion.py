@@ -12,10 +12,7 @@ from identify.errors import IdentificationError
 from identify.estimators.likelihood.cells import hermite
 from identify.estimators.likelihood.joint_fit import JointFit
 from identify.estimators.likelihood.normal_equations import NormalEquations
-from identify.rows.block_tridiagonal import Blocks, Cholesky
-
-NODES = 8
-"""Nodes of a block: larger ones make more work in each, smaller ones more blocks."""
+from identify.rows.band_matrix import Band, Cholesky
 
 
 class SmoothedMotion(NamedTuple):
@@ -77,46 +74,19 @@ def _covariance(fit: JointFit, log: int) -> Array:
     """Return the covariance of (q0, qd0, q1, qd1) of every cell and joint, shape (cell, joint, 4, 4)."""
     cells, z = fit.logs[log], fit.motions[log]
     system = NormalEquations.of(cells, fit.basis, fit.X, z, fit.noise(log))
-    inverse = _windows(Cholesky.of(_blocks(system.band, cells.log.n)).inverse_blocks(), cells.log.n)[: cells.count]
     V, _, L = system.solved()
+    inverse = _windows(Cholesky(np.ascontiguousarray(L.T)).inverse(), cells.log.n)
     U, _ = scipy.linalg.lapack.dtbtrs(L, V, uplo="L", trans="T")
     of_X = U[:, : len(fit.unknowns)].reshape(len(z), 2, cells.log.n, -1)
     pairs = np.concatenate([of_X[:-1], of_X[1:]], axis=1).transpose(0, 2, 1, 3)
     return inverse + np.matmul(np.matmul(pairs, fit.covariance), np.swapaxes(pairs, -1, -2))
 
 
-def _blocks(band: Array, n: int) -> Blocks:
-    """Return the matrix of a lower band in blocks of some nodes, with ones where there are none."""
-    size, b = band.shape[1], NODES * 2 * n
-    count = -(-size // b)
-    own, following = np.zeros((count, b, b)), np.zeros((count - 1, b, b))
-    for below in range(len(band)):
-        value = np.zeros(count * b)
-        value[: size - below] = band[below, : size - below]
-        column = np.arange(count * b)
-        block, j = np.divmod(column, b)
-        inside = j + below < b
-        own[block[inside], j[inside] + below, j[inside]] = value[inside]
-        own[block[inside], j[inside], j[inside] + below] = value[inside]
-        beyond = ~inside & (block < count - 1)
-        following[block[beyond], j[beyond], j[beyond] + below - b] = value[beyond]
-    last = np.arange(size, count * b) % b
-    own[-1, last, last] = 1.0
-    return Blocks(own, following)
-
-
-def _windows(inverse: Blocks, n: int) -> Array:
+def _windows(inverse: Band, n: int) -> Array:
     """Return what the inverse has of both nodes of every cell, joint by joint, shape (cell, joint, 4, 4)."""
-    count, b, _ = inverse.own.shape
-    wide = np.concatenate([inverse.own, np.concatenate([inverse.next, np.zeros((1, b, b))])], axis=2)
-    later = np.concatenate([inverse.own[1:], inverse.own[-1:]])
-    found = np.zeros((count, NODES, n, 4, 4))
-    for node in range(NODES):
-        for j in range(n):
-            index = 2 * n * node + np.array([j, n + j, 2 * n + j, 3 * n + j])
-            for k in range(4):
-                for m in range(k, 4):
-                    row, column = index[k], index[m]
-                    value = wide[:, row, column] if row < b else later[:, row - b, column - b]
-                    found[:, node, j, k, m] = found[:, node, j, m, k] = value
-    return found.reshape(count * NODES, n, 4, 4)
+    cells = len(inverse.lower) // (2 * n) - 1
+    found, first = np.zeros((cells, n, 4, 4)), 2 * n * np.arange(cells)[:, None] + np.arange(n)
+    for k in range(4):
+        for m in range(k, 4):
+            found[..., k, m] = found[..., m, k] = inverse.lower[first + n * k, n * (m - k)]
+    return found

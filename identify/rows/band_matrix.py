@@ -1,0 +1,137 @@
+"""Symmetric matrices with nothing far from their diagonal, and their Cholesky factors: linear in the length of a log."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import lapack
+
+from identify.arrays import Array
+from identify.errors import IdentificationError
+
+
+@dataclass(frozen=True, eq=False)
+class Band:
+    """A symmetric band matrix C. Leading axes are runs.
+
+    Parameters
+    ----------
+    lower : Array, shape (..., r, width)
+        At [j, d] what C has in row j + d of column j.
+    """
+
+    lower: Array
+
+    @property
+    def void(self) -> npt.NDArray[np.bool_]:
+        """Which rows have no variance, and count as left out, shape (..., r)."""
+        return np.asarray(self.lower[..., 0] == 0)
+
+    def widened(self, width: int) -> Array:
+        """Return `lower` with zeros for so many diagonals in all."""
+        beyond = width - self.lower.shape[-1]
+        return np.pad(self.lower, [(0, 0)] * (self.lower.ndim - 1) + [(0, beyond)]) if beyond else self.lower
+
+    def __matmul__(self, x: Array) -> Array:
+        """Return C x, shape (..., r, m)."""
+        size = self.lower.shape[-1]
+        own, below = _in_blocks(self.lower, size)
+        own = own + np.swapaxes(np.tril(own, -1), -1, -2)
+        blocks = own.shape[-3]
+        cut = np.zeros((*x.shape[:-2], blocks * size, x.shape[-1]))
+        cut[..., : x.shape[-2], :] = x
+        cut = cut.reshape(*x.shape[:-2], blocks, size, x.shape[-1])
+        total = np.matmul(own, cut)
+        total[..., :-1, :, :] += np.matmul(np.swapaxes(below, -1, -2), cut[..., 1:, :, :])
+        total[..., 1:, :, :] += np.matmul(below, cut[..., :-1, :, :])
+        return total.reshape(*total.shape[:-3], blocks * size, -1)[..., : x.shape[-2], :]
+
+    def trace_with(self, other: Self) -> Array:
+        """Return the trace of the product with another matrix, of the same width, shape (...)."""
+        both = np.einsum("...rd,...rd->...d", self.lower, other.lower)
+        return 2 * np.sum(both, axis=-1) - both[..., 0]
+
+
+@dataclass(frozen=True, eq=False)
+class Cholesky:
+    """The factor L of a band matrix L L'.
+
+    Parameters
+    ----------
+    lower : Array, shape (..., r, width)
+        At [j, d] what L has in row j + d of column j; NaN in runs that have no factor.
+    """
+
+    lower: Array
+
+    @classmethod
+    def of(cls, C: Band) -> Self:
+        """Return the factor, NaN in runs where C is lost or not positive definite; void rows, without noise, are left.
+
+        Raises
+        ------
+        IdentificationError
+            If C is not positive definite, in all runs that there are.
+        """
+        found = np.full(C.lower.shape, np.nan)
+        known = np.asarray(np.isfinite(C.lower).all(axis=(-2, -1)))
+        refused = 0
+        for run in np.ndindex(known.shape):
+            if known[run]:
+                band = C.lower[run].copy()
+                band[:, 0] += C.void[run]
+                root, failed = lapack.dpbtrf(band.T, lower=1, overwrite_ab=1)
+                refused += failed > 0
+                found[run] = np.nan if failed else root.T
+        if refused and np.isnan(found[..., 0, 0]).all():
+            raise IdentificationError(
+                "the covariance of the rows is singular: there is too little noise to weigh them by; take WLS, or a log of "
+                "an encoder or torque sensor with noise"
+            )
+        return cls(found)
+
+    def whiten(self, x: Array) -> Array:
+        """Return L^-1 x, shape (..., r, m)."""
+        return self._solved(x, "N")
+
+    def unwhiten(self, z: Array) -> Array:
+        """Return L'^-1 z, shape (..., r, m)."""
+        return self._solved(z, "T")
+
+    def inverse(self) -> Band:
+        """Return the inverse of the matrix, as far as that is not zero (Takahashi)."""
+        r, width = self.lower.shape[-2:]
+        own, below = _in_blocks(self.lower, width, rest=1.0)
+        root = np.linalg.inv(own)
+        back = np.swapaxes(root, -1, -2)
+        gain = np.matmul(below, root[..., :-1, :, :])
+        found, beside = np.matmul(back, root), np.zeros_like(own)
+        for k in reversed(range(below.shape[-3])):
+            beside[..., k, :, :] = -np.matmul(found[..., k + 1, :, :], gain[..., k, :, :])
+            found[..., k, :, :] -= np.matmul(np.swapaxes(gain[..., k, :, :], -1, -2), beside[..., k, :, :])
+        whole = np.swapaxes(np.concatenate([found, beside], axis=-2), -1, -2)
+        flat = whole.reshape(*whole.shape[:-2], -1)
+        slanted = np.concatenate([flat, np.zeros((*flat.shape[:-1], width))], axis=-1)
+        return Band(slanted.reshape(*whole.shape[:-3], -1, 2 * width + 1)[..., :r, :width])
+
+    def _solved(self, x: Array, which: str) -> Array:
+        runs = np.broadcast_shapes(x.shape[:-2], self.lower.shape[:-2])
+        every, roots = np.broadcast_to(x, (*runs, *x.shape[-2:])), np.broadcast_to(self.lower, (*runs, *self.lower.shape[-2:]))
+        found = np.empty((*runs, *x.shape[-2:]))
+        for run in np.ndindex(runs):
+            found[run] = lapack.dtbtrs(roots[run].T, every[run], uplo="L", trans=which)[0]
+        return found
+
+
+def _in_blocks(lower: Array, size: int, rest: float = 0.0) -> tuple[Array, Array]:
+    """Return blocks on the diagonal of a lower band matrix, (..., block, b, b), and below them, `rest` beyond its last row."""
+    *runs, r, width = lower.shape
+    count = -(-r // size)
+    # Columns one place longer than they are wide begin, one by one, a row further down.
+    slanted = np.zeros((*runs, count * size, 2 * size + 1))
+    slanted[..., :r, :width] = lower
+    slanted[..., r:, 0] = rest
+    flat = slanted.reshape(*runs, count, -1)[..., : 2 * size * size]
+    whole = np.swapaxes(flat.reshape(*runs, count, size, 2 * size), -1, -2)
+    return whole[..., :size, :], whole[..., :-1, size:, :]
