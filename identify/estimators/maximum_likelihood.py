@@ -75,7 +75,7 @@ class MaximumLikelihood(AbstractEstimator):
             if start.status[run] != Status.OK or not np.isfinite(start.X[run]).all():
                 continue
             try:
-                found = self._found(problem, run, start, NoiseLevels(torque[run], position[run]))
+                found = self._found(problem, run, start, NoiseLevels(torque[run], position[run], problem.repeats[run]))
             except IdentificationError as error:  # one run does not take the others away
                 failures[run] = str(error)
                 continue
@@ -84,7 +84,7 @@ class MaximumLikelihood(AbstractEstimator):
         if failures and not fits:
             raise IdentificationError(next(iter(failures.values())))
         honest = frozen(covariance)
-        levels = NoiseLevels(torque, position)
+        levels = NoiseLevels(torque, position, problem.repeats)
         return Estimate(problem, frozen(X), honest, honest=honest, levels=levels, fits=fits, failures=failures)
 
     def _found(self, problem: Problem, run: tuple[int, ...], start: Estimate, levels: NoiseLevels) -> JointFit:
@@ -93,7 +93,7 @@ class MaximumLikelihood(AbstractEstimator):
         logs = tuple(map(Cells.of, alone))
         rms = np.sqrt(np.mean([np.mean(cells.torque[0] ** 2, axis=-1) for cells in logs], axis=0))
         # A joint that stands says nothing of its torque.
-        own = NoiseLevels(np.where(np.isfinite(levels.torque), levels.torque, rms), levels.position)
+        own = NoiseLevels(np.where(np.isfinite(levels.torque), levels.torque, rms), levels.position, levels.repeats)
         found = JointFit.start(logs, problem.basis, start.X[run], own, find_delay=self.find_delay).solved(EXACT * rms)
         X, sigma = start.X[run], start.sigma[run]
         if found.delay is not None:

@@ -31,7 +31,9 @@ TOLD = 2.0
 """Rows whose residuals count as noise of the torque, whatever their spectrum says: that of a few rows says little."""
 
 
-def noise_of(parts: Sequence[Rows], factors: Factors, fit: Fit, linear: Callable[[Signals], Linearization]) -> NoisyRows:
+def noise_of(
+    parts: Sequence[Rows], factors: Factors, fit: Fit, linear: Callable[[Signals], Linearization], repeats: Array
+) -> NoisyRows:
     """Return the noise of logs as the rows of their explicit model show it, NaN in runs that cannot be solved.
 
     How much of the squared residuals of a joint is noise of the torque, and how much that of positions, their spectrum says: it
@@ -50,6 +52,8 @@ def noise_of(parts: Sequence[Rows], factors: Factors, fit: Fit, linear: Callable
         Their weighted least-squares solution.
     linear : callable
         Returns the linearization of the explicit model about signals.
+    repeats : Array, shape (..., joint)
+        See `NoiseLevels`.
     """
     maps = [rows.maps[0] for rows in parts]
     position = position_noise([each.signals for each in maps])
@@ -63,9 +67,9 @@ def noise_of(parts: Sequence[Rows], factors: Factors, fit: Fit, linear: Callable
     free = np.maximum(np.sum(of_torque * (1 - _leverage(parts, factors, fit)), axis=-1), FREE * whole)
     torque = np.sqrt(np.divide(rest, free, out=np.full(free.shape, np.nan), where=free > 0))
     most = np.minimum(1.0, np.divide(squares, of_position, out=np.ones_like(squares), where=of_position > squares))
-    levels = NoiseLevels(torque, np.where(shown.any(axis=-1, keepdims=True), position * np.sqrt(most), 0.0))
+    levels = NoiseLevels(torque, np.where(shown.any(axis=-1, keepdims=True), position * np.sqrt(most), 0.0), repeats)
     found = NoisyRows(levels, linear)
-    if np.array_equal(levels.position, position):
+    if np.array_equal(levels.effective_position, position):
         found.known.update((each, w.leveled(levels.in_rows) + m) for each, w, m in zip(maps, white, made, strict=True))
     return found
 

@@ -12,6 +12,7 @@ from identify.basis.basis import Basis
 from identify.data.motion_log import MotionLog
 from identify.errors import IdentificationError, LogError
 from identify.estimators.noise import noise_of, position_noise
+from identify.estimators.repeats import repeats
 from identify.estimators.restricted_likelihood import likely_noise
 from identify.estimators.row_weights import RowWeights
 from identify.estimators.simulator import Simulation
@@ -138,6 +139,11 @@ class Problem:
         return self.explicit.position_noise if self.explicit is not self else position_noise(self.signals)
 
     @cached_property
+    def repeats(self) -> Array:
+        """How many times that of independent errors the variance of averages of the positions is, shape (..., joint)."""
+        return self.explicit.repeats if self.explicit is not self else repeats(self.logs, self.position_noise)
+
+    @cached_property
     def factors(self) -> Factors:
         """Triangular factors of the rows as they are, one for each kind."""
         return self._long_factors[0] if self.long else self.rows.factors
@@ -159,14 +165,14 @@ class Problem:
         """The noise of torques and positions, as the explicit model's rows show it, and what it makes of those of any model."""
         if self.explicit is not self:
             return self.explicit.noise
-        return noise_of(self.parts, self._together.factors, self._fit, self.linear)
+        return noise_of(self.parts, self._together.factors, self._fit, self.linear, self.repeats)
 
     @cached_property
     def likely_noise(self) -> NoisyRows:
         """The noise whose levels make the explicit model's rows most likely, from their covariance."""
         if self.explicit is not self:
             return self.explicit.likely_noise
-        start = NoiseLevels(self.noise.levels.torque, self.position_noise)
+        start = NoiseLevels(self.noise.levels.torque, self.position_noise, self.repeats)
         return likely_noise(self.unbiased_parts, start, self.linear)
 
     def linear(self, signals: Signals) -> Linearization:

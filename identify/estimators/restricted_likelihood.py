@@ -69,7 +69,7 @@ def likely_noise(parts: Sequence[Rows], start: NoiseLevels, linear: Callable[[Si
     levels = np.concatenate([begin, np.broadcast_to(start.position, start.torque.shape)], axis=-1)
     squares = likely(units, joined, np.nan_to_num(levels**2), least)
     torque, position = np.split(np.where(np.isfinite(levels), np.sqrt(squares), np.nan), 2, axis=-1)
-    return NoisyRows(NoiseLevels(torque, position), linear)
+    return NoisyRows(NoiseLevels(torque, position, start.repeats), linear)
 
 
 def likely(units: Sequence[Sequence[Band]], joined: Sequence[Array], start: Array, least: Array) -> Array:

@@ -20,6 +20,12 @@ STEP_Q, STEP_QD = 1e-3, 0.05
 SMOOTHING = 0.15
 """Time [s] over which velocities are smoothed, by parabolas, before noise is propagated through them."""
 
+KNOTS = 50.0
+"""Frequency [Hz] at which slopes are computed; between them they are interpolated, since motion has little beyond 10 Hz."""
+
+MOST = 2_000_000
+"""Samples times columns of which slopes are computed at once: columns of many joints take much memory."""
+
 SLIDING = 2 * STEP_QD
 """Least speed [rad/s] at which slopes are taken, so that friction does not change its sign within a difference."""
 
@@ -66,10 +72,21 @@ class Linearization:
         return self._known[key]
 
     def _slopes(self, some: slice) -> Slopes:
-        state = self.signals.state
-        slow = smoothed(state.qd, self.signals.fs)[..., some]
-        conditions = {name: x[..., some] for name, x in state.conditions.items()}
-        return slopes(self.basis, self.X, state.q[..., some], state.qd[..., some], state.qdd[..., some], slow, conditions)
+        state, between = self.signals.state, max(1, int(self.signals.fs / (KNOTS * some.step)))
+        slow, step = smoothed(state.qd, self.signals.fs), between * some.step
+        count = len(range(some.start, state.q.shape[-1], some.step))
+        last = some.start + step * -(-(count - 1) // between)
+        # Beyond the last sample the motion stays as it is: a place to interpolate to.
+        knots = np.minimum(np.arange(some.start, last + 1, step), state.q.shape[-1] - 1)
+        runs = np.prod(state.q.shape[:-2], dtype=int)
+        each = max(1, MOST // (self.basis.n**2 * len(self.basis.names) * max(runs, 1)))
+        pieces = []
+        for part in np.split(knots, range(each, len(knots), each)):
+            conditions = {name: x[..., part] for name, x in state.conditions.items()}
+            motion = (x[..., part] for x in (state.q, state.qd, state.qdd, slow))
+            pieces.append(slopes(self.basis, self.X, *motion, conditions))
+        whole = (np.concatenate(each, axis=-1) for each in zip(*pieces, strict=True))
+        return Slopes(*(_refined(x, between)[..., :count] for x in whole))
 
 
 def slopes(
@@ -126,6 +143,17 @@ def smoothed(x: Array, fs: float) -> Array:
     """Return `x`, shape (..., time), with noise above some 5 Hz taken out, and slow motion left as it is."""
     window = 2 * round(SMOOTHING * fs / 2) + 1
     return slide(x, _parabola(window)) if window > 3 else x
+
+
+def _refined(x: Array, times: int) -> Array:
+    """Return values at `times` as many places, shape (..., time), by cubic polynomials through four neighbours each."""
+    if times == 1:
+        return x
+    ends = np.concatenate([x[..., :1], x, x[..., -1:], x[..., -1:]], axis=-1)
+    s = np.arange(times) / times
+    weights = -s * (1 - s) ** 2 / 2, 1 - (5 - 3 * s) * s**2 / 2, s * (1 + (4 - 3 * s) * s) / 2, -(s**2) * (1 - s) / 2
+    total = sum(w * ends[..., i : i + x.shape[-1], None] for i, w in enumerate(weights))
+    return np.asarray(total).reshape(*x.shape[:-1], -1)
 
 
 @lru_cache(maxsize=16)

@@ -1,6 +1,6 @@
 """How noise of a log's torques and positions reaches its rows."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from math import ceil
@@ -16,7 +16,7 @@ from identify.rows.row_map import RowMap
 from identify.signals.differentiators.central import CentralDifference
 from identify.signals.signals import Signals
 
-RATE = 50.0
+RATE = 200.0
 """Least frequency [Hz] at which noise is propagated: motion, masks and rows have little beyond some 10 Hz."""
 
 ALIASED = 0.01
@@ -36,16 +36,24 @@ class NoiseLevels:
         Of the torques [N m]; NaN of all joints in runs that cannot be solved, and of joints whose rows are all masked.
     position : Array, shape (..., joint)
         Of the positions [rad].
+    repeats : Array, shape (..., joint), optional
+        How many times the variance of averages is what it would be if the positions' noise did not repeat itself.
     """
 
     torque: Array
     position: Array
+    repeats: Array = field(default_factory=lambda: np.ones(()))
 
     @property
     def in_rows(self) -> Array:
         """The noise of the torques as far as rows have it, shape (..., joint): none of joints whose rows are all masked."""
         masked = np.isnan(self.torque) & np.isfinite(self.torque).any(axis=-1, keepdims=True)
         return np.where(masked, 0.0, self.torque)
+
+    @property
+    def effective_position(self) -> Array:
+        """Standard deviation of independent noise of the positions that averages as badly as theirs, shape (..., joint)."""
+        return self.position * np.sqrt(self.repeats)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +81,7 @@ class NoisyRows:
                 return found
         found = torque_paths(rows).covariance(self.levels.in_rows)
         if self.levels.position.any():
-            found = found + position_paths(rows, self.linear(rows.signals)).covariance(self.levels.position)
+            found = found + position_paths(rows, self.linear(rows.signals)).covariance(self.levels.effective_position)
         self.known[rows] = found
         return found
 
@@ -136,19 +144,27 @@ def position_paths(rows: RowMap, linear: Linearization) -> Paths:
         h w B (M s^2 + D s + K) n -> [h'' w B M + h' (2 (w B M)' - w B D) + h ((w B M)'' - (w B D)' + w B K)] n
     """
     windows, grid, some = _thinned(_responses(rows), rows)
-    inertia, damping, stiffness = _through_B(rows, np.stack(linear.at(some)), some)
-    fs = rows.signals.fs / some.step
-    s = partial(CentralDifference(spacing=1 / fs).derivative, fs=fs)
-    return Paths(grid, windows, [stiffness - s(damping - s(inertia)), damping - 2 * s(inertia), inertia], rows.outside)
+    M, D, K = linear.at(some)
+    s = partial(CentralDifference(spacing=some.step / rows.signals.fs).derivative, fs=rows.signals.fs / some.step)
+    M_rate, D_rate = s(M), s(D)
+    M_bend = s(M_rate)
+    inertia, damping, stiffness = (np.zeros((*M.shape[:-3], rows.outside.shape[-2], *M.shape[-2:])) for _ in range(3))
+    for row, joint, u, rate, bend in _multipliers(rows, some):
+        of_M, of_D, of_K = (x[..., joint, :, :] for x in (M, D, K))
+        inertia[..., row, :, :] += u * of_M
+        damping[..., row, :, :] += u * (of_D - 2 * M_rate[..., joint, :, :]) - 2 * rate * of_M
+        of_K = of_K - D_rate[..., joint, :, :] + M_bend[..., joint, :, :]
+        stiffness[..., row, :, :] += u * of_K + rate * (2 * M_rate[..., joint, :, :] - of_D) + bend * of_M
+    return Paths(grid, windows, [stiffness, damping, inertia], rows.outside)
 
 
-def _through_B(rows: RowMap, slopes: Array, some: slice) -> Array:
-    """Return w B times slopes of the joints' torques at some samples, shape (..., kind, joint of the position, time)."""
-    total = np.zeros((*slopes.shape[:-3], rows.outside.shape[-2], *slopes.shape[-2:]))
+def _multipliers(rows: RowMap, some: slice) -> Iterator[tuple[int, int, Array, Array, Array]]:
+    """Yield row, joint, w B at some samples and its derivatives, which are those of all: the edges of a mask are sharp."""
+    s = partial(CentralDifference(spacing=1 / rows.signals.fs).derivative, fs=rows.signals.fs)
     for (row, joint), B in rows.B.items():
-        factor = B if isinstance(B, float) else B[..., None, some]
-        total[..., row, :, :] += factor * slopes[..., joint, :, :]
-    return rows.inside[..., :, None, some] * total
+        u = rows.inside[..., row, :] * B
+        rate = s(u)
+        yield row, joint, *(x[..., None, some] for x in (u, rate, s(rate)))
 
 
 def _thinned(windows: Sequence[Array], rows: RowMap) -> tuple[list[Array], Grid, slice]:

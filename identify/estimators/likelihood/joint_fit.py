@@ -135,7 +135,7 @@ class JointFit:
         lost = (1 - weight) * UNKNOWN * friction_jumps(self.basis, self.X, q[:, 0])[:, None]
         mean = self.levels.torque[:, None] * np.ones_like(weight)
         half = np.hypot(HELD * self.levels.torque[:, None], cells.rough)
-        return Noise(mean + lost, half + lost, self.levels.position, weight == 1, *self._velocities(cells, lost == 0))
+        return Noise(mean + lost, half + lost, self.levels.effective_position, weight == 1, *self._velocities(cells, lost == 0))
 
     def _velocities(self, cells: Cells, known: npt.NDArray[np.bool_]) -> tuple[Array, Array]:
         """Return how far velocities of nodes may be from differences of the positions, and these, shape (node, joint) each.
