@@ -11,6 +11,9 @@ from identify.data.motion_log import MotionLog
 OVERLAP = 0.1
 """Share of a log that must lie over itself for what it says of a lag to count."""
 
+MOST = 2**18
+"""Samples that a log is looked at."""
+
 PRECISE = 1e-12
 """Share of the mean square of the positions below which differences of them are rounding of our own."""
 
@@ -20,9 +23,9 @@ def repeats(logs: Sequence[MotionLog], sigma: Array) -> Array:
 
     A motion that is periodic in whole samples meets the same counts of an encoder again: of m periods the errors are those of
     one, and average out no more than these. With D(lag) the mean square of q(t + lag) - q(t), 2 sigma^2 where errors are
-    independent, but the motion repeats itself, and 0 where errors do, too, their correlation is 1 - D / (2 sigma^2). Every lag at
-    which that is a maximum above zero, beyond those of a motion that has not left its place yet, adds twice the correlation,
-    times the share of the log that lies over itself.
+    independent, but the motion repeats itself, and 0 where errors do, too, their correlation is 1 - D / (2 sigma^2). Every lag
+    at which that is a maximum above zero, beyond those of a motion that has not left its place yet, adds twice the correlation,
+    times the share of the log that lies over itself. A long log goes on as it begins.
 
     Parameters
     ----------
@@ -41,6 +44,8 @@ def repeats(logs: Sequence[MotionLog], sigma: Array) -> Array:
 
 
 def _repeats_of(log: MotionLog, sigma: Array) -> Array:
+    if log.samples > MOST:
+        return 1 + (_repeats_of(log.part(0, MOST), sigma) - 1) * (log.samples / MOST)
     q = np.swapaxes(log.q - np.mean(log.q, axis=-2, keepdims=True), -1, -2)
     N, square = q.shape[-1], np.mean(q**2, axis=-1)
     lags = np.arange(1, round((1 - OVERLAP) * N))

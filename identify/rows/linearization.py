@@ -83,8 +83,8 @@ class Linearization:
         pieces = []
         for part in np.split(knots, range(each, len(knots), each)):
             conditions = {name: x[..., part] for name, x in state.conditions.items()}
-            motion = (x[..., part] for x in (state.q, state.qd, state.qdd, slow))
-            pieces.append(slopes(self.basis, self.X, *motion, conditions))
+            q, qd, qdd = (x[..., part] for x in (state.q, state.qd, state.qdd))
+            pieces.append(slopes(self.basis, self.X, q, qd, qdd, slow[..., part], conditions))
         whole = (np.concatenate(each, axis=-1) for each in zip(*pieces, strict=True))
         return Slopes(*(_refined(x, between)[..., :count] for x in whole))
 

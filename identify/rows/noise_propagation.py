@@ -164,7 +164,7 @@ def _multipliers(rows: RowMap, some: slice) -> Iterator[tuple[int, int, Array, A
     for (row, joint), B in rows.B.items():
         u = rows.inside[..., row, :] * B
         rate = s(u)
-        yield row, joint, *(x[..., None, some] for x in (u, rate, s(rate)))
+        yield row, joint, u[..., None, some], rate[..., None, some], s(rate)[..., None, some]
 
 
 def _thinned(windows: Sequence[Array], rows: RowMap) -> tuple[list[Array], Grid, slice]:
