@@ -33,8 +33,8 @@ def unbiased(rows: Rows, noisier: Rows) -> Rows:
 def with_more_noise(signals: Signals, level: Array) -> Signals:
     """Return the signals of two logs, with more noise in the positions, put in with either sign, and with the same mask.
 
-    Every run meets the same noise. Joints that hardly move get none: an encoder that stands has no noise, and |qd|, of Coulomb
-    friction, no square.
+    Every run meets the same noise; which joint gets which part of it depends on how far it moves, not on the order of joints.
+    Joints that hardly move get none: an encoder that stands has no noise, and |qd|, of Coulomb friction, no square.
 
     Parameters
     ----------
@@ -45,6 +45,8 @@ def with_more_noise(signals: Signals, level: Array) -> Signals:
     """
     log, rng = signals.log, np.random.default_rng(0)
     moves = np.abs(smoothed(signals.state.qd, log.fs)) > SURE * signals.gain * level[..., None]
-    noise = np.swapaxes(moves * level[..., None], -1, -2) * rng.standard_normal(log.q.shape[-2:])
+    drawn = np.broadcast_to(rng.standard_normal(log.q.shape[-2:]), log.q.shape)
+    far = np.argsort(np.argsort(np.std(log.q, axis=-2, keepdims=True)))
+    noise = np.swapaxes(moves * level[..., None], -1, -2) * np.take_along_axis(drawn, far, axis=-1)
     q = np.stack([log.q + noise, log.q - noise])
     return replace(signals, log=replace(log, q=q, tau=np.broadcast_to(log.tau, q.shape)), weights_of=signals)

@@ -11,7 +11,7 @@ import numpy as np
 from identify.arrays import Array
 from identify.rows.banded import BandedCovariance
 from identify.rows.grid import Grid
-from identify.rows.linearization import Linearization
+from identify.rows.linearization import Linearization, smoothed
 from identify.rows.row_map import RowMap
 from identify.signals.differentiators.central import CentralDifference
 from identify.signals.signals import Signals
@@ -159,12 +159,22 @@ def position_paths(rows: RowMap, linear: Linearization) -> Paths:
 
 
 def _multipliers(rows: RowMap, some: slice) -> Iterator[tuple[int, int, Array, Array, Array]]:
-    """Yield row, joint, w B at some samples and its derivatives, which are those of all: the edges of a mask are sharp."""
-    s = partial(CentralDifference(spacing=1 / rows.signals.fs).derivative, fs=rows.signals.fs)
+    """Yield row, joint, w B at some samples and its two derivatives, by the product rule.
+
+    Those of w are made of all samples, since the edges of a mask are sharp. B may be a measured velocity: it is smoothed, as in
+    the linearization, or the derivatives would be those of its own noise.
+    """
+    fs = rows.signals.fs
+    s = partial(CentralDifference(spacing=1 / fs).derivative, fs=fs)
+    weights = [rows.inside]
+    for _ in range(2):
+        weights.append(s(weights[-1]))
     for (row, joint), B in rows.B.items():
-        u = rows.inside[..., row, :] * B
-        rate = s(u)
-        yield row, joint, u[..., None, some], rate[..., None, some], s(rate)[..., None, some]
+        w, w1, w2 = (x[..., row, None, some] for x in weights)
+        slow = [] if isinstance(B, float) else [smoothed(B, fs)]
+        factors = [x[..., None, some] for x in (*slow, *map(s, slow), *map(s, map(s, slow)))]
+        B0, B1, B2 = factors or (B, 0.0, 0.0)
+        yield row, joint, w * B0, w1 * B0 + w * B1, w2 * B0 + 2 * w1 * B1 + w * B2
 
 
 def _thinned(windows: Sequence[Array], rows: RowMap) -> tuple[list[Array], Grid, slice]:
