@@ -51,12 +51,12 @@ from identify.estimators.identification import attempt_each as attempt_each
 from identify.estimators.identification import estimate as estimate
 from identify.estimators.identification import identify as identify
 from identify.estimators.identification import identify_each as identify_each
+from identify.estimators.least_squares.recursive_least_squares import Recursive as Recursive
+from identify.estimators.least_squares.recursive_least_squares import recursive_least_squares as recursive_least_squares
 from identify.estimators.likelihood.joint_fit import JointFit as JointFit
 from identify.estimators.likelihood.smoothed_motion import SmoothedMotion as SmoothedMotion
 from identify.estimators.likelihood.smoothed_motion import smoothed_log as smoothed_log
 from identify.estimators.likelihood.smoothed_motion import smoothed_motion as smoothed_motion
-from identify.estimators.recursive_least_squares import Recursive as Recursive
-from identify.estimators.recursive_least_squares import recursive_least_squares as recursive_least_squares
 from identify.estimators.simulator import AbstractLoop as AbstractLoop
 from identify.estimators.simulator import AbstractPlant as AbstractPlant
 from identify.estimators.simulator import Simulated as Simulated
@@ -83,6 +83,7 @@ from identify.models import Equations as Equations
 from identify.models import ExplicitModel as ExplicitModel
 from identify.models import ImplicitModel as ImplicitModel
 from identify.models import PowerModel as PowerModel
+from identify.noise.propagation import NoiseLevels as NoiseLevels
 from identify.parameters.base_parameters import BaseParameters as BaseParameters
 from identify.parameters.consistent import Consistent as Consistent
 from identify.parameters.consistent import consistent_parameters as consistent_parameters
@@ -92,7 +93,6 @@ from identify.rows.chains import CHAINS as CHAINS
 from identify.rows.chains import idbench_chain as idbench_chain
 from identify.rows.chains import paper_chain as paper_chain
 from identify.rows.factors import Status as Status
-from identify.rows.noise_propagation import NoiseLevels as NoiseLevels
 from identify.rows.operators import OPERATORS as OPERATORS
 from identify.rows.operators import AbstractOperator as AbstractOperator
 from identify.rows.operators import FirLowPass as FirLowPass

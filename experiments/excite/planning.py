@@ -9,8 +9,8 @@ from experiments.errors import ExperimentError
 from identify import Array, FirLowPass, NoiseLevels
 from identify.design.information import Information
 from identify.design.plan import Plan
+from identify.noise.linearization import slopes
 from identify.parameters.base_parameters import random_states
-from identify.rows.linearization import slopes
 
 if TYPE_CHECKING:
     from experiments.excite.design import Design

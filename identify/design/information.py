@@ -10,8 +10,8 @@ import scipy
 from identify.arrays import HELD, Array
 from identify.basis.basis import Basis
 from identify.basis.parameter import FRICTION
-from identify.rows.linearization import observation
-from identify.rows.noise_propagation import NoiseLevels
+from identify.noise.linearization import observation
+from identify.noise.propagation import NoiseLevels
 from identify.signals.state import State
 
 SLOW, TURNING = 0.1, 0.06

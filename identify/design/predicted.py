@@ -6,10 +6,10 @@ from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.data.motion_log import MotionLog
 from identify.models.explicit import ExplicitModel
+from identify.noise.linearization import Linearization
+from identify.noise.propagation import NoiseLevels, NoisyRows
+from identify.noise.whitening import Whitening, kept_rows
 from identify.rows.chain import Chain
-from identify.rows.linearization import Linearization
-from identify.rows.noise_propagation import NoiseLevels, NoisyRows
-from identify.rows.whitening import Whitening, kept_rows
 from identify.signals.signals import Signals
 
 

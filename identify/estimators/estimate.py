@@ -13,8 +13,8 @@ from identify.errors import PluginError
 from identify.estimators.likelihood.joint_fit import JointFit
 from identify.estimators.problem import Problem
 from identify.estimators.propagated import Influence, bias_covariance, excess, noise_covariance
+from identify.noise.propagation import NoiseLevels
 from identify.rows.factors import Factor, Fit, Status
-from identify.rows.noise_propagation import NoiseLevels
 from identify.rows.rows import Rows
 
 

@@ -11,19 +11,19 @@ from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.data.motion_log import MotionLog
 from identify.errors import IdentificationError, LogError
-from identify.estimators.noise import noise_of, position_noise
-from identify.estimators.repeats import repeats
-from identify.estimators.restricted_likelihood import likely_noise
-from identify.estimators.row_weights import RowWeights
 from identify.estimators.simulator import Simulation
-from identify.estimators.unbiased import unbiased, with_more_noise
 from identify.models.explicit import ExplicitModel
 from identify.models.model import AbstractModel
+from identify.noise.linearization import Linearization
+from identify.noise.propagation import NoiseLevels, NoisyRows
+from identify.noise.repeats import repeats
+from identify.noise.restricted_likelihood import likely_noise
+from identify.noise.row_weights import RowWeights
+from identify.noise.spectral_levels import noise_of, position_noise
+from identify.noise.unbiased import unbiased, with_more_noise
 from identify.rows.chain import Chain
 from identify.rows.factors import Factors, Fit
-from identify.rows.linearization import Linearization
 from identify.rows.long_logs import is_long, piece_of
-from identify.rows.noise_propagation import NoiseLevels, NoisyRows
 from identify.rows.rows import Rows
 from identify.signals.signals import Signals
 

@@ -6,8 +6,8 @@ from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.estimators.likelihood.cells import GAUSS, hermite
 from identify.estimators.likelihood.joint_fit import MASK, UNKNOWN
-from identify.rows.linearization import friction_jumps, observation, slopes
-from identify.rows.noise_propagation import NoiseLevels
+from identify.noise.linearization import friction_jumps, observation, slopes
+from identify.noise.propagation import NoiseLevels
 
 TERMS = 8
 """Terms of the exponential series: slopes times a period are well below 1."""

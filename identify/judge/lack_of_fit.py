@@ -9,7 +9,7 @@ import scipy
 
 from identify.arrays import Array
 from identify.errors import IdentificationError
-from identify.estimators.generalized_least_squares import Whitened
+from identify.estimators.least_squares.generalized_least_squares import Whitened
 from identify.estimators.problem import Problem
 from identify.models.explicit import ExplicitModel
 from identify.rows.rows import Rows

@@ -9,7 +9,7 @@ import scipy
 from identify.arrays import Array
 from identify.estimators.estimate import Estimate
 from identify.estimators.propagated import noise_covariance
-from identify.estimators.row_products import Kinds, with_weights
+from identify.estimators.simulating.row_products import Kinds, with_weights
 from identify.rows.rows import Rows
 
 TELLING = 1e-6

@@ -5,7 +5,7 @@ import scipy
 
 from identify.arrays import Array
 from identify.estimators.problem import Problem
-from identify.rows.noise_propagation import NoiseLevels
+from identify.noise.propagation import NoiseLevels
 
 EVERY = 50.0
 """Frequency of the instants over which the robot's slopes are averaged [Hz]."""

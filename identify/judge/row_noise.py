@@ -5,8 +5,8 @@ import scipy
 
 from identify.arrays import Array
 from identify.data.motion_log import MotionLog
-from identify.estimators.two_levels import two_levels
 from identify.judge.diagnosis import Instants
+from identify.noise.two_levels import two_levels
 from identify.rows.chain import Chain
 from identify.signals.signals import Signals
 

@@ -16,7 +16,7 @@ from identify.judge.diagnosis import instants
 from identify.judge.judged_rows import as_judged, shares
 from identify.judge.row_noise import row_noise
 from identify.models.explicit import ExplicitModel
-from identify.rows.noise_propagation import torque_paths
+from identify.noise.propagation import torque_paths
 from identify.rows.operators import AbstractOperator
 from identify.rows.rows import Rows
 

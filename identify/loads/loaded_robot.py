@@ -14,8 +14,8 @@ from identify.data.motion_log import MotionLog
 from identify.errors import LogError, SettingError
 from identify.estimators.estimate import Estimate
 from identify.estimators.estimator import AbstractEstimator
-from identify.estimators.generalized_least_squares import GeneralizedLeastSquares
 from identify.estimators.identification import estimate
+from identify.estimators.least_squares.generalized_least_squares import GeneralizedLeastSquares
 from identify.estimators.problem import Problem
 from identify.estimators.settle import settled
 from identify.models.explicit import ExplicitModel

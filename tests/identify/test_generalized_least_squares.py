@@ -19,12 +19,12 @@ from identify import (
     identify_each,
     scara,
 )
-from identify.estimators.restricted_likelihood import likely_noise
-from identify.estimators.unbiased import unbiased, with_more_noise
+from identify.noise.band_matrix import Band, Cholesky
+from identify.noise.propagation import NoiseLevels, NoisyRows
+from identify.noise.restricted_likelihood import likely_noise
+from identify.noise.unbiased import unbiased, with_more_noise
+from identify.noise.whitening import Whitening, kept_rows
 from identify.rows import long_logs
-from identify.rows.band_matrix import Band, Cholesky
-from identify.rows.noise_propagation import NoiseLevels, NoisyRows
-from identify.rows.whitening import Whitening, kept_rows
 
 EVERY = {name: MODELS.create(name) for name in MODELS.builtin}
 GLS = GeneralizedLeastSquares()

@@ -19,7 +19,7 @@ from identify import (
     smoothed_log,
     smoothed_motion,
 )
-from identify.estimators import maximum_likelihood
+from identify.estimators.likelihood import maximum_likelihood
 from identify.estimators.likelihood.cells import GAUSS, Cells, hermite
 from identify.estimators.likelihood.normal_equations import Noise, NormalEquations
 from identify.estimators.problem import Problem

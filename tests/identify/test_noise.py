@@ -25,8 +25,8 @@ from identify import (
     scara,
 )
 from identify.estimators.propagated import noise_covariance
-from identify.rows.linearization import Linearization
-from identify.rows.noise_propagation import position_paths, torque_paths
+from identify.noise.linearization import Linearization
+from identify.noise.propagation import position_paths, torque_paths
 
 TRUTH = (3.5, 0.05, 0.5, 0.06, 0.12, 0.005, 0.01, 0.1)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identify.estimators.row_weights import LEAST, MOST, floor_of, reciprocal_root, rectified
+from identify.noise.row_weights import LEAST, MOST, floor_of, reciprocal_root, rectified
 
 ALL = np.ones((200, 400), dtype=bool)
 

@@ -25,7 +25,7 @@ def test_total_least_squares_refuses_where_noise_hides_the_answer():
 
 def test_total_least_squares_is_that_of_the_textbook(rng):
     """Van Huffel and Vandewalle: X of the last right singular vector, where all columns and Y have the same noise."""
-    from identify.estimators.total_least_squares import _solved
+    from identify.estimators.least_squares.total_least_squares import _solved
 
     A = rng.standard_normal((200, 4))
     R, S = np.linalg.qr(A, mode="r"), 200 * 0.01 * np.eye(4)

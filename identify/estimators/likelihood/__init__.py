@@ -1,1 +1,1 @@
-"""Motion and parameters together: maximum likelihood."""
+"""Estimators of motion and parameters together."""

@@ -12,8 +12,8 @@ from identify.basis.basis import Basis
 from identify.errors import IdentificationError
 from identify.estimators.likelihood.cells import HELD, Cells
 from identify.estimators.likelihood.normal_equations import Noise, NormalEquations, Solved
-from identify.rows.linearization import friction_jumps, smoothed
-from identify.rows.noise_propagation import NoiseLevels
+from identify.noise.linearization import friction_jumps, smoothed
+from identify.noise.propagation import NoiseLevels
 from identify.signals.masks.reversal import ReversalMask
 
 ROUNDS, STEPS = 6, 6

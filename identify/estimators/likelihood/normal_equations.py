@@ -11,7 +11,7 @@ from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.errors import IdentificationError
 from identify.estimators.likelihood.cells import GAUSS, Cells, hermite
-from identify.rows.linearization import observation, slopes
+from identify.noise.linearization import observation, slopes
 
 Solved = tuple[Array, Array, Array]
 """L^-1 A_zX, L^-1 b_nodes, and the factor L of A_zz in bands."""

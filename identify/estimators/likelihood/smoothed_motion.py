@@ -12,7 +12,7 @@ from identify.errors import IdentificationError
 from identify.estimators.likelihood.cells import hermite
 from identify.estimators.likelihood.joint_fit import JointFit
 from identify.estimators.likelihood.normal_equations import NormalEquations
-from identify.rows.band_matrix import Band, Cholesky
+from identify.noise.band_matrix import Band, Cholesky
 
 
 class SmoothedMotion(NamedTuple):

@@ -7,10 +7,10 @@ from identify.arrays import Array
 from identify.estimators.estimate import Estimate
 from identify.estimators.estimator import Need
 from identify.estimators.problem import Problem
-from identify.estimators.residual_scatter import scatter
-from identify.estimators.row_products import Kinds, Solved, solve_with
-from identify.estimators.simulated_rounds import AbstractSimulating, rates
-from identify.estimators.steps import SecantSteps
+from identify.estimators.simulating.residual_scatter import scatter
+from identify.estimators.simulating.row_products import Kinds, Solved, solve_with
+from identify.estimators.simulating.simulated_rounds import AbstractSimulating, rates
+from identify.estimators.simulating.steps import SecantSteps
 
 
 @final

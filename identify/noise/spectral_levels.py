@@ -6,11 +6,11 @@ from math import comb
 import numpy as np
 
 from identify.arrays import Array
-from identify.estimators.two_levels import two_levels
-from identify.rows.banded import BandedCovariance
+from identify.noise.covariance import BandedCovariance
+from identify.noise.linearization import Linearization
+from identify.noise.propagation import NoiseLevels, NoisyRows, position_paths, torque_paths
+from identify.noise.two_levels import two_levels
 from identify.rows.factors import Factors, Fit, Status
-from identify.rows.linearization import Linearization
-from identify.rows.noise_propagation import NoiseLevels, NoisyRows, position_paths, torque_paths
 from identify.rows.rows import Rows
 from identify.signals.signals import Signals
 from identify.signals.stencils import slide

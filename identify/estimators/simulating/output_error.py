@@ -12,8 +12,8 @@ from identify.errors import IdentificationError, require_positive
 from identify.estimators.estimate import Estimate
 from identify.estimators.estimator import Need
 from identify.estimators.problem import Problem
-from identify.estimators.row_products import Solved
-from identify.estimators.simulated_rounds import AbstractSimulating, Rounds, require_explicit, small_steps
+from identify.estimators.simulating.row_products import Solved
+from identify.estimators.simulating.simulated_rounds import AbstractSimulating, Rounds, require_explicit, small_steps
 from identify.estimators.simulator import AbstractPlant
 
 STEP_Q, STEP_QD = 1e-5, 1e-4

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
 from identify.arrays import Array
-from identify.rows.band_matrix import Band
+from identify.noise.band_matrix import Band
 from identify.rows.grid import Grid, windowed
 
 

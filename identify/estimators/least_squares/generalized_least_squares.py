@@ -11,12 +11,12 @@ from identify.estimators.estimate import Estimate
 from identify.estimators.estimator import AbstractEstimator, Need
 from identify.estimators.problem import Problem
 from identify.estimators.propagated import bias_covariance
-from identify.estimators.restricted_likelihood import alike, likely
-from identify.rows.banded import BandedCovariance
+from identify.noise.covariance import BandedCovariance
+from identify.noise.restricted_likelihood import alike, likely
+from identify.noise.whitening import Whitening, kept_rows
 from identify.rows.factors import Factor, Status, triangular
 from identify.rows.row_map import RowMap
 from identify.rows.rows import Rows
-from identify.rows.whitening import Whitening, kept_rows
 
 LEAST = 1e-4
 """Share of the mean variance of rows that each part of it is at least."""

@@ -7,9 +7,9 @@ from identify.arrays import Array
 from identify.estimators.estimate import Estimate
 from identify.estimators.estimator import Need
 from identify.estimators.problem import Problem
-from identify.estimators.row_products import Kinds, Solved, solve_with
-from identify.estimators.simulated_rounds import AbstractSimulating
-from identify.estimators.steps import SecantSteps
+from identify.estimators.simulating.row_products import Kinds, Solved, solve_with
+from identify.estimators.simulating.simulated_rounds import AbstractSimulating
+from identify.estimators.simulating.steps import SecantSteps
 
 
 @final

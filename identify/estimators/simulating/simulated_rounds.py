@@ -14,9 +14,9 @@ from identify.estimators.estimate import Estimate
 from identify.estimators.estimator import AbstractEstimator
 from identify.estimators.problem import Problem
 from identify.estimators.propagated import Influence
-from identify.estimators.row_products import Solved
+from identify.estimators.simulating.row_products import Solved
+from identify.estimators.simulating.steps import Steps
 from identify.estimators.simulator import AbstractLoop, Simulated
-from identify.estimators.steps import Steps
 from identify.models.explicit import ExplicitModel
 from identify.telling import stage
 

@@ -10,7 +10,7 @@ from identify.errors import IdentificationError, require_positive
 from identify.estimators.estimate import Estimate
 from identify.estimators.estimator import AbstractEstimator, Need
 from identify.estimators.problem import Problem
-from identify.estimators.row_products import Kinds, solve_with, with_weights
+from identify.estimators.simulating.row_products import Kinds, solve_with, with_weights
 from identify.rows.factors import Factor, Status
 
 

@@ -14,11 +14,11 @@ from identify.estimators.estimator import AbstractEstimator, Need
 from identify.estimators.likelihood.cells import Cells
 from identify.estimators.likelihood.joint_fit import MASK, UNKNOWN
 from identify.estimators.problem import Problem
-from identify.estimators.simulated_rounds import small_steps, starting_point
+from identify.estimators.simulating.simulated_rounds import small_steps, starting_point
 from identify.models.explicit import ExplicitModel
+from identify.noise.linearization import friction_jumps
+from identify.noise.propagation import NoiseLevels
 from identify.rows.factors import Status
-from identify.rows.linearization import friction_jumps
-from identify.rows.noise_propagation import NoiseLevels
 from identify.signals.state import State
 
 ALPHA, BETA = 0.1, 2.0

@@ -10,7 +10,7 @@ from identify.errors import IdentificationError, require_whole
 from identify.estimators.estimate import Estimate
 from identify.estimators.estimator import AbstractEstimator, Need
 from identify.estimators.problem import Problem
-from identify.estimators.row_products import Kinds, solve_with
+from identify.estimators.simulating.row_products import Kinds, solve_with
 from identify.rows.factors import Status, triangular
 
 EXACT = 1e-9

@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from identify.arrays import Array
-from identify.rows.band_matrix import Cholesky
-from identify.rows.banded import BandedCovariance
-from identify.rows.noise_propagation import torque_paths
+from identify.noise.band_matrix import Cholesky
+from identify.noise.covariance import BandedCovariance
+from identify.noise.propagation import torque_paths
 from identify.rows.row_map import RowMap
 
 SEEN = 0.05

@@ -13,8 +13,8 @@ from identify.errors import require_positive, require_whole
 from identify.estimators.estimate import Estimate
 from identify.estimators.estimator import AbstractEstimator, Need
 from identify.estimators.problem import Problem
-from identify.estimators.restricted_likelihood import EXACT
-from identify.estimators.row_products import Kinds, Solved, solve_with, with_weights
+from identify.estimators.simulating.row_products import Kinds, Solved, solve_with, with_weights
+from identify.noise.restricted_likelihood import EXACT
 from identify.signals.wild_samples import without_wild_samples
 
 SIGMA = 1.4826

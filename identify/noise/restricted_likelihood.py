@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from identify.arrays import Array
-from identify.rows.band_matrix import Band, Cholesky
+from identify.noise.band_matrix import Band, Cholesky
+from identify.noise.linearization import Linearization
+from identify.noise.propagation import NoiseLevels, NoisyRows, position_paths, torque_paths
+from identify.noise.whitening import kept_rows
 from identify.rows.factors import Factor, triangular
-from identify.rows.linearization import Linearization
-from identify.rows.noise_propagation import NoiseLevels, NoisyRows, position_paths, torque_paths
 from identify.rows.rows import Rows
-from identify.rows.whitening import kept_rows
 from identify.signals.signals import Signals
 
 ROUNDS, SETTLED = 20, 0.01

@@ -9,11 +9,11 @@ from identify.arrays import Array
 from identify.data.motion_log import MotionLog
 from identify.estimators.estimate import Estimate
 from identify.estimators.estimator import Need
-from identify.estimators.gauss_newton import gauss_newton
 from identify.estimators.problem import Problem
-from identify.estimators.residual_scatter import scatter
-from identify.estimators.row_products import Kinds
-from identify.estimators.simulated_rounds import AbstractSimulating, require_explicit
+from identify.estimators.simulating.gauss_newton import gauss_newton
+from identify.estimators.simulating.residual_scatter import scatter
+from identify.estimators.simulating.row_products import Kinds
+from identify.estimators.simulating.simulated_rounds import AbstractSimulating, require_explicit
 
 
 @final

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from identify.arrays import Array
-from identify.estimators.row_products import Kinds, Solved
+from identify.estimators.simulating.row_products import Kinds, Solved
 
 MEMORY = 1.0
 """Time [s] after which residuals are taken for independent: loops and filters remember less."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from identify.arrays import Array
-from identify.rows.linearization import smoothed
+from identify.noise.linearization import smoothed
 from identify.rows.rows import Rows
 from identify.signals.signals import Signals
 

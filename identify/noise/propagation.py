@@ -9,9 +9,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from identify.arrays import Array
-from identify.rows.banded import BandedCovariance
+from identify.noise.covariance import BandedCovariance
+from identify.noise.linearization import Linearization, smoothed
 from identify.rows.grid import Grid
-from identify.rows.linearization import Linearization, smoothed
 from identify.rows.row_map import RowMap
 from identify.signals.differentiators.central import CentralDifference
 from identify.signals.signals import Signals

@@ -10,11 +10,11 @@ import numpy.typing as npt
 import scipy
 
 from identify.arrays import Array, combined
-from identify.estimators.two_levels import two_levels
 from identify.models.model import AbstractModel
+from identify.noise.linearization import smoothed
+from identify.noise.propagation import NoisyRows
+from identify.noise.two_levels import two_levels
 from identify.rows.factors import Factors
-from identify.rows.linearization import smoothed
-from identify.rows.noise_propagation import NoisyRows
 from identify.rows.row_map import RowMap
 from identify.rows.rows import Rows
 

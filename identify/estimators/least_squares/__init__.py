@@ -1,0 +1,1 @@
+"""Estimators that solve the rows Y = W X + rho."""
