@@ -33,6 +33,15 @@ def test_the_truth_foretells_ideal_data(log, truth):
     assert np.isfinite(found.standing).all()
 
 
+def test_a_log_that_begins_and_ends_at_full_speed_is_judged_as_well(log, truth):
+    """Its first and last rows lie as far from its ends as the chain looks, and ask for nothing beyond them."""
+    speed = np.abs(np.diff(log.q, axis=0)) * log.fs
+    fast = np.flatnonzero((speed > 0.5 * speed.max(axis=0)).any(axis=1))
+    begin = fast[len(fast) // 4]
+    found = judged(log.part(begin, fast[fast > begin + 1000][0]), truth)
+    assert (found.percent < 1e-3).all()
+
+
 def test_a_gain_error_is_told_in_percent(log, truth):
     found = judged(log, 1.05 * truth)
     np.testing.assert_allclose(found.percent, 5, rtol=1e-3)
