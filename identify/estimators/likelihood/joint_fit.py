@@ -12,11 +12,12 @@ from identify.basis.basis import Basis
 from identify.errors import IdentificationError
 from identify.estimators.likelihood.cells import HELD, Cells
 from identify.estimators.likelihood.normal_equations import Noise, NormalEquations, Solved
+from identify.estimators.likelihood.reversals import Turns, stretches
 from identify.noise.linearization import friction_jumps, smoothed
 from identify.noise.propagation import NoiseLevels
 from identify.signals.masks.reversal import ReversalMask
 
-ROUNDS, STEPS = 6, 6
+ROUNDS, STEPS = 10, 6
 """Rounds at most, in each of which mask and levels are frozen, and Gauss-Newton steps of each."""
 
 SETTLED, RESTLESS = 0.02, 3.0
@@ -26,6 +27,10 @@ with coarse encoders masks may go to and fro, for a sigma or so."""
 NEXT = 0.5
 """Move of a step, in sigma, after which levels come next: steps converge quadratically, one more would move a thousandth."""
 
+FAR = 0.5
+"""What is found over what is expected, below which the square of a level falls by the square of that: levels that are too high
+are explained by motions that follow the noise, and would fall slowly."""
+
 PROBES = 4
 """Random signs by which the leverage of the torques is estimated."""
 
@@ -34,6 +39,12 @@ CHECK = "check order and delay of the torques, and whether they were filtered, o
 
 UNKNOWN = 5.0
 """Noise of the torque where friction's sign is not known, over the jump of friction there."""
+
+TURNING = 0.3
+"""Half the difference of two torques near a reversal, over the level of their mean there."""
+
+START = 0.1
+"""Level of the torques near reversals to begin with, over the jump of friction there."""
 
 NEAR = 5.0
 """How far velocities may then be from differences of the positions, over what noise and accelerations make of these."""
@@ -60,6 +71,8 @@ class JointFit:
         Noise of torques and positions.
     delay : float, optional
         Change of the delays that the logs state [s], if it is unknown.
+    near : Array, shape (joint,), optional
+        Levels of the torques near reversals [N m], if these are used.
     covariance : Array, shape (p, p), or (p + 1, p + 1)
         Of the error of X, and of the delay if it is unknown.
     """
@@ -70,6 +83,7 @@ class JointFit:
     motions: tuple[Array, ...]
     levels: NoiseLevels
     delay: float | None = None
+    near: Array | None = None
     covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     @classmethod
@@ -99,7 +113,7 @@ class JointFit:
                 now, moved = now._step(noises)
                 if moved < NEXT:
                     break
-            now = replace(now, levels=now._levels(noises, floor))
+            now = now._levels(noises, floor)
             change = _sigmas(now.unknowns - before.unknowns, now.covariance)
             if change < SETTLED:
                 break
@@ -107,6 +121,11 @@ class JointFit:
             raise IdentificationError(f"motion and parameters together do not settle, they move by {change:.2g} sigma: {CHECK}")
         same = np.allclose(now.levels.torque, before.levels.torque, rtol=SETTLED)
         return now if same else replace(now, covariance=now._covariance())
+
+    def with_reversals(self) -> "JointFit":
+        """Return this fit as the start of one that takes friction through reversals for what the model says."""
+        jump = friction_jumps(self.basis, self.X, self.motions[0][0, 0])
+        return replace(self, near=np.maximum(self.levels.torque, START * jump / 2))
 
     def _step(self, noises: list[Noise]) -> tuple["JointFit", float]:
         """Return the fit after a Gauss-Newton step, and how far the parameters moved [sigma]."""
@@ -128,14 +147,33 @@ class JointFit:
         return replace(self, logs=logs, delay=(self.delay or 0.0) + change)
 
     def noise(self, k: int) -> Noise:
-        """Return the standard deviations of a log's cells: torques count for little where friction's sign is not known."""
+        """Return the standard deviations of a log's cells.
+
+        Torques count for little where friction's sign is not known; where a joint reverses without a stop they have a level of
+        their own, if there are any.
+        """
         cells, z = self.logs[k], self.motions[k]
         q, qd, _ = cells.motion(z, 0.5)
-        weight = MASK.weight(smoothed(qd, cells.log.fs), cells.log.fs)
-        lost = (1 - weight) * UNKNOWN * friction_jumps(self.basis, self.X, q[:, 0])[:, None]
-        mean = self.levels.torque[:, None] * np.ones_like(weight)
-        half = np.hypot(HELD * self.levels.torque[:, None], cells.rough)
-        return Noise(mean + lost, half + lost, self.levels.effective_position, weight == 1, *self._velocities(cells, lost == 0))
+        slow = smoothed(qd, cells.log.fs)
+        weight = MASK.weight(slow, cells.log.fs)
+        turns = self._turns(cells, z, slow, weight < 1)
+        lost = np.where(turns.near, 0.0, (1 - weight) * UNKNOWN * friction_jumps(self.basis, self.X, q[:, 0])[:, None])
+        mean = np.where(turns.near, self._near[:, None], self.levels.torque[:, None])
+        half = np.hypot(np.where(turns.near, TURNING, HELD) * mean, cells.rough)
+        known = (weight == 1) & ~turns.near
+        off = self._velocities(cells, lost == 0)
+        return Noise(mean + lost, half + lost, self.levels.effective_position, known, *off, turns)
+
+    @property
+    def _near(self) -> Array:
+        """Levels of the torques near reversals, shape (joint,)."""
+        return self.levels.torque if self.near is None else self.near
+
+    def _turns(self, cells: Cells, z: Array, qd: Array, slow: npt.NDArray[np.bool_]) -> Turns:
+        """Return what is known of slow cells, shape (joint, cell)."""
+        if self.near is None:
+            return Turns.none((self.basis.n, cells.count))
+        return Turns.of(cells, self.basis, self.X, z, stretches(qd, slow), self.near)
 
     def _velocities(self, cells: Cells, known: npt.NDArray[np.bool_]) -> tuple[Array, Array]:
         """Return how far velocities of nodes may be from differences of the positions, and these, shape (node, joint) each.
@@ -149,16 +187,17 @@ class JointFit:
         beside = np.pad(~known, ((0, 0), (0, 1))) | np.pad(~known, ((0, 0), (1, 0)))
         return np.where(beside, off[:, None], np.inf).T, _at_nodes(cells, rate)
 
-    def _levels(self, noises: list[Noise], floor: Array) -> NoiseLevels:
-        """Return the levels with those of the torques from what is left over, and the share of it that the unknowns take."""
+    def _levels(self, noises: list[Noise], floor: Array) -> "JointFit":
+        """Return the fit with levels of the torques from what is left over, and the share of it that the unknowns take."""
         rng, n = np.random.default_rng(0), self.basis.n
         signs = [rng.choice([-1.0, 1.0], (PROBES, n, cells.count)) for cells in self.logs]
         systems, parts, covariance, b = self._reduced(noises, signs)
         taken = sum(np.sum(y[:, 1:] ** 2, axis=0) for _, y, _ in parts) + np.sum(b[:, 1:] * (covariance @ b[:, 1:]), axis=0)
-        known = sum(np.count_nonzero(noise.known, axis=-1) for noise in noises)
-        free = np.maximum(known - np.asarray(taken).reshape(n, -1).mean(axis=1), 1e-3 * known)
-        squares = np.divide(sum(system.squares for system in systems), free, out=np.ones(n), where=known > 0)
-        return replace(self.levels, torque=np.maximum(self.levels.torque * np.sqrt(squares), floor))
+        cells = sum(np.stack([np.count_nonzero(x, axis=-1) for x in (noise.known, noise.turns.near)]) for noise in noises)
+        free = np.maximum(cells - np.asarray(taken).reshape(2, n, -1).mean(axis=-1), 1e-3 * cells)
+        squares = np.divide(sum(system.squares for system in systems), free, out=np.ones((2, n)), where=cells > 0)
+        torque, near = (np.maximum(x * np.where(y < FAR, y, np.sqrt(y)), floor) for x, y in zip((self.levels.torque, self._near), squares, strict=True))
+        return replace(self, levels=replace(self.levels, torque=torque), near=None if self.near is None else near)
 
     def _covariance(self) -> Array:
         """Return the covariance of the unknowns with the levels as they are."""

@@ -53,6 +53,7 @@ class MaximumLikelihood(AbstractEstimator):
     filtered: ClassVar[bool] = False
 
     find_delay: bool = False
+    reversals: bool = False
 
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate of every run.
@@ -95,6 +96,8 @@ class MaximumLikelihood(AbstractEstimator):
         # A joint that stands says nothing of its torque.
         own = NoiseLevels(np.where(np.isfinite(levels.torque), levels.torque, rms), levels.position, levels.repeats)
         found = JointFit.start(logs, problem.basis, start.X[run], own, find_delay=self.find_delay).solved(EXACT * rms)
+        if self.reversals:
+            found = found.with_reversals().solved(EXACT * rms)
         X, sigma = start.X[run], start.sigma[run]
         if found.delay is not None:
             later = [replace(log, torque=replace(log.torque, delay=log.torque.delay + found.delay)) for log in alone]

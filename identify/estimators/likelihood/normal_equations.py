@@ -11,6 +11,7 @@ from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.errors import IdentificationError
 from identify.estimators.likelihood.cells import GAUSS, Cells, hermite
+from identify.estimators.likelihood.reversals import Inside, Turns, signed
 from identify.noise.linearization import observation, slopes
 
 Solved = tuple[Array, Array, Array]
@@ -38,6 +39,8 @@ class Noise:
     velocity, wanted : Array, shape (node, joint)
         Of the velocities that differences of the positions give, infinite where torques say more, and these velocities
         [rad/s].
+    turns : Turns
+        Reversals inside the cells, and which cells have a level of their own beside them.
     """
 
     mean: Array
@@ -46,6 +49,7 @@ class Noise:
     known: npt.NDArray[np.bool_]
     velocity: Array
     wanted: Array
+    turns: Turns
 
 
 @dataclass(eq=False)
@@ -62,8 +66,8 @@ class NormalEquations:
         A_XX.
     b_nodes, b_parameters : Array, shape (2 n nodes, 1 + m), (p + 1, 1 + m)
         The right-hand side, and m of `signs`.
-    squares : Array, shape (joint,)
-        Sums of the squared residuals of the mean torques over their variances, where friction's sign is known.
+    squares : Array, shape (2, joint)
+        Sums of the squared residuals of the mean torques over their variances: where joints move on, and near reversals.
     cost : float
         Sum of the squared residuals over their variances.
     """
@@ -85,13 +89,14 @@ class NormalEquations:
         "A stochastic estimator of the trace of the influence matrix", Communications in Statistics 19 (1990) 433-450).
         """
         n, p, size = basis.n, len(X) + 1, z.size
-        right = 1 + (0 if signs is None else len(signs) * n)
+        right = 1 + (0 if signs is None else len(signs) * 2 * n)
         zeros = np.zeros((4 * n, size)), np.zeros((size, p)), np.zeros((p, p)), np.zeros((size, right)), np.zeros((p, right))
-        found = cls(*zeros, np.zeros(n))
+        found = cls(*zeros, np.zeros((2, n)))
         found._add_positions(cells, z, noise.position)
         found._add_velocities(z, noise)
+        inside = noise.turns.at(z)
         for part in _chunks(cells.count):
-            found._add_torques(cells, basis, X, z, noise, part, signs)
+            found._add_torques(cells, basis, X, z, noise, part, signs, inside)
         return found
 
     def solved(self) -> Solved:
@@ -136,28 +141,31 @@ class NormalEquations:
         self.b_nodes[rows, 0] += (weight * left).ravel()
 
     def _add_torques(
-        self, cells: Cells, basis: Basis, X: Array, z: Array, noise: Noise, part: slice, signs: Array | None
+        self, cells: Cells, basis: Basis, X: Array, z: Array, noise: Noise, part: slice, signs: Array | None, inside: Inside
     ) -> None:
         nodes = z[part.start : part.stop + 1]
-        points = [cells.motion(nodes, s) for s in GAUSS]
+        points = [(q, signed(qd, inside.sign[:, part]), qdd) for q, qd, qdd in (cells.motion(nodes, s) for s in GAUSS)]
         D = np.stack([observation(basis, *point) for point in points])  # (point, cell, joint, p)
         both, T = _slopes_of(cells, basis, X, nodes), cells.period
         J = np.stack([_by_nodes(slope, hermite(s, T)) for s, slope in zip(GAUSS, both, strict=True)])
-        wanted = [tau[:, part].T for tau in cells.torque]
+        jumps = inside.jumps(basis, points, D, part)
+        wanted, groups = [tau[:, part].T for tau in cells.torque], (noise.known, noise.turns.near)
         for sign, tau, sigma in ((1.0, wanted[0], noise.mean), (-1.0, wanted[1], noise.half)):
             # Mean of both points, and half of what the second has more than the first.
             scale = 1 / sigma[:, part].T
-            W, H = ((x[1] + sign * x[0]) / 2 * scale[..., None] for x in (D, J))
+            W, H = ((x[1] + sign * x[0]) / 2 for x in (D, J))
+            jumps.add(W, H, X, sign)
+            W, H = W * scale[..., None], H * scale[..., None]
             rho = (tau * scale - np.matmul(W, X))[..., None]
             self.cost += float(np.sum(rho**2))
             if sign > 0:
-                known = noise.known[:, part].T
-                self.squares += np.sum(rho[..., 0] ** 2 * known, axis=0)
+                self.squares += [np.sum(rho[..., 0] ** 2 * group[:, part].T, axis=0) for group in groups]
             if signs is not None:
-                others = np.zeros((*rho.shape[:2], rho.shape[1] * len(signs)))
-                for j in range(basis.n * (sign > 0)):
-                    others[:, j, j * len(signs) : (j + 1) * len(signs)] = signs[:, j, part].T * known[:, j : j + 1]
-                rho = np.concatenate([rho, others], axis=-1)
+                others = np.zeros((*rho.shape[:2], 2 * rho.shape[1], len(signs)))
+                for g, group in enumerate(groups):
+                    for j in range(basis.n * (sign > 0)):
+                        others[:, j, g * basis.n + j] = signs[:, j, part].T * group[j, part, None]
+                rho = np.concatenate([rho, others.reshape(*rho.shape[:2], -1)], axis=-1)
             self._add_cells(part.start, np.swapaxes(H, -1, -2), W, rho)
 
     def _add_cells(self, first: int, H: Array, W: Array, rho: Array) -> None:
