@@ -11,28 +11,32 @@ from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.errors import IdentificationError
 from identify.estimators.likelihood.cells import HELD, Cells
-from identify.estimators.likelihood.normal_equations import Noise, NormalEquations, Solved
+from identify.estimators.likelihood.normal_equations import Noise, NormalEquations, Solved, torque_squares
 from identify.estimators.likelihood.reversals import Turns, stretches
 from identify.noise.linearization import friction_jumps, smoothed
 from identify.noise.propagation import NoiseLevels
 from identify.signals.masks.reversal import ReversalMask
 
-ROUNDS, STEPS = 10, 6
+ROUNDS, STEPS = 12, 12
 """Rounds at most, in each of which mask and levels are frozen, and Gauss-Newton steps of each."""
 
-SETTLED, RESTLESS = 0.02, 3.0
-"""Change of the parameters in a round, in sigma, at which they count as settled, and above which at the end they are refused:
-with coarse encoders masks may go to and fro, for a sigma or so."""
+RESTLESS = 3.0
+"""Move of the last step, in sigma, above which parameters are refused: with coarse encoders masks may go to and fro, for a sigma
+or so."""
 
 NEXT = 0.5
 """Move of a step, in sigma, after which levels come next: steps converge quadratically, one more would move a thousandth."""
+
+STEADY, LIKE = 0.05, 0.02
+"""Change of the sigmas, in rms, from one set of levels to the next at which they count as settled, and of the levels at which
+sigma need not be computed anew."""
 
 FAR = 0.5
 """What is found over what is expected, below which the square of a level falls by the square of that: levels that are too high
 are explained by motions that follow the noise, and would fall slowly."""
 
-PROBES = 4
-"""Random signs by which the leverage of the torques is estimated."""
+PROBES, MOST_PROBES = 16_000, 6
+"""Random signs by which the leverage of the torques is estimated, and how many a cell has at most."""
 
 CHECK = "check order and delay of the torques, and whether they were filtered, or take GLS"
 """What helps where torques and motion do not go together."""
@@ -98,38 +102,50 @@ class JointFit:
         """Parameters, and the delay if it is unknown."""
         return self.X if self.delay is None else np.append(self.X, self.delay)
 
-    def solved(self, floor: Array) -> "JointFit":
+    def solved(self, floor: Array, steady: float = STEADY) -> "JointFit":
         """Return the fit whose likelihood is greatest; levels of the torques, not below `floor`, are found as well.
+
+        They count as settled when sigmas change by less than the share `steady`, in rms.
 
         Raises
         ------
         IdentificationError
             If it diverges or does not settle, or the log does not determine the motion.
         """
-        now, before, change = self, self, np.inf
+        now, noises, sigma = self, self._noises(), np.full(len(self.unknowns), np.inf)
         for _ in range(ROUNDS):
-            before, noises = now, [now.noise(k) for k in range(len(now.logs))]
             for _ in range(STEPS):
-                now, moved = now._step(noises)
-                if moved < NEXT:
+                now, moved, taken = now._step(noises)
+                if moved <= NEXT:
                     break
-            now = now._levels(noises, floor)
-            change = _sigmas(now.unknowns - before.unknowns, now.covariance)
-            if change < SETTLED:
+            before, wider = now.levels, sigma
+            now, sigma = now._leveled(noises, taken, floor), np.sqrt(np.diag(now.covariance))
+            if moved < NEXT and np.sqrt(np.mean((sigma / wider - 1) ** 2)) < steady:
                 break
-        if change > RESTLESS:
-            raise IdentificationError(f"motion and parameters together do not settle, they move by {change:.2g} sigma: {CHECK}")
-        same = np.allclose(now.levels.torque, before.levels.torque, rtol=SETTLED)
-        return now if same else replace(now, covariance=now._covariance())
+            noises = now._noises()
+        if moved > RESTLESS:
+            raise IdentificationError(f"motion and parameters together do not settle, they move by {moved:.2g} sigma: {CHECK}")
+        same = np.allclose(now.levels.torque, before.torque, rtol=LIKE)
+        return now if same else replace(now, covariance=now._reduced(now._noises())[2])
 
     def with_reversals(self) -> "JointFit":
         """Return this fit as the start of one that takes friction through reversals for what the model says."""
         jump = friction_jumps(self.basis, self.X, self.motions[0][0, 0])
         return replace(self, near=np.maximum(self.levels.torque, START * jump / 2))
 
-    def _step(self, noises: list[Noise]) -> tuple["JointFit", float]:
-        """Return the fit after a Gauss-Newton step, and how far the parameters moved [sigma]."""
-        _, parts, covariance, b = self._reduced(noises)
+    def _noises(self) -> list[Noise]:
+        return [self.noise(k) for k in range(len(self.logs))]
+
+    def _step(self, noises: list[Noise]) -> tuple["JointFit", float, Array]:
+        """Return the fit after a Gauss-Newton step, how far the parameters moved [sigma], and the residuals that are taken.
+
+        These are the numbers of cells whose mean torques the unknowns explain in any case, shape (2, joint).
+        """
+        rng, n = np.random.default_rng(0), self.basis.n
+        probes = int(np.clip(PROBES / sum(cells.count for cells in self.logs), 1, MOST_PROBES))
+        signs = [rng.choice([-1.0, 1.0], (probes, n, cells.count)) for cells in self.logs]
+        _, parts, covariance, b = self._reduced(noises, signs)
+        taken = sum(np.sum(y[:, 1:] ** 2, axis=0) for _, y, _ in parts) + np.sum(b[:, 1:] * (covariance @ b[:, 1:]), axis=0)
         dX = covariance @ b[:, 0]
         motions = []
         for z, (V, y, L) in zip(self.motions, parts, strict=True):
@@ -139,7 +155,8 @@ class JointFit:
         if not np.isfinite(moved) or not all(np.isfinite(z).all() for z in motions):
             raise IdentificationError(f"motion and parameters together diverge: {CHECK}")
         moved_on = replace(self, X=self.X + dX[: len(self.X)], motions=tuple(motions), covariance=covariance)
-        return (moved_on if self.delay is None else moved_on._delayed(float(dX[-1]))), moved
+        ahead = moved_on if self.delay is None else moved_on._delayed(float(dX[-1]))
+        return ahead, moved, np.asarray(taken).reshape(2, n, -1).mean(axis=-1)
 
     def _delayed(self, change: float) -> "JointFit":
         """Return the fit with torques that act so much later [s]; the motion stays where the torques are."""
@@ -187,21 +204,16 @@ class JointFit:
         beside = np.pad(~known, ((0, 0), (0, 1))) | np.pad(~known, ((0, 0), (1, 0)))
         return np.where(beside, off[:, None], np.inf).T, _at_nodes(cells, rate)
 
-    def _levels(self, noises: list[Noise], floor: Array) -> "JointFit":
-        """Return the fit with levels of the torques from what is left over, and the share of it that the unknowns take."""
-        rng, n = np.random.default_rng(0), self.basis.n
-        signs = [rng.choice([-1.0, 1.0], (PROBES, n, cells.count)) for cells in self.logs]
-        systems, parts, covariance, b = self._reduced(noises, signs)
-        taken = sum(np.sum(y[:, 1:] ** 2, axis=0) for _, y, _ in parts) + np.sum(b[:, 1:] * (covariance @ b[:, 1:]), axis=0)
+    def _leveled(self, noises: list[Noise], taken: Array, floor: Array) -> "JointFit":
+        """Return the fit with levels of the torques from what is left over, of which the unknowns take a part."""
+        each = zip(self.logs, self.motions, noises, strict=True)
+        squares = sum(torque_squares(cells, self.basis, self.X, z, noise) for cells, z, noise in each)
         cells = sum(np.stack([np.count_nonzero(x, axis=-1) for x in (noise.known, noise.turns.near)]) for noise in noises)
-        free = np.maximum(cells - np.asarray(taken).reshape(2, n, -1).mean(axis=-1), 1e-3 * cells)
-        squares = np.divide(sum(system.squares for system in systems), free, out=np.ones((2, n)), where=cells > 0)
-        torque, near = (np.maximum(x * np.where(y < FAR, y, np.sqrt(y)), floor) for x, y in zip((self.levels.torque, self._near), squares, strict=True))
+        free = np.maximum(cells - taken, 1e-3 * cells)
+        ratio = np.divide(squares, free, out=np.ones_like(taken), where=cells > 0)
+        factor = np.where(ratio < FAR, ratio, np.sqrt(ratio))
+        torque, near = (np.maximum(x * y, floor) for x, y in zip((self.levels.torque, self._near), factor, strict=True))
         return replace(self, levels=replace(self.levels, torque=torque), near=None if self.near is None else near)
-
-    def _covariance(self) -> Array:
-        """Return the covariance of the unknowns with the levels as they are."""
-        return self._reduced([self.noise(k) for k in range(len(self.logs))])[2]
 
     def _reduced(
         self, noises: list[Noise], signs: Sequence[Array | None] | None = None

@@ -26,6 +26,10 @@ Noise alone, of a 10-bit encoder, takes a fit 7 sigma far."""
 NOTHING = 0.9
 """Share of the rms torque above which noise that is found leaves nothing to the motion: less than a fifth of its square."""
 
+ROUGH, FINE = 1.0, 0.02
+"""Change of sigma from one set of levels to the next at which a fit is good enough to go on from, and at which reversals are used
+up."""
+
 MOST = 2e9
 """Bytes that the equations of all motions may take."""
 
@@ -95,9 +99,8 @@ class MaximumLikelihood(AbstractEstimator):
         rms = np.sqrt(np.mean([np.mean(cells.torque[0] ** 2, axis=-1) for cells in logs], axis=0))
         # A joint that stands says nothing of its torque.
         own = NoiseLevels(np.where(np.isfinite(levels.torque), levels.torque, rms), levels.position, levels.repeats)
-        found = JointFit.start(logs, problem.basis, start.X[run], own, find_delay=self.find_delay).solved(EXACT * rms)
-        if self.reversals:
-            found = found.with_reversals().solved(EXACT * rms)
+        begin = JointFit.start(logs, problem.basis, start.X[run], own, find_delay=self.find_delay)
+        found = _through_reversals(begin, EXACT * rms) if self.reversals else begin.solved(EXACT * rms)
         X, sigma = start.X[run], start.sigma[run]
         if found.delay is not None:
             later = [replace(log, torque=replace(log.torque, delay=log.torque.delay + found.delay)) for log in alone]
@@ -107,6 +110,15 @@ class MaximumLikelihood(AbstractEstimator):
         if (found.levels.torque > NOTHING * rms).all():
             raise IdentificationError(f"the motion explains none of the torques, which are all noise to it: {CHECK}")
         return found
+
+
+def _through_reversals(begin: JointFit, floor: Array) -> JointFit:
+    """Return the fit that uses friction through reversals, or the one that leaves them out where that does not settle."""
+    masked = begin.solved(floor, ROUGH)
+    try:
+        return masked.with_reversals().solved(floor, FINE)
+    except IdentificationError:
+        return masked.solved(floor)
 
 
 def with_delay() -> MaximumLikelihood:

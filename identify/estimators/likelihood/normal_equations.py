@@ -11,13 +11,16 @@ from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.errors import IdentificationError
 from identify.estimators.likelihood.cells import GAUSS, Cells, hermite
-from identify.estimators.likelihood.reversals import Inside, Turns, signed
+from identify.estimators.likelihood.reversals import Inside, Jumps, Turns, signed
 from identify.noise.linearization import observation, slopes
 
 Solved = tuple[Array, Array, Array]
 """L^-1 A_zX, L^-1 b_nodes, and the factor L of A_zz in bands."""
 
-CHUNK = 2000
+BLOCK, TOGETHER = 64, 32
+"""Unknowns that are solved for at once, at least, and blocks that are copied at once."""
+
+CHUNK = 4000
 """Cells whose columns are made at once: those of all would take too much memory."""
 
 RATE = 50.0
@@ -60,24 +63,20 @@ class NormalEquations:
     ----------
     band : Array, shape (4 n, 2 n nodes)
         A_zz, its lower half as `scipy.linalg.cholesky_banded` has it.
-    border : Array, shape (2 n nodes, p + 1)
-        A_zX; the last column is that of the delay, as which positions lie elsewhere in their cells.
+    both : Array, shape (2 n nodes, p + 2 + m)
+        A_zX, whose last column is that of the delay, as which positions lie elsewhere in their cells; and the right-hand sides.
     corner : Array, shape (p + 1, p + 1)
         A_XX.
-    b_nodes, b_parameters : Array, shape (2 n nodes, 1 + m), (p + 1, 1 + m)
+    b_parameters : Array, shape (p + 1, 1 + m)
         The right-hand side, and m of `signs`.
-    squares : Array, shape (2, joint)
-        Sums of the squared residuals of the mean torques over their variances: where joints move on, and near reversals.
     cost : float
         Sum of the squared residuals over their variances.
     """
 
     band: Array
-    border: Array
+    both: Array
     corner: Array
-    b_nodes: Array
     b_parameters: Array
-    squares: Array
     cost: float = 0.0
 
     @classmethod
@@ -90,14 +89,24 @@ class NormalEquations:
         """
         n, p, size = basis.n, len(X) + 1, z.size
         right = 1 + (0 if signs is None else len(signs) * 2 * n)
-        zeros = np.zeros((4 * n, size)), np.zeros((size, p)), np.zeros((p, p)), np.zeros((size, right)), np.zeros((p, right))
-        found = cls(*zeros, np.zeros((2, n)))
+        both = np.zeros((size, p + right))
+        found = cls(np.zeros((size, 4 * n)).T, both, np.zeros((p, p)), np.zeros((p, right)))
         found._add_positions(cells, z, noise.position)
         found._add_velocities(z, noise)
         inside = noise.turns.at(z)
         for part in _chunks(cells.count):
             found._add_torques(cells, basis, X, z, noise, part, signs, inside)
         return found
+
+    @property
+    def border(self) -> Array:
+        """A_zX."""
+        return self.both[:, : len(self.corner)]
+
+    @property
+    def b_nodes(self) -> Array:
+        """The right-hand sides of the nodes."""
+        return self.both[:, len(self.corner) :]
 
     def solved(self) -> Solved:
         """Return the motion eliminated.
@@ -107,14 +116,15 @@ class NormalEquations:
         IdentificationError
             If positions and torques do not determine the motion.
         """
-        both, p = np.concatenate([self.border, self.b_nodes], axis=1), self.border.shape[1]
+        both, p = self.both, len(self.corner)
         L, singular = scipy.linalg.lapack.dpbtrf(self.band, lower=True, overwrite_ab=True)
-        z, none = scipy.linalg.lapack.dtbtrs(L, both, uplo="L", overwrite_b=True)
-        if singular or none:
+        if not singular:
+            _solve(L, both)
+        if singular or not np.isfinite(both).all():
             raise IdentificationError(
                 "the motion is not determined by this log: a joint stands, or its torque is constant or another's: take GLS"
             )
-        return z[:, :p], z[:, p:], L
+        return both[:, :p], both[:, p:], L
 
     def _add_positions(self, cells: Cells, z: Array, sigma: Array) -> None:
         cell, place = cells.places
@@ -144,48 +154,94 @@ class NormalEquations:
         self, cells: Cells, basis: Basis, X: Array, z: Array, noise: Noise, part: slice, signs: Array | None, inside: Inside
     ) -> None:
         nodes = z[part.start : part.stop + 1]
-        points = [(q, signed(qd, inside.sign[:, part]), qdd) for q, qd, qdd in (cells.motion(nodes, s) for s in GAUSS)]
-        D = np.stack([observation(basis, *point) for point in points])  # (point, cell, joint, p)
+        D, jumps = _columns(cells, basis, nodes, inside, part)
         both, T = _slopes_of(cells, basis, X, nodes), cells.period
         J = np.stack([_by_nodes(slope, hermite(s, T)) for s, slope in zip(GAUSS, both, strict=True)])
-        jumps = inside.jumps(basis, points, D, part)
-        wanted, groups = [tau[:, part].T for tau in cells.torque], (noise.known, noise.turns.near)
-        for sign, tau, sigma in ((1.0, wanted[0], noise.mean), (-1.0, wanted[1], noise.half)):
+        groups, every = (noise.known, noise.turns.near), list[tuple[Array, Array, Array]]()
+        for sign, tau, sigma in ((1.0, cells.torque[0], noise.mean), (-1.0, cells.torque[1], noise.half)):
             # Mean of both points, and half of what the second has more than the first.
             scale = 1 / sigma[:, part].T
             W, H = ((x[1] + sign * x[0]) / 2 for x in (D, J))
             jumps.add(W, H, X, sign)
-            W, H = W * scale[..., None], H * scale[..., None]
-            rho = (tau * scale - np.matmul(W, X))[..., None]
-            self.cost += float(np.sum(rho**2))
-            if sign > 0:
-                self.squares += [np.sum(rho[..., 0] ** 2 * group[:, part].T, axis=0) for group in groups]
-            if signs is not None:
-                others = np.zeros((*rho.shape[:2], 2 * rho.shape[1], len(signs)))
-                for g, group in enumerate(groups):
-                    for j in range(basis.n * (sign > 0)):
-                        others[:, j, g * basis.n + j] = signs[:, j, part].T * group[j, part, None]
-                rho = np.concatenate([rho, others.reshape(*rho.shape[:2], -1)], axis=-1)
-            self._add_cells(part.start, np.swapaxes(H, -1, -2), W, rho)
+            rho = (tau[:, part].T - np.matmul(W, X)) * scale
+            every.append((W * scale[..., None], H * scale[..., None], rho))
+        W, H, rho = (np.concatenate(both, axis=1) for both in zip(*every, strict=True))
+        self.cost += float(np.sum(rho**2))
+        n = basis.n
+        right = np.zeros((*rho.shape, 1 + (0 if signs is None else len(signs) * 2 * n)))
+        right[..., 0] = rho
+        if signs is not None:
+            others = right[:, :n, 1:].reshape(len(rho), n, 2, n, len(signs))
+            for j in range(n):
+                others[:, j, :, j] = np.moveaxis([signs[:, j, part].T * group[j, part, None] for group in groups], 0, 1)
+            right[:, :n, 1:] = others.reshape(len(rho), n, -1)
+        self._add_cells(part.start, np.swapaxes(H, -1, -2), W, right)
 
     def _add_cells(self, first: int, H: Array, W: Array, rho: Array) -> None:
         """Add residuals rho, (cell, joint, right), of slopes H, (cell, 4 n, joint), by nodes and W, (cell, joint, p), by X."""
-        count, width = H.shape[:2]
-        own, step = np.matmul(H, np.swapaxes(H, -1, -2)), width // 2
-        stop = step * (count - 1) + 1
-        for i in range(width):
-            for j in range(i + 1):
-                at = step * first + j
-                self.band[i - j, at : at + stop : step] += own[:, i, j]
-        crossed, right = np.matmul(H, W), np.matmul(H, rho)
+        (count, width), p = H.shape[:2], W.shape[-1]
+        own, products, step = np.matmul(H, np.swapaxes(H, -1, -2)), np.matmul(H, np.concatenate([W, rho], axis=-1)), width // 2
+        nodes = self.both.reshape(-1, step, self.both.shape[1])
+        columns = self.band.T.reshape(-1, step, width)  # of the lower half: from the diagonal on
         for half in (0, 1):
-            begin = step * (first + half)
-            rows = slice(begin, begin + step * count)
-            self.border[rows, :-1] += crossed[:, half * step : (half + 1) * step].reshape(step * count, -1)
-            self.b_nodes[rows] += right[:, half * step : (half + 1) * step].reshape(step * count, -1)
+            there, rows = slice(first + half, first + half + count), slice(half * step, (half + 1) * step)
+            nodes[there, :, :p] += products[:, rows, :p]
+            nodes[there, :, p + 1 :] += products[:, rows, p:]
+            for j in range(step):
+                k = half * step + j
+                columns[there, j, : width - k] += own[:, k:, k]
         flat = W.reshape(-1, W.shape[-1])
         self.corner[:-1, :-1] += flat.T @ flat
         self.b_parameters[:-1] += flat.T @ rho.reshape(len(flat), -1)
+
+
+def torque_squares(cells: Cells, basis: Basis, X: Array, z: Array, noise: Noise) -> Array:
+    """Return the squared residuals of a log's mean torques over their variances, in sum, shape (2, joint).
+
+    Where joints move on, and near reversals.
+    """
+    inside, total = noise.turns.at(z), np.zeros((2, basis.n))
+    for part in _chunks(cells.count):
+        D, jumps = _columns(cells, basis, z[part.start : part.stop + 1], inside, part)
+        W = (D[0] + D[1]) / 2
+        jumps.add(W, np.zeros((*W.shape[:2], 4 * basis.n)), X, 1.0)
+        squares = ((cells.torque[0][:, part] - np.matmul(W, X).T) / noise.mean[:, part]) ** 2
+        total += [np.sum(squares * group[:, part], axis=-1) for group in (noise.known, noise.turns.near)]
+    return total
+
+
+def _columns(cells: Cells, basis: Basis, nodes: Array, inside: Inside, part: slice) -> tuple[Array, Jumps]:
+    """Return the columns of a part of the cells at both Gauss points, shape (point, cell, joint, p), and their jumps inside."""
+    points = [(q, signed(qd, inside.sign[:, part]), qdd) for q, qd, qdd in (cells.motion(nodes, s) for s in GAUSS)]
+    D = np.stack([observation(basis, *point) for point in points])
+    return D, inside.jumps(basis, points, D, part)
+
+
+def _solve(L: Array, right: Array) -> None:
+    """Solve L x = b in place, L in bands as `dpbtrf` leaves it, for right sides of shape (size, m) in C order.
+
+    Block by block, so that each is read once for all right sides: `dtbtrs` reads all of L for each.
+    """
+    (width, size), w = L.shape, L.shape[0] - 1
+    block = max(BLOCK, w)
+    own, beside = np.zeros((TOGETHER, block, block)), np.zeros((TOGETHER, w, w))
+    bands = np.zeros((TOGETHER * block, width))
+    for start in range(0, size, len(bands)):
+        some = L.T[start : start + len(bands)]
+        bands[: len(some)] = some
+        each = bands.reshape(TOGETHER, block, width)
+        for below in range(width):
+            # Column by column, as BLAS has matrices; beside them the corner that the next block has in common.
+            own.reshape(TOGETHER, -1)[:, below : (block - below) * block : block + 1] = each[:, : block - below, below]
+            late = np.arange(block - below, block)
+            beside[:, late + below - block, late - block + w] = each[:, late, below]
+        for k, first in enumerate(range(start, start + len(some), block)):
+            rows, later = right[first : first + block], right[first + block : first + block + w]
+            n = len(rows)
+            # The transpose of rows in C order is a matrix of BLAS's: x' L' = b'.
+            scipy.linalg.blas.dtrsm(1.0, own[k, :n, :n].T, rows.T, side=1, lower=1, trans_a=1, overwrite_b=1)
+            if len(later):
+                later -= (beside[k] @ rows[-w:])[: len(later)]
 
 
 def _chunks(count: int) -> Iterator[slice]:

@@ -14,6 +14,9 @@ from identify.noise.linearization import observation
 CREEP = 1e-9
 """Speed [rad/s, of slides m/s] that stands for a sign: friction has its jump there, and nothing else changes."""
 
+OUTPACED = 5.0
+"""Speed over its largest change from cell to cell, in a stretch, beyond which a joint does not stop within a cell."""
+
 RATIO = 50.0
 """Accelerations before and after a reversal differ by this factor at most; a larger one is that of a joint that nearly sticks."""
 
@@ -125,7 +128,7 @@ class Turns:
         """Return what a motion z says of stretches; `margin` is how well torques are known near reversals, shape (joint,)."""
         turns = cls.none((basis.n, cells.count))
         for joint in sorted({one.joint for one in found}):
-            own = [one for one in found if one.joint == joint]
+            own = [turns._slowest(one, z[one.begin : one.end, 1, joint]) for one in found if one.joint == joint]
             forces = Forces.of(cells, basis, X, z, joint, np.concatenate([np.arange(one.begin, one.end) for one in own]))
             ends = np.cumsum([0, *(one.end - one.begin for one in own)])
             for one, begin, end in zip(own, ends, ends[1:], strict=False):
@@ -133,12 +136,22 @@ class Turns:
                 turns._follow(one, v, forces.part(slice(begin, end)), margin[joint], cells.period)
         return turns
 
+    def _slowest(self, one: Stretch, v: Array) -> Stretch:
+        """Return the part of a stretch, of velocities v, shape (cell,), in which the joint may stop; mark the rest."""
+        slowest = np.flatnonzero(np.abs(v) < OUTPACED * np.abs(np.diff(v)).max(initial=0.0))
+        first, last = (slowest[0], slowest[-1] + 1) if len(slowest) else (0, 0)
+        for cells, sign in ((slice(one.begin, one.begin + first), one.before), (slice(one.begin + last, one.end), one.after)):
+            self.near[one.joint, cells], self.sign[one.joint, cells] = True, sign
+        return one._replace(begin=int(one.begin + first), end=int(one.begin + last))
+
     def _follow(self, one: Stretch, v: Array, forces: Forces, margin: float, period: float) -> None:
         """Mark where a joint of velocities v, shape (cell,), surely moves on through a stretch, and where it reverses.
 
         It surely moves while friction does not stop it within a cell. Nothing is known of the cells from the first in which it
         might stop to the last, unless the torque turns it round there at once.
         """
+        if not len(v):
+            return
         row, sign, step = one.joint, np.full(len(v), one.before), period * margin / forces.inertia
         early, late = (s * (v + period * forces.under(s)) > step for s in (one.before, one.after))
         late &= one.after * v > -step
