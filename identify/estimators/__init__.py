@@ -18,7 +18,7 @@ from identify.estimators.likelihood.kalman_filter import UnscentedKalmanFilter a
 from identify.estimators.likelihood.maximum_likelihood import (
     MaximumLikelihood as MaximumLikelihood,
 )
-from identify.estimators.likelihood.maximum_likelihood import with_delay
+from identify.estimators.likelihood.maximum_likelihood import with_delay, with_reversals
 from identify.estimators.problem import Problem as Problem
 from identify.estimators.simulating.closed_loop_input_error import ClosedLoopInputError as ClosedLoopInputError
 from identify.estimators.simulating.closed_loop_output_error import ClosedLoopOutputError as ClosedLoopOutputError
@@ -36,6 +36,7 @@ ESTIMATORS: PluginTable[AbstractEstimator] = PluginTable(
         "GLS": GeneralizedLeastSquares,
         "ML": MaximumLikelihood,
         "ML-delay": with_delay,
+        "ML-reversals": with_reversals,
         "IRLS": IterativelyReweighted,
         "TLS": TotalLeastSquares,
         "RLS": RecursiveLeastSquares,

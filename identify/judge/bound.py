@@ -1,19 +1,28 @@
 """The least error that any estimator can have: the Cramer-Rao bound."""
 
+from dataclasses import dataclass
+from typing import Any, Self
+
 import numpy as np
 
 from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.estimators.likelihood.cells import GAUSS, hermite
 from identify.estimators.likelihood.joint_fit import MASK, UNKNOWN
+from identify.estimators.likelihood.reversals import CREEP
 from identify.noise.linearization import friction_jumps, observation, slopes
 from identify.noise.propagation import NoiseLevels
+
+AT_REST = 1e-3
+"""Share of a joint's rms speed below which it counts as at rest: a simulated contact creeps."""
+
+Index = Any
 
 TERMS = 8
 """Terms of the exponential series: slopes times a period are well below 1."""
 
 
-def cramer_rao(basis: Basis, X: Array, q: Array, qd: Array, fs: float, noise: NoiseLevels) -> Array:
+def cramer_rao(basis: Basis, X: Array, q: Array, qd: Array, fs: float, noise: NoiseLevels, *, reversals: bool = False) -> Array:
     """Return the covariance that no unbiased estimate of X from a log of this motion can go below, shape (..., p, p).
 
     The log has the torques, held for a period each, with white noise, and the positions at the beginning of each, with white
@@ -34,11 +43,17 @@ def cramer_rao(basis: Basis, X: Array, q: Array, qd: Array, fs: float, noise: No
         Sampling frequency [Hz].
     noise : NoiseLevels
         Standard deviations, shape (joint,) each.
+    reversals : bool
+        Whether friction is what its law says up to the instant at which a joint reverses, and from then on, so that only that
+        of joints at rest is not known.
     """
-    A, B, W = _steps(basis, X, q, qd, 1 / fs)
-    unknown = UNKNOWN * friction_jumps(basis, X, np.reshape(q, (-1, basis.n))[0])
+    motion = _Motion.of(basis, X, q, qd, 1 / fs)
+    A, B = motion.steps(motion.T)
+    C = np.matmul(B, motion.W)
     weight = MASK.weight(np.moveaxis((qd[..., 1:, :] + qd[..., :-1, :]) / 2, -1, -2), fs)
-    variance = np.moveaxis((noise.torque[:, None] + (1 - weight) * unknown[:, None]) ** 2, -1, -2)
+    if reversals:
+        weight = motion.through_reversals(A, B, C)
+    variance = np.moveaxis((noise.torque[:, None] + (1 - weight) * UNKNOWN * motion.jump[:, None]) ** 2, -1, -2)
     n, p, runs = basis.n, len(X), q.shape[:-2]
     P = np.broadcast_to(np.diag([1.0] * n + [100.0] * n), (*runs, 2 * n, 2 * n)).copy()
     slope, information = np.zeros((*runs, 2 * n, p)), np.zeros((*runs, p, p))
@@ -56,23 +71,82 @@ def cramer_rao(basis: Basis, X: Array, q: Array, qd: Array, fs: float, noise: No
         step, push = A[..., k, :, :], B[..., k, :, :]
         P = np.matmul(np.matmul(step, P), np.swapaxes(step, -1, -2))
         P += np.matmul(push * variance[..., k, None, :], np.swapaxes(push, -1, -2))
-        slope = np.matmul(step, np.matmul(kept, slope)) - np.matmul(push, W[..., k, :, :])
+        slope = np.matmul(step, np.matmul(kept, slope)) - C[..., k, :, :]
     return np.linalg.pinv(information, hermitian=True)
 
 
-def _steps(basis: Basis, X: Array, q: Array, qd: Array, T: float) -> tuple[Array, Array, Array]:
-    """Return how errors of (q, qd) move over every period: A of themselves, B of a torque, and W of the parameters."""
-    ends = np.stack([q[..., :-1, :], qd[..., :-1, :], q[..., 1:, :], qd[..., 1:, :]])
-    middle, first, second = ([np.moveaxis(np.tensordot(w, ends, axes=1), -1, -2) for w in hermite(s, T)] for s in (0.5, *GAUSS))
-    M, D, K = (np.moveaxis(x, -1, -3) for x in slopes(basis, X, middle[0], middle[1], middle[2], middle[1]))
-    W = (observation(basis, *first) + observation(basis, *second)) / 2
-    n, inverse = basis.n, np.linalg.inv(M)
-    F = np.zeros((*M.shape[:-2], 2 * n, 2 * n))
-    F[..., :n, n:] = np.eye(n)
-    F[..., n:, :n], F[..., n:, n:] = -np.matmul(inverse, K), -np.matmul(inverse, D)
-    push = np.concatenate([np.zeros_like(inverse), inverse], axis=-2)
-    term, A, integral = np.broadcast_to(np.eye(2 * n), F.shape), np.zeros_like(F), np.zeros_like(F)
-    for i in range(1, TERMS + 1):
-        A, integral = A + term, integral + term * (T / i)
-        term = np.matmul(F, term) * (T / i)
-    return A, np.matmul(integral, push), W
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """A motion in periods T: torques' slopes M, D and K, columns W on average, all (..., period, joint, joint or p)."""
+
+    basis: Basis
+    qd: Array
+    middle: list[Array]
+    M: Array
+    D: Array
+    K: Array
+    W: Array
+    jump: Array
+    T: float
+
+    @classmethod
+    def of(cls, basis: Basis, X: Array, q: Array, qd: Array, T: float) -> Self:
+        ends = np.stack([q[..., :-1, :], qd[..., :-1, :], q[..., 1:, :], qd[..., 1:, :]])
+        at = ([np.moveaxis(np.tensordot(w, ends, axes=1), -1, -2) for w in hermite(s, T)] for s in (0.5, *GAUSS))
+        middle, first, second = at
+        M, D, K = (np.moveaxis(x, -1, -3) for x in slopes(basis, X, middle[0], middle[1], middle[2], middle[1]))
+        W = (observation(basis, *first) + observation(basis, *second)) / 2
+        return cls(basis, qd, middle, M, D, K, W, friction_jumps(basis, X, np.reshape(q, (-1, basis.n))[0]), T)
+
+    def steps(self, T: float | Array, some: Index = ()) -> tuple[Array, Array]:
+        """Return how errors of (q, qd) move over times T of some periods: A of themselves, B of a torque."""
+        M, D, K = (x[some] for x in (self.M, self.D, self.K))
+        n, inverse = self.basis.n, np.linalg.inv(M)
+        F = np.zeros((*M.shape[:-2], 2 * n, 2 * n))
+        F[..., :n, n:] = np.eye(n)
+        F[..., n:, :n], F[..., n:, n:] = -np.matmul(inverse, K), -np.matmul(inverse, D)
+        push = np.concatenate([np.zeros_like(inverse), inverse], axis=-2)
+        term, A, integral = np.broadcast_to(np.eye(2 * n), F.shape), np.zeros_like(F), np.zeros_like(F)
+        for i in range(1, TERMS + 1):
+            A, integral = A + term, integral + term * (T / i)
+            term = np.matmul(F, term) * (T / i)
+        return A, np.matmul(integral, push)
+
+    def through_reversals(self, A: Array, B: Array, C: Array) -> Array:
+        """Put reversals into the steps A, B and C = B W; return where friction is known, shape (..., joint, period).
+
+        A joint that reverses after a share s of a period, from acceleration a to a - d, has velocities -a s T and (a - d)
+        (1 - s) T beside it. An error v of its velocity moves the reversal by -v / a, and so changes accelerations by d v / a.
+        """
+        before, after = (np.moveaxis(x, -1, -2) for x in (self.qd[..., :-1, :], self.qd[..., 1:, :]))
+        still = AT_REST * np.sqrt(np.mean(self.qd**2, axis=-2))[..., None]
+        crosses = (before * after < 0) & (np.maximum(np.abs(before), np.abs(after)) > still)
+        known = crosses | ((before * after > 0) & (np.minimum(np.abs(before), np.abs(after)) > still))
+        crosses &= np.sum(crosses, axis=-2, keepdims=True) == 1  # of two in a period, little is lost
+        *runs, joint, period = np.nonzero(crosses)
+        some, every = (*runs, period), np.arange(len(period))
+        sign = np.sign(after[crosses])
+        step = np.linalg.inv(self.M[some])[every, :, joint] * (self.jump[joint] * sign)[:, None]
+        early, late, d = np.abs(before[crosses]), np.abs(after[crosses]), self.T * sign * step[every, joint]
+        total = early + late + d
+        share = 2 * early / (total + np.sqrt(total**2 - 4 * d * early))
+        a = sign * early / (share * self.T)
+        goes = np.abs(a) * self.T > d  # else it sticks
+        known[(*runs, joint, period)] = goes
+        jumps = np.broadcast_to(np.eye(2 * self.basis.n), (len(every), *2 * (2 * self.basis.n,))).copy()
+        jumps[every, self.basis.n :, self.basis.n + joint] -= step / a[:, None]
+        (A1, B1), (A2, B2) = (self.steps((x * self.T)[:, None, None], some) for x in (share, 1 - share))
+        W1 = self._columns(some, joint, -sign, (1 - share)[:, None] * step)
+        W2 = self._columns(some, joint, sign, -share[:, None] * step)
+        through = np.matmul(A2, jumps)
+        found = np.matmul(through, A1), np.matmul(through, B1) + B2, np.matmul(through, np.matmul(B1, W1)) + np.matmul(B2, W2)
+        used = tuple(x[goes] for x in some)
+        for whole, part in zip((A, B, C), found, strict=True):
+            whole[used] = part[goes]
+        return known
+
+    def _columns(self, some: Index, joint: Index, sign: Array, change: Array) -> Array:
+        """Return the columns in the middle of some periods, at other accelerations, where a joint moves with a sign."""
+        q, qd, qdd = (np.moveaxis(x, -1, -2)[some].T.copy() for x in self.middle)
+        qd[joint, np.arange(len(sign))] = sign * CREEP
+        return observation(self.basis, q, qd, qdd + change.T)

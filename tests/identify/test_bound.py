@@ -66,3 +66,55 @@ def test_it_scales_with_the_noise_and_runs_are_independent(truth):
     # Friction's jump stands for an unknown torque where joints turn, which does not grow with the noise.
     double = cramer_rao(scara(), truth, q[1], qd[1], FS, NoiseLevels(np.full(2, 0.02), np.full(2, 2e-5)))
     np.testing.assert_allclose(np.sqrt(np.diag(double) / np.diag(alone)), 2.0, rtol=0.1)
+
+
+def driven(X, start, u):
+    """Positions and velocities of J qdd = u - Fv qd - Fs sign(qd) at the samples, u held for a period: piece by piece."""
+    (J, Fv, Fs), (q, v) = X, start
+    found = [(q, v)]
+    for torque in u:
+        left = 1 / FS
+        while left > 0:
+            sign = np.sign(v) or np.sign(torque)
+            end = (torque - Fs * sign) / Fv  # velocity that it tends to
+            turn = J / Fv * np.log1p(-v / end) if v * end < 0 else np.inf  # v - end falls by exp(-Fv t / J), to -end at zero
+            step = min(left, turn)
+            decay = np.exp(-Fv / J * step)
+            q, v = q + end * step + (v - end) * J / Fv * (1 - decay), end + (v - end) * decay
+            if step == turn:
+                assert abs(torque) > Fs, "it sticks"
+                v = 0.0
+            left -= step
+        found.append((q, v))
+    return np.array(found).T
+
+
+def slopes_of(function, x, size):
+    steps = np.diag(size * np.ones(len(x)))
+    return np.stack([(function(x + step) - function(x - step)) / (2 * step.sum()) for step in steps], axis=-1)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize(("sq", "st"), [(2.8e-5, 1e-4), (4e-4, 1e-3), (2.8e-5, 0.1)])
+def test_reversals_against_differences_of_a_simulation(seed, sq, st):
+    """The whole Gaussian of a joint that reverses: of start, parameters and torques, by simulating it anew for each."""
+    X, rng = np.array([3.5, 0.5, 0.4]), np.random.default_rng(seed)
+    t = np.arange(150) / FS
+    w, phase = 4 * np.pi, rng.uniform(0, 2 * np.pi)
+    u = 30 * np.sin(w * t + phase) + 6 * np.sin(0.37 * w * t)
+    start = np.array([0.0, -30 / (X[0] * w) * np.cos(phase)])
+    q, qd = driven(X, start, u)
+    assert np.count_nonzero(qd[1:] * qd[:-1] < 0) >= 3
+    of_X = slopes_of(lambda x: driven(x, start, u)[0], X, 1e-6)
+    of_start = slopes_of(lambda x: driven(X, x, u)[0], start, 1e-6)
+    of_u = slopes_of(lambda x: driven(X, start, x)[0], u, 1e-5)
+    C, A = sq**2 * np.eye(len(q)) + st**2 * of_u @ of_u.T, np.concatenate([of_X, of_start], axis=1)
+    wanted = np.sqrt(np.diag(np.linalg.inv(A.T @ np.linalg.solve(C, A)))[:3])
+    order = [one_joint().names.index(name) for name in one_joint().names]
+    noise = NoiseLevels(np.array([st]), np.array([sq]))
+    found, masked = (
+        np.sqrt(np.diag(cramer_rao(one_joint(), X[order], q[:, None], qd[:, None], FS, noise, reversals=used)))
+        for used in (True, False)
+    )
+    np.testing.assert_allclose(found, wanted, rtol=0.01)
+    assert (masked > found).all()

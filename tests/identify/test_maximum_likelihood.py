@@ -22,6 +22,7 @@ from identify import (
 from identify.estimators.likelihood import maximum_likelihood
 from identify.estimators.likelihood.cells import GAUSS, Cells, hermite
 from identify.estimators.likelihood.normal_equations import Noise, NormalEquations
+from identify.estimators.likelihood.reversals import Turns
 from identify.estimators.problem import Problem
 from identify.rows.chains import idbench_chain
 from sim.engine.simulation import simulate
@@ -88,7 +89,8 @@ def test_the_right_hand_side_is_the_slope_of_the_cost(exact, truth):
     z = np.stack([np.sin(t + [0.3, 0.7]) + 2 * t, np.cos(t + [0.3, 0.7]) + 2], axis=1)
     one = np.ones((2, cells.count))
     near = np.where(np.arange(cells.count + 1) % 3, np.inf, 0.2)[:, None] + np.zeros(2)
-    noise = Noise(0.1 * one, 0.2 * one, np.full(2, 1e-3), one > 0, near, z[:, 1] + 0.1)
+    turns = Turns.none((2, cells.count))
+    noise = Noise(0.1 * one, 0.2 * one, np.full(2, 1e-3), one > 0, near, z[:, 1] + 0.1, turns)
 
     def cost(X, z):
         return NormalEquations.of(cells, scara(), X, z, noise).cost

@@ -21,8 +21,8 @@ ROUNDS, STEPS = 12, 12
 """Rounds at most, in each of which mask and levels are frozen, and Gauss-Newton steps of each."""
 
 RESTLESS = 3.0
-"""Move of the last step, in sigma, above which parameters are refused: with coarse encoders masks may go to and fro, for a sigma
-or so."""
+"""Move of the last step, in sigma, above which parameters are refused: with coarse encoders masks may go to and fro, for a
+sigma or so."""
 
 NEXT = 0.5
 """Move of a step, in sigma, after which levels come next: steps converge quadratically, one more would move a thousandth."""

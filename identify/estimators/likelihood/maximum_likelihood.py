@@ -26,9 +26,11 @@ Noise alone, of a 10-bit encoder, takes a fit 7 sigma far."""
 NOTHING = 0.9
 """Share of the rms torque above which noise that is found leaves nothing to the motion: less than a fifth of its square."""
 
-ROUGH, FINE = 1.0, 0.02
-"""Change of sigma from one set of levels to the next at which a fit is good enough to go on from, and at which reversals are used
-up."""
+FINE = 0.02
+"""Change of the sigmas from one set of levels to the next at which reversals are used up: they come slowly."""
+
+WORTH = 0.9
+"""Typical sigma, over that of a fit without reversals, below which these are used."""
 
 MOST = 2e9
 """Bytes that the equations of all motions may take."""
@@ -51,6 +53,9 @@ class MaximumLikelihood(AbstractEstimator):
     find_delay : bool
         Whether the delay of the torques is one more unknown, one for all logs, from what they state; it is
         `estimate.fits[()].delay` [s], more than what was stated.
+    reversals : bool
+        Whether friction that jumps at a reversal, as its law says, is used, instead of being left out. Torques near reversals
+        have a level of noise of their own, which is large where friction near rest is not what the law says.
     """
 
     needs: ClassVar[frozenset[Need]] = frozenset({"logs"})
@@ -113,17 +118,28 @@ class MaximumLikelihood(AbstractEstimator):
 
 
 def _through_reversals(begin: JointFit, floor: Array) -> JointFit:
-    """Return the fit that uses friction through reversals, or the one that leaves them out where that does not settle."""
-    masked = begin.solved(floor, ROUGH)
+    """Return the fit that uses friction through reversals, or the one that leaves them out if it is next to no better.
+
+    Where friction near rest is not what its law says, the level of the torques there is large, and little is gained: what the
+    reversals say is then as likely wrong as right.
+    """
+    masked = begin.solved(floor)
     try:
-        return masked.with_reversals().solved(floor, FINE)
+        used = masked.with_reversals().solved(floor, FINE)
     except IdentificationError:
-        return masked.solved(floor)
+        return masked
+    ratio = np.diag(used.covariance) / np.diag(masked.covariance)
+    return used if np.mean(np.log(ratio)) < 2 * np.log(WORTH) else masked
 
 
 def with_delay() -> MaximumLikelihood:
     """Maximum likelihood (ML) of motion, parameters and the delay of the torques together."""
     return MaximumLikelihood(find_delay=True)
+
+
+def with_reversals() -> MaximumLikelihood:
+    """Maximum likelihood (ML) that uses how friction jumps where joints reverse."""
+    return MaximumLikelihood(reversals=True)
 
 
 def _require_near(found: JointFit, X: Array, sigma: Array, names: tuple[str, ...]) -> None:

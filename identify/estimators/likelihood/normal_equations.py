@@ -93,9 +93,8 @@ class NormalEquations:
         found = cls(np.zeros((size, 4 * n)).T, both, np.zeros((p, p)), np.zeros((p, right)))
         found._add_positions(cells, z, noise.position)
         found._add_velocities(z, noise)
-        inside = noise.turns.at(z)
         for part in _chunks(cells.count):
-            found._add_torques(cells, basis, X, z, noise, part, signs, inside)
+            found._add_torques(cells, basis, X, z, noise, part, signs)
         return found
 
     @property
@@ -151,10 +150,10 @@ class NormalEquations:
         self.b_nodes[rows, 0] += (weight * left).ravel()
 
     def _add_torques(
-        self, cells: Cells, basis: Basis, X: Array, z: Array, noise: Noise, part: slice, signs: Array | None, inside: Inside
+        self, cells: Cells, basis: Basis, X: Array, z: Array, noise: Noise, part: slice, signs: Array | None
     ) -> None:
         nodes = z[part.start : part.stop + 1]
-        D, jumps = _columns(cells, basis, nodes, inside, part)
+        D, jumps = _columns(cells, basis, nodes, noise.turns.at(z), part)
         both, T = _slopes_of(cells, basis, X, nodes), cells.period
         J = np.stack([_by_nodes(slope, hermite(s, T)) for s, slope in zip(GAUSS, both, strict=True)])
         groups, every = (noise.known, noise.turns.near), list[tuple[Array, Array, Array]]()
@@ -173,7 +172,7 @@ class NormalEquations:
         if signs is not None:
             others = right[:, :n, 1:].reshape(len(rho), n, 2, n, len(signs))
             for j in range(n):
-                others[:, j, :, j] = np.moveaxis([signs[:, j, part].T * group[j, part, None] for group in groups], 0, 1)
+                others[:, j, :, j] = np.stack([signs[:, j, part].T * group[j, part, None] for group in groups], axis=1)
             right[:, :n, 1:] = others.reshape(len(rho), n, -1)
         self._add_cells(part.start, np.swapaxes(H, -1, -2), W, right)
 

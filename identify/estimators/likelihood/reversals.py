@@ -18,7 +18,7 @@ OUTPACED = 5.0
 """Speed over its largest change from cell to cell, in a stretch, beyond which a joint does not stop within a cell."""
 
 RATIO = 50.0
-"""Accelerations before and after a reversal differ by this factor at most; a larger one is that of a joint that nearly sticks."""
+"""Accelerations before and after a reversal differ by this factor at most: with a larger one the joint nearly sticks."""
 
 Ints = npt.NDArray[np.intp]
 Flags = npt.NDArray[np.bool_]
@@ -249,11 +249,11 @@ class Jumps:
             added += (1 - s)[:, None, None] * (self.change[1] - self.change[0]) / 2
         np.add.at(W, self.cell, added)
         torque = slope[:, None] * np.matmul(mean, X)
+        by_node = np.moveaxis(H, 1, -1)
         for node in (0, 1):
-            np.add.at(H, (self.cell, slice(None), (1 + 2 * node) * n + self.joint), torque * self.slope[:, node : node + 1])
+            np.add.at(by_node, (self.cell, (1 + 2 * node) * n + self.joint), torque * self.slope[:, node : node + 1])
 
 
 def signed(qd: Array, sign: Array) -> Array:
     """Return velocities that have these signs, shape (joint, cell); 0 leaves them their own."""
     return np.where(sign * qd < CREEP * np.abs(sign), sign * CREEP, qd)
-
