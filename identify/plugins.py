@@ -44,11 +44,6 @@ class Table(Mapping[str, Callable[[], T]], Generic[T]):
         """Names of the parts of this package."""
         return tuple(self._builtin)
 
-    def name_of(self, made: object) -> str:
-        """Return what a part is called: its name in this table, or that of its class."""
-        known = (name for name, make in self._builtin.items() if make is type(made))
-        return next(known, type(made).__name__)
-
     def __iter__(self) -> Iterator[str]:
         yield from self._builtin
         yield from self._loaded

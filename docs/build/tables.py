@@ -17,6 +17,7 @@ from typing import Any
 from estimator_tables import compared, compared_in_birdys_shape
 from excitation_tables import coarse, criteria, foretold, motions, ranks
 from results import DOCS, RESULTS, Cell, Column, by_settings, cells, coverage, keep, table, typical
+from reversal_tables import reversals
 
 sys.path.insert(0, str(DOCS.parent))
 PAGES = ("answers.md", "any-arm.md", "estimators.md", "excitation.md", "noise.md", "table2.md")
@@ -140,6 +141,7 @@ TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "table2-power": _causes("power"),
     "bound-encoder": _bound("bound-encoder", "lines (counts)", _lines),
     "bound-torque": _bound("bound-torque", "torque noise [N m]", _one("torque.noise")),
+    "reversals": reversals,
     "excitation-criteria": criteria,
     "excitation-ranks": ranks,
     "excitation-length": motions(

@@ -17,6 +17,9 @@ Need = Literal["factors", "rows", "logs", "loop", "plant"]
 class AbstractEstimator(ABC):
     """Turns a problem into an estimate of X."""
 
+    acronym: ClassVar[str] = ""
+    """What the field calls it, as the table does."""
+
     needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
     """What it uses of a problem: `factors` of its rows, which every log has; its `rows`, which are not kept of logs that are
     too long; its `logs`; the `loop` in which they were recorded, or the robot by itself, its `plant`, which the caller may
@@ -94,7 +97,5 @@ class AbstractEstimator(ABC):
 
     @property
     def called(self) -> str:
-        """Its name."""
-        from identify.estimators import ESTIMATORS  # whose table this class is the kind of
-
-        return ESTIMATORS.name_of(self)
+        """What messages call it: its acronym, or the name of its class."""
+        return self.acronym or type(self).__name__

@@ -252,3 +252,8 @@ def test_a_start_from_which_the_filter_diverges_is_told(sixteen):
     problem = Problem((sixteen[1],), scara(), ExplicitModel(), idbench_chain(), Simulation(start=np.full(8, 1e-9)))
     with pytest.raises(IdentificationError, match="diverges from this start"):
         estimate(problem, UnscentedKalmanFilter(1e-6))
+
+
+@pytest.mark.parametrize("name", ESTIMATORS.builtin)
+def test_messages_call_estimators_what_the_table_does(name):
+    assert ESTIMATORS.create(name).called == name.split("-")[0]

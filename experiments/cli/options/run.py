@@ -28,7 +28,8 @@ class Run(RecordedOptions, Command, action="run:run"):
     chain: str = CHAIN
     """Signal processing, or MODULE:NAME of a chain of yours."""
     estimator: str = ESTIMATOR
-    """GLS, ML, OLS, WLS, IRLS, TLS, RLS, IV, DIDIM, CLIE, CLOE, OE, UKF, ML-delay, or of a plug-in: docs/estimators.md."""
+    """GLS, ML, ML-delay, ML-reversals, OLS, WLS, IRLS, TLS, RLS, IV, DIDIM, CLIE, CLOE, OE, UKF, or of a plug-in:
+    docs/estimators.md."""
     start: Start = "least-squares"
     """Where estimators begin that simulate or filter: at the least-squares estimate, or at the robot's file."""
     consistent: Consistency = "no"

@@ -58,7 +58,8 @@ class LogOptions(WrittenOptions):
     cutoff: Hertz = None
     """Band of the fit [Hz]; by default 5, or what a short log needs."""
     estimator: str = ESTIMATOR
-    """GLS, ML, OLS, WLS, IRLS, TLS, RLS, IV, DIDIM, CLIE, CLOE, OE, UKF, ML-delay, or of a plug-in: docs/estimators.md."""
+    """GLS, ML, ML-delay, ML-reversals, OLS, WLS, IRLS, TLS, RLS, IV, DIDIM, CLIE, CLOE, OE, UKF, or of a plug-in:
+    docs/estimators.md."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -35,6 +35,7 @@ class GeneralizedLeastSquares(AbstractEstimator):
     makes them most likely: one that is white, and what noise makes of friction where joints hardly move.
     """
 
+    acronym: ClassVar[str] = "GLS"
     needs: ClassVar[frozenset[Need]] = frozenset({"factors"})
 
     def solve(self, problem: Problem) -> Estimate:

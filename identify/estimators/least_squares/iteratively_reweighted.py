@@ -49,6 +49,7 @@ class IterativelyReweighted(AbstractEstimator):
         Rounds at most.
     """
 
+    acronym: ClassVar[str] = "IRLS"
     needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
 
     tuning: float = 4.685

@@ -13,6 +13,7 @@ from identify.estimators.problem import Problem
 class OrdinaryLeastSquares(AbstractEstimator):
     """Ordinary least squares, X = argmin |Y - W X|^2, by QR (section 5)."""
 
+    acronym: ClassVar[str] = "OLS"
     needs: ClassVar[frozenset[Need]] = frozenset({"factors"})
 
     def solve(self, problem: Problem) -> Estimate:

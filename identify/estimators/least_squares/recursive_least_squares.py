@@ -28,6 +28,7 @@ class RecursiveLeastSquares(AbstractEstimator):
         Time [s] after which a row counts a third.
     """
 
+    acronym: ClassVar[str] = "RLS"
     needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
 
     memory: float = 10.0

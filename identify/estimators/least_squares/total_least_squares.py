@@ -43,6 +43,7 @@ class TotalLeastSquares(AbstractEstimator):
         Noises of which S is the mean.
     """
 
+    acronym: ClassVar[str] = "TLS"
     needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
 
     draws: int = 8

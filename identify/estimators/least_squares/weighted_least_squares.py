@@ -25,6 +25,7 @@ class WeightedLeastSquares(AbstractEstimator):
         How often weights are taken from the residuals of the estimate before, at least 1.
     """
 
+    acronym: ClassVar[str] = "WLS"
     needs: ClassVar[frozenset[Need]] = frozenset({"factors"})
 
     rounds: int = 2

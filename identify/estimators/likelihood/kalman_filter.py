@@ -54,6 +54,7 @@ class UnscentedKalmanFilter(AbstractEstimator):
         Standard deviation of every parameter at the beginning, as a share of its value.
     """
 
+    acronym: ClassVar[str] = "UKF"
     needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
     begins: ClassVar[bool] = True
     filtered: ClassVar[bool] = False

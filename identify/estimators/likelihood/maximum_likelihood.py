@@ -58,6 +58,7 @@ class MaximumLikelihood(AbstractEstimator):
         have a level of noise of their own, which is large where friction near rest is not what the law says.
     """
 
+    acronym: ClassVar[str] = "ML"
     needs: ClassVar[frozenset[Need]] = frozenset({"logs"})
     filtered: ClassVar[bool] = False
 

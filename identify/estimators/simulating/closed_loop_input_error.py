@@ -25,6 +25,7 @@ class ClosedLoopInputError(AbstractSimulating):
     p-th of the simulations. A wrong controller in the simulation makes it wrong.
     """
 
+    acronym: ClassVar[str] = "CLIE"
     needs: ClassVar[frozenset[Need]] = frozenset({"rows", "loop"})
 
     def solve(self, problem: Problem) -> Estimate:

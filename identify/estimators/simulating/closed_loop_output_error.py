@@ -25,6 +25,7 @@ class ClosedLoopOutputError(AbstractSimulating):
     the robot. Neither filter nor mask take part. A wrong controller in the simulation makes it wrong.
     """
 
+    acronym: ClassVar[str] = "CLOE"
     needs: ClassVar[frozenset[Need]] = frozenset({"rows", "loop"})
     filtered: ClassVar[bool] = False
 

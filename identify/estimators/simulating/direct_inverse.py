@@ -25,6 +25,7 @@ class DirectInverse(AbstractSimulating):
     """
 
     settled: float = 0.1
+    acronym: ClassVar[str] = "DIDIM"
     needs: ClassVar[frozenset[Need]] = frozenset({"rows", "loop"})
 
     def solve(self, problem: Problem) -> Estimate:

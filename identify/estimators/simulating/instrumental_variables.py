@@ -25,6 +25,7 @@ class InstrumentalVariables(AbstractSimulating):
     """
 
     settled: float = 0.1
+    acronym: ClassVar[str] = "IV"
     needs: ClassVar[frozenset[Need]] = frozenset({"rows", "loop"})
 
     def solve(self, problem: Problem) -> Estimate:

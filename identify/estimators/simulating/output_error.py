@@ -38,6 +38,7 @@ class OutputError(AbstractSimulating):
         Of a segment [s].
     """
 
+    acronym: ClassVar[str] = "OE"
     needs: ClassVar[frozenset[Need]] = frozenset({"rows", "plant"})
     filtered: ClassVar[bool] = False
 
