@@ -9,7 +9,7 @@ from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.estimators.likelihood.cells import GAUSS, hermite
 from identify.estimators.likelihood.joint_fit import MASK, UNKNOWN
-from identify.estimators.likelihood.reversals import CREEP
+from identify.estimators.likelihood.jumps import CREEP
 from identify.noise.linearization import friction_jumps, observation, slopes
 from identify.noise.propagation import NoiseLevels
 

@@ -5,10 +5,13 @@ from typing import Self
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import lapack
+from scipy.linalg import blas, lapack
 
 from identify.arrays import Array
 from identify.errors import IdentificationError
+
+BLOCK, TOGETHER = 64, 32
+"""Unknowns that are solved for at once, at least, and blocks that are copied at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,3 +138,30 @@ def _in_blocks(lower: Array, size: int, rest: float = 0.0) -> tuple[Array, Array
     flat = slanted.reshape(*runs, count, -1)[..., : 2 * size * size]
     whole = np.swapaxes(flat.reshape(*runs, count, size, 2 * size), -1, -2)
     return whole[..., :size, :], whole[..., :-1, size:, :]
+
+
+def solve_lower(L: Array, right: Array) -> None:
+    """Solve L x = b in place, L in bands as `dpbtrf` leaves it, for right sides of shape (size, m) in C order.
+
+    Block by block, so that each is read once for all right sides: `dtbtrs` reads all of L for each.
+    """
+    (width, size), w = L.shape, L.shape[0] - 1
+    block = max(BLOCK, w)
+    own, beside = np.zeros((TOGETHER, block, block)), np.zeros((TOGETHER, w, w))
+    bands = np.zeros((TOGETHER * block, width))
+    for start in range(0, size, len(bands)):
+        some = L.T[start : start + len(bands)]
+        bands[: len(some)] = some
+        each = bands.reshape(TOGETHER, block, width)
+        for below in range(width):
+            # Column by column, as BLAS has matrices; beside them the corner that the next block has in common.
+            own.reshape(TOGETHER, -1)[:, below : (block - below) * block : block + 1] = each[:, : block - below, below]
+            late = np.arange(block - below, block)
+            beside[:, late + below - block, late - block + w] = each[:, late, below]
+        for k, first in enumerate(range(start, start + len(some), block)):
+            rows, later = right[first : first + block], right[first + block : first + block + w]
+            n = len(rows)
+            # The transpose of rows in C order is a matrix of BLAS's: x' L' = b'.
+            blas.dtrsm(1.0, own[k, :n, :n].T, rows.T, side=1, lower=1, trans_a=1, overwrite_b=1)
+            if len(later):
+                later -= (beside[k] @ rows[-w:])[: len(later)]

@@ -21,7 +21,8 @@ from identify import (
 )
 from identify.estimators.likelihood.cells import Cells
 from identify.estimators.likelihood.joint_fit import JointFit
-from identify.estimators.likelihood.normal_equations import NormalEquations, _solve, torque_squares
+from identify.estimators.likelihood.normal_equations import NormalEquations, torque_squares
+from identify.noise.band_matrix import solve_lower
 
 EXPLICIT, HELD, FS, RUNS = MODELS.create("explicit"), TorqueChannel("held"), 100.0, 16
 MASKED, USED = MaximumLikelihood(), MaximumLikelihood(reversals=True)
@@ -115,7 +116,7 @@ def test_bands_are_solved_as_lapack_does(rng):
         assert not bad
         b = rng.standard_normal((size, right))
         wanted, _ = lapack.dtbtrs(L, b, uplo="L")
-        _solve(L, b)
+        solve_lower(L, b)
         np.testing.assert_allclose(b, wanted, rtol=1e-9, atol=1e-12)
 
 

@@ -11,14 +11,13 @@ from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.errors import IdentificationError
 from identify.estimators.likelihood.cells import GAUSS, Cells, hermite
-from identify.estimators.likelihood.reversals import Inside, Jumps, Turns, signed
+from identify.estimators.likelihood.jumps import Inside, Jumps, signed
+from identify.estimators.likelihood.reversals import Turns
+from identify.noise.band_matrix import solve_lower
 from identify.noise.linearization import observation, slopes
 
 Solved = tuple[Array, Array, Array]
 """L^-1 A_zX, L^-1 b_nodes, and the factor L of A_zz in bands."""
-
-BLOCK, TOGETHER = 64, 32
-"""Unknowns that are solved for at once, at least, and blocks that are copied at once."""
 
 CHUNK = 4000
 """Cells whose columns are made at once: those of all would take too much memory."""
@@ -118,7 +117,7 @@ class NormalEquations:
         both, p = self.both, len(self.corner)
         L, singular = scipy.linalg.lapack.dpbtrf(self.band, lower=True, overwrite_ab=True)
         if not singular:
-            _solve(L, both)
+            solve_lower(L, both)
         if singular or not np.isfinite(both).all():
             raise IdentificationError(
                 "the motion is not determined by this log: a joint stands, or its torque is constant or another's: take GLS"
@@ -214,33 +213,6 @@ def _columns(cells: Cells, basis: Basis, nodes: Array, inside: Inside, part: sli
     points = [(q, signed(qd, inside.sign[:, part]), qdd) for q, qd, qdd in (cells.motion(nodes, s) for s in GAUSS)]
     D = np.stack([observation(basis, *point) for point in points])
     return D, inside.jumps(basis, points, D, part)
-
-
-def _solve(L: Array, right: Array) -> None:
-    """Solve L x = b in place, L in bands as `dpbtrf` leaves it, for right sides of shape (size, m) in C order.
-
-    Block by block, so that each is read once for all right sides: `dtbtrs` reads all of L for each.
-    """
-    (width, size), w = L.shape, L.shape[0] - 1
-    block = max(BLOCK, w)
-    own, beside = np.zeros((TOGETHER, block, block)), np.zeros((TOGETHER, w, w))
-    bands = np.zeros((TOGETHER * block, width))
-    for start in range(0, size, len(bands)):
-        some = L.T[start : start + len(bands)]
-        bands[: len(some)] = some
-        each = bands.reshape(TOGETHER, block, width)
-        for below in range(width):
-            # Column by column, as BLAS has matrices; beside them the corner that the next block has in common.
-            own.reshape(TOGETHER, -1)[:, below : (block - below) * block : block + 1] = each[:, : block - below, below]
-            late = np.arange(block - below, block)
-            beside[:, late + below - block, late - block + w] = each[:, late, below]
-        for k, first in enumerate(range(start, start + len(some), block)):
-            rows, later = right[first : first + block], right[first + block : first + block + w]
-            n = len(rows)
-            # The transpose of rows in C order is a matrix of BLAS's: x' L' = b'.
-            scipy.linalg.blas.dtrsm(1.0, own[k, :n, :n].T, rows.T, side=1, lower=1, trans_a=1, overwrite_b=1)
-            if len(later):
-                later -= (beside[k] @ rows[-w:])[: len(later)]
 
 
 def _chunks(count: int) -> Iterator[slice]:
