@@ -122,7 +122,9 @@ class _Motion:
         still = AT_REST * np.sqrt(np.mean(self.qd**2, axis=-2))[..., None]
         crosses = (before * after < 0) & (np.maximum(np.abs(before), np.abs(after)) > still)
         known = crosses | ((before * after > 0) & (np.minimum(np.abs(before), np.abs(after)) > still))
-        crosses &= np.sum(crosses, axis=-2, keepdims=True) == 1  # of two in a period, little is lost
+        together = np.sum(crosses, axis=-2, keepdims=True) > 1
+        known &= ~(crosses & together)  # two in a period are rare: their friction counts as unknown
+        crosses &= ~together
         *runs, joint, period = np.nonzero(crosses)
         some, every = (*runs, period), np.arange(len(period))
         sign = np.sign(after[crosses])

@@ -17,7 +17,7 @@ from identify.signals.differentiators.central import CentralDifference
 from identify.signals.signals import Signals
 
 RATE = 200.0
-"""Least frequency [Hz] at which noise is propagated: motion, masks and rows have little beyond some 10 Hz."""
+"""Least frequency [Hz] at which noise is propagated: rows and motion have little beyond some 10 Hz, the edges of masks more."""
 
 ALIASED = 0.01
 """Share of a variance by which it may be off for being summed at few samples: 0.5 % of sigma."""
@@ -180,7 +180,7 @@ def _multipliers(rows: RowMap, some: slice) -> Iterator[tuple[int, int, Array, A
 def _thinned(windows: Sequence[Array], rows: RowMap) -> tuple[list[Array], Grid, slice]:
     """Return windows at as few samples as sums of their products need, as weights; the rows among these; and which they are.
 
-    A low-pass at 5 Hz needs no more than some 50 Hz, whatever the log has.
+    A low-pass at 5 Hz needs far fewer than a log of 1 kHz has.
     """
     fs, grid = rows.signals.fs, rows.grid
     windows = _without_tails(windows, grid.first)

@@ -36,7 +36,7 @@ FAR = 0.5
 are explained by motions that follow the noise, and would fall slowly."""
 
 PROBES, MOST_PROBES = 16_000, 6
-"""Random signs by which the leverage of the torques is estimated, and how many a cell has at most."""
+"""Random signs, over all cells, by which the leverage of the torques is estimated, and at most so many for each cell."""
 
 CHECK = "check order and delay of the torques, and whether they were filtered, or take GLS"
 """What helps where torques and motion do not go together."""
@@ -129,7 +129,7 @@ class JointFit:
         return now if same else replace(now, covariance=now._reduced(now._noises())[2])
 
     def with_reversals(self) -> "JointFit":
-        """Return this fit as the start of one that takes friction through reversals for what the model says."""
+        """Return this fit as the start of one that uses friction through reversals."""
         jump = friction_jumps(self.basis, self.X, self.motions[0][0, 0])
         return replace(self, near=np.maximum(self.levels.torque, START * jump / 2))
 
