@@ -118,3 +118,21 @@ def test_reversals_against_differences_of_a_simulation(seed, sq, st):
     )
     np.testing.assert_allclose(found, wanted, rtol=0.01)
     assert (masked > found).all()
+
+
+def test_joints_that_reverse_in_one_period_are_not_known_there():
+    """Two joints that do not feel each other: the first is known better if the second reverses at other instants."""
+    basis = Basis(2, (Armature(), ViscousFriction(), CoulombFriction()))
+    X = np.array([{"Ia": 3.5, "Fv": 0.5, "Fs": 0.4}[name[:2]] for name in basis.names])
+    t = np.arange(150) / FS
+    u = 30 * np.sin(4 * np.pi * t + 1)
+    q, qd = driven((3.5, 0.5, 0.4), (0.0, -30 / (3.5 * 4 * np.pi) * np.cos(1)), u)
+    noise = NoiseLevels(np.full(2, 1e-3), np.full(2, 2.8e-5))
+    together, apart = (
+        cramer_rao(
+            basis, X, *(np.stack([x[10:], x[start : start + len(x) - 10]], axis=1) for x in (q, qd)), FS, noise, reversals=True
+        )
+        for start in (10, 0)
+    )
+    first = basis.names.index("Fs1")
+    assert together[first, first] > 1.5 * apart[first, first]
