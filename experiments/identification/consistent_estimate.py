@@ -33,7 +33,7 @@ def made_consistent(subject: Subject, estimate: Estimate, prior: Prior) -> Estim
     """
     found = consistent_of(subject, estimate, prior)
     X = found.base[_places(subject, estimate)]
-    return replace(estimate, X=X, honest=estimate.best_covariance, whiten=None)
+    return replace(estimate, X=X, solution=None, honest=estimate.best_covariance)
 
 
 def words_of_consistency(before: dict[str, Estimate], after: dict[str, Estimate]) -> Iterator[str]:

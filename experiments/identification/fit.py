@@ -187,7 +187,7 @@ class Fit:
         alone = replace(logs, fitted=logs.fitted[k : k + 1], names=logs.names[k : k + 1])
         problem = Problem(alone.fitted, self.basis, self.problem.model, self.processing)
         seen: Outcomes = {
-            name: replace(e, problem=problem.with_model(e.problem.model), honest=e.best_covariance, whiten=None, fits={})
+            name: replace(e, problem=problem.with_model(e.problem.model), solution=None, honest=e.best_covariance, fits={})
             for name, e in self.estimates.items()
         }
         return replace(self, logs=alone, problem=problem, unconstrained=seen, outcomes=seen)
@@ -198,7 +198,7 @@ class Fit:
         if self.problem.long:
             return {}
         parts = self.problem.parts
-        return {name: np.array([_rms_by_kind(part, e.X) for part in parts]) for name, e in self.estimates.items()}
+        return {name: np.array([_rms_by_kind(part.rows, e.X) for part in parts]) for name, e in self.estimates.items()}
 
     @cached_property
     def explained(self) -> dict[str, Array]:

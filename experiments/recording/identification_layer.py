@@ -124,7 +124,7 @@ class Layer:
 
     def _running(self, at: str, form: str, estimate: Estimate, color: Color) -> None:
         """Send the estimate as it comes about, with its variance, once that is small enough to be worth a look."""
-        if estimate.whiten is None:
+        if estimate.independent_rows() is None:
             return
         log = self._log
         t = np.append(np.arange(EVERY, log.t[-1], EVERY), log.t[-1] + self._chain.halo(log.fs, log.torque))

@@ -37,7 +37,7 @@ OUTSIDE = 1e6
 
 def torques_figure(one: HeldOut) -> str:
     """Return measured and predicted torques on a held-out log, joint by joint."""
-    rows = one.problem.parts[0]
+    rows = one.problem.rows
     figure, panels = _panels(rows.kinds, 1.5)
     models = list(one.torques)
     for j, panel in enumerate(panels):

@@ -67,7 +67,8 @@ class FrictionCurves:
     def _rows(self) -> list[tuple[Array, Array, Array]]:
         """The same of all joints, log by log, shape (joint, row) each."""
         found, (laws, X) = [], self._laws
-        for rows, signals in zip(self.fit.problem.parts, self.fit.problem.signals, strict=True):
+        for part in self.fit.problem.parts:
+            rows, signals = part.rows, part.signals
             friction = combined(laws.explicit(signals.state), X, np.zeros(signals.state.q.shape))
             residual = rows.Y - rows.predicted(self.X)
             left = np.stack([residual[rows.group == j] for j in range(self.fit.basis.n)])

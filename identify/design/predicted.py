@@ -7,10 +7,9 @@ from identify.basis.basis import Basis
 from identify.data.motion_log import MotionLog
 from identify.models.explicit import ExplicitModel
 from identify.noise.linearization import Linearization
-from identify.noise.propagation import NoiseLevels, NoisyRows
-from identify.noise.whitening import Whitening, kept_rows
+from identify.noise.noisy_rows import NoisyRows
+from identify.noise.propagation import NoiseLevels
 from identify.rows.chain import Chain
-from identify.signals.signals import Signals
 
 
 def predicted_information(log: MotionLog, basis: Basis, X: Array, levels: NoiseLevels, chain: Chain) -> Array:
@@ -37,14 +36,9 @@ def predicted_information(log: MotionLog, basis: Basis, X: Array, levels: NoiseL
         If the log is too short for the chain.
     """
     signals = chain.signals(log)
-
-    def linear(of: Signals) -> Linearization:
-        return Linearization(of, basis, np.broadcast_to(X, (*log.q.shape[:-2], len(X))))
-
+    linear = Linearization(signals, basis, np.broadcast_to(X, (*log.q.shape[:-2], len(X))))
     rows = chain.rows(signals, basis, ExplicitModel())
-    (to_rows,) = rows.maps
-    lead = (*log.q.shape[:-2], log.n)
-    noise = NoisyRows(NoiseLevels(np.broadcast_to(levels.torque, lead), np.broadcast_to(levels.position, lead)), linear)
-    kept = kept_rows(to_rows)
-    white = Whitening(noise.covariance(to_rows).kept(kept), kept).whiten(rows.W)
+    noisy, lead = NoisyRows(rows.maps[0], linear), (*log.q.shape[:-2], log.n)
+    each = NoiseLevels(np.broadcast_to(levels.torque, lead), np.broadcast_to(levels.position, lead))
+    white = noisy.whitening(noisy.covariance(each)).whiten(rows.W)
     return np.matmul(np.swapaxes(white, -1, -2), white)

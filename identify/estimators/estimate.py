@@ -1,6 +1,6 @@
 """What comes out of an identification, and how good it is."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Self
@@ -12,7 +12,8 @@ from identify.arrays import Array, frozen
 from identify.errors import PluginError
 from identify.estimators.likelihood.joint_fit import JointFit
 from identify.estimators.problem import Problem
-from identify.estimators.propagated import Influence, bias_covariance, excess, noise_covariance
+from identify.estimators.propagated import bias_covariance, excess, noise_covariance
+from identify.estimators.solution import AbstractSolution, Given, OfWeightedRows
 from identify.noise.propagation import NoiseLevels
 from identify.rows.factors import Factor, Fit, Status
 from identify.rows.rows import Rows
@@ -30,15 +31,10 @@ class Estimate:
         Estimated parameters; NaN where the rows cannot be solved.
     covariance : Array, shape (..., p, p)
         Covariance of the error of X, as the estimator has it: of OLS and WLS as if rows were independent.
-    influence : callable, optional
-        Returns G of rows, shape (..., rows, p), with which X = G' Y to first order; without it there is no corrected sigma.
-    weights : callable, optional
-        Returns what rows were multiplied by, shape (..., rows), where X is a least-squares solution of each row by itself.
-    whiten : callable, optional
-        Returns [W Y] of rows of one log made independent, shape (..., rows, p + 1), of which X is the least-squares solution,
-        each from those that come before it.
+    solution : AbstractSolution, optional
+        How X follows from the rows; without it there is no corrected sigma.
     honest : Array, shape (..., p, p), optional
-        Covariance of the error of X that the noise of the logs makes, if the estimator knows it; by default from `influence`.
+        Covariance of the error of X that the noise of the logs makes, if the estimator knows it; by default from `solution`.
     levels : NoiseLevels, optional
         The noise of the logs as the estimator found it; by default that of the problem.
     fits : mapping of tuple of int to JointFit
@@ -54,9 +50,7 @@ class Estimate:
     problem: Problem
     X: Array
     covariance: Array
-    influence: Influence | None = None
-    weights: Callable[[Rows], Array] | None = None
-    whiten: Callable[[Rows], Array] | None = None
+    solution: AbstractSolution | None = None
     honest: Array | None = None
     levels: NoiseLevels | None = None
     fits: Mapping[tuple[int, ...], JointFit] = field(default_factory=dict)
@@ -71,7 +65,7 @@ class Estimate:
         X: npt.ArrayLike,
         covariance: npt.ArrayLike | None = None,
         *,
-        influence: Influence | Array | None = None,
+        influence: Array | None = None,
     ) -> Self:
         """Return the estimate X of a problem.
 
@@ -83,34 +77,25 @@ class Estimate:
             The estimate.
         covariance : array_like, shape (..., p, p), optional
             That of section 7.3 by default: sigma_rho^2 (W' W)^-1 with sigma_rho^2 = |Y - W X|^2 / (r - p).
-        influence : Array, shape (..., r, p), or callable, optional
-            G with which X = G' Y to first order: what the estimate changes by if a row of Y, or the error of a row, does. A
-            function returns that of any rows of the problem. It is what an honest sigma is computed from.
+        influence : Array, shape (..., r, p), optional
+            G with which X = G' Y to first order: what the estimate changes by if a row of Y, or the error of a row, does. It
+            is what an honest sigma is computed from.
         """
         shape, p = problem.factors.together.status.shape, len(problem.names)
         x = _real_array("X", X, (*shape, p))
-        given = influence
-        function = given if given is None or callable(given) else (lambda _: given)
+        solution = None
+        if influence is not None:
+            solution = Given(_real_array("influence", influence, (*shape, len(problem.rows.time), p)))
         if covariance is None:
-            return cls(problem, x, frozen(_paper_covariance(problem.factors.together, x)), function)
-        return cls(problem, x, _real_array("covariance", covariance, (*shape, p, p)), function)
+            return cls(problem, x, frozen(_paper_covariance(problem.factors.together, x)), solution)
+        return cls(problem, x, _real_array("covariance", covariance, (*shape, p, p)), solution)
 
     @classmethod
     def of_fit(cls, problem: Problem, fit: Fit, *, scaled: bool) -> Self:
         """Return the estimate of a least-squares solution; `scaled` if its rows were divided by what their noise makes."""
         inverse = fit.factor.inverse(problem.factors.together.status == Status.OK)
-
-        def weights(rows: Rows) -> Array:
-            weight = np.tile(fit.weight, len(rows.time) // rows.kinds)
-            return weight * problem.row_weights.of(rows) if scaled and problem.row_weights else weight
-
-        def whiten(rows: Rows) -> Array:
-            return rows.joined * weights(rows)[..., None]
-
-        def influence(rows: Rows) -> Array:
-            return np.matmul(rows.W * (weights(rows) ** 2)[..., None], inverse)
-
-        return cls(problem, frozen(fit.X), frozen(_paper_covariance(fit.factor, fit.X, inverse)), influence, weights, whiten)
+        covariance = _paper_covariance(fit.factor, fit.X, inverse)
+        return cls(problem, frozen(fit.X), frozen(covariance), OfWeightedRows(fit.weight, inverse, scaled))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -136,18 +121,29 @@ class Estimate:
         """
         if self.honest is not None:
             return self.honest
-        if self.influence is None:
+        if self.solution is None:
             return np.full(self.covariance.shape, np.nan)
-        found = noise_covariance(self.problem, self.influence)
-        if self.weights is not None:
-            found = found * excess(self.problem, self.X, self.weights)[..., None, None]
-        found = found + bias_covariance(self.problem, self.influence)
+        parts = self.problem.parts
+        influence, weights = self.solution.influence(parts), self.solution.weights(parts)
+        found = noise_covariance(self.problem, influence)
+        if weights is not None:
+            found = found * excess(self.problem, self.X, weights)[..., None, None]
+        found = found + bias_covariance(self.problem, influence)
         return np.where((self.status == Status.OK)[..., None, None], found, np.nan)
+
+    def influence(self) -> Array | None:
+        """Return G of all rows, with which X = G' Y to first order, shape (..., r, p), if it is known."""
+        return None if self.solution is None else np.concatenate(self.solution.influence(self.problem.parts), axis=-2)
+
+    def independent_rows(self) -> Array | None:
+        """Return [W Y] made independent, shape (..., r, p + 1), if X is the least-squares solution of such rows."""
+        found = None if self.solution is None else self.solution.independent(self.problem.parts)
+        return None if found is None else np.concatenate(found, axis=-2)
 
     @property
     def noise_levels(self) -> NoiseLevels:
         """Standard deviations of the noise in torques and positions, on which the corrected sigma rests."""
-        return self.levels or self.problem.noise.levels
+        return self.levels or self.problem.noise
 
     @property
     def corrected_sigma(self) -> Array:

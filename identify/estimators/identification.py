@@ -116,7 +116,7 @@ def attempt_each(
     with one_thread(), blamed():  # what one model's rows lack, such as the joints of the basis, all lack
         for name, each in problems.items():
             with stage(f"rows of the {name} model"):
-                _ = each.parts
+                _ = each.some_rows
     for signals in problem.signals:
         signals.state.forget()
     found = dict[str, Estimate | IdentificationError]()

@@ -11,16 +11,15 @@ from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.data.motion_log import MotionLog
 from identify.errors import IdentificationError, LogError
+from identify.estimators.log_rows import LogRows
 from identify.estimators.simulator import Simulation
 from identify.models.explicit import ExplicitModel
 from identify.models.model import AbstractModel
-from identify.noise.linearization import Linearization
-from identify.noise.propagation import NoiseLevels, NoisyRows
+from identify.noise.propagation import NoiseLevels
 from identify.noise.repeats import repeats
-from identify.noise.restricted_likelihood import likely_noise
-from identify.noise.row_weights import RowWeights
-from identify.noise.spectral_levels import noise_of, position_noise
-from identify.noise.unbiased import unbiased, with_more_noise
+from identify.noise.restricted_likelihood import kept_units, likely, likely_levels
+from identify.noise.row_weights import floor_of, reciprocal_root
+from identify.noise.spectral_levels import position_noise, spectral_levels
 from identify.rows.chain import Chain
 from identify.rows.factors import Factors, Fit
 from identify.rows.long_logs import is_long, piece_of
@@ -34,6 +33,9 @@ ROUNDING = 1e-9
 
 SAMPLED = 8
 """Pieces of long logs from which noise is estimated and propagated."""
+
+BEGIN, LEAST = (1.0, 0.1, 0.1), 1e-4
+"""Shares of the errors of rows of which one kind is not alike, to begin with, and at least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +91,12 @@ class Problem:
     def rows(self) -> Rows:
         """Y, W and what belongs to them; raise IdentificationError if the logs are too long for their rows to be kept."""
         self.require_rows()
-        return self._together
+        return self.some_rows
+
+    @cached_property
+    def some_rows(self) -> Rows:
+        """The rows of all parts."""
+        return Rows.stack([part.rows for part in self.parts])
 
     @cached_property
     def signals(self) -> tuple[Signals, ...]:
@@ -104,34 +111,25 @@ class Problem:
         return tuple(chain.signals(log.part(*piece)) for chain, log, piece in some)
 
     @cached_property
-    def parts(self) -> tuple[Rows, ...]:
-        """The rows of each log; of long ones those of some pieces."""
-        return tuple(self._rows_of(signals) for signals in self.signals)
+    def parts(self) -> tuple[LogRows, ...]:
+        """The rows of each log, and what belongs to them; of long ones those of some pieces."""
+        if self.explicit is self:
+            return tuple(LogRows(self, signals) for signals in self.signals)
+        return tuple(LogRows(self, part.signals, part) for part in self.explicit.parts)
 
-    def every_part(self) -> Iterator[Rows]:
+    def every_part(self) -> Iterator[LogRows]:
         """Yield the rows of each log, or of every piece of long ones."""
         if not self.long:
             yield from self.parts
             return
         for chain, log, piece in self._pieces:
-            yield self._rows_of(chain.signals(log.part(*piece)))
+            yield LogRows(self, chain.signals(log.part(*piece)))
 
     @cached_property
     def share(self) -> float:
         """The share of all rows that the parts make: 1 but for logs too long for their rows to be kept."""
         every = sum(self.chain.grid(log).count for log in self.logs)
-        return len(self._together.time) / self._together.kinds / every
-
-    @cached_property
-    def unbiased_parts(self) -> tuple[Rows, ...]:
-        """The parts, with W less what noise of the positions adds to it on average."""
-        return tuple(map(self.unbiased, self.parts))
-
-    def unbiased(self, rows: Rows) -> Rows:
-        """Return rows of one log, or of a piece of it, with W less what noise of the positions adds to it on average."""
-        signals = rows.maps[0].signals
-        noisier = self.explicit._noisier.get(signals) or with_more_noise(signals, self.position_noise)
-        return unbiased(rows, self._rows_of(noisier))
+        return len(self.some_rows.time) / self.some_rows.kinds / every
 
     @cached_property
     def position_noise(self) -> Array:
@@ -151,7 +149,16 @@ class Problem:
     @cached_property
     def scaled_factors(self) -> Factors:
         """Triangular factors of the rows, divided by what their noise is relative to that of others of their kind."""
-        return self._long_factors[1] if self.long else self._scaled(self.rows)
+        if self.long:
+            return self._long_factors[1]
+        return self.factors if self.alike else self.rows.factors_of(self.weights)
+
+    @cached_property
+    def weights(self) -> Array:
+        """What rows are multiplied by, where those of one kind differ in their noise; else ones, shape (..., r) or (r,)."""
+        if self.alike:
+            return np.ones(len(self.some_rows.time))
+        return np.concatenate([part.weights for part in self.parts], axis=-1)
 
     @cached_property
     def explicit(self) -> "Problem":
@@ -161,33 +168,49 @@ class Problem:
         return self._explicit or replace(self, model=ExplicitModel(), _signals=self.signals)
 
     @cached_property
-    def noise(self) -> NoisyRows:
-        """The noise of torques and positions, as the explicit model's rows show it, and what it makes of those of any model."""
-        if self.explicit is not self:
-            return self.explicit.noise
-        return noise_of(self.parts, self._together.factors, self._fit, self.linear, self.repeats)
+    def start(self) -> Fit:
+        """The estimate by weighted least squares, from all parts."""
+        return self.some_rows.factors.fit(2)
 
     @cached_property
-    def likely_noise(self) -> NoisyRows:
+    def noise(self) -> NoiseLevels:
+        """The noise of torques and positions, as the spectrum of what the explicit model leaves over shows it."""
+        if self.explicit is not self:
+            return self.explicit.noise
+        rows, noisy = zip(*((part.rows, part.noisy) for part in self.parts), strict=True)
+        return spectral_levels(rows, noisy, self.some_rows.factors, self.start, self.position_noise, self.repeats)
+
+    @cached_property
+    def likely_noise(self) -> NoiseLevels:
         """The noise whose levels make the explicit model's rows most likely, from their covariance."""
         if self.explicit is not self:
             return self.explicit.likely_noise
-        start = NoiseLevels(self.noise.levels.torque, self.position_noise, self.repeats)
-        return likely_noise(self.unbiased_parts, start, self.linear)
-
-    def linear(self, signals: Signals) -> Linearization:
-        """Return the linearization of the explicit model about these signals."""
-        known = self.explicit._linear
-        if signals not in known:
-            return Linearization(signals, self.basis, self.explicit._fit.X)
-        return known[signals]
+        start = NoiseLevels(self.noise.torque, self.position_noise, self.repeats)
+        rows, noisy = zip(*((part.unbiased, part.noisy) for part in self.parts), strict=True)
+        return likely_levels(rows, noisy, start)
 
     @cached_property
-    def row_weights(self) -> RowWeights | None:
-        """What rows are multiplied by where those of one kind differ in their noise; None if they are alike."""
-        if all(part.alike for rows in self.parts for part in rows.maps):
-            return None
-        return RowWeights(self.parts, self.model, self.noise)
+    def alike(self) -> bool:
+        """Whether rows of one kind are alike in their noise, but for the mask: those of a model whose B is constant."""
+        return all(part.rows.maps[0].alike for part in self.parts)
+
+    @cached_property
+    def floor(self) -> Array:
+        """Variance that is added to that of every row where they are not alike, shape (...): see `floor_of`."""
+        every = np.concatenate([part.variance for part in self.parts], axis=-1)
+        rows, mean = self.some_rows, np.mean(every, axis=-1)
+        left = rows.Y - rows.predicted(rows.factors_of(reciprocal_root(every, mean)).fit().X)
+        return floor_of(left**2, every, rows.valid)
+
+    @cached_property
+    def shares(self) -> Array:
+        """How much of each of their errors makes the rows most likely, shape (..., error): see `LogRows.errors`."""
+        if self.alike:
+            return np.ones((1,))
+        units = [kept_units(part.noisy, part.errors) for part in self.parts]
+        joined = [part.unbiased.joined * part.noisy.kept[..., None] for part in self.parts]
+        begin = np.broadcast_to(np.array(BEGIN), (*joined[0].shape[:-2], len(BEGIN)))
+        return likely(units, joined, begin, np.full(len(BEGIN), LEAST))
 
     def at(self, log: MotionLog | Sequence[MotionLog], weights: Weights = "measured") -> Rows:
         """Return the rows of other logs, by the same chain, basis and model (instrumental variables, DIDIM).
@@ -218,7 +241,7 @@ class Problem:
             raise IdentificationError(f"weights = {weights!r} is none of 'measured', 'own'")
         measured = self.signals if weights == "measured" else [None] * len(logs)
         signals = [self.chain.signals(one, given) for one, given in zip(logs, measured, strict=True)]
-        return Rows.stack([self._rows_of(one) for one in signals])
+        return Rows.stack([self.rows_of(one) for one in signals])
 
     def with_model(self, model: AbstractModel) -> "Problem":
         """Return the problem of another model, which shares all that the two have in common."""
@@ -236,30 +259,12 @@ class Problem:
 
     def forget(self) -> None:
         """Drop what only the rows of further models would need."""
-        self.explicit.__dict__.pop("_noisier", None)
+        for part in self.explicit.parts:
+            part.__dict__.pop("noisier", None)
 
-    def _rows_of(self, signals: Signals) -> Rows:
+    def rows_of(self, signals: Signals) -> Rows:
+        """Return the rows of the signals of one log, or of a piece of it."""
         return self.chain.rows(signals, self.basis, self.model)
-
-    @cached_property
-    def _together(self) -> Rows:
-        """The rows of all parts."""
-        return Rows.stack(self.parts)
-
-    @cached_property
-    def _fit(self) -> Fit:
-        """The estimate by weighted least squares, from all parts."""
-        return self._together.factors.fit(2)
-
-    @cached_property
-    def _linear(self) -> dict[Signals, Linearization]:
-        """Linearizations about the signals of all parts."""
-        return {signals: Linearization(signals, self.basis, self._fit.X) for signals in self.signals}
-
-    @cached_property
-    def _noisier(self) -> dict[Signals, Signals]:
-        """The signals of all parts with more noise, which all models share."""
-        return {signals: with_more_noise(signals, self.position_noise) for signals in self.signals}
 
     @cached_property
     def _pieces(self) -> list[tuple[Chain, MotionLog, tuple[int, int]]]:
@@ -271,11 +276,11 @@ class Problem:
     @cached_property
     def _long_factors(self) -> tuple[Factors, Factors]:
         """Factors of long logs, plain and scaled, of which each piece is made once for both."""
-        plain, scaled = zip(*((rows.factors, self._scaled(rows)) for rows in self.every_part()), strict=True)
+        plain, scaled = list[Factors](), list[Factors]()
+        for part in self.every_part():
+            plain.append(part.rows.factors)
+            scaled.append(plain[-1] if self.alike else part.rows.factors_of(part.weights))
         return Factors.merged(plain), Factors.merged(scaled)
-
-    def _scaled(self, rows: Rows) -> Factors:
-        return rows.factors if self.row_weights is None else rows.factors_of(self.row_weights.of(rows))
 
 
 def _speeds(log: MotionLog, chain: Chain) -> Array:

@@ -9,7 +9,7 @@ import scipy
 
 from identify.arrays import Array
 from identify.errors import IdentificationError
-from identify.estimators.least_squares.generalized_least_squares import Whitened
+from identify.estimators.log_rows import LogRows
 from identify.estimators.problem import Problem
 from identify.models.explicit import ExplicitModel
 from identify.rows.rows import Rows
@@ -69,9 +69,8 @@ def lack_of_fit(problem: Problem, X: Array) -> tuple[Lack, ...]:
         If there are too few rows, or the covariance of the rows is singular.
     """
     explicit = problem.with_model(ExplicitModel())
-    whitened = Whitened(explicit)
     parts = explicit.parts
-    own, y, raw = (np.concatenate(x) for x in zip(*(_whitened(whitened, rows) for rows in parts), strict=True))
+    own, y, raw = (np.concatenate(x) for x in zip(*map(_whitened, parts), strict=True))
     used = int(np.count_nonzero(own.any(axis=1)))  # rows that the mask takes are zero
     freedom = used - own.shape[1] - BINS
     if freedom < BINS:
@@ -84,11 +83,11 @@ def lack_of_fit(problem: Problem, X: Array) -> tuple[Lack, ...]:
     found = list[tuple[float, Lack]]()
     variables = _variables(parts, problem, X)
     for (joint, over), functions in variables.items():
-        made = [_rows_of(rows, joint, f) for rows, f in zip(parts, functions, strict=True)]
-        E = np.concatenate([whitened.whiten(rows, x) for rows, x in zip(parts, made, strict=True)])
+        made = [_rows_of(part.rows, joint, f) for part, f in zip(parts, functions, strict=True)]
+        E = np.concatenate([part.whitening.whiten(x) for part, x in zip(parts, made, strict=True)])
         log_p, b = _tested(E, Q, left, level)
         size = np.concatenate(made) @ b - raw @ np.linalg.lstsq(R, Q.T @ (E @ b), rcond=None)[0]
-        there = np.concatenate([rows.valid & (rows.group == joint) for rows in parts])
+        there = np.concatenate([part.rows.valid & (part.rows.group == joint) for part in parts])
         p = min(1.0, float(np.exp(log_p)) * len(variables))
         found.append((log_p, Lack(joint, over, p, float(np.sqrt(np.mean(size[there] ** 2))) if there.any() else 0.0)))
     return tuple(lack for _, lack in sorted(found, key=lambda each: each[0]))
@@ -105,10 +104,10 @@ def _tested(E: Array, Q: Array, left: Array, level: float) -> tuple[float, Array
     return float(scipy.stats.chi2.logsf(z @ z / level, kept.sum())) if kept.any() else 0.0, b
 
 
-def _whitened(whitened: Whitened, rows: Rows) -> tuple[Array, Array, Array]:
+def _whitened(part: LogRows) -> tuple[Array, Array, Array]:
     """Return W and Y made independent, and W as it is."""
-    z = whitened(rows)
-    return z[..., :-1], z[..., -1], rows.W
+    z = part.whitening.whiten(part.unbiased.joined)
+    return z[..., :-1], z[..., -1], part.rows.W
 
 
 def _rows_of(rows: Rows, joint: int, functions: Array) -> Array:
@@ -142,9 +141,9 @@ def _time(signals: Signals, tau: Array, j: int) -> tuple[Array, Array]:
 OVER: Mapping[str, Variable] = {"velocity": _velocity, "position": _position, "load": _load, "time": _time}
 
 
-def _variables(parts: tuple[Rows, ...], problem: Problem, X: Array) -> dict[tuple[int, str], list[Array]]:
+def _variables(parts: tuple[LogRows, ...], problem: Problem, X: Array) -> dict[tuple[int, str], list[Array]]:
     """Return the functions of every joint and variable, part by part, shape (function, time) each."""
-    signals = [rows.maps[0].signals for rows in parts]
+    signals = [part.signals for part in parts]
     torques = [ExplicitModel().equations(problem.basis, one).predicted(X) for one in signals]
     found = dict[tuple[int, str], list[Array]]()
     for j in range(problem.basis.n):

@@ -10,7 +10,7 @@ from identify.arrays import Array
 from identify.estimators.estimate import Estimate
 from identify.estimators.propagated import noise_covariance
 from identify.estimators.simulating.row_products import Kinds, with_weights
-from identify.rows.rows import Rows
+from identify.estimators.solution import Given
 
 TELLING = 1e-6
 """Variance of a direction of the difference, over the largest, below which it is rounding."""
@@ -57,15 +57,11 @@ def noise_in_rows(estimate: Estimate) -> NoiseInRows:
         By instrumental variables.
     """
     problem, rows = estimate.problem, estimate.rows
-    assert estimate.influence is not None
-    kinds, of_IV = Kinds.of_rows(problem), estimate.influence(rows)
+    kinds, of_IV = Kinds.of_rows(problem), estimate.influence()
+    assert of_IV is not None
     plain = with_weights(rows.Y, rows.W, kinds.weights(np.nan_to_num(estimate.residual)))
-    apart = np.nan_to_num(of_IV - plain.G)
-
-    def influence(_: Rows) -> Array:
-        return apart
-
-    V, size = np.nan_to_num(noise_covariance(problem, influence)), np.nan_to_num(estimate.sigma, nan=1.0)
+    apart = Given(np.nan_to_num(of_IV - plain.G)).influence(problem.parts)
+    V, size = np.nan_to_num(noise_covariance(problem, apart)), np.nan_to_num(estimate.sigma, nan=1.0)
     size = np.where(size > 0, size, 1.0)
     values, axes = np.linalg.eigh(V / size[..., :, None] / size[..., None, :])
     along = np.matmul(np.swapaxes(axes, -1, -2), (np.nan_to_num(estimate.X - plain.X) / size)[..., None])[..., 0]

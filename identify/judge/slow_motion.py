@@ -44,7 +44,7 @@ def slow_motion(problem: Problem, X: Array) -> tuple[Array, Array]:
     factor : Array, shape (joint,)
         1 where friction is the same down to that speed; else the end of the fastest band where it is not.
     """
-    every = [_seen(part, X) for part in problem.parts]
+    every = [_seen(part.rows, X) for part in problem.parts]
     speed = np.mean([slow for slow, _, _ in every], axis=0)
     factor = np.ones(len(speed))
     for j in range(len(speed)):

@@ -136,7 +136,7 @@ def validate(held_out: Problem, X: Array, covariance: Array | None = None) -> Va
         )
     held_out.require_rows("a motion is judged by its rows, and ")
     judged = as_judged(held_out)
-    signals, chain, basis, rows = judged.signals[0], judged.chain, judged.basis, judged.parts[0]
+    signals, chain, basis, rows = judged.signals[0], judged.chain, judged.basis, judged.parts[0].rows
     left = instants(signals, basis, ExplicitModel(), chain, X)
     moving = [_Joint.of(rows, X, j) for j in range(basis.n)]
     standing = chain.operator.map(left.equations, left.equations.weighted_as(1.0 - signals.weight), chain.grid(signals.log))
@@ -188,7 +188,7 @@ class _Joint:
     @classmethod
     def of(cls, rows: Rows, X: Array, joint: int) -> "_Joint":
         own = rows.group == joint
-        spread = np.sqrt(torque_paths(rows.maps[0]).covariance(np.ones(rows.kinds)).variance[own])
+        spread = np.sqrt(torque_paths(rows.maps[0]).variance(np.ones(rows.kinds))[own])
         share = shares(rows.maps[0])[joint]
         return cls(rows.Y[own], (rows.Y - rows.predicted(X))[own], rows.W[own], rows.valid[own], spread, share)
 

@@ -115,10 +115,8 @@ def with_known_robot(robot: LoadedRobot, names: tuple[str, ...], X: Array, covar
     basis, logs = robot.basis, marked(robot.loaded, 1.0)
     found = with_robot_held(robot, dict(zip(names, map(float, X), strict=True)))
     of_robot = Problem(logs, basis.of(basis.named(*names)), ExplicitModel(), robot.chain).rows
-    rows = found.problem.rows
-    slope = np.zeros((len(found.names), len(names)))
-    if found.influence is not None:
-        slope = -found.influence(rows).T @ of_robot.W
+    G = found.influence()
+    slope = np.zeros((len(found.names), len(names))) if G is None else -G.T @ of_robot.W
     X_payload, C = of_payload(found, robot.names)
     place = [found.names.index(name) for name in robot.names]
     return Payload(robot.names, X_payload, C + slope[place] @ covariance @ slope[place].T, robot.known)

@@ -26,7 +26,9 @@ class BandedCovariance:
     bands: Array
 
     @classmethod
-    def of(cls, grid: Grid, windows: Sequence[Array], signals: Sequence[Array], outside: Array) -> Self:
+    def of(
+        cls, grid: Grid, windows: Sequence[Array], signals: Sequence[Array], outside: Array, most: int | None = None
+    ) -> Self:
         """Return the covariance of rows that are sums over unit white noise n of several sources:
 
             row of sample k = outside sum over sources and t of n(t) sum over d of windows[d](t - k) signals[d](t)
@@ -41,10 +43,12 @@ class BandedCovariance:
             As many.
         outside : Array, shape (..., kind, instant)
             Weights of the rows.
+        most : int, optional
+            Lags at most, such as 1 where the variances alone count; all that there are by default.
         """
         early, G, found = np.stack(windows), np.stack(signals), []
         terms, length = early.shape
-        before, lags = (length - 1) // 2, min(grid.count, -(-length // grid.step))
+        before, lags = (length - 1) // 2, min(grid.count, -(-length // grid.step), most or grid.count)
         late = np.zeros((lags, terms, length))
         for lag, window in enumerate(late):
             window[:, lag * grid.step :] = early[:, : length - lag * grid.step]

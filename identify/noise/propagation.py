@@ -1,10 +1,9 @@
 """How noise of a log's torques and positions reaches its rows."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from math import ceil
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -14,7 +13,6 @@ from identify.noise.linearization import Linearization, smoothed
 from identify.rows.grid import Grid
 from identify.rows.row_map import RowMap
 from identify.signals.differentiators.central import CentralDifference
-from identify.signals.signals import Signals
 
 RATE = 200.0
 """Least frequency [Hz] at which noise is propagated: rows and motion have little beyond some 10 Hz, the edges of masks more."""
@@ -57,36 +55,6 @@ class NoiseLevels:
 
 
 @dataclass(frozen=True, eq=False)
-class NoisyRows:
-    """The noise of logs, and the covariance that it gives their rows.
-
-    Parameters
-    ----------
-    levels : NoiseLevels
-        Of all logs.
-    linear : callable
-        Returns the explicit model's linearization about the signals of a log.
-    known : mapping of RowMap to BandedCovariance
-        Covariances that were computed.
-    """
-
-    levels: NoiseLevels
-    linear: Callable[[Signals], Linearization]
-    known: WeakKeyDictionary[RowMap, BandedCovariance] = field(default_factory=WeakKeyDictionary, repr=False)
-
-    def covariance(self, rows: RowMap) -> BandedCovariance:
-        """Return the covariance of rows, which is computed once for all models that noise reaches alike."""
-        for other, found in self.known.items():
-            if rows.noisy_as(other):
-                return found
-        found = torque_paths(rows).covariance(self.levels.in_rows)
-        if self.levels.position.any():
-            found = found + position_paths(rows, self.linear(rows.signals)).covariance(self.levels.effective_position)
-        self.known[rows] = found
-        return found
-
-
-@dataclass(frozen=True, eq=False)
 class Paths:
     """How unit noise of each joint reaches rows: see `BandedCovariance.of`.
 
@@ -109,14 +77,20 @@ class Paths:
 
     def covariance(self, level: Array) -> BandedCovariance:
         """Return the covariance that noise of these standard deviations, shape (..., joint), gives the rows."""
-        leveled = [signal * level[..., None, :, None] for signal in self.signals]
-        return BandedCovariance.of(self.grid, self.windows, leveled, self.outside)
+        return BandedCovariance.of(self.grid, self.windows, self._leveled(level), self.outside)
+
+    def variance(self, level: Array) -> Array:
+        """Return the variances that noise of these standard deviations, shape (..., joint), gives the rows, shape (..., r)."""
+        return BandedCovariance.of(self.grid, self.windows, self._leveled(level), self.outside, 1).variance
 
     def each(self) -> list[BandedCovariance]:
         """Return the covariances that unit noise gives the rows, joint by joint."""
         joints = range(self.signals[0].shape[-2])
         single = [[signal[..., j : j + 1, :] for signal in self.signals] for j in joints]
         return [BandedCovariance.of(self.grid, self.windows, signals, self.outside) for signals in single]
+
+    def _leveled(self, level: Array) -> list[Array]:
+        return [signal * level[..., None, :, None] for signal in self.signals]
 
 
 def torque_paths(rows: RowMap) -> Paths:

@@ -1,6 +1,6 @@
 """The noise levels that make the rows of the explicit model most likely."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -9,12 +9,11 @@ import numpy.typing as npt
 
 from identify.arrays import Array
 from identify.noise.band_matrix import Band, Cholesky
-from identify.noise.linearization import Linearization
-from identify.noise.propagation import NoiseLevels, NoisyRows, position_paths, torque_paths
-from identify.noise.whitening import kept_rows
+from identify.noise.covariance import BandedCovariance
+from identify.noise.noisy_rows import NoisyRows
+from identify.noise.propagation import NoiseLevels
 from identify.rows.factors import Factor, triangular
 from identify.rows.rows import Rows
-from identify.signals.signals import Signals
 
 ROUNDS, SETTLED = 20, 0.01
 """Rounds at most, and change, in all that the levels make of the rows, at which they count as found."""
@@ -41,8 +40,8 @@ SMALLEST = 1e-9
 """Noise of positions [rad] at least: rounding, of a log in single precision."""
 
 
-def likely_noise(parts: Sequence[Rows], start: NoiseLevels, linear: Callable[[Signals], Linearization]) -> NoisyRows:
-    """Return the noise of logs by restricted maximum likelihood (REML), from the rows of their explicit model.
+def likely_levels(parts: Sequence[Rows], noisy: Sequence[NoisyRows], start: NoiseLevels) -> NoiseLevels:
+    """Return the levels of the noise of logs by restricted maximum likelihood (REML), from the rows of their explicit model.
 
     The covariance of rows is C = sum of sigma_i^2 C_i over the torques and positions of all joints. The likelihood of what the
     parameters leave over is stationary where r' C^-1 C_i C^-1 r = trace of P C_i, with P = C^-1 - C^-1 W (W' C^-1 W)^-1 W' C^-1
@@ -55,21 +54,21 @@ def likely_noise(parts: Sequence[Rows], start: NoiseLevels, linear: Callable[[Si
     ----------
     parts : sequence of Rows
         Rows of the explicit model, log by log.
+    noisy : sequence of NoisyRows
+        How noise reaches them.
     start : NoiseLevels
         Where to begin; NaN in runs that cannot be solved.
-    linear : callable
-        Returns the linearization of the explicit model about signals.
     """
-    units = [_units(rows, linear(rows.maps[0].signals)) for rows in parts]
-    joined = [rows.joined * kept_rows(rows.maps[0])[..., None] for rows in parts]
-    tau = [rows.maps[0].signals.torque.mean for rows in parts]
+    units = [kept_units(each, each.units()) for each in noisy]
+    joined = [rows.joined * each.kept[..., None] for rows, each in zip(parts, noisy, strict=True)]
+    tau = [each.to_rows.signals.torque.mean for each in noisy]
     rms = np.sqrt(sum(np.mean(one**2, axis=-1) for one in tau) / len(parts))
     least = np.concatenate([np.maximum(EXACT * rms, 1e-12), np.full(rms.shape, SMALLEST)], axis=-1) ** 2
     begin = np.where(np.isfinite(start.torque), np.maximum(start.torque, LOWEST * rms), start.torque)
     levels = np.concatenate([begin, np.broadcast_to(start.position, start.torque.shape)], axis=-1)
     squares = likely(units, joined, np.nan_to_num(levels**2), least)
     torque, position = np.split(np.where(np.isfinite(levels), np.sqrt(squares), np.nan), 2, axis=-1)
-    return NoisyRows(NoiseLevels(torque, position, start.repeats), linear)
+    return NoiseLevels(torque, position, start.repeats)
 
 
 def likely(units: Sequence[Sequence[Band]], joined: Sequence[Array], start: Array, least: Array) -> Array:
@@ -97,12 +96,11 @@ def likely(units: Sequence[Sequence[Band]], joined: Sequence[Array], start: Arra
     return squares
 
 
-def _units(rows: Rows, linear: Linearization) -> list[Band]:
-    """Return the covariances of rows by unit noise of the torques, and of the positions, joint by joint."""
-    (to_rows,) = rows.maps
-    each = [*torque_paths(to_rows).each(), *position_paths(to_rows, linear).each()]
-    kept = kept_rows(to_rows)
-    return alike([C.kept(kept).matrix for C in each])
+def kept_units(noisy: NoisyRows, parts: Sequence[BandedCovariance]) -> list[Band]:
+    """Return parts of the covariance of the rows that are kept, as matrices as wide as the widest."""
+    bands = [C.kept(noisy.kept).matrix for C in parts]
+    width = max(band.lower.shape[-1] for band in bands)
+    return [Band(band.widened(width)) for band in bands]
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,12 +176,6 @@ class _Slope:
         of_sigma = np.max(np.abs(moved / squares - 1) * share, axis=-1) < SETTLED
         of_X = np.max(np.abs(np.nan_to_num(np.matmul(self.moves, (moved - squares)[..., None]))), axis=(-2, -1)) < STILL
         return np.asarray(of_sigma & of_X)
-
-
-def alike(bands: Sequence[Band]) -> list[Band]:
-    """Return matrices as wide as the widest."""
-    width = max(band.lower.shape[-1] for band in bands)
-    return [Band(band.widened(width)) for band in bands]
 
 
 def _sum(parts: Sequence[Band], squares: Array) -> Band:

@@ -1,9 +1,6 @@
 """What rows whose noise differs are divided by in weighted least squares."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from functools import cached_property
-from weakref import WeakKeyDictionary
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -11,83 +8,34 @@ import scipy
 
 from identify.arrays import Array, combined
 from identify.models.model import AbstractModel
-from identify.noise.linearization import smoothed
-from identify.noise.propagation import NoisyRows
+from identify.noise.linearization import Linearization, smoothed
 from identify.noise.two_levels import two_levels
-from identify.rows.factors import Factors
 from identify.rows.row_map import RowMap
-from identify.rows.rows import Rows
 
 LEAST, MOST = 0.01, 10.0
 """Range of b/a: residuals of some hundred rows do not show less, and more is as good as equal weights."""
 
 
-@dataclass(frozen=True, eq=False)
-class RowWeights:
-    """Weights of the rows of a model that multiplies torques by something that varies, such as the power model.
+def friction_bias(to_rows: RowMap, linear: Linearization, model: AbstractModel, position: Array) -> Array:
+    """Return what noise of the velocities makes of W X where joints hardly move, shape (..., r).
+
+    Friction turns noise into power, Fs |qd|, of one sign: that of a velocity of E|qd + noise| - |qd|.
 
     Parameters
     ----------
-    parts : tuple of Rows
-        Rows of each log, or of some pieces.
+    to_rows : RowMap
+        Of one log.
+    linear : Linearization
+        Of the explicit model, about its signals: basis and X.
     model : AbstractModel
-        Theirs.
-    noise : NoisyRows
-        That of the logs.
+        Whose rows they are.
+    position : Array, shape (..., joint)
+        Standard deviation of the positions' noise [rad].
     """
-
-    parts: tuple[Rows, ...]
-    model: AbstractModel
-    noise: NoisyRows
-    _variances: WeakKeyDictionary[RowMap, Array] = field(default_factory=WeakKeyDictionary, repr=False)
-
-    def of(self, rows: Rows) -> Array:
-        """Return what rows are multiplied by, shape (..., r)."""
-        return reciprocal_root(self.variance(rows), self.floor)
-
-    def variance(self, rows: Rows) -> Array:
-        """Return the variance that the noise of the logs would give rows without a mask, shape (..., r)."""
-        for part in rows.maps:
-            if part not in self._variances:
-                self._variances[part] = self._variance(part.unmasked())
-        return np.concatenate([self._variances[part] for part in rows.maps], axis=-1)
-
-    @cached_property
-    def floor(self) -> Array:
-        """Variance that is added to that of every row, since not all residuals are noise, shape (...): see `floor_of`."""
-        variances = [self.variance(part) for part in self.parts]
-        every = np.concatenate(variances, axis=-1)
-        weights = [reciprocal_root(one, np.mean(every, axis=-1)) for one in variances]
-        X = Factors.merged([part.factors_of(weight) for part, weight in zip(self.parts, weights, strict=True)]).fit().X
-        squares = [(part.Y - part.predicted(X)) ** 2 for part in self.parts]
-        valid = np.concatenate([part.valid for part in self.parts], axis=-1)
-        return floor_of(np.concatenate(squares, axis=-1), every, valid)
-
-    def excess(self, X: Array, weights: Callable[[Rows], Array], free: Array) -> Array:
-        """Return how many times the squares of weighted residuals are what noise makes of them, at least 1, shape (...).
-
-        Of the estimate X, `free` the share of the residuals that its parameters do not take.
-        """
-        squares, expected = np.zeros(()), np.zeros(())
-        for part in self.parts:
-            weight = weights(part) ** 2 * part.valid
-            squares = squares + np.sum(weight * (part.Y - part.predicted(X)) ** 2, axis=-1)
-            expected = expected + np.sum(weight * self.variance(part), axis=-1)
-        ratio = np.divide(squares, expected * free, out=np.ones_like(squares), where=expected > 0)
-        return np.maximum(ratio, 1.0)
-
-    def bias(self, rows: RowMap) -> Array:
-        """Return what noise of the velocities makes of W X where joints hardly move, shape (..., r).
-
-        Friction turns noise into power, Fs |qd|, of one sign: that of a velocity of E|qd + noise| - |qd|.
-        """
-        signals, linear = rows.signals, self.noise.linear(rows.signals)
-        speed = rectified(smoothed(signals.state.qd, signals.fs), self.noise.levels.position[..., None] * signals.gain)
-        columns = self.model.c(linear.basis, replace(signals.state, qd=speed))
-        return rows.measurement(combined(columns, linear.X, np.zeros(rows.inside.shape)))
-
-    def _variance(self, rows: RowMap) -> Array:
-        return self.noise.covariance(rows).variance + self.bias(rows) ** 2
+    signals = to_rows.signals
+    speed = rectified(smoothed(signals.state.qd, signals.fs), position[..., None] * signals.gain)
+    columns = model.c(linear.basis, replace(signals.state, qd=speed))
+    return to_rows.measurement(combined(columns, linear.X, np.zeros(to_rows.inside.shape)))
 
 
 def floor_of(squares: Array, variance: Array, valid: npt.NDArray[np.bool_]) -> Array:

@@ -1,14 +1,14 @@
 """The noise of a log: of positions from their differences, of torques from what the explicit model leaves over."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import comb
 
 import numpy as np
 
 from identify.arrays import Array
 from identify.noise.covariance import BandedCovariance
-from identify.noise.linearization import Linearization
-from identify.noise.propagation import NoiseLevels, NoisyRows, position_paths, torque_paths
+from identify.noise.noisy_rows import NoisyRows
+from identify.noise.propagation import NoiseLevels
 from identify.noise.two_levels import two_levels
 from identify.rows.factors import Factors, Fit, Status
 from identify.rows.rows import Rows
@@ -31,9 +31,9 @@ TOLD = 2.0
 """Rows whose residuals count as noise of the torque, whatever their spectrum says: that of a few rows says little."""
 
 
-def noise_of(
-    parts: Sequence[Rows], factors: Factors, fit: Fit, linear: Callable[[Signals], Linearization], repeats: Array
-) -> NoisyRows:
+def spectral_levels(
+    parts: Sequence[Rows], noisy: Sequence[NoisyRows], factors: Factors, fit: Fit, position: Array, repeats: Array
+) -> NoiseLevels:
     """Return the noise of logs as the rows of their explicit model show it, NaN in runs that cannot be solved.
 
     How much of the squared residuals of a joint is noise of the torque, and how much that of positions, their spectrum says: it
@@ -46,19 +46,17 @@ def noise_of(
     ----------
     parts : sequence of Rows
         Rows of the explicit model, log by log.
+    noisy : sequence of NoisyRows
+        How noise reaches them.
     factors : Factors
         Of all these rows.
     fit : Fit
         Their weighted least-squares solution.
-    linear : callable
-        Returns the linearization of the explicit model about signals.
-    repeats : Array, shape (..., joint)
-        See `NoiseLevels`.
+    position, repeats : Array, shape (..., joint)
+        Of the positions' noise, its standard deviation as their differences show it, and how it repeats itself: `NoiseLevels`.
     """
-    maps = [rows.maps[0] for rows in parts]
-    position = position_noise([each.signals for each in maps])
-    white = [torque_paths(each).covariance(np.ones_like(position)) for each in maps]
-    made = [position_paths(each, linear(each.signals)).covariance(position) for each in maps]
+    white = [each.torque.covariance(np.ones_like(position)) for each in noisy]
+    made = [each.position.covariance(position) for each in noisy]
     squares, of_position = factors.squares(fit.X), np.sum(_by_kind(parts, made), axis=-1)
     shown = np.nan_to_num(of_position / np.where(squares > 0, squares, np.nan)) > NEGLIGIBLE
     rest = np.where(shown, _torque_share(parts, fit.X, white, made), 1.0) * squares
@@ -67,11 +65,7 @@ def noise_of(
     free = np.maximum(np.sum(of_torque * (1 - _leverage(parts, factors, fit)), axis=-1), FREE * whole)
     torque = np.sqrt(np.divide(rest, free, out=np.full(free.shape, np.nan), where=free > 0))
     most = np.minimum(1.0, np.divide(squares, of_position, out=np.ones_like(squares), where=of_position > squares))
-    levels = NoiseLevels(torque, np.where(shown.any(axis=-1, keepdims=True), position * np.sqrt(most), 0.0), repeats)
-    found = NoisyRows(levels, linear)
-    if np.array_equal(levels.effective_position, position):
-        found.known.update((each, w.leveled(levels.in_rows) + m) for each, w, m in zip(maps, white, made, strict=True))
-    return found
+    return NoiseLevels(torque, np.where(shown.any(axis=-1, keepdims=True), position * np.sqrt(most), 0.0), repeats)
 
 
 def _by_kind(parts: Sequence[Rows], covariances: Sequence[BandedCovariance]) -> Array:

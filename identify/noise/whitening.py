@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -10,11 +9,6 @@ import numpy.typing as npt
 from identify.arrays import Array
 from identify.noise.band_matrix import Cholesky
 from identify.noise.covariance import BandedCovariance
-from identify.noise.propagation import torque_paths
-from identify.rows.row_map import RowMap
-
-SEEN = 0.05
-"""Share of a row's variance that the mask must leave: of the edge of a mask alone, variance and model are not known well."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,15 +38,3 @@ class Whitening:
     def solve(self, x: Array) -> Array:
         """Return C^-1 x, zero for rows that are left out, shape (..., r, m)."""
         return self.root.unwhiten(self.whiten(x)) * self.kept[..., None]
-
-
-_KEPT: WeakKeyDictionary[RowMap, npt.NDArray[np.bool_]] = WeakKeyDictionary()
-
-
-def kept_rows(rows: RowMap) -> npt.NDArray[np.bool_]:
-    """Return which rows the mask leaves enough of, shape (..., r); computed once."""
-    if rows not in _KEPT:
-        one = np.ones(rows.signals.log.n)
-        whole = torque_paths(rows.unmasked()).covariance(one).variance
-        _KEPT[rows] = np.asarray(torque_paths(rows).covariance(one).variance > SEEN * whole)
-    return _KEPT[rows]

@@ -20,10 +20,10 @@ from identify import (
     scara,
 )
 from identify.noise.band_matrix import Band, Cholesky
-from identify.noise.propagation import NoiseLevels, NoisyRows
-from identify.noise.restricted_likelihood import likely_noise
+from identify.noise.noisy_rows import NoisyRows
+from identify.noise.propagation import NoiseLevels
+from identify.noise.restricted_likelihood import likely_levels
 from identify.noise.unbiased import unbiased, with_more_noise
-from identify.noise.whitening import Whitening, kept_rows
 from identify.rows import long_logs
 
 EVERY = {name: MODELS.create(name) for name in MODELS.builtin}
@@ -52,8 +52,8 @@ def dense(C):
 def whitened(log):
     """Return the rows of an implicit problem with their whitening, and their covariance as a matrix."""
     problem = Problem((log,), scara(), EVERY["implicit"], idbench_chain())
-    noise = NoisyRows(NoiseLevels(np.array([0.1, 0.01]), np.full(2, 1e-4)), problem.linear)
-    whitening = whitening_of(problem.rows.maps[0], noise)
+    noisy = NoisyRows(problem.rows.maps[0], problem.parts[0].linear)
+    whitening = noisy.whitening(noisy.covariance(NoiseLevels(np.array([0.1, 0.01]), np.full(2, 1e-4))))
     return problem.rows, whitening, dense(whitening.C)
 
 
@@ -79,11 +79,11 @@ def test_a_matrix_that_is_not_positive_is_refused():
 def test_it_solves_the_normal_equations_with_the_covariance_of_the_rows(model, log):
     """G' Y = X, and G' W = 1 but for what noise adds to W; its covariance is that of the noise through G, by dense matrices."""
     found = identify(noisy(log, BITS16, (0.02, 0.001), 1).part(0, log.samples), scara(), EVERY[model], estimator=GLS)
-    rows, G = found.rows, found.influence(found.rows)[0]
+    rows, G = found.rows, found.influence()[0]
     np.testing.assert_allclose(G.T @ rows.W[0], np.eye(8), atol=1e-3)
     np.testing.assert_allclose(G.T @ rows.Y[0], found.X[0], rtol=1e-6)
     if model != "power":  # whose rows have noise of their own
-        C = found.problem.likely_noise.covariance(rows.maps[0])
+        C = found.problem.parts[0].errors[0]
         C = dense(replace(C, bands=C.bands[0]))
         np.testing.assert_allclose(np.diag(G.T @ C @ G), found.sigma[0] ** 2, rtol=1e-6)
 
@@ -95,7 +95,7 @@ def test_levels_are_found(torque, log):
     or below 0.001 and 5e-5 N m where there is none.
     """
     problem = Problem((noisy(log, BITS16, torque),), scara(), EVERY["power"], idbench_chain())
-    levels = problem.likely_noise.levels
+    levels = problem.likely_noise
     squares = levels.position**2 / BITS16**2
     standard_error = np.std(squares, axis=0) / np.sqrt(len(squares))
     assert (np.abs(np.mean(squares, axis=0) - 1) < 0.05 + 3 * standard_error).all()
@@ -139,11 +139,6 @@ def test_no_noise_is_put_in_where_a_joint_stands(log):
     assert np.abs(better.W - rows.W).max() > 1e-6
 
 
-def whitening_of(rows, noise):
-    kept = kept_rows(rows)
-    return Whitening(noise.covariance(rows).kept(kept), kept)
-
-
 @pytest.mark.thorough
 @pytest.mark.parametrize("operator", OPERATORS.builtin)
 def test_every_operator_has_a_covariance_to_solve_with(operator, log, truth):
@@ -185,7 +180,7 @@ def test_levels_do_not_depend_on_where_they_begin(log):
     """At half or at twice what they are: to 5 %, as five rounds leave it."""
     problem = Problem((noisy(log, BITS16, (0.1, 0.005), 1).part(0, log.samples),), scara(), EVERY["explicit"], idbench_chain())
     starts = [NoiseLevels(x * np.array([[0.1, 0.005]]), np.full((1, 2), x * BITS16)) for x in (0.5, 2.0)]
-    found = [likely_noise(problem.parts, start, problem.linear).levels for start in starts]
+    found = [likely_levels([problem.rows], [problem.parts[0].noisy], start) for start in starts]
     np.testing.assert_allclose(found[0].torque, found[1].torque, rtol=0.05)
 
 
@@ -198,7 +193,7 @@ def test_what_noise_adds_to_W_is_taken_from_it(log, truth):
     found = identify(noisy(log, 16 * BITS16, (0.0, 0.0)), scara(), EVERY["explicit"], estimator=GLS)
     assert np.abs(np.mean((found.X - truth) / found.sigma, axis=0)).max() < 0.5
     problem, whole = found.problem, found.rows
-    whitening = whitening_of(whole.maps[0], problem.likely_noise)
+    whitening = problem.parts[0].whitening
     solved = np.swapaxes(whitening.solve(whole.W), -1, -2)
     plain = np.linalg.solve(solved @ whole.W, solved @ whole.Y[..., None])[..., 0]
     assert np.abs(np.mean((plain - truth) / found.sigma, axis=0)).max() > 1
@@ -223,5 +218,6 @@ def test_levels_that_begin_at_nothing_are_found(log):
     draws = noisy(log, BITS16, (0.1, 0.005), 4)
     problem = Problem((draws,), scara(), EVERY["explicit"], idbench_chain())
     nothing = NoiseLevels(np.zeros((4, 2)), np.full((4, 2), BITS16))
-    levels = likely_noise(problem.unbiased_parts, nothing, problem.linear).levels
-    np.testing.assert_allclose(levels.torque, problem.likely_noise.levels.torque, rtol=0.03)
+    (part,) = problem.parts
+    levels = likely_levels([part.unbiased], [part.noisy], nothing)
+    np.testing.assert_allclose(levels.torque, problem.likely_noise.torque, rtol=0.03)

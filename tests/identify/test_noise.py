@@ -131,7 +131,7 @@ def test_the_noise_of_an_encoder_is_found(bits, log):
     so leave less in the rows, by up to a fifth at 16 bits, than white noise does."""
     step = 2 * np.pi / 2**bits
     counted = MotionLog(log.fs, np.round(log.q / step) * step, log.tau, log.torque)
-    found = Problem((counted,), scara(), EVERY["explicit"], idbench_chain()).noise.levels.position
+    found = Problem((counted,), scara(), EVERY["explicit"], idbench_chain()).noise.position
     np.testing.assert_allclose(found, step / np.sqrt(12), rtol=0.2)
 
 
@@ -143,16 +143,16 @@ def test_torque_noise_is_found_beside_stronger_noise_of_the_positions(log):
     q, tau = (x + s * rng.standard_normal((60, *x.shape)) for x, s in ((log.q, 2.8e-5), (log.tau, sigma)))
     chain = replace(idbench_chain(), operator=FirLowPass(10.0, 10.0))
     problem = Problem((MotionLog(log.fs, q, tau, log.torque),), scara(), EVERY["explicit"], chain)
-    rows, levels = problem.rows, problem.noise.levels
+    rows, levels = problem.rows, problem.noise
     of_torque = torque_paths(rows.maps[0]).covariance(levels.torque).variance
-    of_position = position_paths(rows.maps[0], problem.linear(problem.signals[0])).covariance(levels.position).variance
+    of_position = position_paths(rows.maps[0], problem.parts[0].linear).covariance(levels.position).variance
     assert (rows.by_kind(of_torque).sum(axis=-1) < rows.by_kind(of_position).sum(axis=-1)).all()
     assert (np.abs(np.log2(np.median(levels.torque, axis=0) / sigma)) < 1).all()
 
 
 def test_a_log_without_noise_of_its_positions_has_none(log):
     """What is left of a motion after six differences is below a thousandth of a 16-bit encoder's noise."""
-    found = Problem((log,), scara(), EVERY["explicit"], idbench_chain()).noise.levels.position
+    found = Problem((log,), scara(), EVERY["explicit"], idbench_chain()).noise.position
     assert (found < 1e-3 * 2 * np.pi / 2**16 / np.sqrt(12)).all()
 
 
@@ -186,7 +186,7 @@ def test_weighting_does_not_undo_the_mask(log, rng):
     found = identify(
         noisy(log, (0.5, 0.025), 1).part(0, log.samples), scara(), EVERY["explicit"], chain, WeightedLeastSquares()
     )
-    weights = found.weights(found.rows)
+    (weights,) = found.solution.weights(found.problem.parts)
     for kind in (0, 1):
         assert np.ptp(weights[..., found.rows.group == kind]) == 0
 
@@ -218,7 +218,7 @@ def test_the_corrected_sigma_is_the_scatter(sigma, estimator, log):
 def test_the_level_of_each_joint_is_found(log, mask):
     """From some 280 rows a level is known to 4 %; the mean of 300 to 0.3 %, 1 % is left to the leverage of correlated rows."""
     chain = replace(idbench_chain(), mask=MASKS.create(mask))
-    levels = Problem((noisy(log, (0.5, 0.025)),), scara(), EVERY["power"], chain).noise.levels.torque
+    levels = Problem((noisy(log, (0.5, 0.025)),), scara(), EVERY["power"], chain).noise.torque
     np.testing.assert_allclose(np.sqrt(np.mean(levels**2, axis=0)), (0.5, 0.025), rtol=0.013)
     assert levels.std(axis=0) / levels.mean(axis=0) == pytest.approx(0.045, abs=0.015)
 
@@ -237,7 +237,7 @@ def test_what_comes_before_the_operator_is_not_counted_twice(log, operator, pref
     chain = replace(idbench_chain(), prefilter=prefilter, operator=OPERATORS.create(operator))
     draws, weighted = noisy(replace(log, torque=channel), (300.0, 300.0), 100), WeightedLeastSquares()
     found = identify(draws, scara(), EVERY["explicit"], chain, weighted)
-    np.testing.assert_allclose(np.sqrt(np.mean(found.problem.noise.levels.torque**2, axis=0)), 300.0, rtol=0.04)
+    np.testing.assert_allclose(np.sqrt(np.mean(found.problem.noise.torque**2, axis=0)), 300.0, rtol=0.04)
     rms = np.sqrt(np.mean(found.corrected_sigma**2, axis=0))
     np.testing.assert_allclose(rms, found.X.std(axis=0), rtol=0.28)  # four times what 100 draws leave
 
@@ -246,11 +246,10 @@ def test_two_logs_are_worth_two(log):
     """Of one fit: half the variance, where noise levels are the same."""
     one = noisy(log, (0.1, 0.1), 1)
     single, double = (identify(x, scara(), EVERY["power"]) for x in (one, [one, one]))
-    influence = double.influence(double.rows)  # of weights that the noise of both logs made
-    parts = [influence[..., double.rows.of_log(k), :] for k in (0, 1)]
+    parts = double.solution.influence(double.problem.parts)  # of weights that the noise of both logs made
     np.testing.assert_array_equal(*parts)
-    whole = noise_covariance(double.problem, double.influence)
-    half = double.problem.noise.covariance(double.rows.maps[0]).of_sums(parts[0])
+    whole = noise_covariance(double.problem, parts)
+    half = double.problem.parts[0].covariance.of_sums(parts[0])
     np.testing.assert_allclose(whole, 2 * half, rtol=1e-9)
     np.testing.assert_allclose(2 * double.corrected_covariance, single.corrected_covariance, rtol=0.1)
 

@@ -17,7 +17,7 @@ def noisy(log):
 def test_it_is_least_squares_of_the_rows_so_far(noisy, model, estimator):
     """By another route: SciPy-free normal least squares, anew for every instant."""
     estimate = identify(noisy, scara(), MODELS.create(model), estimator=ESTIMATORS.create(estimator))
-    t, halo, given, whitened = np.arange(8.0, 47.0, 3.0), 0.7, estimate.rows, estimate.whiten(estimate.rows)
+    t, halo, given, whitened = np.arange(8.0, 47.0, 3.0), 0.7, estimate.rows, estimate.independent_rows()
     W, Y = whitened[:, :-1], whitened[:, -1]
     running = recursive_least_squares(estimate, t, halo)
     _, whole = least_squares(W, Y, given.valid)

@@ -14,6 +14,7 @@ from identify.estimators.estimate import Estimate
 from identify.estimators.estimator import AbstractEstimator, Need
 from identify.estimators.problem import Problem
 from identify.estimators.simulating.row_products import Kinds, Solved, solve_with, with_weights
+from identify.estimators.solution import Given
 from identify.noise.restricted_likelihood import EXACT
 from identify.signals.wild_samples import without_wild_samples
 
@@ -76,7 +77,7 @@ class IterativelyReweighted(AbstractEstimator):
                 break
             weights = weights.again(new.residual, active)
         G = found.G * kinds.own[..., None]
-        return Estimate(clean, frozen(found.X), frozen(found.covariance), lambda _: G)
+        return Estimate(clean, frozen(found.X), frozen(found.covariance), Given(G))
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +171,7 @@ def _clean(log: MotionLog) -> MotionLog:
 
 def _relative(problem: Problem, kinds: Kinds) -> Array:
     """Return the standard deviation that noise gives each row, over the median of its kind, shape (..., instant, kind)."""
-    variance = np.concatenate([problem.noise.covariance(rows).variance for rows in problem.rows.maps], axis=-1)
+    variance = np.concatenate([part.covariance.variance for part in problem.parts], axis=-1)
     size = kinds.by_kind(np.sqrt(np.nan_to_num(variance)) * kinds.own)
     typical = _spread(size, kinds.by_kind(kinds.own) > 0)[..., None, :] / SIGMA
     return np.maximum(np.where(typical > 0, size / typical, 1.0), LEAST)

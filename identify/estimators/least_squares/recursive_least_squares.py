@@ -11,6 +11,7 @@ from identify.estimators.estimate import Estimate
 from identify.estimators.estimator import AbstractEstimator, Need
 from identify.estimators.problem import Problem
 from identify.estimators.simulating.row_products import Kinds, solve_with, with_weights
+from identify.estimators.solution import Given
 from identify.rows.factors import Factor, Status
 
 
@@ -47,13 +48,7 @@ class RecursiveLeastSquares(AbstractEstimator):
         even = kinds.weights(every.residual)
         weight = even * np.exp(-np.concatenate(ages) / (2 * self.memory))
         found = with_weights(rows.Y, rows.W, weight)
-        return Estimate(
-            problem,
-            frozen(found.X),
-            frozen(found.covariance_by(even)),
-            lambda _: found.G,
-            whiten=lambda given: given.joined * weight[..., None],
-        )
+        return Estimate(problem, frozen(found.X), frozen(found.covariance_by(even)), Given(found.G, weight))
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,11 +89,11 @@ def recursive_least_squares(estimate: Estimate, t: Array, halo: float = 0.0) -> 
         If the estimate is not that of a single run of one log, no least-squares solution, or its log too long for its rows to
         be kept; if the instants decrease.
     """
-    if estimate.whiten is None or estimate.X.ndim > 1 or len(estimate.problem.logs) > 1:
+    if (rows := estimate.independent_rows()) is None or estimate.X.ndim > 1 or len(estimate.problem.logs) > 1:
         raise IdentificationError("recursive least squares needs the rows of a least-squares estimate of one run of one log")
     if len(t) and np.diff(t, prepend=t[0]).min() < 0:
         raise IdentificationError("the instants of recursive least squares must not decrease: sort them")
-    given, rows = estimate.rows, estimate.whiten(estimate.rows)
+    given = estimate.rows
     valid = np.cumsum(np.append(0, given.valid))
     until = np.append(np.searchsorted(given.time + halo, t, side="right"), len(given.time))
     p, before = len(estimate.names), 0

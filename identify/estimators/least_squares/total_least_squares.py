@@ -76,7 +76,7 @@ class TotalLeastSquares(AbstractEstimator):
             raise IdentificationError(next(iter(failures.values())))
 
         G = np.matmul(rows.W * (weight**2)[..., None], np.swapaxes(inverse, -1, -2))
-        return replace(Estimate.judge(problem, X, influence=lambda _: G), failures=failures)
+        return replace(Estimate.judge(problem, X, influence=G), failures=failures)
 
     def _noise(self, problem: Problem, weight: Array) -> Array:
         """Return the sum over weighted rows of the covariance of [W Y] by noise of the positions, shape (..., p + 1, p + 1)."""

@@ -83,7 +83,7 @@ class UnscentedKalmanFilter(AbstractEstimator):
         runs, p = start.shape[:-1], start.shape[-1]
         X, covariance, failures = np.full((*runs, p), np.nan), np.full((*runs, p, p), np.nan), dict[tuple[int, ...], str]()
         torque = np.zeros((*runs, problem.basis.n))
-        levels = problem.noise.levels
+        levels = problem.noise
         for run in np.ndindex(runs):
             if problem.factors.together.status[run] != Status.OK or not np.isfinite(start[run]).all():
                 continue

@@ -78,7 +78,7 @@ class MaximumLikelihood(AbstractEstimator):
         _require_short(problem)
         # Rows show little of the positions' noise where torques are noisy; their differences show all of it.
         start, position = GeneralizedLeastSquares().solve(problem), np.maximum(problem.position_noise, SMALLEST)
-        torque = problem.likely_noise.levels.torque.copy()
+        torque = problem.likely_noise.torque.copy()
         runs, p, failures = start.X.shape[:-1], len(problem.names), dict[tuple[int, ...], str]()
         X, covariance = np.full((*runs, p), np.nan), np.full((*runs, p, p), np.nan)
         fits: dict[tuple[int, ...], JointFit] = {}

@@ -10,6 +10,7 @@ from identify.estimators.problem import Problem
 from identify.estimators.simulating.row_products import Kinds, Solved, solve_with
 from identify.estimators.simulating.simulated_rounds import AbstractSimulating
 from identify.estimators.simulating.steps import SecantSteps
+from identify.estimators.solution import Given
 
 
 @final
@@ -36,4 +37,4 @@ class InstrumentalVariables(AbstractSimulating):
             return solve_with(kinds, rows.Y, rows.W, problem.at(rounds.simulated(X).logs).W)
 
         found = rounds.until_settled(step, rounds.start(), SecantSteps())
-        return rounds.estimate(found, influence=lambda _: found.G)
+        return rounds.estimate(found, solution=Given(found.G))

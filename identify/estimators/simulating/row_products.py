@@ -35,8 +35,7 @@ class Kinds:
     def of_rows(cls, problem: Problem) -> Self:
         """Return the kinds of a problem's rows."""
         rows = problem.rows
-        own = 1.0 if problem.row_weights is None else problem.row_weights.of(rows)
-        return cls(rows.kinds, np.asarray(rows.valid * own, dtype=np.float64))
+        return cls(rows.kinds, rows.valid * problem.weights)
 
     def by_kind(self, x: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return values of all residuals, shape (..., r), as (..., instant, kind)."""

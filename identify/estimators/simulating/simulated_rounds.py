@@ -13,10 +13,10 @@ from identify.errors import IdentificationError, require_positive, require_whole
 from identify.estimators.estimate import Estimate
 from identify.estimators.estimator import AbstractEstimator
 from identify.estimators.problem import Problem
-from identify.estimators.propagated import Influence
 from identify.estimators.simulating.row_products import Solved
 from identify.estimators.simulating.steps import Steps
 from identify.estimators.simulator import AbstractLoop, Simulated
+from identify.estimators.solution import AbstractSolution
 from identify.models.explicit import ExplicitModel
 from identify.telling import stage
 
@@ -161,7 +161,7 @@ class Rounds:
         self.failures.setdefault(run, why)
         self.active[run] = False
 
-    def estimate(self, found: Solved, *, influence: Influence | None = None, honest: Array | None = None) -> Estimate:
+    def estimate(self, found: Solved, *, solution: AbstractSolution | None = None, honest: Array | None = None) -> Estimate:
         """Return the estimate of a solution, NaN in the runs that failed; raise IdentificationError if all did."""
         if len(self.failures) == self.active.size:
             raise IdentificationError(next(iter(self.failures.values())))
@@ -172,7 +172,7 @@ class Rounds:
             self.problem,
             frozen(X),
             frozen(covariance),
-            influence,
+            solution,
             honest=None if honest is None else frozen(honest),
             failures=self.failures,
             path=tuple(self.path),

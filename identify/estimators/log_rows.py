@@ -1,0 +1,115 @@
+"""The rows of one log, and what belongs to them."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.noise.covariance import BandedCovariance
+from identify.noise.linearization import Linearization
+from identify.noise.noisy_rows import NoisyRows
+from identify.noise.row_weights import friction_bias, reciprocal_root
+from identify.noise.unbiased import unbiased, with_more_noise
+from identify.noise.whitening import Whitening
+from identify.rows.rows import Rows
+from identify.signals.signals import Signals
+
+if TYPE_CHECKING:
+    from identify.estimators.problem import Problem
+
+
+@dataclass(frozen=True, eq=False)
+class LogRows:
+    """The rows of one log, or of a piece of it, and what its noise makes of them; each is made when it is first asked for.
+
+    Parameters
+    ----------
+    problem : Problem
+        Robot, model and chain, and the noise of all logs.
+    signals : Signals
+        Of the log.
+    explicit : LogRows, optional
+        Those of the explicit model from the same signals, where this is another model: what noise does to both is shared.
+    """
+
+    problem: "Problem"
+    signals: Signals
+    explicit: "LogRows | None" = None
+
+    @cached_property
+    def rows(self) -> Rows:
+        """Y = W X + rho."""
+        return self.problem.rows_of(self.signals)
+
+    @cached_property
+    def linear(self) -> Linearization:
+        """The linearization of the explicit model about the signals."""
+        if self.explicit is not None:
+            return self.explicit.linear
+        return Linearization(self.signals, self.problem.basis, self.problem.explicit.start.X)
+
+    @cached_property
+    def noisy(self) -> NoisyRows:
+        """How noise of the log reaches the rows."""
+        return self._twin.noisy if self._twin else NoisyRows(self.rows.maps[0], self.linear)
+
+    @cached_property
+    def covariance(self) -> BandedCovariance:
+        """The covariance of the rows by `Problem.noise`."""
+        return self._twin.covariance if self._twin else self.noisy.covariance(self.problem.noise)
+
+    @cached_property
+    def whitening(self) -> Whitening:
+        """What makes the rows independent, by `Problem.likely_noise` and, of a model such as power, its `errors`."""
+        if self._twin:
+            return self._twin.whitening
+        first, *others = (C.scaled(self.problem.shares[..., k]) for k, C in enumerate(self.errors))
+        return self.noisy.whitening(sum(others, start=first))
+
+    @cached_property
+    def errors(self) -> list[BandedCovariance]:
+        """What noise makes of the rows and, where B varies, errors of the same mean variance: white, and friction near zero."""
+        C = self.noisy.covariance(self.problem.likely_noise)
+        if self.problem.alike:
+            return [C]
+        mean, (count, kinds) = np.mean(C.variance, axis=-1, keepdims=True), C.bands.shape[-3:-1]
+        of_rest = np.mean(rest := self.bias**2, axis=-1, keepdims=True)
+        share = np.divide(rest, of_rest, out=np.ones_like(rest), where=of_rest > 0)
+        return [C, *(BandedCovariance.of_variance(mean * x, kinds) for x in (np.ones(count * kinds), share))]
+
+    @cached_property
+    def unbiased(self) -> Rows:
+        """The rows with W less what noise of the positions adds to it on average."""
+        return unbiased(self.rows, self.problem.rows_of(self.noisier))
+
+    @cached_property
+    def noisier(self) -> Signals:
+        """The signals with more noise, which all models share."""
+        return with_more_noise(self.signals, self.problem.position_noise) if self.explicit is None else self.explicit.noisier
+
+    @cached_property
+    def bias(self) -> Array:
+        """What noise of the velocities makes of W X where joints hardly move, shape (..., r)."""
+        return self._bias_of(self.noisy)
+
+    @cached_property
+    def variance(self) -> Array:
+        """The variance that the noise of the logs would give the rows without a mask, shape (..., r)."""
+        whole = self.noisy.unmasked
+        return whole.variance(self.problem.noise) + self._bias_of(whole) ** 2
+
+    @property
+    def weights(self) -> Array:
+        """What rows of a model whose B varies are multiplied by, shape (..., r)."""
+        return reciprocal_root(self.variance, self.problem.floor)
+
+    @cached_property
+    def _twin(self) -> "LogRows | None":
+        """The rows of the explicit model, if noise reaches both alike."""
+        other = self.explicit
+        return other if other is not None and self.rows.maps[0].noisy_as(other.rows.maps[0]) else None
+
+    def _bias_of(self, noisy: NoisyRows) -> Array:
+        return friction_bias(noisy.to_rows, self.linear, self.problem.model, self.problem.noise.position)

@@ -1,0 +1,123 @@
+"""How an estimate follows from the rows of a problem."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.estimators.log_rows import LogRows
+
+
+class AbstractSolution(ABC):
+    """X = G' Y, to first order."""
+
+    @abstractmethod
+    def influence(self, parts: Sequence[LogRows]) -> list[Array]:
+        """Return G of the rows of each part of the problem, shape (..., r, p)."""
+
+    @abstractmethod
+    def weights(self, parts: Sequence[LogRows]) -> list[Array] | None:
+        """Return what rows were multiplied by, shape (..., r), if X is a least-squares solution whose residuals tell noise."""
+
+    @abstractmethod
+    def independent(self, parts: Sequence[LogRows]) -> list[Array] | None:
+        """Return [W Y] made independent, shape (..., r, p + 1), each row by those before it, if X is their solution."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class OfWeightedRows(AbstractSolution):
+    """The solution of rows of which each has a weight.
+
+    Parameters
+    ----------
+    weight : Array, shape (..., kind)
+        Of every kind.
+    inverse : Array, shape (..., p, p)
+        Of W' W of the weighted rows.
+    scaled : bool
+        Whether rows that differ from those of their kind had a weight of their own, too.
+    """
+
+    weight: Array
+    inverse: Array
+    scaled: bool
+
+    def influence(self, parts: Sequence[LogRows]) -> list[Array]:
+        """Return w^2 W (W' w^2 W)^-1."""
+        each = zip(parts, self.weights(parts), strict=True)
+        return [np.matmul(part.rows.W * (weight**2)[..., None], self.inverse) for part, weight in each]
+
+    def weights(self, parts: Sequence[LogRows]) -> list[Array]:
+        """Return what rows were multiplied by."""
+        of_kinds = [np.tile(self.weight, part.rows.maps[0].grid.count) for part in parts]
+        scaled = self.scaled and not parts[0].problem.alike
+        return [weight * part.weights if scaled else weight for part, weight in zip(parts, of_kinds, strict=True)]
+
+    def independent(self, parts: Sequence[LogRows]) -> list[Array]:
+        """Return the weighted rows."""
+        return [part.rows.joined * weight[..., None] for part, weight in zip(parts, self.weights(parts), strict=True)]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class OfWhitenedRows(AbstractSolution):
+    """The solution of rows made independent by their covariance, W without what noise adds to it.
+
+    Parameters
+    ----------
+    inverse : Array, shape (..., p, p)
+        Of W' C^-1 W.
+    """
+
+    inverse: Array
+
+    def influence(self, parts: Sequence[LogRows]) -> list[Array]:
+        """Return C^-1 W (W' C^-1 W)^-1."""
+        return [np.matmul(part.whitening.solve(part.unbiased.W), self.inverse) for part in parts]
+
+    def weights(self, parts: Sequence[LogRows]) -> None:  # rows count together
+        """Return None: the levels of the noise are those of these rows."""
+
+    def independent(self, parts: Sequence[LogRows]) -> list[Array]:
+        """Return L^-1 [W Y], L L' being the covariance."""
+        return [part.whitening.whiten(part.unbiased.joined) for part in parts]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Given(AbstractSolution):
+    """The G, and the weights, of the rows of all parts, one below the other.
+
+    Parameters
+    ----------
+    G : Array, shape (..., r, p)
+        Of all rows.
+    weight : Array, shape (..., r), optional
+        What rows were multiplied by, if X is their solution and each counts by itself.
+    """
+
+    G: Array
+    weight: Array | None = None
+
+    def influence(self, parts: Sequence[LogRows]) -> list[Array]:
+        """Return G as it was given."""
+        return np.split(self.G, _ends(parts), axis=-2)
+
+    def weights(self, parts: Sequence[LogRows]) -> None:  # G says all
+        """Return None: how the rows were weighted is in G."""
+
+    def independent(self, parts: Sequence[LogRows]) -> list[Array] | None:
+        """Return the weighted rows."""
+        if self.weight is None:
+            return None
+        weights = np.split(self.weight, _ends(parts), axis=-1)
+        return [part.rows.joined * weight[..., None] for part, weight in zip(parts, weights, strict=True)]
+
+
+def _ends(parts: Sequence[LogRows]) -> Array:
+    """Return where the rows of each part but the last end among those of all."""
+    return np.cumsum([len(part.rows.time) for part in parts])[:-1]

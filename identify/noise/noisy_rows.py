@@ -1,0 +1,77 @@
+"""The rows of one log as noise of its torques and positions reaches them."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from identify.arrays import Array
+from identify.noise.covariance import BandedCovariance
+from identify.noise.linearization import Linearization
+from identify.noise.propagation import NoiseLevels, Paths, position_paths, torque_paths
+from identify.noise.whitening import Whitening
+from identify.rows.row_map import RowMap
+
+SEEN = 0.05
+"""Share of a row's variance that the mask must leave: of the edge of a mask alone, variance and model are not known well."""
+
+
+@dataclass(frozen=True, eq=False)
+class NoisyRows:
+    """The rows of one log as noise reaches them; each part is made when it is first asked for.
+
+    Parameters
+    ----------
+    to_rows : RowMap
+        How samples become rows.
+    linear : Linearization
+        Of the explicit model, about the signals of the log.
+    """
+
+    to_rows: RowMap
+    linear: Linearization
+
+    @cached_property
+    def torque(self) -> Paths:
+        """How noise of the torques reaches the rows."""
+        return torque_paths(self.to_rows)
+
+    @cached_property
+    def position(self) -> Paths:
+        """How noise of the positions reaches the rows."""
+        return position_paths(self.to_rows, self.linear)
+
+    @cached_property
+    def kept(self) -> npt.NDArray[np.bool_]:
+        """Which rows the mask leaves enough of, shape (..., r)."""
+        one = np.ones(self.to_rows.signals.log.n)
+        return np.asarray(self.torque.variance(one) > SEEN * self.unmasked.torque.variance(one))
+
+    def covariance(self, levels: NoiseLevels) -> BandedCovariance:
+        """Return the covariance that noise of these levels gives the rows."""
+        found = self.torque.covariance(levels.in_rows)
+        if levels.position.any():
+            found = found + self.position.covariance(levels.effective_position)
+        return found
+
+    def variance(self, levels: NoiseLevels) -> Array:
+        """Return the variance that noise of these levels gives the rows, shape (..., r)."""
+        found = self.torque.variance(levels.in_rows)
+        if levels.position.any():
+            found = found + self.position.variance(levels.effective_position)
+        return found
+
+    @cached_property
+    def unmasked(self) -> "NoisyRows":
+        """The rows as if nothing were masked."""
+        to_rows = self.to_rows.unmasked()
+        return self if to_rows is self.to_rows else NoisyRows(to_rows, self.linear)
+
+    def whitening(self, C: BandedCovariance) -> Whitening:
+        """Return what makes the rows that are kept independent, by their covariance."""
+        return Whitening(C.kept(self.kept), self.kept)
+
+    def units(self) -> list[BandedCovariance]:
+        """Return the covariances that unit noise of the torques, and of the positions, gives the rows, joint by joint."""
+        return [*self.torque.each(), *self.position.each()]
