@@ -40,5 +40,5 @@ def predicted_information(log: MotionLog, basis: Basis, X: Array, levels: NoiseL
     rows = chain.rows(signals, basis, ExplicitModel())
     noisy, lead = NoisyRows(rows.maps[0], linear), (*log.q.shape[:-2], log.n)
     each = NoiseLevels(np.broadcast_to(levels.torque, lead), np.broadcast_to(levels.position, lead))
-    white = noisy.whitening(noisy.covariance(each)).whiten(rows.W)
+    white = noisy.whitening(each).whiten(rows.W)
     return np.matmul(np.swapaxes(white, -1, -2), white)

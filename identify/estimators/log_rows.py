@@ -65,15 +65,14 @@ class LogRows:
         """What makes the rows independent, by `Problem.likely_noise` and, of a model such as power, its `errors`."""
         if self._twin:
             return self._twin.whitening
-        first, *others = (C.scaled(self.problem.shares[..., k]) for k, C in enumerate(self.errors))
-        return self.noisy.whitening(sum(others, start=first))
+        if self.problem.alike:
+            return self.noisy.whitening(self.problem.likely_noise)
+        return self.noisy.whitening_by(self.errors, self.problem.shares)
 
     @cached_property
     def errors(self) -> list[BandedCovariance]:
-        """What noise makes of the rows and, where B varies, errors of the same mean variance: white, and friction near zero."""
+        """Where B varies, what noise makes of the rows, and errors of that mean variance: white, and of friction near zero."""
         C = self.noisy.covariance(self.problem.likely_noise)
-        if self.problem.alike:
-            return [C]
         mean, (count, kinds) = np.mean(C.variance, axis=-1, keepdims=True), C.bands.shape[-3:-1]
         of_rest = np.mean(rest := self.bias**2, axis=-1, keepdims=True)
         share = np.divide(rest, of_rest, out=np.ones_like(rest), where=of_rest > 0)
@@ -99,6 +98,11 @@ class LogRows:
         """The variance that the noise of the logs would give the rows without a mask, shape (..., r)."""
         whole = self.noisy.unmasked
         return whole.variance(self.problem.noise) + self._bias_of(whole) ** 2
+
+    def forget(self) -> None:
+        """Drop what only the rows of further models would need."""
+        self.__dict__.pop("noisier", None)
+        self.noisy.__dict__.pop("units", None)
 
     @property
     def weights(self) -> Array:

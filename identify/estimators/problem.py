@@ -17,7 +17,7 @@ from identify.models.explicit import ExplicitModel
 from identify.models.model import AbstractModel
 from identify.noise.propagation import NoiseLevels
 from identify.noise.repeats import repeats
-from identify.noise.restricted_likelihood import kept_units, likely, likely_levels
+from identify.noise.restricted_likelihood import likely, likely_levels
 from identify.noise.row_weights import floor_of, reciprocal_root
 from identify.noise.spectral_levels import position_noise, spectral_levels
 from identify.rows.chain import Chain
@@ -178,7 +178,8 @@ class Problem:
         if self.explicit is not self:
             return self.explicit.noise
         rows, noisy = zip(*((part.rows, part.noisy) for part in self.parts), strict=True)
-        return spectral_levels(rows, noisy, self.some_rows.factors, self.start, self.position_noise, self.repeats)
+        found = spectral_levels(rows, noisy, self.some_rows.factors, self.start, self.position_noise)
+        return replace(found, repeats=self.repeats) if found.position.any() else found
 
     @cached_property
     def likely_noise(self) -> NoiseLevels:
@@ -207,7 +208,7 @@ class Problem:
         """How much of each of their errors makes the rows most likely, shape (..., error): see `LogRows.errors`."""
         if self.alike:
             return np.ones((1,))
-        units = [kept_units(part.noisy, part.errors) for part in self.parts]
+        units = [part.noisy.matrices(part.errors) for part in self.parts]
         joined = [part.unbiased.joined * part.noisy.kept[..., None] for part in self.parts]
         begin = np.broadcast_to(np.array(BEGIN), (*joined[0].shape[:-2], len(BEGIN)))
         return likely(units, joined, begin, np.full(len(BEGIN), LEAST))
@@ -260,7 +261,7 @@ class Problem:
     def forget(self) -> None:
         """Drop what only the rows of further models would need."""
         for part in self.explicit.parts:
-            part.__dict__.pop("noisier", None)
+            part.forget()
 
     def rows_of(self, signals: Signals) -> Rows:
         """Return the rows of the signals of one log, or of a piece of it."""

@@ -1,5 +1,6 @@
 """Symmetric matrices with nothing far from their diagonal, and their Cholesky factors: linear in the length of a log."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -31,10 +32,15 @@ class Band:
         """Which rows have no variance, and count as left out, shape (..., r)."""
         return np.asarray(self.lower[..., 0] == 0)
 
-    def widened(self, width: int) -> Array:
-        """Return `lower` with zeros for so many diagonals in all."""
-        beyond = width - self.lower.shape[-1]
-        return np.pad(self.lower, [(0, 0)] * (self.lower.ndim - 1) + [(0, beyond)]) if beyond else self.lower
+    @classmethod
+    def weighted(cls, parts: Sequence[Self], weights: Array) -> Self:
+        """Return the sum of matrices, each times a number for each run, shape (..., matrix)."""
+        widest = max(parts, key=lambda part: part.lower.shape[-1]).lower
+        runs = np.broadcast_shapes(weights.shape[:-1], widest.shape[:-2])
+        total = np.zeros((*runs, *widest.shape[-2:]))
+        for i, part in enumerate(parts):
+            total[..., : part.lower.shape[-1]] += part.lower * weights[..., i, None, None]
+        return cls(total)
 
     def __matmul__(self, x: Array) -> Array:
         """Return C x, shape (..., r, m)."""
@@ -51,8 +57,9 @@ class Band:
         return total.reshape(*total.shape[:-3], blocks * size, -1)[..., : x.shape[-2], :]
 
     def trace_with(self, other: Self) -> Array:
-        """Return the trace of the product with another matrix, of the same width, shape (...)."""
-        both = np.einsum("...rd,...rd->...d", self.lower, other.lower)
+        """Return the trace of the product with another matrix, shape (...)."""
+        width = min(self.lower.shape[-1], other.lower.shape[-1])
+        both = np.einsum("...rd,...rd->...d", self.lower[..., :width], other.lower[..., :width])
         return 2 * np.sum(both, axis=-1) - both[..., 0]
 
 

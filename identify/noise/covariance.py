@@ -1,6 +1,6 @@
 """The covariance of rows, of which only those near each other in time are correlated."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Self
 
@@ -46,18 +46,20 @@ class BandedCovariance:
         most : int, optional
             Lags at most, such as 1 where the variances alone count; all that there are by default.
         """
-        early, G, found = np.stack(windows), np.stack(signals), []
+        early, G = np.stack(windows), np.stack(signals)
         terms, length = early.shape
         before, lags = (length - 1) // 2, min(grid.count, -(-length // grid.step), most or grid.count)
         late = np.zeros((lags, terms, length))
         for lag, window in enumerate(late):
             window[:, lag * grid.step :] = early[:, : length - lag * grid.step]
         products = (early[:, None] * late[:, None]).reshape(lags, -1, length)
-        for kind in range(G.shape[-3]):  # all at once would take too much memory
-            pairs = np.einsum("d...st,e...bst->...bdet", G[..., kind, :, :], G)
-            found.append(windowed(pairs.reshape(*pairs.shape[:-3], -1, pairs.shape[-1]), products, before, grid))
-        bands = np.moveaxis(np.stack(found, axis=-4), (-4, -3), (-2, -1))
-        return cls(bands * _pairs(outside, lags))
+        runs, kinds = G.shape[1:-3], G.shape[-3]
+        bands = np.zeros((*runs, lags, grid.count, kinds, kinds))
+        for kind, others in _sharing(G):  # all at once would take too much memory
+            pairs = np.einsum("d...st,e...bst->...bdet", G[..., kind, :, :], G[..., others, :, :])
+            found = windowed(pairs.reshape(*pairs.shape[:-3], -1, pairs.shape[-1]), products, before, grid)
+            bands[..., kind, others] = np.moveaxis(found, -3, -1)
+        return cls(bands * _weights(outside, lags))
 
     @classmethod
     def of_variance(cls, variance: Array, kinds: int) -> Self:
@@ -71,10 +73,6 @@ class BandedCovariance:
         total[..., : few.shape[-4], :, :, :] += few
         return type(self)(total)
 
-    def leveled(self, level: Array) -> Self:
-        """Return the covariance of rows multiplied by a level for each kind, shape (..., kind)."""
-        return type(self)(self.bands * (level[..., :, None] * level[..., None, :])[..., None, None, :, :])
-
     def scaled(self, factor: Array) -> Self:
         """Return the covariance times a number for each run, shape (...)."""
         return type(self)(self.bands * factor[..., None, None, None, None])
@@ -83,7 +81,7 @@ class BandedCovariance:
         """Return the covariance with zeros for rows that are not kept, shape (..., r)."""
         lags, count, kinds = self.bands.shape[-4:-1]
         by_row = np.swapaxes(rows.reshape(*rows.shape[:-1], count, kinds), -1, -2).astype(np.float64)
-        return type(self)(self.bands * _pairs(by_row, lags))
+        return type(self)(self.bands * _weights(by_row, lags))
 
     @property
     def matrix(self) -> Band:
@@ -123,7 +121,15 @@ class BandedCovariance:
         return total
 
 
-def _pairs(outside: Array, lags: int) -> Array:
+def _sharing(G: Array) -> Iterator[tuple[int, npt.NDArray[np.intp]]]:
+    """Yield kinds, and those with which they have noise of one source in common, of signals (..., kind, source, time)."""
+    reached = np.moveaxis(np.asarray(G.any(axis=-1)), -2, 0).reshape(G.shape[-3], -1, G.shape[-2]).any(axis=1)
+    for kind, own in enumerate(reached):
+        if len(others := np.flatnonzero((reached & own).any(axis=-1))):
+            yield kind, others
+
+
+def _weights(outside: Array, lags: int) -> Array:
     """Return products of weights, shape (..., kind, instant), of rows with those of later ones, as bands; 0 beyond the last."""
     beyond = np.concatenate([outside, np.zeros((*outside.shape[:-1], lags - 1))], axis=-1)
     later = np.moveaxis(sliding_window_view(beyond, outside.shape[-1], axis=-1), -3, -1)

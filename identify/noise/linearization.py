@@ -20,8 +20,8 @@ STEP_Q, STEP_QD = 1e-3, 0.05
 SMOOTHING = 0.15
 """Time [s] over which velocities are smoothed, by parabolas, before noise is propagated through them."""
 
-KNOTS = 50.0
-"""Frequency [Hz] at which slopes are computed; between them they are interpolated, since motion has little beyond 10 Hz."""
+KNOTS = 25.0
+"""Frequency [Hz] at which slopes are computed; between them cubics go through them, since motion has little beyond 5 Hz."""
 
 MOST = 2_000_000
 """Samples times columns of which slopes are computed at once: columns of many joints take much memory."""

@@ -1,5 +1,6 @@
 """The rows of one log as noise of its torques and positions reaches them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -7,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from identify.arrays import Array
+from identify.noise.band_matrix import Band
 from identify.noise.covariance import BandedCovariance
 from identify.noise.linearization import Linearization
 from identify.noise.propagation import NoiseLevels, Paths, position_paths, torque_paths
@@ -68,10 +70,23 @@ class NoisyRows:
         to_rows = self.to_rows.unmasked()
         return self if to_rows is self.to_rows else NoisyRows(to_rows, self.linear)
 
-    def whitening(self, C: BandedCovariance) -> Whitening:
-        """Return what makes the rows that are kept independent, by their covariance."""
-        return Whitening(C.kept(self.kept), self.kept)
+    def whitening(self, levels: NoiseLevels) -> Whitening:
+        """Return what makes the rows that are kept independent, by noise of these levels; of `units` where they are there."""
+        if "units" in self.__dict__:
+            position = np.broadcast_to(levels.effective_position, levels.torque.shape)
+            squares = np.concatenate([levels.in_rows, position], axis=-1) ** 2
+            return Whitening(Band.weighted(self.units, squares), self.kept)
+        return self.whitening_by([self.covariance(levels)], np.ones(1))
 
-    def units(self) -> list[BandedCovariance]:
-        """Return the covariances that unit noise of the torques, and of the positions, gives the rows, joint by joint."""
-        return [*self.torque.each(), *self.position.each()]
+    def whitening_by(self, parts: Sequence[BandedCovariance], shares: Array) -> Whitening:
+        """Return what makes the rows that are kept independent, by so much of each covariance, shape (..., part)."""
+        return Whitening(Band.weighted(self.matrices(parts), shares), self.kept)
+
+    @cached_property
+    def units(self) -> list[Band]:
+        """Covariances that unit noise of torques, and of positions, gives the rows that are kept, joint by joint."""
+        return self.matrices([*self.torque.each(), *self.position.each()])
+
+    def matrices(self, parts: Sequence[BandedCovariance]) -> list[Band]:
+        """Return parts of the covariance of the rows that are kept."""
+        return [C.kept(self.kept).matrix for C in parts]

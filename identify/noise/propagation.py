@@ -14,8 +14,8 @@ from identify.rows.grid import Grid
 from identify.rows.row_map import RowMap
 from identify.signals.differentiators.central import CentralDifference
 
-RATE = 200.0
-"""Least frequency [Hz] at which noise is propagated: rows and motion have little beyond some 10 Hz, the edges of masks more."""
+RATE, EDGES = 50.0, 200.0
+"""Least frequencies [Hz] at which noise is propagated: rows and motion have little beyond some 10 Hz, edges of masks more."""
 
 ALIASED = 0.01
 """Share of a variance by which it may be off for being summed at few samples: 0.5 % of sigma."""
@@ -82,6 +82,11 @@ class Paths:
     def variance(self, level: Array) -> Array:
         """Return the variances that noise of these standard deviations, shape (..., joint), gives the rows, shape (..., r)."""
         return BandedCovariance.of(self.grid, self.windows, self._leveled(level), self.outside, 1).variance
+
+    def by_kind(self) -> "Paths":
+        """Return the paths to the rows of each kind by itself, the kind being the last of the leading axes."""
+        alone = [signal[..., None, :, :] for signal in self.signals]
+        return Paths(self.grid, self.windows, alone, self.outside[..., None, :])
 
     def each(self) -> list[BandedCovariance]:
         """Return the covariances that unit noise gives the rows, joint by joint."""
@@ -160,7 +165,7 @@ def _thinned(windows: Sequence[Array], rows: RowMap) -> tuple[list[Array], Grid,
     windows = _without_tails(windows, grid.first)
     middle = (len(windows[0]) - 1) // 2
     H = np.stack(windows)
-    full, least = np.matmul(H, H.T), max(1, int(fs / RATE))
+    full, least = np.matmul(H, H.T), max(1, int(fs / (RATE if (rows.inside == 1).all() else EDGES)))
     size = ALIASED * np.sqrt(np.outer(np.diag(full), np.diag(full)))
     for step in [d for d in range(least, 1, -1) if grid.step % d == 0]:
         thin = H[:, middle % step :: step]

@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from identify.arrays import Array
 from identify.noise.band_matrix import Band, Cholesky
-from identify.noise.covariance import BandedCovariance
 from identify.noise.noisy_rows import NoisyRows
 from identify.noise.propagation import NoiseLevels
 from identify.rows.factors import Factor, triangular
@@ -59,7 +58,7 @@ def likely_levels(parts: Sequence[Rows], noisy: Sequence[NoisyRows], start: Nois
     start : NoiseLevels
         Where to begin; NaN in runs that cannot be solved.
     """
-    units = [kept_units(each, each.units()) for each in noisy]
+    units = [each.units for each in noisy]
     joined = [rows.joined * each.kept[..., None] for rows, each in zip(parts, noisy, strict=True)]
     tau = [each.to_rows.signals.torque.mean for each in noisy]
     rms = np.sqrt(sum(np.mean(one**2, axis=-1) for one in tau) / len(parts))
@@ -96,13 +95,6 @@ def likely(units: Sequence[Sequence[Band]], joined: Sequence[Array], start: Arra
     return squares
 
 
-def kept_units(noisy: NoisyRows, parts: Sequence[BandedCovariance]) -> list[Band]:
-    """Return parts of the covariance of the rows that are kept, as matrices as wide as the widest."""
-    bands = [C.kept(noisy.kept).matrix for C in parts]
-    width = max(band.lower.shape[-1] for band in bands)
-    return [Band(band.widened(width)) for band in bands]
-
-
 @dataclass(frozen=True, eq=False)
 class _Slope:
     """How the likelihood of rows depends on the squares of its levels. Leading axes are runs.
@@ -125,7 +117,7 @@ class _Slope:
     @classmethod
     def at(cls, units: Sequence[Sequence[Band]], joined: Sequence[Array], squares: Array) -> Self:
         """Return the slopes at squares of levels."""
-        roots = [Cholesky.of(_sum(parts, squares)) for parts in units]
+        roots = [Cholesky.of(Band.weighted(parts, squares)) for parts in units]
         white = [root.whiten(x) for root, x in zip(roots, joined, strict=True)]
         names = ("",) * (joined[0].shape[-1] - 1)
         factor = Factor(triangular(np.concatenate(white, axis=-2)), np.array(0), names)
@@ -176,10 +168,3 @@ class _Slope:
         of_sigma = np.max(np.abs(moved / squares - 1) * share, axis=-1) < SETTLED
         of_X = np.max(np.abs(np.nan_to_num(np.matmul(self.moves, (moved - squares)[..., None]))), axis=(-2, -1)) < STILL
         return np.asarray(of_sigma & of_X)
-
-
-def _sum(parts: Sequence[Band], squares: Array) -> Band:
-    lower = parts[0].lower * squares[..., 0, None, None]
-    for i, part in enumerate(parts[1:], 1):
-        lower += part.lower * squares[..., i, None, None]
-    return Band(lower)

@@ -32,7 +32,7 @@ TOLD = 2.0
 
 
 def spectral_levels(
-    parts: Sequence[Rows], noisy: Sequence[NoisyRows], factors: Factors, fit: Fit, position: Array, repeats: Array
+    parts: Sequence[Rows], noisy: Sequence[NoisyRows], factors: Factors, fit: Fit, position: Array
 ) -> NoiseLevels:
     """Return the noise of logs as the rows of their explicit model show it, NaN in runs that cannot be solved.
 
@@ -52,25 +52,26 @@ def spectral_levels(
         Of all these rows.
     fit : Fit
         Their weighted least-squares solution.
-    position, repeats : Array, shape (..., joint)
-        Of the positions' noise, its standard deviation as their differences show it, and how it repeats itself: `NoiseLevels`.
+    position : Array, shape (..., joint)
+        Standard deviation of the positions' noise, as their differences show it [rad].
     """
-    white = [each.torque.covariance(np.ones_like(position)) for each in noisy]
-    made = [each.position.covariance(position) for each in noisy]
-    squares, of_position = factors.squares(fit.X), np.sum(_by_kind(parts, made), axis=-1)
+    level = position[..., None, :]  # of every kind by itself
+    white = [each.torque.by_kind().covariance(np.ones_like(level)) for each in noisy]
+    made = [each.position.by_kind().covariance(level) for each in noisy]
+    squares, of_position = factors.squares(fit.X), np.sum(_variances(made), axis=-1)
     shown = np.nan_to_num(of_position / np.where(squares > 0, squares, np.nan)) > NEGLIGIBLE
     rest = np.where(shown, _torque_share(parts, fit.X, white, made), 1.0) * squares
-    of_torque = _by_kind(parts, white)
+    of_torque = _variances(white)
     whole = np.sum(of_torque, axis=-1)
     free = np.maximum(np.sum(of_torque * (1 - _leverage(parts, factors, fit)), axis=-1), FREE * whole)
     torque = np.sqrt(np.divide(rest, free, out=np.full(free.shape, np.nan), where=free > 0))
     most = np.minimum(1.0, np.divide(squares, of_position, out=np.ones_like(squares), where=of_position > squares))
-    return NoiseLevels(torque, np.where(shown.any(axis=-1, keepdims=True), position * np.sqrt(most), 0.0), repeats)
+    return NoiseLevels(torque, np.where(shown.any(axis=-1, keepdims=True), position * np.sqrt(most), 0.0))
 
 
-def _by_kind(parts: Sequence[Rows], covariances: Sequence[BandedCovariance]) -> Array:
-    """Return the variances of rows, shape (..., kind, instant)."""
-    return np.concatenate([rows.by_kind(C.variance) for rows, C in zip(parts, covariances, strict=True)], axis=-1)
+def _variances(covariances: Sequence[BandedCovariance]) -> Array:
+    """Return the variances of the rows of all logs, shape (..., kind, instant), from the covariances kind by kind."""
+    return np.concatenate([C.variance for C in covariances], axis=-1)
 
 
 def _torque_share(
@@ -79,12 +80,12 @@ def _torque_share(
     """Return the share of the squared residuals that noise of the torque makes, as their spectrum says, shape (..., kind)."""
     residuals = [rows.by_kind(rows.Y - rows.predicted(X)) for rows in parts]
     seen = np.concatenate([np.abs(np.fft.rfft(rho, 2 * rho.shape[-1])) ** 2 for rho in residuals], axis=-1)
-    T, P = (np.concatenate([C.spectrum for C in each], axis=-1) for each in (white, made))
+    T, P = (np.concatenate([C.spectrum[..., 0, :] for C in each], axis=-1) for each in (white, made))
     a, b = two_levels(T, P, seen)
-    of_torque, of_position = a * np.sum(_by_kind(parts, white), axis=-1), b * np.sum(_by_kind(parts, made), axis=-1)
+    of_torque, of_position = a * np.sum(_variances(white), axis=-1), b * np.sum(_variances(made), axis=-1)
     both = of_torque + of_position
     share = np.divide(of_torque, both, out=np.ones_like(both), where=both > 0)
-    few = np.maximum(np.count_nonzero(_by_kind(parts, white), axis=-1), 1)
+    few = np.maximum(np.count_nonzero(_variances(white), axis=-1), 1)
     return np.maximum(share, np.minimum(TOLD / few, 1.0))
 
 

@@ -7,8 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from identify.arrays import Array
-from identify.noise.band_matrix import Cholesky
-from identify.noise.covariance import BandedCovariance
+from identify.noise.band_matrix import Band, Cholesky
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,19 +16,19 @@ class Whitening:
 
     Parameters
     ----------
-    C : BandedCovariance
-        Theirs.
+    C : Band
+        Covariance of those that are kept.
     kept : bool array, shape (..., r)
         False for rows that are left out.
     """
 
-    C: BandedCovariance
+    C: Band
     kept: npt.NDArray[np.bool_]
 
     @cached_property
     def root(self) -> Cholesky:
         """The factor of the covariance of the rows that are kept; raise IdentificationError if it is singular."""
-        return Cholesky.of(self.C.matrix)
+        return Cholesky.of(self.C)
 
     def whiten(self, x: Array) -> Array:
         """Return L^-1 x of rows x, shape (..., r, m), L L' being their covariance."""

@@ -53,8 +53,8 @@ def whitened(log):
     """Return the rows of an implicit problem with their whitening, and their covariance as a matrix."""
     problem = Problem((log,), scara(), EVERY["implicit"], idbench_chain())
     noisy = NoisyRows(problem.rows.maps[0], problem.parts[0].linear)
-    whitening = noisy.whitening(noisy.covariance(NoiseLevels(np.array([0.1, 0.01]), np.full(2, 1e-4))))
-    return problem.rows, whitening, dense(whitening.C)
+    levels = NoiseLevels(np.array([0.1, 0.01]), np.full(2, 1e-4))
+    return problem.rows, noisy.whitening(levels), dense(noisy.covariance(levels))
 
 
 def test_band_algebra_is_that_of_the_whole_matrix(whitened, rng):
@@ -65,7 +65,7 @@ def test_band_algebra_is_that_of_the_whole_matrix(whitened, rng):
     np.testing.assert_allclose(whitening.solve(x)[kept], np.linalg.solve(C, x[kept]), rtol=1e-6, atol=1e-9)
     z = whitening.whiten(x)
     np.testing.assert_allclose(z.T @ z, x[kept].T @ np.linalg.solve(C, x[kept]), rtol=1e-9)
-    band = whitening.C.matrix
+    band = whitening.C
     np.testing.assert_allclose((band @ (x * whitening.kept[:, None]))[kept], C @ x[kept], rtol=1e-9, atol=1e-15)
     assert Cholesky.of(band).inverse().trace_with(band) == pytest.approx(len(kept))
 
@@ -83,7 +83,7 @@ def test_it_solves_the_normal_equations_with_the_covariance_of_the_rows(model, l
     np.testing.assert_allclose(G.T @ rows.W[0], np.eye(8), atol=1e-3)
     np.testing.assert_allclose(G.T @ rows.Y[0], found.X[0], rtol=1e-6)
     if model != "power":  # whose rows have noise of their own
-        C = found.problem.parts[0].errors[0]
+        C = found.problem.parts[0].noisy.covariance(found.problem.likely_noise)
         C = dense(replace(C, bands=C.bands[0]))
         np.testing.assert_allclose(np.diag(G.T @ C @ G), found.sigma[0] ** 2, rtol=1e-6)
 
