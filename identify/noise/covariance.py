@@ -123,7 +123,7 @@ class BandedCovariance:
 
 def _sharing(G: Array) -> Iterator[tuple[int, npt.NDArray[np.intp]]]:
     """Yield kinds, and those with which they have noise of one source in common, of signals (..., kind, source, time)."""
-    reached = np.moveaxis(np.asarray(G.any(axis=-1)), -2, 0).reshape(G.shape[-3], -1, G.shape[-2]).any(axis=1)
+    reached = np.asarray((G != 0).any(axis=(*range(G.ndim - 3), -1)))
     for kind, own in enumerate(reached):
         if len(others := np.flatnonzero((reached & own).any(axis=-1))):
             yield kind, others

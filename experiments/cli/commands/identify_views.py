@@ -60,10 +60,10 @@ class Shown:
 
 def report(shown: Shown, attempts: Attempts) -> None:
     """Write the page of the identification."""
-    from experiments.reports.page import report as page_of
-
     if shown.folder is None or shown.fit.logs.long:
         return
+    from experiments.reports.page import report as page_of
+
     text = page_of(shown.judgement, shown.warnings, shown.page.found["notes"], shown.command, attempts)
     shown.folder.add("report.html", text)
 
