@@ -27,6 +27,16 @@ class Band:
 
     lower: Array
 
+    @classmethod
+    def product(cls, x: Array, y: Array, width: int) -> Self:
+        """Return so many diagonals of x y', which is symmetric, x and y of shape (..., r, m)."""
+        left, right = (_in_pieces(z, width) for z in (x, np.broadcast_to(y, x.shape)))
+        back = np.swapaxes(right, -1, -2)
+        return cls(_as_band(np.matmul(left, back), np.matmul(left[..., 1:, :, :], back[..., :-1, :, :]), x.shape[-2]))
+
+    def __sub__(self, other: Self) -> Self:
+        return type(self)(self.lower - other.lower)
+
     @property
     def void(self) -> npt.NDArray[np.bool_]:
         """Which rows have no variance, and count as left out, shape (..., r)."""
@@ -47,14 +57,11 @@ class Band:
         size = self.lower.shape[-1]
         own, below = _in_blocks(self.lower, size)
         own = own + np.swapaxes(np.tril(own, -1), -1, -2)
-        blocks = own.shape[-3]
-        cut = np.zeros((*x.shape[:-2], blocks * size, x.shape[-1]))
-        cut[..., : x.shape[-2], :] = x
-        cut = cut.reshape(*x.shape[:-2], blocks, size, x.shape[-1])
+        cut = _in_pieces(x, size)
         total = np.matmul(own, cut)
         total[..., :-1, :, :] += np.matmul(np.swapaxes(below, -1, -2), cut[..., 1:, :, :])
         total[..., 1:, :, :] += np.matmul(below, cut[..., :-1, :, :])
-        return total.reshape(*total.shape[:-3], blocks * size, -1)[..., : x.shape[-2], :]
+        return total.reshape(*total.shape[:-3], -1, x.shape[-1])[..., : x.shape[-2], :]
 
     def trace_with(self, other: Self) -> Array:
         """Return the trace of the product with another matrix, shape (...)."""
@@ -116,14 +123,11 @@ class Cholesky:
         root = np.linalg.inv(own)
         back = np.swapaxes(root, -1, -2)
         gain = np.matmul(below, root[..., :-1, :, :])
-        found, beside = np.matmul(back, root), np.zeros_like(own)
+        found, beside = np.matmul(back, root), np.zeros_like(gain)
         for k in reversed(range(below.shape[-3])):
             beside[..., k, :, :] = -np.matmul(found[..., k + 1, :, :], gain[..., k, :, :])
             found[..., k, :, :] -= np.matmul(np.swapaxes(gain[..., k, :, :], -1, -2), beside[..., k, :, :])
-        whole = np.swapaxes(np.concatenate([found, beside], axis=-2), -1, -2)
-        flat = whole.reshape(*whole.shape[:-2], -1)
-        slanted = np.concatenate([flat, np.zeros((*flat.shape[:-1], width))], axis=-1)
-        return Band(slanted.reshape(*whole.shape[:-3], -1, 2 * width + 1)[..., :r, :width])
+        return Band(_as_band(found, beside, r))
 
     def _solved(self, x: Array, which: str) -> Array:
         runs = np.broadcast_shapes(x.shape[:-2], self.lower.shape[:-2])
@@ -145,6 +149,28 @@ def _in_blocks(lower: Array, size: int, rest: float = 0.0) -> tuple[Array, Array
     flat = slanted.reshape(*runs, count, -1)[..., : 2 * size * size]
     whole = np.swapaxes(flat.reshape(*runs, count, size, 2 * size), -1, -2)
     return whole[..., :size, :], whole[..., :-1, size:, :]
+
+
+def _in_pieces(x: Array, size: int) -> Array:
+    """Return rows, shape (..., r, m), in pieces, shape (..., piece, size, m), with zeros beyond the last."""
+    *runs, r, m = x.shape
+    count = -(-r // size)
+    if count * size == r:
+        return x.reshape(*runs, count, size, m)
+    cut = np.zeros((*runs, count * size, m))
+    cut[..., :r, :] = x
+    return cut.reshape(*runs, count, size, m)
+
+
+def _as_band(own: Array, below: Array, r: int) -> Array:
+    """Return the lower band, of r rows, of blocks on the diagonal, shape (..., block, b, b), and of those below them."""
+    size = own.shape[-1]
+    whole = np.zeros((*own.shape[:-2], size, 2 * size))
+    whole[..., :size], whole[..., :-1, :, size:] = np.swapaxes(own, -1, -2), np.swapaxes(below, -1, -2)
+    flat = whole.reshape(*whole.shape[:-2], -1)
+    slanted = np.concatenate([flat, np.zeros((*flat.shape[:-1], size))], axis=-1)
+    band: Array = slanted.reshape(*whole.shape[:-3], -1, 2 * size + 1)[..., :r, :size]
+    return band
 
 
 def solve_lower(L: Array, right: Array) -> None:

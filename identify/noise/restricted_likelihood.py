@@ -126,16 +126,14 @@ class _Slope:
         found, expected = np.zeros(squares.shape), np.zeros(squares.shape)
         bend, through_W = np.zeros((*squares.shape, squares.shape[-1])), np.zeros(())
         for root, parts, z in zip(roots, units, white, strict=True):
-            solved, all_of_C = root.unwhiten(z), root.inverse()
-            solved[..., -1:] -= np.matmul(solved[..., :-1], X[..., None])
-            left, products = solved[..., -1], []
-            for i, part in enumerate(parts):
-                product = part @ solved
-                products.append(product[..., -1])
-                found[..., i] += np.sum(left * product[..., -1], axis=-1)
-                taken = np.matmul(np.swapaxes(solved[..., :-1], -1, -2), product[..., :-1])
-                expected[..., i] += all_of_C.trace_with(part) - np.sum(taken * inverse, axis=(-2, -1))
-            w = root.whiten(np.stack(products, axis=-1))
+            solved = root.unwhiten(z)
+            W, left = solved[..., :-1], solved[..., -1:] - np.matmul(solved[..., :-1], X[..., None])
+            P = root.inverse() - Band.product(np.matmul(W, inverse), W, root.lower.shape[-1])
+            products = [part @ left for part in parts]
+            for i, (part, product) in enumerate(zip(parts, products, strict=True)):
+                found[..., i] += np.sum(left * product, axis=(-2, -1))
+                expected[..., i] += P.trace_with(part)
+            w = root.whiten(np.concatenate(products, axis=-1))
             bend += np.matmul(np.swapaxes(w, -1, -2), w)
             through_W = through_W + np.matmul(np.swapaxes(z[..., :-1], -1, -2), w)
         steps = np.matmul(inverse, through_W)
