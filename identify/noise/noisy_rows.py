@@ -1,8 +1,9 @@
 """The rows of one log as noise of its torques and positions reaches them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 import numpy.typing as npt
@@ -85,8 +86,8 @@ class NoisyRows:
     @cached_property
     def units(self) -> list[Band]:
         """Covariances that unit noise of torques, and of positions, gives the rows that are kept, joint by joint."""
-        return self.matrices([*self.torque.each(), *self.position.each()])
+        return self.matrices(chain(self.torque.each(), self.position.each()))
 
-    def matrices(self, parts: Sequence[BandedCovariance]) -> list[Band]:
+    def matrices(self, parts: Iterable[BandedCovariance]) -> list[Band]:
         """Return parts of the covariance of the rows that are kept."""
         return [C.kept(self.kept).matrix for C in parts]

@@ -88,11 +88,10 @@ class Paths:
         alone = [signal[..., None, :, :] for signal in self.signals]
         return Paths(self.grid, self.windows, alone, self.outside[..., None, :])
 
-    def each(self) -> list[BandedCovariance]:
-        """Return the covariances that unit noise gives the rows, joint by joint."""
-        joints = range(self.signals[0].shape[-2])
-        single = [[signal[..., j : j + 1, :] for signal in self.signals] for j in joints]
-        return [BandedCovariance.of(self.grid, self.windows, signals, self.outside) for signals in single]
+    def each(self) -> Iterator[BandedCovariance]:
+        """Yield the covariances that unit noise gives the rows, joint by joint."""
+        for j in range(self.signals[0].shape[-2]):
+            yield BandedCovariance.of(self.grid, self.windows, [x[..., j : j + 1, :] for x in self.signals], self.outside)
 
     def _leveled(self, level: Array) -> list[Array]:
         return [signal * level[..., None, :, None] for signal in self.signals]
