@@ -51,6 +51,8 @@ class AbstractEstimator(ABC):
         """
         self._require(problem)
         estimate, status = self.solve(problem), problem.factors.together.status
+        if throw and self.full_rank:
+            problem.factors.together.check()
         if not isinstance(estimate, Estimate):
             raise PluginError(f"plug-in {type(self).__name__}.solve returned {estimate!r:.60}, expected an Estimate")
         p = len(problem.names)

@@ -1,9 +1,9 @@
 """What an estimator is given."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal, Self
+from typing import Literal, Self, TypeVar
 
 import numpy as np
 
@@ -21,18 +21,22 @@ from identify.noise.restricted_likelihood import likely, likely_levels
 from identify.noise.row_weights import floor_of, reciprocal_root
 from identify.noise.spectral_levels import position_noise, spectral_levels
 from identify.rows.chain import Chain
-from identify.rows.factors import Factors, Fit
+from identify.rows.factors import Factor, Factors, Fit, triangular
 from identify.rows.long_logs import is_long, piece_of
 from identify.rows.rows import Rows
 from identify.signals.signals import Signals
 
 Weights = Literal["measured", "own"]
+Reduced = TypeVar("Reduced")
 
 ROUNDING = 1e-9
 """Share by which frequencies may differ that are the same: of a file they are the mean of its steps."""
 
 SAMPLED = 8
 """Pieces of long logs from which noise is estimated and propagated."""
+
+MOVED = 0.02
+"""Sigma by which what noise adds to W may move an estimate of long logs for it to be left there."""
 
 BEGIN, LEAST = (1.0, 0.1, 0.1), 1e-4
 """Shares of the errors of rows of which one kind is not alike, to begin with, and at least."""
@@ -144,14 +148,28 @@ class Problem:
     @cached_property
     def factors(self) -> Factors:
         """Triangular factors of the rows as they are, one for each kind."""
-        return self._long_factors[0] if self.long else self.rows.factors
+        return Factors.merged([part.rows.factors for part in self.every_part()]) if self.long else self.rows.factors
 
     @cached_property
     def scaled_factors(self) -> Factors:
         """Triangular factors of the rows, divided by what their noise is relative to that of others of their kind."""
-        if self.long:
-            return self._long_factors[1]
-        return self.factors if self.alike else self.rows.factors_of(self.weights)
+        if self.alike:
+            return self.factors
+        if not self.long:
+            return self.rows.factors_of(self.weights)
+        return Factors.merged(self._of_pieces(lambda part: part.rows.factors_of(part.weights)))
+
+    @cached_property
+    def independent_factor(self) -> Array:
+        """The triangular factor of the rows made independent, W without what noise adds to it, shape (..., p + 1, p + 1)."""
+        if not self.long:
+            return triangular(np.concatenate([part.whitening.whiten(part.unbiased.joined) for part in self.parts], axis=-2))
+        biased = self._biased
+
+        def factor(part: LogRows) -> Array:
+            return triangular(part.whitening.whiten((part.unbiased if biased else part.rows).joined))
+
+        return triangular(np.concatenate(self._of_pieces(factor), axis=-2))
 
     @cached_property
     def weights(self) -> Array:
@@ -275,13 +293,27 @@ class Problem:
         return [(chain, log, piece) for chain, log in each for piece in chain.pieces(log, piece_of(log))]
 
     @cached_property
-    def _long_factors(self) -> tuple[Factors, Factors]:
-        """Factors of long logs, plain and scaled, of which each piece is made once for both."""
-        plain, scaled = list[Factors](), list[Factors]()
+    def _biased(self) -> bool:
+        """Whether what noise adds to W moves the estimate of long logs, as some pieces show, by anything that counts."""
+        plain, better = (
+            Factor(triangular(np.concatenate([part.whitening.whiten(each) for part, each in rows])), np.array(0), self.names)
+            for rows in (
+                [(part, part.rows.joined) for part in self.parts],
+                [(part, part.unbiased.joined) for part in self.parts],
+            )
+        )
+        known = np.array(plain.determined & better.determined)
+        sigma = np.sqrt(np.diagonal(better.inverse(known)) * self.share)
+        return not (np.abs(plain.solution(known) - better.solution(known)) < MOVED * sigma).all()
+
+    def _of_pieces(self, reduced: Callable[[LogRows], Reduced]) -> list[Reduced]:
+        """Return what is made of every piece of long logs; the plain factors of their rows are made in passing."""
+        plain, found = list[Factors](), list[Reduced]()
         for part in self.every_part():
             plain.append(part.rows.factors)
-            scaled.append(plain[-1] if self.alike else part.rows.factors_of(part.weights))
-        return Factors.merged(plain), Factors.merged(scaled)
+            found.append(reduced(part))
+        self.__dict__.setdefault("factors", Factors.merged(plain))
+        return found
 
 
 def _speeds(log: MotionLog, chain: Chain) -> Array:

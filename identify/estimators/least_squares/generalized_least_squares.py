@@ -11,7 +11,7 @@ from identify.estimators.estimator import AbstractEstimator, Need
 from identify.estimators.problem import Problem
 from identify.estimators.propagated import bias_covariance
 from identify.estimators.solution import OfWhitenedRows
-from identify.rows.factors import Factor, Status, triangular
+from identify.rows.factors import Factor, Status
 
 
 @final
@@ -32,8 +32,8 @@ class GeneralizedLeastSquares(AbstractEstimator):
 
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate; of logs too long for their rows to be kept, pieces count as independent."""
-        parts = [triangular(part.whitening.whiten(part.unbiased.joined)) for part in problem.every_part()]
-        factor = Factor(triangular(np.concatenate(parts, axis=-2)), problem.factors.together.rows, problem.names)
+        R = problem.independent_factor
+        factor = Factor(R, problem.factors.together.rows, problem.names)
         solvable = (problem.factors.together.status == Status.OK) & factor.determined
         solution = OfWhitenedRows(inverse := factor.inverse(solvable))
         off = np.zeros(()) if problem.alike else bias_covariance(problem, solution.influence(problem.parts))
