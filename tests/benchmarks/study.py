@@ -18,6 +18,8 @@ import mujoco
 from mujoco.batch import Batch
 
 from experiments.cli.page import new_page
+from experiments.recording.study_recording import StudyRecording
+from experiments.results.folder import ResultsFolder
 from experiments.study.cluster import cluster_pool
 from experiments.study.run_study import local_pool, run_missing
 from experiments.study.store import Store
@@ -65,7 +67,8 @@ def timed(runs: int, workers: int, report: bool) -> tuple[float, float]:
             run_missing(store, pool, SHARD, lambda done: None)
             took = time.perf_counter() - start - up
         if report:
-            write_results(new_page(), store, None)
+            results = ResultsFolder(store.folder, "study", "benchmark")
+            write_results(new_page(), store, results, StudyRecording(described, store.folder, None))
             print(f"  report, recording and summary: {time.perf_counter() - start - took - up:.1f} s more")
         seconds = store.seconds()
         print(f"  start {up:.1f} s, not in the ratio below")
