@@ -17,6 +17,8 @@ from identify.rows.rows import Rows
 from identify.signals.signals import Signals
 
 if TYPE_CHECKING:
+    from weakref import ref
+
     from identify.estimators.problem import Problem
 
 
@@ -26,17 +28,25 @@ class LogRows:
 
     Parameters
     ----------
-    problem : Problem
-        Robot, model and chain, and the noise of all logs.
+    owner : weak reference to Problem
+        Robot, model and chain, and the noise of all logs. Weak, since the problem has these rows: a circle of references would
+        keep what is large until the garbage is collected.
     signals : Signals
         Of the log.
     explicit : LogRows, optional
         Those of the explicit model from the same signals, where this is another model: what noise does to both is shared.
     """
 
-    problem: "Problem"
+    owner: "ref[Problem]"
     signals: Signals
     explicit: "LogRows | None" = None
+
+    @property
+    def problem(self) -> "Problem":
+        """The problem, which must be kept as long as its rows are used."""
+        problem = self.owner()
+        assert problem is not None
+        return problem
 
     @cached_property
     def rows(self) -> Rows:
@@ -66,8 +76,12 @@ class LogRows:
         if self._twin:
             return self._twin.whitening
         if self.problem.alike:
-            return self.noisy.whitening(self.problem.likely_noise)
-        return self.noisy.whitening_by(self.errors, self.problem.shares)
+            found = self.noisy.whitening(self.problem.likely_noise)
+            self.noisy.forget()
+            return found
+        shares, errors = self.problem.shares, self.errors
+        del self.__dict__["errors"]  # what is large, and needed by nothing else
+        return self.noisy.whitening_by(errors, shares)
 
     @cached_property
     def errors(self) -> list[BandedCovariance]:
@@ -102,7 +116,6 @@ class LogRows:
     def forget(self) -> None:
         """Drop what only the rows of further models would need."""
         self.__dict__.pop("noisier", None)
-        self.noisy.__dict__.pop("units", None)
 
     @property
     def weights(self) -> Array:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, Self, TypeVar
+from weakref import ref
 
 import numpy as np
 
@@ -118,8 +119,8 @@ class Problem:
     def parts(self) -> tuple[LogRows, ...]:
         """The rows of each log, and what belongs to them; of long ones those of some pieces."""
         if self.explicit is self:
-            return tuple(LogRows(self, signals) for signals in self.signals)
-        return tuple(LogRows(self, part.signals, part) for part in self.explicit.parts)
+            return tuple(LogRows(ref(self), signals) for signals in self.signals)
+        return tuple(LogRows(ref(self), part.signals, part) for part in self.explicit.parts)
 
     def every_part(self) -> Iterator[LogRows]:
         """Yield the rows of each log, or of every piece of long ones."""
@@ -127,7 +128,7 @@ class Problem:
             yield from self.parts
             return
         for chain, log, piece in self._pieces:
-            yield LogRows(self, chain.signals(log.part(*piece)))
+            yield LogRows(ref(self), chain.signals(log.part(*piece)))
 
     @cached_property
     def share(self) -> float:
@@ -178,11 +179,13 @@ class Problem:
             return np.ones(len(self.some_rows.time))
         return np.concatenate([part.weights for part in self.parts], axis=-1)
 
-    @cached_property
+    @property
     def explicit(self) -> "Problem":
         """The problem of the explicit model, whose rows show the noise of the logs."""
-        if isinstance(self.model, ExplicitModel):
-            return self
+        return self if isinstance(self.model, ExplicitModel) else self._of_explicit
+
+    @cached_property
+    def _of_explicit(self) -> "Problem":
         return self._explicit or replace(self, model=ExplicitModel(), _signals=self.signals)
 
     @cached_property

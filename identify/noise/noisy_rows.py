@@ -65,11 +65,15 @@ class NoisyRows:
             found = found + self.position.variance(levels.effective_position)
         return found
 
-    @cached_property
+    @property
     def unmasked(self) -> "NoisyRows":
         """The rows as if nothing were masked."""
+        return self._whole or self
+
+    @cached_property
+    def _whole(self) -> "NoisyRows | None":
         to_rows = self.to_rows.unmasked()
-        return self if to_rows is self.to_rows else NoisyRows(to_rows, self.linear)
+        return None if to_rows is self.to_rows else NoisyRows(to_rows, self.linear)
 
     def whitening(self, levels: NoiseLevels) -> Whitening:
         """Return what makes the rows that are kept independent, by noise of these levels; of `units` where they are there."""
@@ -87,6 +91,11 @@ class NoisyRows:
     def units(self) -> list[Band]:
         """Covariances that unit noise of torques, and of positions, gives the rows that are kept, joint by joint."""
         return self.matrices(chain(self.torque.each(), self.position.each()))
+
+    def forget(self) -> None:
+        """Drop what is large, and needed again by few: paths and units."""
+        for name in ("torque", "position", "units"):
+            self.__dict__.pop(name, None)
 
     def matrices(self, parts: Iterable[BandedCovariance]) -> list[Band]:
         """Return parts of the covariance of the rows that are kept."""

@@ -1,5 +1,6 @@
 """Noise of torques and positions, propagated to rows and parameters: the corrected sigma."""
 
+import gc
 from dataclasses import replace
 
 import numpy as np
@@ -269,3 +270,16 @@ def test_a_run_that_cannot_be_solved_has_none(log, rng):
     alone = identify(MotionLog(log.fs, q[0], tau[0], log.torque), scara(), EVERY["explicit"])
     assert np.isnan(both.corrected_sigma[1]).all()
     np.testing.assert_array_equal(both.corrected_sigma[0], alone.corrected_sigma)
+
+
+@pytest.mark.parametrize("estimator", ["WLS", "GLS"])
+def test_no_circle_of_references_outlives_an_identification(log, estimator):
+    """Problems and their rows are large: what nobody holds any more is gone at once, not when the garbage is collected."""
+    one = noisy(log, (0.1, 0.005), 1)
+    gc.collect()
+    gc.disable()
+    try:
+        identify_each(one, scara(), EVERY, estimator=ESTIMATORS.create(estimator))
+        assert gc.collect() == 0
+    finally:
+        gc.enable()
