@@ -1,11 +1,12 @@
 """What errors of the positions do to the torques that a robot's model predicts."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import scipy
 
 from identify.arrays import HELD, Array, combined, frozen
@@ -62,22 +63,23 @@ class Linearization:
     signals: Signals
     basis: Basis
     X: Array
-    _known: dict[tuple[int, int], Slopes] = field(default_factory=dict, repr=False)
 
     def at(self, some: slice) -> Slopes:
-        """Return the slopes at some samples, each computed once."""
-        key = int(some.start), int(some.step)
-        if key not in self._known:
-            self._known[key] = self._slopes(some)
-        return self._known[key]
+        """Return the slopes at some samples."""
+        places = np.arange(some.start or 0, self.signals.state.q.shape[-1], some.step or 1)
+        return Slopes(*(_between(x, places, self._every) for x in self._at_knots))
 
-    def _slopes(self, some: slice) -> Slopes:
-        state, between = self.signals.state, max(1, int(self.signals.fs / (KNOTS * some.step)))
-        slow, step = smoothed(state.qd, self.signals.fs), between * some.step
-        count = len(range(some.start, state.q.shape[-1], some.step))
-        last = some.start + step * -(-(count - 1) // between)
+    @property
+    def _every(self) -> int:
+        """Samples from one knot to the next."""
+        return max(1, int(self.signals.fs / KNOTS))
+
+    @cached_property
+    def _at_knots(self) -> Slopes:
+        state, last = self.signals.state, self.signals.state.q.shape[-1] - 1
+        slow = smoothed(state.qd, self.signals.fs)
         # Beyond the last sample the motion stays as it is: a place to interpolate to.
-        knots = np.minimum(np.arange(some.start, last + 1, step), state.q.shape[-1] - 1)
+        knots = np.minimum(np.arange(0, last + self._every, self._every), last)
         runs = np.prod(state.q.shape[:-2], dtype=int)
         each = max(1, MOST // (self.basis.n**2 * len(self.basis.names) * max(runs, 1)))
         pieces = []
@@ -85,8 +87,7 @@ class Linearization:
             conditions = {name: x[..., part] for name, x in state.conditions.items()}
             q, qd, qdd = (x[..., part] for x in (state.q, state.qd, state.qdd))
             pieces.append(slopes(self.basis, self.X, q, qd, qdd, slow[..., part], conditions))
-        whole = (np.concatenate(each, axis=-1) for each in zip(*pieces, strict=True))
-        return Slopes(*(_refined(x, between)[..., :count] for x in whole))
+        return Slopes(*(np.concatenate(each, axis=-1) for each in zip(*pieces, strict=True)))
 
 
 def slopes(
@@ -145,15 +146,15 @@ def smoothed(x: Array, fs: float) -> Array:
     return slide(x, _parabola(window)) if window > 3 else x
 
 
-def _refined(x: Array, times: int) -> Array:
-    """Return values at `times` as many places, shape (..., time), by cubic polynomials through four neighbours each."""
-    if times == 1:
-        return x
+def _between(x: Array, places: npt.NDArray[np.intp], every: int) -> Array:
+    """Return values of every so many samples, shape (..., knot), at places [samples], by cubics through four neighbours."""
+    if every == 1:
+        return x[..., places]
     ends = np.concatenate([x[..., :1], x, x[..., -1:], x[..., -1:]], axis=-1)
-    s = np.arange(times) / times
+    first, s = places // every, (places % every) / every
     weights = -s * (1 - s) ** 2 / 2, 1 - (5 - 3 * s) * s**2 / 2, s * (1 + (4 - 3 * s) * s) / 2, -(s**2) * (1 - s) / 2
-    total = sum(w * ends[..., i : i + x.shape[-1], None] for i, w in enumerate(weights))
-    return np.asarray(total).reshape(*x.shape[:-1], -1)
+    total: Array = sum(w * ends[..., first + i] for i, w in enumerate(weights))
+    return total
 
 
 @lru_cache(maxsize=16)
