@@ -8,7 +8,18 @@ from typing import Any
 
 DOCS = Path(__file__).absolute().parent.parent
 RESULTS = DOCS / "results"
-KEPT = ("settings", "chain", "estimator", "model", "runs", "rmse_percent", "coverage", "paper_coverage", "bound_percent")
+KEPT = (
+    "settings",
+    "chain",
+    "estimator",
+    "model",
+    "runs",
+    "rmse_percent",
+    "coverage",
+    "paper_coverage",
+    "bound_percent",
+    "bound_through_reversals_percent",
+)
 """What is kept of a cell."""
 
 COMPARED = ("bias_percent", "bias_margin_percent", "failures", "simulations")

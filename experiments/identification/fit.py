@@ -242,6 +242,11 @@ class Fit:
             return None
         return self.logs.fitted[0].torque.delay + (joint[0].delay or 0.0), float(joint[0].covariance[-1, -1]) ** 0.5
 
+    @property
+    def left_out(self) -> dict[str, str]:
+        """Why reversals, which were asked for, are left out, model by model."""
+        return {model: one.left_out for model, e in self.estimates.items() for one in e.fits.values() if one.left_out}
+
     def summary(self) -> dict[str, Any]:
         """Return what a summary.json says of it."""
         truth = None if self.truth is None else list(self.truth.values())
@@ -259,6 +264,7 @@ class Fit:
             "estimator": self.request.estimator,
             "consistent": self.request.consistent,
             "torque": self._channel(0),
+            "reversals_left_out": self.left_out,
             "found_delay": None if delay is None else {"delay": delay[0], "sigma": delay[1]},
             "noise": self.noise,
             "lack_of_fit": [asdict(lack) for lack in self.lack],

@@ -85,6 +85,8 @@ def _told(fit: Fit) -> Iterator[str]:
     yield _noise(fit)
     yield words_of_lack(fit.lack, fit.subject)
     yield from words_of_iterations(fit)
+    for model, why in fit.left_out.items():
+        yield f"{model}: reversals are left out, as ML does: {why}"
     if fit.request.consistent != "no":
         before = {name: e for name, e in fit.unconstrained.items() if isinstance(e, Estimate)}
         yield from words_of_consistency(before, fit.estimates)

@@ -47,7 +47,7 @@ def typical_figure(families: Mapping[str, Sequence[Cell]], axis: Axis, edges: in
             x, y = _places(panel, group, axis, edges), np.array([100 * c.typical for c in group])
             ends = np.abs(100 * np.array([c.typical_interval for c in group]).T - y)
             panel.errorbar(x, y, ends, color=_color(model), label=model, lw=_width(cells, model), marker=".", capsize=2)
-            if np.isfinite(least := np.array([100 * c.typical_least for c in group])).any():
+            if np.isfinite(least := np.array([100 * c.typical_least() for c in group])).any():
                 panel.plot(x, least, color="black", ls=":", lw=1.0, label="bound" if model == _last(cells) else None)
         panel.set_yscale("log")
         panel.set_title(title)
@@ -107,7 +107,7 @@ def bars_figure(cells: Sequence[Cell]) -> str:
     for p, (name, panel) in enumerate(panels.items()):
         mean = 100 * np.array([cell.bias[p] for cell in cells])
         spread = np.nan_to_num(100 * np.array([cell.deviation[p] for cell in cells]))
-        least = np.array([100 * cell.least[p] for cell in cells])
+        least = np.array([100 * cell.least()[p] for cell in cells])
         sizes = (np.abs(mean) + spread)[np.isfinite(mean)]
         limit = REACH * float(np.median(sizes)) if len(sizes) and np.median(sizes) > 0 else 1.0
         panel.axhline(0.0, color="black", lw=0.6)

@@ -10,8 +10,9 @@ import numpy as np
 
 from experiments.identification.simulators import RobotPlant, ScenarioLoop
 from experiments.identification.subject import Subject
-from experiments.study.bound import bound_of
+from experiments.study.bound import bounds_of
 from experiments.study.method import Method
+from experiments.study.statistics import BOUNDS
 from experiments.study.study import Study
 from identify import Array, Estimate, ExplicitModel, IdentificationError, Problem, Simulation, Status, attempt_each
 from identify.estimators.settle import settled
@@ -30,13 +31,10 @@ FARTHEST = 3.0
 PARTS = ("", ".sigma", ".paper_sigma", ".truth")
 """Of every parameter: the estimate, its corrected sigma, that of the paper's formula, and the truth."""
 
-BOUND = ".bound"
-"""Of every parameter, in studies that ask for it: the least error that noise allows."""
-
 
 def parts_of(study: Study) -> tuple[str, ...]:
     """Return what the rows of a study hold of every parameter."""
-    return (*PARTS, BOUND) if study.bound else PARTS
+    return (*PARTS, *BOUNDS) if study.bound else PARTS
 
 
 @dataclass
@@ -75,9 +73,9 @@ def run_shard(study: Study, runs: range, *, threads: int = 1, progress: Progress
         done += len(together) * steps
         for k, method in enumerate(study.methods):
             start = time.perf_counter()
-            truth, bound = known[method.friction]
+            truth, bounds = known[method.friction]
             simulation = _simulation(study, method, simulated, together, truth)
-            shard.rows += _identify(study, method, simulated, list(together), truth, bound, simulation)
+            shard.rows += _identify(study, method, simulated, list(together), truth, bounds, simulation)
             shard.seconds[f"{method.chain_name} {method.estimator_name}"] += time.perf_counter() - start
             tell(2.0 + k)
     shard.rows.sort(key=lambda row: row["run"])
@@ -100,10 +98,10 @@ def _groups(study: Study, scenarios: Mapping[int, Scenario], shard: Shard) -> It
     yield from groups.values()
 
 
-def _known(study: Study, subject: Subject, simulated: Run) -> tuple[dict[str, float], Array | None]:
-    """Return the truth of a robot's parameters, and the least error that noise allows, if that is asked for."""
+def _known(study: Study, subject: Subject, simulated: Run) -> tuple[dict[str, float], dict[str, Array]]:
+    """Return the truth of a robot's parameters, and the least errors that noise allows, if they are asked for."""
     truth = subject.truth(simulated.robots[0], simulated.scenario.friction)
-    return truth, bound_of(subject.basis, simulated, truth) if study.bound else None
+    return truth, bounds_of(subject.basis, simulated, truth) if study.bound else {}
 
 
 def _simulate(
@@ -130,7 +128,7 @@ def _identify(
     simulated: Run,
     runs: Sequence[int],
     truth: Mapping[str, float],
-    bound: Array | None,
+    bounds: Mapping[str, Array],
     simulation: Simulation,
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for every run and model."""
@@ -144,7 +142,7 @@ def _identify(
         found = dict.fromkeys(study.models, error)
     for model in study.models:
         outcome = found[model]
-        columns = _columns(outcome, truth, bound) if isinstance(outcome, Estimate) else {}
+        columns = _columns(outcome, truth, bounds) if isinstance(outcome, Estimate) else {}
         for i, run in enumerate(runs):
             common = _common(study, method, run, model, simulated.seeds[i])
             if reason := simulated.failures.get(i) or _failure(outcome, i):
@@ -177,12 +175,11 @@ def _failure(outcome: Estimate | IdentificationError, i: int) -> str:
     return "" if np.isfinite(outcome.X[i]).all() else "the estimator finds no finite value"
 
 
-def _columns(estimate: Estimate, truth: Mapping[str, float], bound: Array | None) -> dict[str, list[Any]]:
+def _columns(estimate: Estimate, truth: Mapping[str, float], bounds: Mapping[str, Array]) -> dict[str, list[Any]]:
     """Return what an estimate of many runs found, a list with the value of each run."""
     runs = len(estimate.X)
-    parts = [estimate.X, estimate.best_sigma, estimate.sigma, np.tile(list(truth.values()), (runs, 1))]
-    names = PARTS if bound is None else (*PARTS, BOUND)
-    parts += [] if bound is None else [bound]
+    found = estimate.X, estimate.best_sigma, estimate.sigma, np.tile(list(truth.values()), (runs, 1))
+    parts = {**dict(zip(PARTS, found, strict=True)), **bounds}
     columns = {
         "condition_number": estimate.condition_number.tolist(),
         "rows": estimate.row_count.tolist(),
@@ -190,7 +187,7 @@ def _columns(estimate: Estimate, truth: Mapping[str, float], bound: Array | None
         "simulations": [0] * runs if estimate.simulations is None else estimate.simulations.tolist(),
     }
     for p, name in enumerate(estimate.names):
-        columns |= {name + part: x[:, p].tolist() for part, x in zip(names, parts, strict=True)}
+        columns |= {name + part: x[:, p].tolist() for part, x in parts.items()}
     return columns
 
 

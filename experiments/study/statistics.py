@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -26,6 +26,10 @@ RIGHT = float(2 * scipy.stats.norm.cdf(SIGMAS) - 1)
 LEAST = 1e-16
 """Relative error that counts as none: logarithms of 0 would say too much of rounding."""
 
+BOUNDS = (".bound", ".bound_through_reversals")
+"""Of every parameter, in studies that ask for it: the least error that noise allows where friction near rest is not known, and
+where it is what its law says up to the instant of a reversal."""
+
 NUMBER = re.compile(r"\d[\d.,e+-]*")
 
 
@@ -48,8 +52,8 @@ class Cell:
     failures : mapping of str to int array
         Reasons of the others, as the first of them has it, and the runs that failed so: reasons that differ in numbers alone
         are one.
-    bound : Array, shape (runs, p), optional
-        The least standard deviations that noise allows, of a study that asks for them.
+    bounds : mapping of str to Array, shape (runs, p)
+        The least standard deviations that noise allows, of a study that asks for them: see `BOUNDS`.
     simulations : Array, shape (runs,), optional
         How often the estimator simulated each run.
     shared : bool array, shape (p,), optional
@@ -65,7 +69,7 @@ class Cell:
     paper_sigma: Array
     truth: Array
     failures: Mapping[str, np.typing.NDArray[np.int64]]
-    bound: Array | None = None
+    bounds: Mapping[str, Array] = field(default_factory=dict)
     simulations: Array | None = None
     shared: np.typing.NDArray[np.bool_] | None = None
 
@@ -119,22 +123,20 @@ class Cell:
         low, high = np.exp(np.quantile(typical, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2]))
         return float(low), float(high)
 
-    @property
-    def least(self) -> Array:
-        """Root mean square of the least relative errors that noise allows (Cramer-Rao), shape (p,); NaN if not asked for."""
-        if self.bound is None:
+    def least(self, bound: str = BOUNDS[0]) -> Array:
+        """Return the rms of the least relative errors that noise allows (Cramer-Rao), shape (p,); NaN if not asked for."""
+        if bound not in self.bounds:
             return np.full(len(self.parameters), np.nan)
-        return np.sqrt(np.mean((self.bound / np.where(self.truth == 0, np.nan, self.truth)) ** 2, axis=0))
+        return np.sqrt(np.mean((self.bounds[bound] / np.where(self.truth == 0, np.nan, self.truth)) ** 2, axis=0))
 
     @property
     def mean_simulations(self) -> float:
         """Mean number of simulations that the estimator made of a run; 0 for one that makes none."""
         return 0.0 if self.simulations is None or not self.runs else float(np.nan_to_num(self.simulations).mean())
 
-    @property
-    def typical_least(self) -> float:
-        """Geometric mean over the parameters of `least`."""
-        return float(np.exp(np.mean(np.log(np.maximum(self.least[self.relative], LEAST)))))
+    def typical_least(self, bound: str = BOUNDS[0]) -> float:
+        """Return the geometric mean over the parameters of `least`."""
+        return float(np.exp(np.mean(np.log(np.maximum(self.least(bound)[self.relative], LEAST)))))
 
     @property
     def relative(self) -> np.typing.NDArray[np.bool_]:
@@ -192,7 +194,7 @@ def _cell(
         sigma=of(".sigma"),
         paper_sigma=of(".paper_sigma"),
         truth=of(".truth"),
-        bound=of(".bound") if parameters[0] + ".bound" in rows else None,
+        bounds={bound: of(bound) for bound in BOUNDS if parameters[0] + bound in rows},
         simulations=rows["simulations"][ok].astype(np.float64) if "simulations" in rows else None,
         failures=_grouped(rows["failure"][index[failed]], rows["run"][index[failed]]),
     )

@@ -13,7 +13,7 @@ from experiments.study.answer import answer, grouped, headline, method, percent,
 from experiments.study.axis import Axis
 from experiments.study.comparison import differences
 from experiments.study.figures import bars_figure, cost_figure, coverage_figure, error_figure, typical_figure
-from experiments.study.statistics import Cell
+from experiments.study.statistics import BOUNDS, Cell
 from experiments.study.study import Study
 from experiments.study.versions import versions
 from experiments.text import percent as signed
@@ -99,15 +99,15 @@ def _overview(cell: Cell) -> list[str]:
     settings = [value(x) for x in cell.settings.values()]
     head = [*settings, *cell.names, f"{cell.runs}", f"{cell.failed or ''}"]
     if not cell.runs:
-        return [*head, *[""] * 6]
+        return [*head, *[""] * 7]
     worst = int(np.nan_to_num(cell.rmse).argmax())
     shares = []
     for sigma in (cell.sigma, cell.paper_sigma):
         share = 100 * cell.coverage(sigma)
         shares.append(f"{share.mean():.0f} % ({share.min():.0f} to {share.max():.0f})" if np.isfinite(share).all() else "")
-    least = percent(cell.typical_least) if np.isfinite(cell.typical_least) else ""
+    least = [percent(x) if np.isfinite(x := cell.typical_least(bound)) else "" for bound in BOUNDS]
     often = f"{cell.mean_simulations:.3g}" if cell.mean_simulations else ""
-    return [*head, percent(cell.typical), least, f"{percent(cell.rmse[worst])} {cell.parameters[worst]}", *shares, often]
+    return [*head, percent(cell.typical), *least, f"{percent(cell.rmse[worst])} {cell.parameters[worst]}", *shares, often]
 
 
 def _details(cell: Cell, title: str) -> Iterator[list[str]]:

@@ -16,7 +16,7 @@ from experiments.results.summaries import write_summary
 from experiments.study.answer import answer, method, percent, settings_of, short, value
 from experiments.study.axis import FRICTION
 from experiments.study.shard_file import arrays
-from experiments.study.statistics import Cell, cells
+from experiments.study.statistics import BOUNDS, Cell, cells
 from experiments.study.store import Store
 from experiments.study.study_report import report
 from experiments.study.versions import versions
@@ -52,16 +52,15 @@ def write_results(page: "Page", store: Store, folder: ResultsFolder, recording: 
 
 def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:
     axes = [short(field) for field in store.study.varied if field != FRICTION] or [""]
-    least = ["bound"] if store.study.bound else []
+    least = ["bound", "through reversals"] if store.study.bound else []
     often = ["simulations"] if any(cell.mean_simulations for cell in found) else []
     columns = [*axes[1:], "identified by", "runs", "failed", "typical error", *least, "within 2 sigma", *often]
     grid = new_table(store.study.question, columns)
     for cell in found:
         settings = [value(x) for x in settings_of(cell).values()] or [""]
         numbers = f"{cell.runs}", f"{cell.failed or ''}"
-        errors = (
-            [percent(cell.typical), *([percent(cell.typical_least)] if least else [])] if cell.runs else [""] * (1 + len(least))
-        )
+        bounds = [percent(cell.typical_least(bound)) for bound in BOUNDS] if least else []
+        errors = [percent(cell.typical), *bounds] if cell.runs else [""] * (1 + len(least))
         judged = *errors, _held(cell), *_often(cell, often)
         grid.add_row(*settings, method(cell, found), *numbers, *judged)
     grid.columns[0].header = axes[0]
@@ -119,7 +118,7 @@ def _cell(cell: Cell) -> dict[str, Any]:
             "coverage_low": cell.coverage_interval(cell.sigma)[:, 0],
             "coverage_high": cell.coverage_interval(cell.sigma)[:, 1],
             "paper_coverage": cell.coverage(cell.paper_sigma),
-            "bound_percent": 100 * cell.least,
+            **{f"{bound[1:]}_percent": 100 * cell.least(bound) for bound in BOUNDS},
         }
         summary |= {name: [float(x) if isfinite(x) else None for x in values] for name, values in numbers.items()}
     return summary

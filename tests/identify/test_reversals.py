@@ -165,3 +165,13 @@ def test_where_torque_noise_rules_little_is_gained_and_nothing_lost():
     used, masked = (fitted(q, tau, 16, 0.01, estimator) for estimator in (USED, MASKED))
     assert typical(used) < 1.02 * typical(masked)
     assert np.sqrt(np.mean(((used.X - exact.X) / used.sigma) ** 2)) == pytest.approx(1.0, abs=0.25)
+
+
+@pytest.mark.thorough
+def test_a_fit_says_why_it_leaves_reversals_out():
+    """Of friction that is soft near rest; where it is as its law says, they are used, and nothing is said."""
+    for law, used in (("coulomb", True), ("soft", False)):
+        q, _, tau = logged("moves", law, 2)
+        for fit in fitted(q, tau, 16, 0.0, USED).fits.values():
+            assert (fit.near is not None) == used
+            assert (fit.left_out == "") == used

@@ -79,6 +79,8 @@ class JointFit:
         Levels of the torques near reversals [N m], if these are used.
     covariance : Array, shape (p, p), or (p + 1, p + 1)
         Of the error of X, and of the delay if it is unknown.
+    left_out : str
+        Why reversals, which were asked for, are left out; empty if they are used, or were not asked for.
     """
 
     logs: tuple[Cells, ...]
@@ -89,6 +91,7 @@ class JointFit:
     delay: float | None = None
     near: Array | None = None
     covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    left_out: str = ""
 
     @classmethod
     def start(

@@ -127,10 +127,13 @@ def _through_reversals(begin: JointFit, floor: Array) -> JointFit:
     masked = begin.solved(floor)
     try:
         used = masked.with_reversals().solved(floor, FINE)
-    except IdentificationError:
-        return masked
-    ratio = np.diag(used.covariance) / np.diag(masked.covariance)
-    return used if np.mean(np.log(ratio)) < 2 * np.log(WORTH) else masked
+    except IdentificationError as error:
+        return replace(masked, left_out=str(error))
+    gained = 1 - np.sqrt(np.exp(np.mean(np.log(np.diag(used.covariance) / np.diag(masked.covariance)))))
+    if gained > 1 - WORTH:
+        return used
+    less = f"{100 * gained:.2g} % less" if gained > 0 else "no less"
+    return replace(masked, left_out=f"sigma would be {less}, for which friction near rest would have to be as its law says")
 
 
 def with_delay() -> MaximumLikelihood:

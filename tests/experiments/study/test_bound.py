@@ -28,6 +28,7 @@ def test_the_bound_stands_beside_the_errors(tmp_path, capsys):
     ratio = np.array(cell["rmse_percent"]) / cell["bound_percent"]
     assert (ratio > 0.5).all()  # nine runs know an rms to a quarter
     assert np.exp(np.mean(np.log(ratio))) > 1
+    assert (np.array(cell["bound_through_reversals_percent"]) < cell["bound_percent"]).all()
     assert "<th>bound</th>" in (tmp_path / "out" / "report.html").read_text()
 
 
