@@ -61,6 +61,8 @@ from identify.estimators.simulator import AbstractLoop as AbstractLoop
 from identify.estimators.simulator import AbstractPlant as AbstractPlant
 from identify.estimators.simulator import Simulated as Simulated
 from identify.estimators.simulator import Simulation as Simulation
+from identify.files.log_file import read_log as read_log
+from identify.files.log_file import write_log as write_log
 from identify.judge.bound import cramer_rao as cramer_rao
 from identify.judge.diagnosis import Instants as Instants
 from identify.judge.diagnosis import binned as binned

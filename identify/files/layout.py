@@ -168,7 +168,7 @@ class LogLayout:
         if self.torque:
             lines += [f'meaning = "{self.torque.meaning}"', f"delay = {self.torque.delay!r}"]
         else:
-            lines += ['# meaning = "held"  # or "instantaneous", "averaged": see docs/real-logs.md', "# delay = 0.0  # [s]"]
+            lines += ['# meaning = "held"  # or "instantaneous", "averaged": see docs/torque.md', "# delay = 0.0  # [s]"]
         if self.gain:
             lines += [f"gain = {list(self.gain)}"]
         if self.motors:

@@ -18,7 +18,7 @@ WRITTEN = (CSV, ".parquet")
 """What names of files end with that idbench writes."""
 
 
-def write_log(log: MotionLog, path: Path, joints: Sequence[str] = ()) -> None:
+def write_log(log: MotionLog, path: Path | str, joints: Sequence[str] = ()) -> None:
     """Write one run to a CSV or Parquet file; the torque channel goes into the metadata of Parquet.
 
     CSV has no place for it; its torques are in N m, gain included. Columns are named after the `joints`, or numbered.
@@ -30,6 +30,7 @@ def write_log(log: MotionLog, path: Path, joints: Sequence[str] = ()) -> None:
     OSError
         If the file cannot be written.
     """
+    path = Path(path)
     if path.suffix.lower() not in WRITTEN:
         raise LogError(f"{path}: the name of a log that is written must end with {' or '.join(WRITTEN)}")
     if log.q.ndim != 2:
@@ -55,7 +56,7 @@ def write_log(log: MotionLog, path: Path, joints: Sequence[str] = ()) -> None:
         parquet.write_table(table.replace_schema_metadata({TORQUE: json.dumps(torque).encode()}), file)
 
 
-def read_log(path: Path, torque: TorqueChannel | None = None, joints: Sequence[str] = ()) -> MotionLog:
+def read_log(path: Path | str, torque: TorqueChannel | None = None, joints: Sequence[str] = ()) -> MotionLog:
     """Read a log from a file of any kind that `read_columns` knows.
 
     Parameters
@@ -73,6 +74,7 @@ def read_log(path: Path, torque: TorqueChannel | None = None, joints: Sequence[s
         If the file cannot be read, lacks a column, does not say what its torque means and `torque` does not either, or
         holds values that make no log.
     """
+    path = Path(path)
     found = read_columns(path)
     if found.joints and not joints:
         raise LogError(f"{path} names its joints, {', '.join(found.joints)}: say their order with joints=(...)")
