@@ -14,7 +14,18 @@ from pathlib import Path
 
 import numpy as np
 
-from identify import MODELS, MaximumLikelihood, MotionLog, NoiseLevels, Problem, TorqueChannel, cramer_rao, idbench_chain, scara
+from identify import (
+    MODELS,
+    GeneralizedLeastSquares,
+    MaximumLikelihood,
+    MotionLog,
+    NoiseLevels,
+    Problem,
+    TorqueChannel,
+    cramer_rao,
+    idbench_chain,
+    scara,
+)
 
 FS, FLOOR = 100.0, np.array([1e-4, 1e-5])
 CASES = [
@@ -22,7 +33,11 @@ CASES = [
 ]
 """Motion, bits of the encoders, noise of the torques [N m]."""
 
-ESTIMATORS = {"ML": MaximumLikelihood(), "ML-reversals": MaximumLikelihood(reversals=True)}
+ESTIMATORS = {
+    "GLS": GeneralizedLeastSquares(),
+    "ML": MaximumLikelihood(),
+    "ML-reversals": MaximumLikelihood(reversals=True),
+}
 
 _spec = importlib.util.spec_from_file_location("exact_scara", Path(__file__).parent.parent / "identify" / "exact_scara.py")
 assert _spec is not None
