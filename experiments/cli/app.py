@@ -60,7 +60,8 @@ def run(args: Sequence[str] | None = None) -> int:
             else:
                 with importing():
                     command = _parsed(words)
-                _do(command)
+                if command is not None:
+                    _do(command)
     except KeyboardInterrupt:
         return _complain("interrupted", INTERRUPTED)
     except Exception as error:
@@ -85,11 +86,15 @@ def _require_memory() -> None:
             )
 
 
-def _parsed(words: list[str]) -> Callable[[], None]:
-    """Return the command that words name, with its options."""
+def _parsed(words: list[str]) -> Callable[[], None] | None:
+    """Return the command that words name, with its options, or None if they asked for its help, which is shown."""
+    from experiments.cli.help_text import show_help, without_short
     from experiments.cli.wrong_words import refused, require_command, require_once
 
     require_command(words, COMMANDS)
+    if show_help(words, COMMANDS):
+        return None
+    words = without_short(words)
     require_once(words)
     with refused(words, COMMANDS):
         made: Callable[[], None] = APP.cli(prog="idbench", description=DESCRIPTION, args=words)

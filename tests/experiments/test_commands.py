@@ -1,6 +1,7 @@
 """The commands on scenarios and logs, as a user calls them."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 import tomli_w
 
 from experiments.cli import main
+from experiments.cli.options.identify import Identify
 from experiments.paper import table2
 from experiments.paper.attribution import imperfections
 from experiments.paper.table2 import PAPER, Table2
@@ -231,3 +233,14 @@ def test_table2_makes_the_papers_rows_on_the_motion_that_ships():
     assert table.rest == 3.0
     assert sum(load("table1").trajectory.durations) == pytest.approx(40.0)
     assert {name: len(column.estimate) for name, column in PAPER.items()} == dict.fromkeys(PAPER, 8)
+
+
+def test_the_help_of_identify_is_short_and_all_of_it_is_one_option_away(capsys):
+    assert main(["identify", "--help"]) == 0
+    short = re.findall(r"^\W+(--[a-z][\w-]*)", capsys.readouterr().out, re.MULTILINE)
+    assert set(short) == {f"--{name.replace('_', '-')}" for name in Identify.essential if name != "log"}
+    with pytest.raises(SystemExit):
+        main(["identify", "--help-all"])
+    whole = re.findall(r"^\W+(--[a-z][\w-]*)", capsys.readouterr().out, re.MULTILINE)
+    assert set(short) < set(whole)
+    assert len(whole) > 35

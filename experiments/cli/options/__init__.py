@@ -1,15 +1,9 @@
 """Options of the commands: plain dataclasses, each with the name of the function that does its work."""
 
-from experiments.cli.options import (  # noqa: F401  # each registers its commands, in the order of the help
-    authors,
-    excite,
-    identify,
-    loads,
-    log,
-    paper,
-    robot,
-    run,
-    scenario,
-    study,
-    view,
-)
+from importlib import import_module
+
+FILES = ("run", "identify", "view", "paper", "log", "robot", "excite", "loads", "study", "scenario", "authors")
+"""Each registers its commands, in the order of the help: first those that people need first."""
+
+for _file in FILES:
+    import_module(f"{__name__}.{_file}")

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import final
+from typing import ClassVar, final
 
 import tyro
 
@@ -20,6 +20,11 @@ from experiments.recording.audience import Watching
 @dataclass(frozen=True)
 class Identify(LogOptions, Command, action="identify:identify"):
     """Identify a log, or several in one fit: columns t, q1, q2, ..., tau1, tau2, ... in SI units, or what log.toml says."""
+
+    essential: ClassVar[tuple[str, ...]] = (
+        "log", "robot", "torque", "torque_delay", "friction", "armature", "resample", "estimator", "validate", "write", "out",
+    )  # fmt: skip
+    """Options of the short help."""
 
     log: tyro.conf.Positional[tuple[Path, ...]] = ()
     """The files; their times uniform to 1 %, or --resample. CSV and other text, Parquet, NumPy, Matlab, ROS bags. Or the
