@@ -50,7 +50,9 @@ def commands() -> str:
 def _help(name: str) -> str:
     code = "import sys; from experiments.cli import entry; entry()"
     plain = os.environ | {"COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb"}
-    done = subprocess.run([sys.executable, "-c", code, name, "--help-all"], cwd=ROOT, env=plain, capture_output=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code, name, "--help-all"], cwd=ROOT, env=plain, capture_output=True, check=True
+    )
     return done.stdout.decode().replace("usage: -c", "usage: idbench").strip()
 
 

@@ -12,16 +12,16 @@ Laws = Annotated[tuple[str, ...], tyro.conf.arg(metavar="[JOINT=]LAW+LAW")]
 @final
 @dataclass(frozen=True)
 class Parameters:
-    """Which parameters of a robot are asked for."""
+    """Which parameters of a robot are identified."""
 
     armature: Literal["file", "all", "none"] = "file"
-    """Which joints have the inertia of a rotor: those to which the robot's file gives one, all, or none, as where torques are
-    measured at the links: reversals are not masked then."""
+    """Joints with a rotor inertia: those that have one in the robot's file, all, or none (torques measured at the links;
+    reversals are then not masked)."""
     add: Names = ()
-    """Laws of friction beside viscous and Coulomb friction, such as offset, a constant torque of each joint."""
+    """Friction laws in addition to viscous and Coulomb friction, such as offset, a constant torque of each joint."""
     without: Names = ()
     """Parameters to leave out, as if they were zero."""
     friction: Laws = ("standard",)
-    """Laws of friction: standard (viscous and Coulomb), none (torques measured at the links), asymmetric, or a sum such as
-    standard+load+stribeck; of one joint: 2=standard+load. auto: those that predict motion best that was not fitted. `idbench
-    list` has them all."""
+    """Friction laws: standard (viscous and Coulomb), none (torques measured at the links), asymmetric, or a sum such as
+    standard+load+stribeck; for one joint: 2=standard+load. auto chooses those that predict held-out stretches best. `idbench
+    list` lists them."""

@@ -16,22 +16,21 @@ Joints = Annotated[tuple[str, ...], tyro.conf.arg(metavar="JOINT")]
 @final
 @dataclass(frozen=True)
 class ColumnOptions:
-    """What the columns of a log are, where no log.toml beside it says so."""
+    """What the columns of a log are, unless a log.toml beside it states it."""
 
     layout: File = None
-    """A log.toml that stands elsewhere: what the columns are. `idbench log FILE --write` makes one."""
+    """Another log.toml that describes the columns. `idbench log FILE --write` makes one."""
     columns: Texts = ()
-    """Names of columns: t=time q=position_* tau=effort_* (a * stands for numbers or names of joints; or list them with
-    commas)."""
+    """Names of columns: t=time q=position_* tau=effort_* (* stands for numbers or names of joints; or a list with commas)."""
     units: Texts = ()
     """Units: t=ms q=deg tau=mNm, or tau=A with --gain."""
     rows: Texts = ()
-    """Only rows in which columns have these values: episode_index=3."""
+    """Use only rows in which columns have these values: episode_index=3."""
     gain: Each = ()
-    """Torque over what is logged, in the unit of tau (N m/A): one for all joints, or one each."""
+    """Torque per logged unit (N m/A): one for all joints, or one each."""
     resample: bool = False
-    """Make times uniform: leave repeated rows out, take a steady clock where stamps jitter, fill drops, cut at gaps, use
-    logged velocities where they know better. What was done is said."""
+    """Make times uniform: remove repeated rows, use a steady clock where stamps jitter, interpolate missing samples, split at
+    gaps, use logged velocities where they are more accurate. Every step is reported."""
 
     @property
     def stated(self) -> bool:
@@ -42,17 +41,17 @@ class ColumnOptions:
 @final
 @dataclass(frozen=True)
 class MountingOptions:
-    """How the robot is mounted, and which of its joints the log has."""
+    """How the robot is mounted, and which joints the log contains."""
 
     joints: Joints = ()
-    """Joints of the log, in the order of its columns, where the robot has more: grippers, mobile bases."""
+    """Joints of the log, in the order of its columns, if the robot has more (grippers, mobile bases)."""
     lock: Annotated[tuple[str, ...], tyro.conf.arg(metavar="JOINT=VALUE")] = ()
-    """Joints that do not move, and where they are held [rad, m]."""
+    """Joints that do not move, and their positions [rad, m]."""
     coupling: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=JOINT+JOINT")] = ()
-    """Drives whose motor turns with several joints, each with a rotor and frictions of its own: motor6=joint_5+joint_6, or with
-    factors, m2=a-0.5*b. Those of an MJCF file are its fixed tendons."""
+    """Drives whose motor turns with several joints, with rotor and friction of their own: motor6=joint_5+joint_6, or with
+    factors, m2=a-0.5*b. In an MJCF file these are fixed tendons."""
     gravity: Vector = None
-    """Gravity in the frame of the robot's base [m/s^2], for one on a wall or a ceiling; the file's by default."""
+    """Gravity in the frame of the robot's base [m/s^2], for a base on a wall or ceiling. Default: the file's."""
 
     @property
     def mounting(self) -> "Mounting":

@@ -30,20 +30,20 @@ LEAVING = "idbench-leaving"
 
 @dataclass(frozen=True)
 class Watching:
-    """How the command is watched."""
+    """Live viewing and recording."""
 
     live: bool = False
-    """Open a rerun viewer and show everything while it is computed."""
+    """Show everything live in a rerun viewer."""
     connect: Url = None
-    """Show it in a viewer that runs already, such as rerun+http://127.0.0.1:9876/proxy."""
+    """Show everything live in a running viewer, such as rerun+http://127.0.0.1:9876/proxy."""
     serve: bool = False
-    """Show it in a browser: serve the web viewer on this machine until Ctrl-C."""
+    """Show everything live in a browser: serve the web viewer on this machine until Ctrl-C."""
     port: Count = None
-    """Port of the web viewer, 9090 by default; data go through the port after it."""
+    """Port of the web viewer. Default: 9090; data use the next port."""
     pace: Real = None
-    """Simulated seconds shown in a second, such as 1.0; as fast as possible without it."""
+    """Simulated seconds per second of live view, such as 1.0. Default: as fast as possible."""
     rerun: bool = True
-    """Record; without it rerun is not even loaded."""
+    """Write a recording."""
 
     def __post_init__(self) -> None:
         ways = [name for name, given in (("--live", self.live), ("--connect", self.connect), ("--serve", self.serve)) if given]

@@ -14,28 +14,28 @@ from experiments.option_types import File, Json
 @final
 @dataclass(frozen=True)
 class New(Command, action="authors:begin"):
-    """Begin a scenario, a study, or a package of a plug-in: a commented start that runs as it is."""
+    """Create a scenario, a study, or a plug-in package: a commented template that runs."""
 
     what: tyro.conf.Positional[Literal["scenario", "study", "plugin"]]
-    """What to begin."""
+    """What to create."""
     name: tyro.conf.Positional[str]
-    """What to call it."""
+    """Its name."""
     kind: Annotated[str, tyro.conf.arg(metavar="KIND")] = "estimator"
-    """Of a plug-in: estimator, block (a friction law that is identified), friction (of the simulated robot), trajectory,
+    """Kind of plug-in: estimator, block (an identified friction law), friction (of the simulated robot), trajectory,
     controller, drive or encoder."""
     like: Annotated[str, tyro.conf.arg(metavar="SCENARIO")] = "ideal"
-    """Of a scenario: that which it starts from."""
+    """Scenario to copy."""
     out: File = None
-    """File or folder to write; NAME.toml, or NAME, by default."""
+    """File or folder to write. Default: NAME.toml, or NAME."""
 
 
 @command("check")
 @final
 @dataclass(frozen=True)
 class Check(Command, action="authors:check"):
-    """Check whether a plug-in keeps the contract of its point."""
+    """Check whether a plug-in satisfies the contract of its kind."""
 
     plugin: tyro.conf.Positional[str]
-    """Its name, as idbench list has it; with its point if several have the name (drives/ideal); or MODULE:CLASS."""
+    """Its name in `idbench list`, with its table if ambiguous (drives/ideal); or MODULE:CLASS."""
     json: Json = False
-    """Print what is asked, and why it is not kept, as JSON; what is for people goes to the error stream."""
+    """Print the checks and their results as JSON; human-readable text goes to the error stream."""

@@ -19,46 +19,45 @@ Percent = Annotated[str | None, tyro.conf.arg(metavar="PERCENT", help_behavior_h
 @final
 @dataclass(frozen=True)
 class Excite(RecordedOptions, Command, action="excite:excite"):
-    """Design a motion that tells the parameters of a robot well, within its limits."""
+    """Design an exciting trajectory within the robot's limits."""
 
     robot: tyro.conf.Positional[str]
-    """Name of a robot that ships, or a file that describes it (MJCF or URDF)."""
+    """Name of a shipped robot, or its file (MJCF or URDF)."""
     duration: float = 10.0
-    """Time of the motion [s], without the ways from and to home, and rest."""
+    """Duration of the motion [s], without the moves from and to home and the rest."""
     kind: str = "fourier"
-    """fourier: a finite Fourier series; moves: fifth-order point-to-point moves; or of a plug-in: idbench list."""
+    """fourier: a finite Fourier series; moves: fifth-order point-to-point moves; or a plug-in (idbench list)."""
     frequency: float = 1.0
-    """Highest frequency of the series, or moves a second [Hz]."""
+    """Highest frequency of the series, or moves per second [Hz]."""
     repeat: int = 1
-    """Times that the motion is run, one after the other."""
+    """How often the motion is repeated."""
     log: Files = ()
-    """Earlier logs of the robot: what they tell need not be told again."""
+    """Earlier logs of the robot, whose information is taken into account."""
     noise: Scenario = None
-    """A scenario (name, or TOML file) whose encoders and torque noise are those of the log, and whose drive is simulated."""
+    """Scenario (name, or TOML file) that states encoders, torque noise and drive."""
     encoder_bits: Real = None
-    """Resolution of the encoders, a turn [bits]; that of the scenario of --noise, or 17."""
+    """Resolution of the encoders per turn [bits]. Default: that of --noise, or 17."""
     torque_noise: Each = ()
-    """White noise of the torques, rms [N m], of all joints or of each; that of the scenario of --noise, or 0.05."""
+    """White torque noise, rms [N m], for all joints or for each. Default: that of --noise, or 0.05."""
     fs: Real = None
-    """Sampling frequency of controller and log [Hz]; that of the scenario of --noise, or 100."""
+    """Sampling frequency of controller and log [Hz]. Default: that of --noise, or 100."""
     limits: File = None
-    """What the motion must keep (TOML): ranges, velocities, torques, boxes around the robot; by default what its file says."""
+    """Limits of the motion (TOML): ranges, velocities, torques, boxes around the robot. Default: those of the robot's file."""
     velocity: Each = ()
-    """Largest speed [rad/s, of slides m/s], of all joints or of each; before that of --limits and of the file. MJCF has no word
-    for it."""
+    """Largest speed [rad/s, m/s], for all joints or for each. Overrides --limits and the file. MJCF files usually have none."""
     acceleration: Each = ()
-    """Largest acceleration [rad/s^2, of slides m/s^2], of all joints or of each."""
+    """Largest acceleration [rad/s^2, m/s^2], for all joints or for each."""
     weigh: Weights = ()
-    """Parameters that count more, as LMY2=4, or less, in the mean of ln sigma."""
+    """Weights of parameters in the mean of ln sigma, such as LMY2=4."""
     criterion: str = "sigma"
-    """sigma: the mean of ln sigma, begun with the determinant; determinant: that alone; to compare with others: condition,
-    birdy, smallest."""
+    """sigma: the mean of ln sigma, after the determinant; determinant: only that; for comparison: condition, birdy,
+    smallest."""
     until: Percent = None
-    """On the simulated robot: design, run and identify motions one after the other, until one sigma of every parameter makes
-    less than so much of a brisk motion's torque, such as 0.1%."""
+    """Design, run and identify motions on the simulated robot until one sigma of each parameter contributes less than this
+    share of a brisk motion's torque, such as 0.1%."""
     seed: int = 0
-    """Of random motions and of the search; the same seed gives the same motion."""
+    """Seed of random motions and of the search. The same seed gives the same motion."""
     out: Folder = field(default=None, kw_only=True)
-    """Folder for motion.csv, scenario.toml, summary.json, report.html and recording.rrd; runs/excited-<robot> by default."""
+    """Folder for motion.csv, scenario.toml, summary.json, report.html and recording.rrd. Default: runs/excited-<robot>."""
     parameters: Asked = Parameters()  # noqa: RUF009  # frozen
-    """Which parameters are asked for."""
+    """Which parameters are identified."""

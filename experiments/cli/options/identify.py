@@ -19,7 +19,7 @@ from experiments.recording.audience import Watching
 @final
 @dataclass(frozen=True)
 class Identify(LogOptions, Command, action="identify:identify"):
-    """Identify a log, or several in one fit: columns t, q1, q2, ..., tau1, tau2, ... in SI units, or what log.toml says."""
+    """Identify a log, or several logs in one fit: columns t, q1, ..., tau1, ... in SI units, or as log.toml states."""
 
     essential: ClassVar[tuple[str, ...]] = (
         "log", "robot", "torque", "torque_delay", "friction", "armature", "resample", "estimator", "validate", "write", "out",
@@ -27,35 +27,35 @@ class Identify(LogOptions, Command, action="identify:identify"):
     """Options of the short help."""
 
     log: tyro.conf.Positional[tuple[Path, ...]] = ()
-    """The files; their times uniform to 1 %, or --resample. CSV and other text, Parquet, NumPy, Matlab, ROS bags. Or the
-    folder of a run, whose recording gets a layer of this identification."""
+    """Log files: CSV and other text, Parquet, NumPy, Matlab, ROS bags. Times must be uniform to 1 %, otherwise use --resample.
+    Or the folder of a run; its recording gets a layer of this identification."""
     chain: str = CHAIN
-    """Signal processing, or MODULE:NAME of a chain of yours."""
+    """Chain of signal processing, or MODULE:NAME of your own."""
     chain_file: File = None
     """TOML file with settings of the chain: chain = "idbench", then tables such as [operator] with cutoff = 20.0."""
     model: str | None = None
-    """all, explicit, implicit, power, or MODULE:CLASS of a model of yours; by default all, of which the screen shows the best,
-    where joints are many."""
+    """all, explicit, implicit, power, or MODULE:CLASS of your own. Default: all; for robots of many joints the screen shows the
+    best one."""
     loop: Scenarios = ()
-    """Scenarios that describe the closed loop of each log, for IV, DIDIM, CLIE and CLOE: robot, motion, controller, timing,
-    drive. Of a run's folder its own."""
+    """Scenario of the control loop of each log, for IV, DIDIM, CLIE and CLOE: robot, motion, controller, timing, drive.
+    Default: that of the run's folder."""
     start: Start = "least-squares"
-    """Where estimators begin that simulate or filter: at the least-squares estimate, or at the robot's file."""
+    """Where estimators that simulate or filter start: at the least-squares estimate, or at the robot's file."""
     consistent: Consistency = "no"
-    """Move estimates to the nearest physically consistent parameters, in the metric of their own covariance (extra
-    `consistent`); what no motion shows is held near the file by the constant pull-back or the entropic distance."""
+    """Move estimates to the nearest physically consistent parameters, in the metric of their covariance (extra `consistent`).
+    Unidentifiable parameters are held near the file by the constant pull-back or the entropic distance."""
     follow: Seconds = None
-    """Identify a CSV log while it is being written, until it has not grown for so long; then as a whole. With --live or
-    --serve estimates and residuals are seen to grow."""
+    """Identify a CSV log while it is being written, until it has not grown for this time, then as a whole. --live or --serve
+    show estimates and residuals as they develop."""
     validate: Files = ()
-    """Held-out logs, on each of which the result is judged; without them the last quarter of the log, by a fit of the rest."""
+    """Held-out logs on which the result is validated. Default: the last quarter of the log, predicted by a fit of the rest."""
     write_mjcf: File = None
-    """File to write: the robot's own with the inertias, armatures and frictions that were found, made physically consistent
-    (extra `consistent`); those of the first model."""
+    """Write the robot's MJCF file with the identified inertias, armatures and frictions of the first model, made physically
+    consistent (extra `consistent`)."""
     write: Files = ()
-    """Files to write: .urdf or .xml, the robot with what was found; .json, base parameters with their covariance and regressor;
-    .py, a function of the inverse dynamics that needs NumPy alone."""
+    """Files to write: .urdf or .xml, the identified robot; .json, base parameters with covariance and regressor; .py, the
+    inverse dynamics as a function that needs only NumPy."""
     label: str = ""
-    """What to call this identification in a recording; by default chain and estimator."""
+    """Name of this identification in a recording. Default: chain and estimator."""
     watching: Watched = Watching()  # noqa: RUF009  # frozen
-    """How it is watched."""
+    """Live viewing and recording."""

@@ -36,18 +36,18 @@ Known = Annotated[KnownOptions, tyro.conf.OmitArgPrefixes]
 
 @dataclass(frozen=True)
 class LoadOptions(LogOptions):
-    """What both commands are given."""
+    """Options of both commands."""
 
     log: tyro.conf.Positional[tuple[Path, ...]] = ()
     """Logs with the payload."""
     unloaded: Files = ()
-    """Logs without it."""
+    """Logs without the payload."""
     known: Known = KnownOptions()
     """What is known of the payload."""
     simulate: Scenario = None
-    """Instead of logs: a scenario with a payload, simulated with and without it; what is found is compared with the truth."""
+    """Simulate a scenario with and without its payload instead of reading logs, and compare the result with the true values."""
     runs: Count = None
-    """How often it is simulated; 20 by default."""
+    """Number of simulations. Default: 20."""
 
 
 @command("payload")
@@ -57,19 +57,19 @@ class IdentifyPayload(LoadOptions, Command, action="loads:payload"):
     """Identify what the gripper holds: mass, first moments, inertia, from logs with it and logs without it."""
 
     before: File = None
-    """Instead of logs without it: the robot, identified before, as `idbench identify --write FILE.json` leaves it."""
+    """A robot identified earlier (`idbench identify --write FILE.json`), instead of logs without the payload."""
     way: Way = "together"
-    """together: all logs in one fit, the best; fixed: the robot first, then the payload alone; apart: both, subtracted;
-    difference: of the torques of one repeated motion; all: to compare them."""
+    """together: all logs in one fit (best); fixed: first the robot, then the payload; apart: two fits, subtracted; difference:
+    of the torques of one repeated motion; all: compare them."""
     write_mjcf: File = None
-    """File to write: the robot's own with the payload as a physically consistent body."""
+    """Write the robot's file with the payload as a physically consistent body."""
 
 
 @command("gains")
 @final
 @dataclass(frozen=True)
 class IdentifyGains(LoadOptions, Command, action="loads:gains"):
-    """Identify the gains of drives, torque over current, from logs of currents, without and with a payload of known mass.
+    """Identify the torque constants of the drives, gears included, from logs of currents with and without a known payload.
 
     Currents are read with --gain as a first guess, or with 1.
     """

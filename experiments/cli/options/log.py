@@ -17,42 +17,42 @@ from experiments.option_types import Delay, File, Folder, Hertz, Json, Torque
 @final
 @dataclass(frozen=True)
 class ShowLog(Command, action="log:show_log"):
-    """Show what is understood of a log: its columns and units, rate and clock, ranges, noise, encoders. Needs no robot."""
+    """Show the contents of a log: columns, units, rate, clock, ranges, noise, encoders. Needs no robot."""
 
     log: tyro.conf.Positional[Path]
     """The file: CSV and other text, Parquet, NumPy, Matlab, a ROS bag; or its log.toml."""
     reading: Reading = ColumnOptions()  # noqa: RUF009  # frozen
-    """What its columns are; guessed from their names and values if nothing says it."""
+    """What the columns are; guessed from names and values if not stated."""
     write: bool = False
-    """Write what was understood as a file beside the log, NAME.toml, to be corrected: what is read later is what it says."""
+    """Write this description to NAME.toml beside the log, to be corrected. Other commands read the log as it states."""
     picture: File = None
-    """Picture to write, PNG or SVG: motion, torques, spectra, time steps."""
+    """Write a picture (PNG or SVG): motion, torques, spectra, time steps."""
     force: bool = False
-    """Guess anew although there is such a file, and replace it."""
+    """Guess again and replace an existing description."""
     json: Json = False
-    """Print the same as JSON; what is for people goes to the error stream."""
+    """Print as JSON; human-readable text goes to the error stream."""
 
 
 @command("resample")
 @final
 @dataclass(frozen=True)
 class Resample(Command, action="resample:resample"):
-    """Write a log anew at a fixed sampling frequency, its clock repaired: repeated rows, jitter, drops, gaps."""
+    """Resample a log at a fixed frequency and repair its clock: repeated rows, jitter, missing samples, gaps."""
 
     log: tyro.conf.Positional[Path]
-    """The file, its times in any steps."""
+    """The log, with arbitrary time steps."""
     out: Path
-    """File to write, CSV or Parquet; a log with gaps becomes several, numbered."""
+    """File to write, CSV or Parquet. A log with gaps becomes several numbered files."""
     fs: Hertz = None
-    """Sampling frequency [Hz]; by default that of the log."""
+    """Sampling frequency [Hz]. Default: that of the log."""
     reading: Reading = ColumnOptions()  # noqa: RUF009  # frozen
-    """What its columns are."""
+    """What the columns are."""
     torque: Torque = None
-    """What a torque sample means; asked for unless the file says it. A held torque comes out averaged."""
+    """What a torque sample means. Required unless the file states it. A held torque becomes averaged."""
     torque_delay: Delay = None
-    """From a sample to the instant it speaks for, in seconds."""
+    """Delay from a sample to the torque that it stands for, in seconds."""
     force: bool = False
-    """Replace a file that is there already."""
+    """Replace an existing file."""
 
 
 @command("export")
@@ -64,6 +64,6 @@ class Export(Command, action="resample:export"):
     folder: tyro.conf.Positional[Path]
     """Results folder, such as runs/table2."""
     out: Folder = None
-    """Folder to write to; the results folder itself by default."""
+    """Folder to write to. Default: the results folder."""
     force: bool = False
-    """Replace files with other contents."""
+    """Replace existing files."""

@@ -17,30 +17,30 @@ class Table1(RecordedOptions, Command, action="paper:compare"):
     """Reproduce the paper's simulation comparison (Table 1) and record it."""
 
     out: Folder = None
-    """Folder for summary.json, recording.rrd and log.parquet; runs/table1 by default."""
+    """Folder for summary.json, recording.rrd and log.parquet. Default: runs/table1."""
     chain: str = "all"
-    """Signal processing: all that the comparison has, or the name of one (paper, paper_masked, idbench, ...)."""
+    """Chain of signal processing: all, or one by name (paper, paper_masked, idbench, ...)."""
     motions: Count = None
-    """Instead of one motion: the errors over so many random ones of the paper's class; into runs/table1-motions by default.
-    3500 take some five minutes."""
+    """Show the errors over this number of random motions of the paper's class (runs/table1-motions). 3500 take about five
+    minutes."""
     seed: Count = None
-    """Search another trajectory from this seed instead of taking the one that ships."""
+    """Search another trajectory from this seed."""
     scenario: Scenario = None
-    """Name of a scenario, or a file (TOML), as `idbench search` writes it, instead of the one that ships."""
+    """Another scenario: a name, or a file (TOML) as `idbench search` writes it."""
 
 
 @command("search")
 @final
 @dataclass(frozen=True)
 class Search(Command, action="paper:search"):
-    """Search a trajectory with the paper's condition numbers: to meet its figures. Those of `idbench excite` tell more."""
+    """Search a trajectory with the paper's condition numbers. (`idbench excite` designs better ones.)"""
 
     seed: int = 0
     """The same seed gives the same trajectory."""
     out: File = None
-    """Scenario file (TOML) to write; printed if none is given."""
+    """Scenario file (TOML) to write. Default: print it."""
     force: bool = False
-    """Replace a file that is there already."""
+    """Replace an existing file."""
 
 
 @command("table2")
@@ -54,4 +54,4 @@ class Table2(RecordedOptions, Command, action="paper:table2"):
     scenario: str = "table2"
     """Name of a scenario, or a file (TOML)."""
     inner: Window = None
-    """From when to when [s] the signals inside the loop are recorded at the full rate of the drive, such as 10 10.5."""
+    """Interval [s] in which signals inside the control loop are recorded at the full rate of the drive, such as 10 10.5."""

@@ -17,13 +17,13 @@ from experiments.option_types import Json
 @final
 @dataclass(frozen=True)
 class DescribeRobot(Command, action="robot:describe"):
-    """Show what can be identified of a robot: its joints, its base parameters, what its torques are made of."""
+    """Show what is identifiable: joints, base parameters, and a torque budget."""
 
     name: tyro.conf.Positional[str]
-    """Name of a robot that ships, or a file that describes it: MJCF, URDF, or a table of DH parameters (.toml)."""
+    """Name of a shipped robot, or its file: MJCF, URDF, or a table of Denavit-Hartenberg parameters (.toml)."""
     json: Json = False
-    """Print joints and parameters as JSON; what is for people goes to the error stream."""
+    """Print joints and parameters as JSON; human-readable text goes to the error stream."""
     parameters: Asked = Parameters()  # noqa: RUF009  # frozen
-    """Which parameters are asked for."""
+    """Which parameters are identified."""
     mounting: Mounted = MountingOptions()  # noqa: RUF009  # frozen
     """How the robot is mounted."""

@@ -14,11 +14,11 @@ from experiments.option_types import File, Scenario
 @final
 @dataclass(frozen=True)
 class WriteScenario(Command, action="scenario:write"):
-    """Write a scenario out to start from, every setting explained; without a name, list those that ship."""
+    """Write a scenario to a file, with every setting explained. Without a name: list the shipped scenarios."""
 
     name: tyro.conf.Positional[Scenario] = None
     """Name of a scenario, or a file."""
     out: File = None
-    """File (TOML) to write; printed if none is given."""
+    """File (TOML) to write. Default: print it."""
     force: bool = False
-    """Replace a file that is there already."""
+    """Replace an existing file."""

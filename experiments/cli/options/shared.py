@@ -26,9 +26,9 @@ class WrittenOptions:
     out: Folder = None
     """Folder for the results."""
     force: bool = False
-    """Replace what is there already, results of other commands included."""
+    """Replace existing files, including results of other commands."""
     json: Json = False
-    """Print summary and warnings as JSON; what is for people goes to the error stream."""
+    """Print summary and warnings as JSON; human-readable text goes to the error stream."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,29 +36,29 @@ class LogOptions(WrittenOptions):
     """How logs are read and identified."""
 
     robot: Robot = None
-    """Name of a robot that ships, or a file that describes it: MJCF, URDF, or a table of DH parameters (.toml); scara, or that
-    of the run, by default."""
+    """Name of a shipped robot, or its file: MJCF, URDF, or a table of Denavit-Hartenberg parameters (.toml). Default: scara, or
+    the robot of the run."""
     torque: Torque = None
-    """What a torque sample means: held from its sample on for a period (a controller's command), the torque at an instant
-    (a measurement), or the mean over a period. Asked for unless the file says it."""
+    """What a torque sample means: held for one period from its sample on (a controller's command), the torque at that instant
+    (a measurement), or the mean over the period. Required unless the file states it."""
     torque_delay: Delay = None
-    """From a sample to the instant it speaks for, in seconds, or `estimate` to find it from the log."""
+    """Delay from a sample to the torque that it stands for, in seconds, or `estimate` to estimate it from the log."""
     unwrap: bool = False
     """Unwrap 2 pi jumps of the angles."""
     reading: Reading = ColumnOptions()  # noqa: RUF009  # frozen
-    """What its columns are."""
+    """What the columns are."""
     mounting: Mounted = MountingOptions()  # noqa: RUF009  # frozen
     """How the robot is mounted."""
     parameters: Asked = Parameters()  # noqa: RUF009  # frozen
-    """Which parameters are asked for."""
+    """Which parameters are identified."""
     mask_speed: Each = ()
-    """Speeds up to which a joint counts as standing or turning, of all joints or of each [rad/s, of slides m/s]: its friction
-    is not judged there. By default 5 % of its own rms speed, above the noise of its velocity, and
-    as far as its friction is surely another one than in faster motion, up to a fifth of that speed."""
+    """Speed below which a joint counts as resting or reversing, for all joints or for each [rad/s, m/s]; such instants are
+    masked. Default: 5 % of its rms speed or 4 times the noise of its velocity, raised up to 20 % where its friction differs
+    significantly from that of faster motion."""
     cutoff: Hertz = None
-    """Band of the fit [Hz]; by default 5, or what a short log needs."""
+    """Cut-off of the low-pass [Hz]. Default: 5, or what a short log needs."""
     estimator: str = ESTIMATOR
-    """GLS, ML, ML-delay, ML-reversals, OLS, WLS, IRLS, TLS, RLS, IV, DIDIM, CLIE, CLOE, OE, UKF, or of a plug-in:
+    """GLS, ML, ML-delay, ML-reversals, OLS, WLS, IRLS, TLS, RLS, IV, DIDIM, CLIE, CLOE, OE, UKF, or a plug-in; see
     docs/estimators.md."""
 
 
@@ -67,4 +67,4 @@ class RecordedOptions(WrittenOptions):
     """Where results go, and how they are watched."""
 
     watching: Watched = Watching()  # noqa: RUF009  # frozen
-    """How it is watched."""
+    """Live viewing and recording."""

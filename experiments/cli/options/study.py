@@ -16,29 +16,29 @@ from experiments.recording.audience import Watching
 @final
 @dataclass(frozen=True)
 class Study(Command, action="study:study"):
-    """Run a study: a scenario over a grid and many seeds, identified by every method; without a name, list those that ship."""
+    """Run a study: simulate a scenario over a grid and many seeds, and identify each run. Without a name: list the studies."""
 
     study: tyro.conf.Positional[Annotated[str | None, tyro.conf.arg(metavar="STUDY", help_behavior_hint="")]] = None
-    """Name of a study that ships, or a file (TOML)."""
+    """Name of a shipped study, or its file (TOML)."""
     out: Folder = None
-    """Folder of the study; runs/<name of the study> by default."""
+    """Folder of the study. Default: runs/<study>."""
     resume: Folder = None
-    """Folder of a study that was interrupted: what it lacks is run, and its report is made anew."""
+    """Folder of an interrupted study: run what is missing, and make the report again."""
     seeds: Count = None
-    """Independent runs of every combination, instead of the study's own number."""
+    """Independent runs per combination, instead of the study's number."""
     shard: Count = None
-    """Most runs that are simulated together; no bit depends on it."""
+    """Largest number of runs simulated together. Results do not depend on it."""
     threads: Count = None
-    """Shards at a time; all processors by default."""
+    """Shards at a time. Default: all processors."""
     workers: Count = None
-    """Processes of this machine to run on instead (needs the extra `cluster`)."""
+    """Run in this number of processes instead (extra `cluster`)."""
     scheduler: Url = None
-    """Address of a Dask scheduler to run on instead, as tcp://host:8786 (needs the extra `cluster`)."""
+    """Run on a Dask scheduler instead, such as tcp://host:8786 (extra `cluster`)."""
     force: bool = False
-    """Replace what is there already, results of other commands included."""
+    """Replace existing files, including results of other commands."""
     yes: bool = False
-    """Run more than a hundred thousand runs."""
+    """Allow more than a hundred thousand runs."""
     json: Json = False
-    """Print summary and warnings as JSON; what is for people goes to the error stream."""
+    """Print summary and warnings as JSON; human-readable text goes to the error stream."""
     watching: Watched = Watching()  # noqa: RUF009  # frozen
-    """How it is watched; runs show as they are finished."""
+    """Live viewing and recording; runs appear as they finish."""

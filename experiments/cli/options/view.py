@@ -15,24 +15,24 @@ from experiments.option_types import File, Json
 @final
 @dataclass(frozen=True)
 class List(Command, action="list:list_plugins"):
-    """List the plug-ins: what can be combined, one line each."""
+    """List all parts that can be combined, built-in and plug-ins."""
 
     json: Json = False
-    """Print it as JSON instead."""
+    """Print as JSON."""
 
 
 @command("view")
 @final
 @dataclass(frozen=True)
 class View(Command, action="view:view"):
-    """Open the recording of a results folder in the rerun viewer; those of several laid over each other, to be compared."""
+    """Open the recording of a results folder in the rerun viewer, or overlay those of several."""
 
     folders: tyro.conf.Positional[Annotated[tuple[Path, ...], tyro.conf.arg(metavar="DIR|FILE")]] = ()
-    """Results folders, or a recording (.rrd); the latest of runs/ if none is named."""
+    """Results folders, or a recording (.rrd). Default: the latest of runs/."""
     tab: str = ""
-    """What is in front: overview, friction, drive, filters, noise, excitation, parameters, iterations,
-    torques, compare, study or table2, if it has it."""
+    """Tab to show first: overview, friction, drive, filters, noise, excitation, parameters, iterations, torques, compare, study
+    or table2."""
     save: File = None
-    """Write the recording and its layers to one file (.rrd) instead, to be taken elsewhere."""
+    """Write the recording and its layers to one file (.rrd) instead of opening them."""
     force: bool = False
-    """Replace a file that is there already."""
+    """Replace an existing file."""
