@@ -1,6 +1,6 @@
 """Identifications as text."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import zip_longest
 from math import isfinite, log2, pi
 
@@ -150,8 +150,8 @@ def print_held_out(console: Console, one: HeldOut | Unjudged, whole: Sequence[st
     apart = [f"{joint} {rms:.2g}" for joint, rms in zip(joints, first.standing, strict=True) if isfinite(rms)]
     if apart:
         console.print(Text(f"at rest and reversing, where friction is not determined: {', '.join(apart)} N m"), soft_wrap=True)
-    for model, verdict in one.verdicts.items():
-        console.print(Text(f"{model}: {verdict.word}: {'; '.join(verdict.reasons)}"), soft_wrap=True)
+    for words, models in _alike({model: (v.word, *v.reasons) for model, v in one.verdicts.items()}).items():
+        console.print(Text(f"{', '.join(models)}: {words[0]}: {'; '.join(words[1:])}"), soft_wrap=True)
     reasons = dict.fromkeys(verdict.unsimulated for verdict in one.verdicts.values() if verdict.unsimulated)
     for why in reasons:
         models = [model for model, verdict in one.verdicts.items() if verdict.unsimulated == why]
@@ -159,6 +159,14 @@ def print_held_out(console: Console, one: HeldOut | Unjudged, whole: Sequence[st
     for model, why in one.fit.failures.items():
         console.print(Text(f"{model}: not judged: {why}"), soft_wrap=True)
     console.print()
+
+
+def _alike(verdicts: Mapping[str, tuple[str, ...]]) -> dict[tuple[str, ...], list[str]]:
+    """Return verdicts with the models that have them."""
+    found: dict[tuple[str, ...], list[str]] = {}
+    for model, words in verdicts.items():
+        found.setdefault(words, []).append(model)
+    return found
 
 
 def _held_out_cells(one: HeldOut, model: str, j: int) -> tuple[str, str, str, str]:

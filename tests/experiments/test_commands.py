@@ -94,6 +94,9 @@ def test_one_model_and_an_estimated_delay(csv, capsys):
     printed = capsys.readouterr().out
     assert "torque delay estimated from the log:" in printed
     assert "power" not in printed
+    *_, last = printed.strip().splitlines()
+    assert last.startswith("Result: good (explicit model), torque errors of at most ")
+    assert "on the last quarter of the log; next: " in last
 
 
 def test_a_file_that_does_not_say_is_asked(csv, complaint):
@@ -146,6 +149,15 @@ def test_files_that_cannot_be_used_are_one_line(csv, change, message, complaint)
 def test_a_header_may_have_spaces_and_quotes_and_velocities(csv):
     rewritten(csv, lambda lines: [lines[0].replace(",", " , ") + ",qd1", *(f"{line},0" for line in lines[1:])])
     assert main(["identify", str(csv), "--torque", "held"]) == 0
+
+
+def test_the_last_line_says_what_to_check_first_and_models_alike_are_one(csv, capsys):
+    """Of a log whose delay is wrong by 3 ms."""
+    assert main(["identify", str(csv), "--torque", "held", "--torque-delay", "0.003"]) == 0
+    lines = capsys.readouterr().out.strip().splitlines()
+    assert lines[-1].startswith("Result: ")
+    assert lines[-1].endswith("next: check the torque's delay")
+    assert any(line.startswith("explicit, implicit: ") for line in lines)
 
 
 def test_a_log_with_a_gap_is_resampled_by_the_command_that_is_told(csv, tmp_path, complaint, monkeypatch):

@@ -27,6 +27,7 @@ from experiments.identification.log_warnings import warnings_of_log
 from experiments.identification.reading import file_of, stated_by
 from experiments.identification.request import Request
 from experiments.recording.audience import Audience
+from experiments.reports.conclusion import conclusion
 from experiments.reports.leading import shown_whole
 from experiments.reports.printed import print_fit, print_held_out
 from experiments.results.attempts import Attempts
@@ -74,6 +75,7 @@ def identify(options: Identify) -> None:
                 delay = options.torque_delay != "estimate"
                 warnings = attempts.attempt("the checks", lambda: checks(judgement, delay=delay)) or {}
             page.warn(warnings)
+            page.print(Text(conclusion(judgement, warnings), style="bold"), soft_wrap=True)
             attempts.attempt("summary.json", lambda: _save(folder, page))
             page.end()
             view_all(Shown(page, options, command, judgement, warnings, folder, audience), attempts)
