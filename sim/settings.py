@@ -46,7 +46,7 @@ EachPositiveOrNone = Annotated[tuple[Positive, ...] | None, BeforeValidator(_as_
 EachNotNegativeOrNone = Annotated[tuple[NotNegative, ...] | None, BeforeValidator(_as_many)]
 EachNotNegative = Annotated[tuple[NotNegative, ...], BeforeValidator(_as_many), Field(min_length=1)]
 EachCount = Annotated[tuple[Annotated[Whole, Field(ge=1)], ...], BeforeValidator(_as_many), Field(min_length=1)]
-"""One value for all joints, or one a joint; a tuple in either case."""
+"""One value for all joints, or one per joint; a tuple in either case."""
 
 Positions = tuple[tuple[Number, ...], ...]
 """Waypoints, joint by joint [rad]."""
@@ -175,5 +175,5 @@ def _metadata(annotation: Any) -> list[Any]:
 def per_joint(values: tuple[float, ...], n: int, name: str) -> npt.NDArray[np.float64]:
     """Return a setting as an array of one value for each of `n` joints; raise ScenarioError if their numbers differ."""
     if len(values) not in (1, n):
-        raise ScenarioError(f"{name} has {len(values)} values for {n} joints: give one for all, or one a joint")
+        raise ScenarioError(f"{name} has {len(values)} values for {n} joints: give one for all, or one per joint")
     return np.array(np.broadcast_to(np.asarray(values, dtype=np.float64), (n,)))

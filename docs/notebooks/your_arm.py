@@ -1,7 +1,7 @@
 """
 # Identify your arm
 
-From a robot's file and a log to parameters, a verdict, and a look at what is left. Put your own file and log in the
+From a robot's file and a log to parameters, a verdict, and a look at the residuals. Put your own file and log in the
 first two cells. As it stands it simulates a PUMA 560, so that the truth is known.
 """
 
@@ -35,7 +35,7 @@ print(
 """
 ## What can be identified
 
-No motion tells all ten parameters of every link apart. *Base parameters* are what it does tell.
+Not all ten parameters of every link are identifiable. *Base parameters* are their identifiable combinations.
 """
 
 from identify import BaseParameters, tree_basis
@@ -62,7 +62,7 @@ behind rotors of 0.2 kg m².
 
 ## Is it any good?
 
-Judge it on motion that it has not seen: three quarters of the log are fitted, the last quarter is predicted.
+Validate it on held-out data: three quarters of the log are fitted, the last quarter is predicted.
 """
 
 from identify import Problem, split, validate

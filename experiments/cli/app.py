@@ -25,7 +25,7 @@ idbench: identify the dynamics of robots, on simulated data whose truth is known
   idbench view                    look at the latest results
   idbench identify LOG.csv        identify a log; --robot names the arm
   idbench robot panda             what can be identified of an arm
-  idbench excite panda            design a motion that tells its parameters well
+  idbench excite panda            design an exciting trajectory
   idbench study encoder           ask a question of many simulated robots
   idbench new scenario mine       begin a scenario, a study or a plug-in of your own
   idbench list, idbench --help    what can be combined, all commands"""

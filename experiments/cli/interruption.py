@@ -33,7 +33,7 @@ def terminating() -> Iterator[None]:
 
 
 class TerminatedError(SystemExit):
-    """The process was told to end; of our own, so that no plug-in is blamed for it."""
+    """The process received a signal to end; a class of our own, so that no plug-in is blamed for it."""
 
 
 class Notice:

@@ -71,7 +71,7 @@ def _said(event: parser.ParseErrorEvent, words: Sequence[str], commands: Mapping
             missing = ", ".join(_called(each.arg) for each in event.missing_arguments)
             said = f"{name}: {missing} is missing; {help_} tells more"
         case parser.UnrecognizedArgs():
-            said = _unknown(event.tokens[0], name, commands) + help_ + " tells all"
+            said = _unknown(event.tokens[0], name, commands) + help_ + " lists all"
         case _:
             said = f"{' '.join(words)}: {getattr(event, 'message', type(event).__name__)}; {help_} tells more"
     return said

@@ -132,12 +132,12 @@ class Excited:
 
     @property
     def best(self) -> Array:
-        """Standard deviations from the random motion that tells most, shape (p,); NaN without any."""
+        """Standard deviations from the best random motion, shape (p,); NaN without any."""
         return self.sigmas[1 + int(self.typical[1:].argmin())] if self.random else np.full(len(self.sigma), np.nan)
 
     @property
     def ratios(self) -> tuple[float, float]:
-        """Typical sigma over that of the median random motion, and over that of the best; NaN without any."""
+        """Typical sigma relative to the median random motion, and to the best one; NaN without any."""
         others = self.typical[1:]
         return (1 / float(np.median(others)), 1 / float(others.min())) if len(others) else (np.nan, np.nan)
 

@@ -6,4 +6,4 @@ Start = Literal["least-squares", "file"]
 """Where estimators begin that simulate or filter: at the least-squares estimate, or at the parameters of the robot's file."""
 
 Consistency = Literal["no", "pullback", "entropic"]
-"""Whether estimates are moved to where bodies can exist, and by which distance what no motion shows is held."""
+"""Whether estimates are made physically consistent, and by which distance unidentifiable parameters are held."""

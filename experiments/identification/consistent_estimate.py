@@ -27,13 +27,13 @@ def consistent_of(subject: Subject, estimate: Estimate, prior: Prior = "pullback
 
 
 def made_consistent(subject: Subject, estimate: Estimate, prior: Prior) -> Estimate:
-    """Return an estimate with the parameters of bodies that can exist, nearest in the metric of its own covariance.
+    """Return the nearest physically consistent estimate, in the metric of its own covariance.
 
     Its covariance stays: where the estimate is consistent already nothing moves, and elsewhere it is too large, not too small.
     """
     found = consistent_of(subject, estimate, prior)
     X = found.base[_places(subject, estimate)]
-    return replace(estimate, X=X, solution=None, honest=estimate.best_covariance)
+    return replace(estimate, X=X, solution=None, calibrated=estimate.best_covariance)
 
 
 def words_of_consistency(before: dict[str, Estimate], after: dict[str, Estimate]) -> Iterator[str]:

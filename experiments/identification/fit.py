@@ -187,7 +187,7 @@ class Fit:
         alone = replace(logs, fitted=logs.fitted[k : k + 1], names=logs.names[k : k + 1])
         problem = Problem(alone.fitted, self.basis, self.problem.model, self.processing)
         seen: Outcomes = {
-            name: replace(e, problem=problem.with_model(e.problem.model), solution=None, honest=e.best_covariance, fits={})
+            name: replace(e, problem=problem.with_model(e.problem.model), solution=None, calibrated=e.best_covariance, fits={})
             for name, e in self.estimates.items()
         }
         return replace(self, logs=alone, problem=problem, unconstrained=seen, outcomes=seen)

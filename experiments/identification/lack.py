@@ -46,6 +46,6 @@ def advice_on_lack(found: Sequence[Lack], joints: Sequence[str]) -> Iterator[str
         names = ", ".join(joints[lack.joint] for lack in wrong if lack.over == over)
         first = next(lack.joint for lack in wrong if lack.over == over)
         yield (
-            f"what is left of the torque of {names} hangs on {over}, which no parameter explains: errors are larger than "
+            f"the residual torque of {names} depends on {over}, which no parameter explains: errors are larger than "
             f"sigma; try {TRY[over].format(joint=said(first, joints))}"
         )

@@ -40,7 +40,7 @@ OPEN = 0.02
 
 
 LOG, DELAY, FILE, MOTION, MODEL = "the log", "the torque's delay", "the robot's file", "the motion", "the model"
-"""What warnings are about, in the order in which to see to them: what comes first may be what makes the others."""
+"""Subjects of warnings, in the order in which to check them: the first may cause the others."""
 
 
 def warnings_of_result(fit: Fit) -> dict[str, list[str]]:
@@ -107,7 +107,7 @@ def used(marks: Mapping[str, Sequence[Sequence[str]]]) -> list[str]:
 
 
 def _negative(fit: Fit, model: str) -> list[str]:
-    """Return what cannot be below zero and surely is."""
+    """Return parameters that must be positive and are significantly negative."""
     estimate = fit.estimates[model]
     friction = zip(fit.basis.parameters, estimate.X, estimate.best_sigma, strict=True)
     return [p.name for p, x, sigma in friction if p.kind in NOT_NEGATIVE and _surely_negative(x, sigma)]

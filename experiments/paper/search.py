@@ -1,7 +1,7 @@
 """Which point-to-point sequence has the condition numbers that the paper reports?
 
 The paper gives Cond(W) of its trajectory, not the trajectory. This search finds one from a seed, by condition number
-alone: it is there to meet the paper's figures, not to tell the parameters well. It looks at a torque only to keep the
+alone: it is there to meet the paper's figures, not to excite the parameters well. It looks at a torque only to keep the
 actuators' limits, and never at an error of identification.
 """
 

@@ -18,7 +18,7 @@ WHY = (
     "Chain paper takes the paper's steps as they are printed, chain paper_masked leaves out what lies near reversals besides, "
     "as the paper's school does; neither has the paper's trajectory, of which the paper gives the condition numbers alone. The "
     "explicit model's errors of friction are {paper:.2g} and {paper_masked:.2g} times the paper's (geometric means), those of "
-    "ZZR1 {zzr1:.2g} times at the most; single errors are up to {most:.0f} times the paper's. How errors scatter over motions: "
+    "ZZR1 {zzr1:.2g} times at most; single errors are up to {most:.0f} times the paper's. How errors scatter over motions: "
     "--motions 3500. What makes those of chain paper, by taking it out (largest error in %):"
 )
 

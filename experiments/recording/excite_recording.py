@@ -24,7 +24,7 @@ SHOWN = 50.0
 """Frequency [Hz] of the curves."""
 
 DARK, BRIGHT = np.array([32.0, 32.0, 36.0]), np.array([90.0, 200.0, 120.0])
-"""Colours of cells: of a stretch that tells nothing, and of that which tells most."""
+"""Colours of cells: of a stretch without information, and of the most informative one."""
 
 LEVELS = 8
 """Colours that are told apart: an entity each, where one for each cell would make a large recording."""
@@ -69,7 +69,7 @@ def _send_sigmas(stream: Stream, found: Excited) -> None:
         return
     names = found.design.subject.basis.names
     others = np.sort(found.sigmas[1:] / found.median, axis=0)
-    x = decades("sigma over that of the median random motion", others, found.sigma / found.median)
+    x = decades("sigma relative to the median random motion", others, found.sigma / found.median)
     for at, members in _parts(names):
         chart = Chart(stream, f"excited/sigma/{at}", x, listed("", [names[p] for p in members]), SQUARE)
         y = np.arange(float(len(members)))

@@ -65,7 +65,7 @@ def compare(shelf: Shelf) -> Part:
 def excited(shelf: Shelf) -> Part:
     """Return a designed motion: the arm, limits in use, what is told, and when."""
     sigmas = charts(shelf, "predicted sigma", "excited/sigma/*", SQUARE)
-    told = charts(shelf, "which stretch tells which parameter: bright tells most", "excited/told/*")
+    told = charts(shelf, "which stretch excites which parameter: bright is most", "excited/told/*")
     if not told:
         return None
     limits = column(*(plot(shelf, _limit(path), f"limits/{path}") for path in sorted(shelf.last("limits/*"))))

@@ -98,7 +98,7 @@ class ResidualCharts:
                 chart.list_entry(name, shade)
 
     def _friction(self, j: int, left: Mapping[str, Instants]) -> None:
-        """Send what is left of the torque without the rigid body, over velocity, the laws that were found, and the true one."""
+        """Send the torque minus that of the rigid body, over velocity, the laws that were found, and the true one."""
         if not any(p.kind in FRICTIONS and p.joint == j for p in self.fit.basis.parameters):
             return
         force, way = self.fit.subject.units(j)

@@ -35,7 +35,7 @@ MASK_STATES = "green used, amber in part, red masked"
 
 
 def overview(shelf: Shelf) -> Part:
-    """Return where to begin: the arm, the motion, torques measured and predicted, what is left over, parameters."""
+    """Return where to begin: the arm, the motion, torques measured and predicted, residuals, parameters."""
     rows = _rows(shelf)
     motion = column(
         plot(shelf, "q [rad]", "q/planned", "q/true") or plot(shelf, "q [rad]", "q/measured"),
@@ -111,7 +111,7 @@ def drive(shelf: Shelf) -> Part:
 
 
 def filters(shelf: Shelf) -> Part:
-    """Return the motion before and after the filters, what the mask leaves out, and spectra of what is left over."""
+    """Return the motion before and after the filters, masked instants, and spectra of the residuals."""
     if not (spectra := charts(shelf, "{1}: spectrum of the residual of {3}", "identify/*/spectrum/*")):
         return None
     motion = [
@@ -128,7 +128,7 @@ def filters(shelf: Shelf) -> Part:
 
 
 def noise(shelf: Shelf) -> Part:
-    """Return the noise found, spectra of what is left over beside those predicted, and smoothed motions."""
+    """Return the estimated noise, measured and predicted spectra of the residuals, and smoothed motions."""
     if not (spectra := charts(shelf, "{1}: spectrum of the residual of {3}", "identify/*/spectrum/*")):
         return None
     smoothed = [
@@ -141,7 +141,7 @@ def noise(shelf: Shelf) -> Part:
 
 
 def excitation(shelf: Shelf) -> Part:
-    """Return the columns of W, and how well they tell the parameters apart."""
+    """Return the columns of W, and its singular values."""
     rows = shelf.last("identify/*/*/columns/*")
     found = [shelf.of(f"identify/*/*/columns/{row}")[0] for row in rows]
     W = [

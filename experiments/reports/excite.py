@@ -75,7 +75,7 @@ def _sigma_figure(found: Excited) -> str:
     panel.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
     panel.yaxis.set_minor_formatter(FuncFormatter(lambda y, _: f"{y:g}" if f"{y:e}"[0] in "235" else ""))
     panel.set_xticks(at, names, rotation=90)
-    panel.set_ylabel("sigma over that of the median\nrandom motion")
+    panel.set_ylabel("sigma relative to the\nmedian random motion")
     panel.legend(ncols=4, loc="upper center", bbox_to_anchor=(0.5, 1.16), frameon=False)
     return svg(figure)
 

@@ -29,7 +29,7 @@ def lines(found: Excited) -> list[str]:
     told = [f"typical sigma: {median:.2f} of the median of {count}, {best:.2f} of the best"] if found.random else []
     if len(found.random) < found.drawn:
         told.append(f"{found.drawn} random motions were drawn, {len(found.random)} keep the limits")
-    told.append(f"Cond(W) = {found.condition:.3g}, for the curious: it says nothing about sigma")
+    told.append(f"Cond(W) = {found.condition:.3g}, not a measure of quality")
     held = "; ".join(found.binding)
     told.append(
         f"what holds the motion back: {held}" if held else "no limit holds the motion back: a higher --frequency may do"

@@ -10,7 +10,7 @@ from experiments.style import JOINTS
 from identify import Array
 
 POINTS = 4000
-"""Points of a curve at the most: more are not seen."""
+"""Largest number of points of a curve: more are invisible."""
 
 
 def figure_of(facts: LogFacts) -> Figure:

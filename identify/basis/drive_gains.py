@@ -19,7 +19,7 @@ class DriveGains(AbstractJointLaw):
     """What the gain of a drive is in multiples of the one that a log was read with, kg.
 
     With the torque g i of a current i, g = kg g0, the rows of joint j are g0 i = model / kg, linear about kg = 1 and the torque
-    of the model by an estimate. The column has no noise of the current in it, so that there is no bias as in least squares of
+    of the model by an estimate. The column does not contain the current's noise, so there is no bias as in least squares of
     currents, nor are errors in all variables assumed as in total least squares: M. Gautier and S. Briot, "Global identification
     of joint drive gains and dynamic parameters of robots", J. Dynamic Systems, Measurement, and Control 136 (2014) 051025.
 

@@ -51,7 +51,7 @@ class Spring(AbstractConservativeBlock):
 
     def _bent(self, state: State, j: int) -> Array:
         if len(self.rest) not in (1, state.n):
-            raise SettingError(f"{len(self.rest)} rest positions of springs for {state.n} joints: give one, or one a joint")
+            raise SettingError(f"{len(self.rest)} rest positions of springs for {state.n} joints: give one, or one per joint")
         return state.q[..., j, :] - np.broadcast_to(self.rest, (state.n,))[j]
 
     def _numbers(self, n: int) -> tuple[int, ...]:

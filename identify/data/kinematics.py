@@ -1,4 +1,4 @@
-"""How the links of a robot hang together: all that identification has to know of a robot's geometry."""
+"""The kinematics of a robot: all that identification needs to know of its geometry."""
 
 from dataclasses import dataclass
 from typing import Literal, final, get_args
@@ -104,7 +104,7 @@ class Coupling:
     name : str
         Of the drive.
     weights : tuple of float
-        One a joint; 0 of those with which it does not turn.
+        One per joint; 0 for those with which it does not turn.
     armature : bool
         Whether it adds an inertia of its own.
     spring : float, optional

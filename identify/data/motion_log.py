@@ -56,7 +56,7 @@ class TorqueChannel:
         try:
             gains = np.atleast_1d(np.asarray(self.gain, dtype=np.float64))
         except (TypeError, ValueError) as error:
-            raise SettingError(f"torque gain = {self.gain!r} must be a number, or one a joint") from error
+            raise SettingError(f"torque gain = {self.gain!r} must be a number, or one per joint") from error
         if gains.ndim != 1 or not np.isfinite(gains).all() or (gains == 0).any():
             raise SettingError(f"torque gain = {self.gain} must be finite and not 0")
         object.__setattr__(self, "gain", float(gains[0]) if gains.size == 1 else tuple(float(g) for g in gains))
@@ -114,12 +114,12 @@ class MotionLog:
                 )
         object.__setattr__(self, "conditions", {name: self._condition(name, x) for name, x in self.conditions.items()})
         if np.size(self.torque.gain) not in (1, self.n):
-            raise LogError(f"{np.size(self.torque.gain)} torque gains for {self.n} joints: give one, or one a joint")
+            raise LogError(f"{np.size(self.torque.gain)} torque gains for {self.n} joints: give one, or one per joint")
 
     def _condition(self, name: str, values: npt.ArrayLike) -> Array:
         found = frozen(_real(name, values))
         if found.ndim < 2 or found.shape[-2] not in (1, self.samples) or found.shape[-1] not in (1, self.n):
-            raise LogError(f"{name} has shape {found.shape}, q {self.q.shape}: one value a sample is needed, or one a joint")
+            raise LogError(f"{name} has shape {found.shape}, q {self.q.shape}: give one value per sample, or one per joint")
         _require_finite(name, found)
         return frozen(np.broadcast_to(found, (*found.shape[:-2], self.samples, found.shape[-1])))
 

@@ -72,7 +72,7 @@ class LogSigma(AbstractCriterion):
 @final
 @dataclass(frozen=True)
 class Condition(AbstractCriterion):
-    """ln Cond(W), of W as it is: what most of the field minimises; it depends on units, and knows no noise."""
+    """ln Cond(W), of W as it is: what most of the field minimises; it depends on units, and not on the noise."""
 
     noise: ClassVar[bool] = False
 

@@ -1,4 +1,4 @@
-"""Moves that are chosen one after the other, each the one that tells most beside those before it."""
+"""Moves that are chosen one after the other, each the most informative one beside those before it."""
 
 from dataclasses import dataclass, replace
 

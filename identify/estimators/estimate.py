@@ -33,7 +33,7 @@ class Estimate:
         Covariance of the error of X, as the estimator has it: of OLS and WLS as if rows were independent.
     solution : AbstractSolution, optional
         How X follows from the rows; without it there is no corrected sigma.
-    honest : Array, shape (..., p, p), optional
+    calibrated : Array, shape (..., p, p), optional
         Covariance of the error of X that the noise of the logs makes, if the estimator knows it; by default from `solution`.
     levels : NoiseLevels, optional
         The noise of the logs as the estimator found it; by default that of the problem.
@@ -51,7 +51,7 @@ class Estimate:
     X: Array
     covariance: Array
     solution: AbstractSolution | None = None
-    honest: Array | None = None
+    calibrated: Array | None = None
     levels: NoiseLevels | None = None
     fits: Mapping[tuple[int, ...], JointFit] = field(default_factory=dict)
     failures: Mapping[tuple[int, ...], str] = field(default_factory=dict)
@@ -79,7 +79,7 @@ class Estimate:
             That of section 7.3 by default: sigma_rho^2 (W' W)^-1 with sigma_rho^2 = |Y - W X|^2 / (r - p).
         influence : Array, shape (..., r, p), optional
             G with which X = G' Y to first order: what the estimate changes by if a row of Y, or the error of a row, does. It
-            is what an honest sigma is computed from.
+            is what the corrected sigma is computed from.
         """
         shape, p = problem.factors.together.status.shape, len(problem.names)
         x = _real_array("X", X, (*shape, p))
@@ -119,8 +119,8 @@ class Estimate:
         X = G' Y, and each row is a linear function of the samples of a log, whose torques and positions are noisy. So X is such
         a function, too: rows may overlap, be weighted or multiplied by velocities, and joints may differ.
         """
-        if self.honest is not None:
-            return self.honest
+        if self.calibrated is not None:
+            return self.calibrated
         if self.solution is None:
             return np.full(self.covariance.shape, np.nan)
         parts = self.problem.parts

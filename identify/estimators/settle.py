@@ -143,7 +143,7 @@ class AdaptiveRows:
         return self._last[1]
 
     def misfit(self, basis: Basis) -> Array:
-        """Return what is left with the shapes of friction where they are believed to be, shape (...)."""
+        """Return the misfit with the current nonlinear parameters of friction, shape (...)."""
         return misfit(self.factors(basis).only(_rest(basis), basis.believed))
 
     @cached_property

@@ -164,7 +164,7 @@ class _Files:
                 "log.toml, or --gain, N m a unit of each joint"
             )
         if gain and len(gain) not in (1, n):
-            raise LogError(f"{self.log}: {len(gain)} gains for {n} joints: give one, or one a joint")
+            raise LogError(f"{self.log}: {len(gain)} gains for {n} joints: give one, or one per joint")
         if wrong := [x for x in gain if not LEAST <= abs(x) <= MOST]:
             raise LogError(
                 f"{self.log}: a gain of {wrong[0]:g} makes no torque: give N m a unit of tau for each joint (--gain, or "

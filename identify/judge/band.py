@@ -50,7 +50,7 @@ class Band:
     def of(cls, logs: Sequence[MotionLog], parameters: int, least: float) -> "Band":
         """Return the band for logs of so many parameters: `least` [Hz], or more where that leaves too few rows.
 
-        Rows come at twice the cut-off: T seconds make 2 T f instants, and a power model has one row an instant. A short, fast
+        Rows come at twice the cut-off: T seconds make 2 T f instants, and a power model has one row per instant. A short, fast
         log starves at 5 Hz. Above twice the frequency at which the torques are noise there is nothing: power is a product.
         """
         T = sum(log.samples / log.fs for log in logs)

@@ -1,4 +1,4 @@
-"""Looking into an identification: what is left over at every sample, where it lies, and what the filters let through."""
+"""Looking into an identification: residuals at every sample, over the motion, and in frequency."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ class Instants:
 
     @property
     def residual(self) -> Array:
-        """What is left at the inner samples, shape (row, time)."""
+        """Residuals at the inner samples, shape (row, time)."""
         return self.everywhere[..., self.inner]
 
     @property

@@ -44,7 +44,7 @@ class HeldOut:
     start : Problem
         That of the laws that all joints have.
     held : Array, shape (FOLDS + 1, joint, P + 1, P + 1)
-        Of what is left out, of every joint: stretch by stretch, and its fastest motion.
+        Held-out data of every joint: stretch by stretch, and its fastest motion.
     weight : Array, shape (joint,)
         1 over the variance of the joint's error without the laws.
     p : int
@@ -145,7 +145,7 @@ def _at_all_shapes(block: AbstractBlock) -> AbstractBlock:
 
 
 def _held(joined: Array, speed: Array) -> Array:
-    """Return the products of what is left out, shape (FOLDS + 1, joint, P + 1, P + 1), of rows (joint, time, P + 1)."""
+    """Return the products of held-out rows, shape (FOLDS + 1, joint, P + 1, P + 1), of rows (joint, time, P + 1)."""
     ends = np.linspace(0, joined.shape[1], FOLDS + 1).round().astype(int)
     stretches = [joined[:, a:b] for a, b in pairwise(ends)]
     moving = [np.quantile(v[v > 0], FAST) if (v > 0).any() else np.inf for v in speed]

@@ -74,9 +74,9 @@ def lack_of_fit(problem: Problem, X: Array) -> tuple[Lack, ...]:
     used = int(np.count_nonzero(own.any(axis=1)))  # rows that the mask takes are zero
     freedom = used - own.shape[1] - BINS
     if freedom < BINS:
-        raise IdentificationError(f"{used} rows for {own.shape[1]} parameters are too few to test what is left over")
+        raise IdentificationError(f"{used} rows for {own.shape[1]} parameters are too few to test the residuals")
     if not (np.isfinite(own).all() and np.isfinite(y).all()):
-        raise IdentificationError("the covariance of the rows is singular, so that they cannot be tested for what is left over")
+        raise IdentificationError("the covariance of the rows is singular, so that their residuals cannot be tested")
     Q, R = np.linalg.qr(own)
     left = y - Q @ (Q.T @ y)
     level = max(1.0, float(left @ left) / freedom)

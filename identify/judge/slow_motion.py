@@ -14,7 +14,7 @@ BANDS = np.array([1.0, 2.0, 3.0, 4.0])
 """Ends of the bands of speeds that are looked at, in multiples of what the mask takes: a fifth of the rms speed at most."""
 
 EXCESS = 1.5
-"""Rms of what is left in a band, in multiples of that of faster motion, from which on it costs more than it tells."""
+"""Rms of the residual in a band, relative to faster motion, above which the band does more harm than good."""
 
 INDEPENDENT = 0.5
 """Share of the rows that count as independent, as neighbours share noise: with all, ten times too many masks are raised."""
@@ -58,7 +58,7 @@ def slow_motion(problem: Problem, X: Array) -> tuple[Array, Array]:
 
 
 def _seen(part: Rows, X: Array) -> tuple[Array, Array, Array]:
-    """Return the speeds of the mask, and of every row the joint's speed in multiples of it and what is left; NaN if masked."""
+    """Return the speeds of the mask, and of every row the joint's speed in multiples of it and the residual; NaN if masked."""
     signals = part.maps[0].signals
     qd = signals.state.qd
     slow = slow_speed(qd)
@@ -68,7 +68,7 @@ def _seen(part: Rows, X: Array) -> tuple[Array, Array, Array]:
 
 
 def _wrong(some: Array, fast: Array) -> bool:
-    """Return whether what is left in some rows is surely more than in fast motion."""
+    """Return whether the residual of some rows is significantly larger than in fast motion."""
     if len(some) < 2 or len(fast) < 2 * len(BANDS) or not fast.any():
         return False
     ratio = float(np.mean(some**2) / np.mean(fast**2))

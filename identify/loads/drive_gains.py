@@ -104,7 +104,7 @@ def identify_drive_gains(robot: LoadedRobot) -> GainEstimate:
 
 
 def _require_sign(robot: LoadedRobot, step: Array, sigma: Array, problem: Problem) -> None:
-    """Raise IdentificationError if gains are surely below zero: kg enters as 2 - 1/kg about 1 (`DriveGains`)."""
+    """Raise IdentificationError if gains are significantly negative: kg enters as 2 - 1/kg about 1 (`DriveGains`)."""
     inverse = 2 - step
     if not (wrong := inverse < -SURE * sigma).any():
         return

@@ -70,7 +70,7 @@ class Payload:
     def consistent(self) -> Array:
         """Return the ten parameters of the body that agrees best with the estimate, in the metric of its covariance.
 
-        Over pseudo-inertias L L', which are those of bodies that can exist; what was known stays.
+        Over pseudo-inertias L L', which are physically consistent; what was known stays.
         """
         estimate = self.standard()
         free = [LETTERS.index(name) for name in self.names]

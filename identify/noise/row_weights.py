@@ -41,7 +41,7 @@ def friction_bias(to_rows: RowMap, linear: Linearization, model: AbstractModel, 
 def floor_of(squares: Array, variance: Array, valid: npt.NDArray[np.bool_]) -> Array:
     """Return m b/a of the variances a v + b m that explain squared residuals best, m the mean of v, shape (...).
 
-    v is what the noise of torques and positions makes of a row. What no noise is, such as cogging, or friction of another kind
+    v is what the noise of torques and positions makes of a row. What is not noise, such as cogging, or friction of another kind
     near standstill, does not vanish where v does: with weights of v alone the slow rows of the power model, in which it is most
     of the torque, would count most. a and b, not negative, are fitted with errors in proportion to the variances themselves.
 

@@ -34,7 +34,7 @@ def with_more_noise(signals: Signals, level: Array) -> Signals:
     """Return the signals of two logs, with more noise in the positions, put in with either sign, and with the same mask.
 
     Every run meets the same noise; which joint gets which part of it depends on how far it moves, not on the order of joints.
-    Joints that hardly move get none: an encoder that stands has no noise, and |qd|, of Coulomb friction, no square.
+    Joints that hardly move get none: their encoder's error is constant, and |qd|, of Coulomb friction, has no square.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ SEED = 0
 """Of the random states: any others give the same grouping, up to rounding."""
 
 DEPENDENT = 1e-3
-"""A column counts as a combination of those before it when what is left over is below this share of a long column of its unit.
+"""A column counts as a combination of those before it when its residual is below this share of a long column of its unit.
 
 Descriptions round angles: of the arms of example-robot-data, columns that are dependent in the robot leave up to 3e-6 where
 angles have four digits after the point (1.5708), up to 6e-4 with two (1.57); none that is independent leaves less than 0.09."""

@@ -29,7 +29,7 @@ REACHED = 0.1
 @final
 @dataclass(frozen=True, eq=False)
 class Consistent:
-    """Standard parameters of bodies that can exist.
+    """Physically consistent standard parameters.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def consistent_parameters(
     inertial parameter identification", IEEE RA-L 3 (2018) 60-67), and armatures and frictions are not negative. d, the
     distance to the given model, depends on no frame (`Prior`: T. Lee, P. M. Wensing and F. C. Park, "Geometric robot dynamic
     identification: a convex programming approach", IEEE T-RO 36 (2020) 348-365). So base values are the estimate's where
-    bodies can have them, and what no motion shows stays as it was given. What constraints do not touch is not moved; C is then
+    bodies can have them, and unidentifiable parameters stay as given. What constraints do not touch is not moved; C is then
     that of the others.
 
     Parameters
@@ -112,7 +112,7 @@ def consistent_parameters(
     if not rows.any():
         return _found(grouping, X, root, standard, rows)
     bodies = Bodies([p for p, there in zip(grouping.standard.parameters, columns, strict=True) if there], given[columns])
-    # x = start + J u + N z: u counts sigma away from the estimate, z is what no motion shows.
+    # x = start + J u + N z: u counts sigma away from the estimate, z are the unidentifiable directions.
     own = _root(covariance[np.ix_(rows, rows)])
     scaled = grouping.K[np.ix_(rows, columns)] * bodies.scale
     to_estimate = bodies.scale[:, None] * np.linalg.pinv(scaled)
@@ -192,7 +192,7 @@ def _solved(clarabel: ModuleType, bodies: Bodies, way: tuple[Array, Array, int],
     ).solve()
     if str(found.status) not in ("Solved", "AlmostSolved"):
         raise IdentificationError(
-            f"bodies that can exist come nowhere near these parameters (the solver ends with {found.status}): is the torque's "
+            f"no physically consistent bodies are near these parameters (the solver ends with {found.status}): is the torque's "
             "sign, unit and delay right?"
         )
     return np.array(found.x)[: T.shape[1]]

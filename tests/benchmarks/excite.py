@@ -3,7 +3,7 @@
     uv run python tests/benchmarks/excite.py [SEEDS [ROBOT ...]]
 
 For each arm: the time of a whole design (random motions, search, limits at 1 kHz, predictions); that of one value with its
-slope, over that of the columns at the same states; the typical sigma over that of the median and of the best random motion; how
+slope, over that of the columns at the same states; the typical sigma relative to the median and the best random motion; how
 far the worst of the seeds is from the best.
 """
 

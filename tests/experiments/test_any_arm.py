@@ -30,7 +30,7 @@ def scenario(robot, moves, seed):
 
 @pytest.fixture(scope="module", params=["panda"])
 def arm(request):
-    """Return an identification of all models, and a motion that it has not seen; of the larger arm."""
+    """Return an identification of all models, and a held-out motion; of the larger arm."""
     subject = Subject(request.param)
     log, unseen = (simulate(scenario(request.param, *how)).alone() for how in ((20, 0), (6, 7)))
     return on_log(fit(Request(subject), Logs((log,), truth=subject.truth(subject.robot))), "second", unseen)
@@ -39,7 +39,7 @@ def arm(request):
 @pytest.mark.parametrize("model", MODELS.builtin)
 def test_well_excited_base_parameters_are_true_within_2_percent(arm, model):
     """Well excited: sigma is below 1 % of the value. Of the PUMA's 52, 16 are zero and have no relative error, which leaves six
-    in ten; the power model's single row an instant tells fewer.
+    in ten; the power model, with a single row per instant, fewer.
     """
     estimate = arm.fit.estimates[model]
     truth = np.array(list(arm.fit.truth.values()))

@@ -1,4 +1,4 @@
-"""Estimators that simulate, and estimates of bodies that can exist, on the command line."""
+"""Estimators that simulate, and physically consistent estimates, on the command line."""
 
 import json
 from dataclasses import replace

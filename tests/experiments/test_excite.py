@@ -266,7 +266,7 @@ def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
         (["scara", "--until", "200%"], "--until 200%: give a share between 0 and 100 %"),
         (["scara", "--limits", "nowhere.toml"], "cannot read limits nowhere.toml"),
         (["scara", "--repeat", "0"], "--repeat 0 must be at least 1"),
-        (["scara", "--noise", "ideal"], "scenario ideal has no noise of its torques: add --torque-noise"),
+        (["scara", "--noise", "ideal"], "scenario ideal has no torque noise: add --torque-noise"),
         (["scora"], "did you mean 'scara'?"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",

@@ -215,7 +215,7 @@ def test_what_is_written_makes_the_torques_that_were_identified(idbench, logs, t
     rng = np.random.default_rng(0)
     q, qd, qdd = (rng.uniform(-1, 1, (20, 6)) for _ in range(3))
     tau = inverse_dynamics(written, q, qd, qdd) + coulomb_torque(written, qd)
-    # The bodies that can exist are some sigma from the estimate, which the function has as it is.
+    # The physically consistent bodies are some sigma from the estimate, which the function has as it is.
     assert np.abs(function["inverse_dynamics"](q, qd, qdd) - tau).max() < 0.01 * np.abs(tau).max()
     assert function["JOINTS"] == written.joints
     np.testing.assert_allclose(function["inverse_dynamics"](q[0], qd[0], qdd[0]), function["inverse_dynamics"](q, qd, qdd)[0])

@@ -129,7 +129,7 @@ def test_the_scaras_tree_spans_its_closed_form_and_gives_the_same_estimates(log,
 @pytest.mark.thorough
 @pytest.mark.parametrize("robot", ["puma560", "panda"])
 def test_ideal_data_give_every_base_parameter_in_all_models(robot):
-    """Torques by MuJoCo, sensors exact: what is left is the error of differences and of what lies between samples."""
+    """Torques by MuJoCo, sensors exact: the remaining error is that of differences and of what lies between samples."""
     arm = Robot.load(robot)
     tree = kinematic_tree(arm)
     found = BaseParameters.of(tree, tree_basis(tree))

@@ -117,7 +117,7 @@ def eighteen():
 
 @pytest.mark.thorough
 def test_a_foreign_log_is_identified(eighteen):
-    """18 bits, no noise: 0.5 % in all three models."""
+    """18 bits, exact torques: 0.5 % in all three models."""
     log, X = eighteen
     for form, error in errors(log, X).items():
         assert error.max() < 0.5, form

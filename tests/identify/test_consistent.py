@@ -1,4 +1,4 @@
-"""Physically consistent parameters: bodies that can exist, that agree with the estimate, and are otherwise those given."""
+"""Physically consistent parameters that agree with the estimate and are otherwise those given."""
 
 import sys
 

@@ -78,7 +78,7 @@ SHAPED = {
 
 @pytest.mark.parametrize("name", SHAPED)
 def test_a_law_is_recovered(name):
-    """To 2 %: what is left is the smoothing of the kinks at reversals."""
+    """To 2 %: the remaining error is the smoothing of the kinks at reversals."""
     law, truth = SHAPED[name]
     found = identify(made(law), scara() + BLOCKS.create(name), ExplicitModel(), estimator=ESTIMATORS.create("WLS"))
     values = dict(zip(found.names, found.X, strict=True))
@@ -106,7 +106,7 @@ def test_the_column_of_a_shape_is_its_slope():
 
 
 @pytest.mark.thorough
-def test_sigma_of_shapes_is_honest():
+def test_sigma_of_nonlinear_parameters_is_calibrated():
     """40 runs of white noise in one batch: two sigma hold 95 %, between 90 and 99 % of 480 correlated cases."""
     exact, rng = made(stribeck_law).part(0, 5000), np.random.default_rng(5)
     q, many = exact.q, exact.tau + 0.02 * rng.standard_normal((40, *exact.tau.shape))

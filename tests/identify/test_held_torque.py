@@ -20,7 +20,7 @@ def log(request):
 @pytest.mark.thorough
 @pytest.mark.parametrize("model", MODELS.builtin)
 def test_a_held_torque_that_says_so_is_identified(model, log, truth):
-    """What is left is RK4 at 1 ms and MuJoCo's soft friction near standstill."""
+    """The remaining error is RK4 at 1 ms and MuJoCo's soft friction near standstill."""
     assert identify(log, scara(), MODELS.create(model)).relative_error_percent(truth).max() < 0.1
 
 

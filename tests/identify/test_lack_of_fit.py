@@ -71,5 +71,5 @@ def test_a_robot_at_rest_cannot_be_tested(exact):
     """Its positions do not change: the covariance of its rows has no size."""
     still = MotionLog(exact.fs, np.zeros((500, 2)), np.zeros((500, 2)), exact.torque)
     problem = Problem((still,), scara(), ExplicitModel(), CHAINS.create("idbench"))
-    with pytest.raises(IdentificationError, match=r"left over"):
+    with pytest.raises(IdentificationError, match=r"residuals cannot be tested"):
         lack_of_fit(problem, np.zeros(len(scara().names)))

@@ -152,7 +152,7 @@ def test_torque_noise_is_found_beside_stronger_noise_of_the_positions(log):
 
 
 def test_a_log_without_noise_of_its_positions_has_none(log):
-    """What is left of a motion after six differences is below a thousandth of a 16-bit encoder's noise."""
+    """After six differences a motion is below a thousandth of a 16-bit encoder's noise."""
     found = Problem((log,), scara(), EVERY["explicit"], idbench_chain()).noise.position
     assert (found < 1e-3 * 2 * np.pi / 2**16 / np.sqrt(12)).all()
 

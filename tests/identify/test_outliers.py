@@ -45,7 +45,7 @@ def test_wild_samples_cost_less_than_twice_the_error(noisy, truth):
     assert all(error(log, "OLS") > 50 * error(clean, "OLS") for log in wild)
 
 
-def test_irls_has_an_honest_sigma(noisy, truth):
+def test_irls_has_a_calibrated_sigma(noisy, truth):
     """Of eight runs with eight parameters, to a quarter; with wild samples it says more than is wrong, never less."""
     clean, wild, _ = (identify(log, scara(), ExplicitModel(), estimator=IterativelyReweighted()) for log in noisy)
     rms = [np.sqrt(np.mean(((found.X - truth) / found.best_sigma) ** 2)) for found in (clean, wild)]

@@ -1,4 +1,4 @@
-"""Sigma out of residuals that hang together over time."""
+"""Sigma from autocorrelated residuals."""
 
 from dataclasses import replace
 

@@ -36,5 +36,5 @@ def test_total_least_squares_is_that_of_the_textbook(rng):
     v = np.linalg.svd(A)[2][-1]
     np.testing.assert_allclose(_solved(np.linalg.qr(A, mode="r"), S)[0], -v[:3] / v[3], rtol=1e-9)
     exact = S.copy()
-    exact[:3, :3] = 0.0  # no noise in W: least squares
+    exact[:3, :3] = 0.0  # W without noise: least squares
     np.testing.assert_allclose(_solved(np.linalg.qr(A, mode="r"), exact)[0], np.linalg.lstsq(A[:, :3], A[:, 3])[0], rtol=1e-9)

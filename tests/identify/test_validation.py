@@ -1,4 +1,4 @@
-"""Judging on unseen motion: known errors come out as what they are."""
+"""Validation on held-out motion: known errors are measured correctly."""
 
 from dataclasses import replace
 

@@ -110,7 +110,7 @@ def _designed(options: Excite) -> Design:
     if len(options.torque_noise) not in (0, 1, subject.robot.n):
         count = len(options.torque_noise)
         raise ExperimentError(
-            f"--torque-noise has {count} values for {subject.robot.n} joints: give one for all, or one a joint"
+            f"--torque-noise has {count} values for {subject.robot.n} joints: give one for all, or one per joint"
         )
     return Design(
         robot=absolute(options.robot),
@@ -160,7 +160,7 @@ def _scenario(options: Excite) -> Scenario:
             raise ExperimentError(f"--torque-noise {given} must be at least {QUIET:g} and at most {LOUD:g} N m")
         scenario = replace(scenario, torque=TorqueMeasurement(noise=noise))
     elif not max(scenario.torque.noise):
-        raise ExperimentError(f"scenario {options.noise} has no noise of its torques: add --torque-noise, such as 0.05")
+        raise ExperimentError(f"scenario {options.noise} has no torque noise: add --torque-noise, such as 0.05")
     return scenario if options.fs is None else replace(scenario, fs=options.fs)
 
 

@@ -38,4 +38,4 @@ class GeneralizedLeastSquares(AbstractEstimator):
         solution = OfWhitenedRows(inverse := factor.inverse(solvable))
         off = np.zeros(()) if problem.alike else bias_covariance(problem, solution.influence(problem.parts))
         X, covariance = frozen(factor.solution(solvable)), frozen(inverse + off)
-        return Estimate(problem, X, covariance, solution, honest=covariance, levels=problem.likely_noise)
+        return Estimate(problem, X, covariance, solution, calibrated=covariance, levels=problem.likely_noise)

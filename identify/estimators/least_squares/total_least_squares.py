@@ -91,7 +91,7 @@ class TotalLeastSquares(AbstractEstimator):
 
 
 def _with_rest(R: Array, S: Array) -> Array:
-    """Return the noise of [W Y] with that of Y as large as what is left over, if the noise of W is what it is said to be."""
+    """Return the noise of [W Y] with that of Y as large as the residual, if the noise of W is as stated."""
     p = len(R) - 1
     A, b = R[:, :p].T @ R[:, :p] - S[:p, :p], R[:, :p].T @ R[:, p] - S[:p, p]
     whole = S.copy()

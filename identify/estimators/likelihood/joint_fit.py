@@ -208,7 +208,7 @@ class JointFit:
         return np.where(beside, off[:, None], np.inf).T, _at_nodes(cells, rate)
 
     def _leveled(self, noises: list[Noise], taken: Array, floor: Array) -> "JointFit":
-        """Return the fit with levels of the torques from what is left over, of which the unknowns take a part."""
+        """Return the fit with levels of the torques from the residuals, of which the unknowns absorb a part."""
         each = zip(self.logs, self.motions, noises, strict=True)
         squares = sum(torque_squares(cells, self.basis, self.X, z, noise) for cells, z, noise in each)
         cells = sum(np.stack([np.count_nonzero(x, axis=-1) for x in (noise.known, noise.turns.near)]) for noise in noises)

@@ -96,9 +96,9 @@ class UnscentedKalmanFilter(AbstractEstimator):
             _, X[run], covariance[run], torque[run] = best
         if failures and len(failures) == X[..., 0].size:
             raise IdentificationError(next(iter(failures.values())))
-        honest = frozen(covariance)
+        calibrated = frozen(covariance)
         noise = NoiseLevels(torque, problem.position_noise)
-        return Estimate(problem, frozen(X), honest, honest=honest, levels=noise, failures=failures, path=(start, X))
+        return Estimate(problem, frozen(X), calibrated, calibrated=calibrated, levels=noise, failures=failures, path=(start, X))
 
 
 def _tried(

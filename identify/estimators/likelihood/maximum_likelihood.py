@@ -94,9 +94,9 @@ class MaximumLikelihood(AbstractEstimator):
             torque[run] = np.where(np.isfinite(torque[run]), found.levels.torque, np.nan)
         if failures and not fits:
             raise IdentificationError(next(iter(failures.values())))
-        honest = frozen(covariance)
+        calibrated = frozen(covariance)
         levels = NoiseLevels(torque, position, problem.repeats)
-        return Estimate(problem, frozen(X), honest, honest=honest, levels=levels, fits=fits, failures=failures)
+        return Estimate(problem, frozen(X), calibrated, calibrated=calibrated, levels=levels, fits=fits, failures=failures)
 
     def _found(self, problem: Problem, run: tuple[int, ...], start: Estimate, levels: NoiseLevels) -> JointFit:
         """Return the fit of one run."""

@@ -142,10 +142,10 @@ class Turns:
         return one._replace(begin=int(one.begin + first), end=int(one.begin + last))
 
     def _follow(self, one: Stretch, v: Array, forces: Forces, margin: float, period: float) -> None:
-        """Mark where a joint of velocities v, shape (cell,), surely moves on through a stretch, and where it reverses.
+        """Mark where a joint of velocities v, shape (cell,), certainly moves on through a stretch, and where it reverses.
 
-        It surely moves while friction does not stop it within a cell. Nothing is known of the cells from the first in which it
-        might stop to the last, unless the torque turns it round there at once.
+        It certainly moves while friction does not stop it within a cell. Nothing is known of the cells from the first in which
+        it might stop to the last, unless the torque turns it round there at once.
         """
         if not len(v):
             return

@@ -41,4 +41,4 @@ class ClosedLoopInputError(AbstractSimulating):
 
         rounds, kinds = self.begun(problem), Kinds.of_rows(problem)
         found = gauss_newton(problem, rounds, torques, kinds)
-        return rounds.estimate(found, honest=scatter(found, kinds, rates(problem)))
+        return rounds.estimate(found, calibrated=scatter(found, kinds, rates(problem)))

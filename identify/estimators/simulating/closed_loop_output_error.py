@@ -37,7 +37,7 @@ class ClosedLoopOutputError(AbstractSimulating):
         found = gauss_newton(problem, rounds, positions, kinds)
         ends = np.cumsum([0, *(log.samples * log.n for log in problem.logs)]).tolist()
         parts = [(slice(ends[k], ends[k + 1]), log.fs) for k, log in enumerate(problem.logs)]
-        return rounds.estimate(found, honest=scatter(found, kinds, parts))
+        return rounds.estimate(found, calibrated=scatter(found, kinds, parts))
 
 
 def positions(logs: tuple[MotionLog, ...]) -> Array:

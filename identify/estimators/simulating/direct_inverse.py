@@ -37,4 +37,4 @@ class DirectInverse(AbstractSimulating):
             return solve_with(kinds, rows.Y, W, W)
 
         found = rounds.until_settled(step, rounds.start(), SecantSteps())
-        return rounds.estimate(found, honest=scatter(found, kinds, rates(problem)))
+        return rounds.estimate(found, calibrated=scatter(found, kinds, rates(problem)))

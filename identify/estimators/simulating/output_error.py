@@ -72,7 +72,7 @@ class OutputError(AbstractSimulating):
             return Solved(*(np.stack(x).reshape(*shape, *x[0].shape) for x in zip(*found, strict=True)))
 
         found = rounds.until_settled(step, rounds.start())
-        return rounds.estimate(found, honest=found.covariance)
+        return rounds.estimate(found, calibrated=found.covariance)
 
     def _step(
         self, shots: list["_Shots"], X: Array, h: Array, rounds: Rounds, run: tuple[int, ...]

@@ -1,4 +1,4 @@
-"""The covariance of an estimate, from how its residuals hang together over time."""
+"""The covariance of an estimate from the autocovariance of its residuals (HAC)."""
 
 from collections.abc import Sequence
 

@@ -27,7 +27,7 @@ NOTHING = 1e-2
 """Steps that make less than this share of 0.1 % of the torque count as none, however sure the estimate is of itself."""
 
 UNSETTLED = 1.0
-"""What is left, in sigma, of an estimate that has not settled, but is kept after the last round all the same."""
+"""Remaining distance, in sigma, at which an estimate that has not converged is kept after the last step."""
 
 STRAYS, ELSEWHERE = 0.1, 0.3
 """Rms by which a simulated motion may differ from the logged one in the end, and in the first round, as a share of the rms of
@@ -45,7 +45,7 @@ class Rounds:
     most : int
         Rounds at most.
     settled : float
-        What is left, in sigma, below which parameters count as settled.
+        Remaining distance, in sigma, below which parameters count as converged.
     exact : bool
         Whether the simulated robot must have all parameters of the problem.
     """
@@ -87,7 +87,7 @@ class Rounds:
         X : Array, shape (..., p)
             Where it begins.
         steps : Steps, optional
-            What is left, and where the next round begins; by default what the last has moved, and where it has led.
+            Remaining distance and start of the next step; by default the move and the end of the last one.
 
         Raises
         ------
@@ -161,7 +161,7 @@ class Rounds:
         self.failures.setdefault(run, why)
         self.active[run] = False
 
-    def estimate(self, found: Solved, *, solution: AbstractSolution | None = None, honest: Array | None = None) -> Estimate:
+    def estimate(self, found: Solved, *, solution: AbstractSolution | None = None, calibrated: Array | None = None) -> Estimate:
         """Return the estimate of a solution, NaN in the runs that failed; raise IdentificationError if all did."""
         if len(self.failures) == self.active.size:
             raise IdentificationError(next(iter(self.failures.values())))
@@ -173,7 +173,7 @@ class Rounds:
             frozen(X),
             frozen(covariance),
             solution,
-            honest=None if honest is None else frozen(honest),
+            calibrated=None if calibrated is None else frozen(calibrated),
             failures=self.failures,
             path=tuple(self.path),
             simulations=self.simulations,
@@ -193,7 +193,7 @@ class AbstractSimulating(AbstractEstimator):
     rounds : int
         Rounds at most.
     settled : float
-        What is left, in sigma, below which parameters count as settled.
+        Remaining distance, in sigma, below which parameters count as converged.
     """
 
     begins: ClassVar[bool] = True

@@ -11,10 +11,10 @@ FARTHEST = 1.0
 
 
 class Steps:
-    """Rounds that make small what is left faster than they can be foreseen, as those of Gauss and Newton do."""
+    """Steps that converge faster than can be extrapolated, such as Gauss-Newton steps."""
 
     def taken(self, X: Array, G: Array, unit: Array, *, comparable: bool) -> tuple[Array, Array]:
-        """Return what is left at most [units], shape (...), and where the next round begins, shape (..., p).
+        """Return an upper bound of the remaining distance [units], shape (...), and the start of the next step, shape (..., p).
 
         Parameters
         ----------
@@ -42,7 +42,7 @@ class SecantSteps(Steps):
         self._before: tuple[Array, Array] | None = None
 
     def taken(self, X: Array, G: Array, unit: Array, *, comparable: bool) -> tuple[Array, Array]:
-        """Return what is left at most [units], and where the next round begins."""
+        """Return an upper bound of the remaining distance [units], and the start of the next step."""
         before, self._before = self._before, (X, G) if comparable else None
         step = (G - X) / unit
         if before is None or not comparable:

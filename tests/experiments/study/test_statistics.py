@@ -230,7 +230,7 @@ def test_a_truth_of_zero_has_no_relative_error():
 
 
 def test_a_combination_that_another_does_not_surely_win_does_not_count_against(rng):
-    """Explicit is surely better in four; in two power errs less by a per cent or so, which is no difference."""
+    """Explicit is significantly better in four; in two power errs less by a per cent or so, which is no difference."""
     cells = []
     for k in range(6):
         error = rng.normal(0, 1, (40, 2))
