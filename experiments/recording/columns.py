@@ -13,6 +13,14 @@ from identify import Array
 
 NANOSECONDS = 1_000_000_000
 
+SHOWN, POSES = 125.0, 62.5
+"""Frequencies [Hz] above which curves, and poses of the arms, are thinned out: a minute on a screen has no more points."""
+
+
+def shown(first: int, count: int, fs: float, most: float = SHOWN) -> np.typing.NDArray[np.bool_]:
+    """Return which of `count` samples from number `first` on are recorded, at a sampling frequency `fs` [Hz]."""
+    return (first + np.arange(count)) % max(1, int(fs / most)) == 0
+
 
 def part(name: str) -> str:
     """Return a name as part of an entity's path, in which slashes, spaces and the like mean something."""

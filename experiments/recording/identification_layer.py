@@ -8,7 +8,7 @@ import rerun as rr
 from experiments.identification.fit import Fit
 from experiments.recording.audience import Audience
 from experiments.recording.chart import send_keys
-from experiments.recording.columns import part, parts, seconds, time_columns
+from experiments.recording.columns import part, parts, seconds, shown, time_columns
 from experiments.recording.iteration_charts import send_iterations
 from experiments.recording.lanes import Lanes, mask_states
 from experiments.recording.layouts import tabs
@@ -100,7 +100,8 @@ class Layer:
             for kind, (samples, curves) in kinds.items():
                 path, colors = f"{self._at}/{name}/{kind}", kind_colors(kind, len(self._joints))
                 self.stream.style(path, [f"{kind} {joint}" for joint in self._joints], colors)
-                self.stream.curves(path, time_columns(samples / log.fs, log.fs), curves.T)
+                kept = shown(0, len(samples), log.fs / float(np.diff(samples[:2], append=samples[-1:] + 1)[0]))
+                self.stream.curves(path, time_columns(samples[kept] / log.fs, log.fs), curves.T[kept])
         lanes, weight = Lanes(self.stream, log.fs), self._signals.weight
         for joint, of_joint in zip(self._joints, weight, strict=True):
             lanes.send(f"{self._at}/mask/{joint}", log.t, mask_states(of_joint))

@@ -9,7 +9,7 @@ import rerun as rr
 from experiments.recording.arm import Arm
 from experiments.recording.audience import Audience
 from experiments.recording.chart import send_keys
-from experiments.recording.columns import Times, parts, seconds, time_columns
+from experiments.recording.columns import POSES, Times, parts, seconds, shown, time_columns
 from experiments.recording.lanes import Lanes, joint_states
 from experiments.recording.layouts import tabs
 from experiments.recording.stream import Stream
@@ -55,7 +55,7 @@ class Base:
         self.stream, self._audience = Stream(name, audience), audience
         self.inner: Stream | None = None
         self.live: LiveIdentification | None = None
-        self._shown = 0
+        self._shown, self._window = 0, (np.inf, -np.inf)
         self._joints, self._fs, self._roles, self._slow = parts(robot.joints), fs, roles, slow_speed(qd.T)
         for number, joint in enumerate(self._joints):  # for layouts, which see entities alone, in the order of their names
             self.stream.keep(f"joints/{number:03}/{joint}", rr.TextDocument(joint))
@@ -71,9 +71,9 @@ class Base:
         signals, t = _signals(stretch), (stretch.first + np.arange(len(stretch.q))) / self._fs
         if stretch.electric is not None:
             signals |= {f"drive/{name}": getattr(stretch.electric, name) for name in ELECTRIC}
-        self._accelerate(t, stretch.qd)
         if stretch.inner is not None:
             self.inside(stretch.inner)
+        self._accelerate(t, stretch.qd)
         if self.live:
             self.live.grow(stretch.measured, stretch.logged)
         poses = {"true": stretch.q, "planned": stretch.reference.q, "measured": stretch.measured}
@@ -97,10 +97,12 @@ class Base:
             Share of each sample for which a drive was at a limit of its.
         """
         t = (first + np.arange(len(qd))) / self._fs
-        times = time_columns(t, self._fs)
+        kept, seen = self._kept(first, t), shown(first, len(qd), self._fs, POSES)
+        times = time_columns(t[kept], self._fs)
         for path, values in signals.items():
-            self._curves(self.stream, path, times if path in LOGGED else times[:1], values)
-        self._arm.move(times[:1], poses)
+            self._curves(self.stream, path, times if path in LOGGED else times[:1], values[kept])
+        if seen.any():
+            self._arm.move([seconds(t[seen])], {role: q[seen] for role, q in poses.items()})
         for j, joint in enumerate(self._joints):
             states = joint_states(qd[:, j], self._slow[j], None if limited is None else limited[:, j], self._turning[j])
             self._lanes.send(f"state/{joint}", t, states)
@@ -148,11 +150,17 @@ class Base:
         t, qd = np.concatenate([self._before[0], t]), np.concatenate([self._before[1], qd])
         self._before = t[-1:], qd[-1:]
         if len(t) > 1:
-            middle = [seconds((t[1:] + t[:-1]) / 2)]
-            self._curves(self.stream, "qdd/true", middle, np.diff(qd, axis=0) * self._fs)
+            kept = self._kept(round(t[0] * self._fs), t[:-1])
+            middle = [seconds(((t[1:] + t[:-1]) / 2)[kept])]
+            self._curves(self.stream, "qdd/true", middle, (np.diff(qd, axis=0) * self._fs)[kept])
+
+    def _kept(self, first: int, t: Array) -> np.typing.NDArray[np.bool_]:
+        """Return which samples are recorded: as many as can be seen, and all where the inside of the loop is recorded, too."""
+        return shown(first, len(t), self._fs) | ((t >= self._window[0]) & (t <= self._window[1]))
 
     def inside(self, inner: Inner) -> None:
         """Send signals inside the loop, in a layer of their own."""
+        self._window = min(self._window[0], inner.t[0]), max(self._window[1], inner.t[-1])
         if self.inner is None:
             self.inner = Stream(self.stream.name, self._audience, layer=True)
         times = [seconds(inner.t)]

@@ -8,6 +8,7 @@ from rerun.chunk import RrdReader
 
 from experiments.recording.audience import Audience
 from experiments.recording.chart import SQUARE
+from experiments.recording.columns import shown
 from experiments.recording.identification_recording import RunRecording
 from identify import measured_state
 from sim.robot.scene import motion, shapes
@@ -207,3 +208,12 @@ def test_the_same_scenario_has_the_same_id_and_another_seed_another(recorded, re
     ids = [RunRecording(from_dict(reading.SCENARIO | {"seed": seed})).base.stream.name for seed in (0, 0, 1)]
     assert ids[0] == ids[1] == recorded.streams[0][1].name
     assert ids[2] != ids[0]
+
+
+def test_fast_logs_are_thinned_out_to_what_can_be_seen():
+    """125 points a second at least, of any rate, wherever a stretch begins; all of them at up to twice that."""
+    for fs in (50.0, 100.0, 249.0, 250.0, 500.0, 1000.0, 5000.0):
+        whole = shown(0, 10_000, fs)
+        assert whole.sum() >= min(fs, 125.0) / fs * 10_000
+        assert whole.all() == (fs < 250)
+        np.testing.assert_array_equal(np.concatenate([shown(0, 333, fs), shown(333, 9667, fs)]), whole)
