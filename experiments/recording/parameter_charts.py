@@ -1,6 +1,6 @@
 """Charts of estimates: every parameter with its interval beside the truth, and how well W tells them apart."""
 
-from math import ceil
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -11,10 +11,11 @@ from experiments.recording.columns import part
 from experiments.recording.scales import Signed, decades, linear, listed
 from experiments.recording.stream import Stream
 from experiments.style import GREY, model_color
+from experiments.text import percentage
 from identify import Array
 
 MOST = 13
-"""Parameters of a chart."""
+"""Parameters of a single chart; more have a chart for each joint."""
 
 SIGMAS = 2.0
 """Half the length of an interval."""
@@ -24,29 +25,41 @@ ASIDE = 0.22
 
 
 def send_parameters(stream: Stream, at: str, fit: Fit, number: int = 0) -> None:
-    """Send every parameter's error, or its deviation from the first model's, with its interval; and the singular values."""
-    names = [f"{name} = 0" if x == 0 else name for name, x in zip(fit.basis.names, _reference(fit), strict=True)]
-    scale = _scale(fit)
-    for k, members in enumerate(_parts(fit)):
-        mine = [names[p] for p in members]
-        place = f"{at}/parameters/{k}_{part(fit.basis.names[members[0]])}_to_{part(fit.basis.names[members[-1]])}"
-        chart = Chart(stream, place, scale, listed("", mine), SQUARE)
+    """Send every parameter's error, or its deviation from the first model's, in standard errors; and the singular values."""
+    reference, unit = _reference(fit), next(iter(fit.estimates.values())).best_sigma
+    relative = 100 * unit / np.where(reference == 0, np.nan, np.abs(reference))
+    off = {form: (estimate.X - reference) / unit for form, estimate in fit.estimates.items()}
+    reach = {form: SIGMAS * estimate.best_sigma / unit for form, estimate in fit.estimates.items()}
+    scale = _scale(fit, [np.abs(off[form]) + reach[form] for form in off])
+    for k, (title, members) in enumerate(_parts(fit, np.nan_to_num(relative, nan=np.inf))):
+        names = [_label(fit.basis.names[p], relative[p]) for p in members]
+        chart = Chart(stream, f"{at}/parameters/{k:02}/{part(title)}", scale, listed("", names), SQUARE)
         ends = np.array([-0.5, len(members) - 0.5])
         chart.line("true" if fit.truth else next(iter(fit.estimates)), np.zeros(2), ends, GREY, listed=False)
-        for i, (form, estimate) in enumerate(fit.estimates.items()):
-            off, sigma = _deviation(fit, estimate.X)[members], _in_percent(fit, estimate.best_sigma)[members]
+        for i, form in enumerate(fit.estimates):
+            x, half = off[form][members], reach[form][members]
             y = np.arange(float(len(members))) + ASIDE * (i - (len(fit.estimates) - 1) / 2)
             color = model_color(form, number)
-            reach = np.stack([off - SIGMAS * sigma, off + SIGMAS * sigma], axis=1)
-            chart.segments(form, reach, np.stack([y, y], axis=1), color, 1.5)
-            chart.marks(form, off, y, color, SYMBOLS[i % len(SYMBOLS)])
+            chart.segments(form, np.stack([x - half, x + half], axis=1), np.stack([y, y], axis=1), color, 1.5)
+            chart.marks(form, x, y, color, SYMBOLS[i % len(SYMBOLS)])
     _singular_values(stream, at, fit, number)
 
 
-def _parts(fit: Fit) -> list[npt.NDArray[np.intp]]:
-    """Return the parameters of each chart, by joints."""
-    order = sorted(range(len(fit.basis.names)), key=lambda p: fit.basis.parameters[p].joint or 0)
-    return np.array_split(np.array(order, dtype=np.intp), ceil(len(order) / MOST))
+def _label(name: str, relative: float) -> str:
+    """Return a parameter with its %sigma."""
+    return f"{name} {percentage(relative)} %" if np.isfinite(relative) else f"{name} = 0"
+
+
+def _parts(fit: Fit, relative: Array) -> Iterator[tuple[str, npt.NDArray[np.intp]]]:
+    """Yield title and parameters of each chart: all of few; of many those of each joint, the least certain first."""
+    every = np.arange(len(fit.basis.names))
+    if len(every) <= MOST:
+        yield "all", every
+        return
+    joints = np.array([parameter.joint or 0 for parameter in fit.basis.parameters])
+    for j in np.unique(joints):
+        mine = every[joints == j]
+        yield fit.subject.robot.joints[j], mine[np.argsort(-relative[mine], kind="stable")]
 
 
 def _reference(fit: Fit) -> Array:
@@ -54,25 +67,12 @@ def _reference(fit: Fit) -> Array:
     return np.array(list(fit.truth.values())) if fit.truth else next(iter(fit.estimates.values())).X
 
 
-def _in_percent(fit: Fit, values: Array) -> Array:
-    reference = np.abs(_reference(fit))
-    return 100 * values / np.where(reference == 0, np.nan, reference)
-
-
-def _deviation(fit: Fit, X: Array) -> Array:
-    return _in_percent(fit, X - _reference(fit))
-
-
-def _scale(fit: Fit) -> Signed:
-    """Return an axis for all parameters, linear up to what the best of them is sure of."""
-    sigmas = [SIGMAS * _in_percent(fit, estimate.best_sigma) for estimate in fit.estimates.values()]
-    off = [_deviation(fit, estimate.X) for estimate in fit.estimates.values()]
-    every = np.concatenate([np.abs(x) + s for x, s in zip(off, sigmas, strict=True)])
-    every = every[np.isfinite(every) & (every > 0)]
-    low, high = (float(every.min()), float(every.max())) if len(every) else (1.0, 1.0)
-    bend = 10.0 ** np.floor(np.log10(max(low, high * 1e-6)))
-    what = "error" if fit.truth else f"difference from {next(iter(fit.estimates))}"
-    return Signed(f"{what} [%], and two sigma; beyond {bend:g} in decades", -1.3 * high, 1.3 * high, bend)
+def _scale(fit: Fit, farthest: Sequence[Array]) -> Signed:
+    """Return an axis for all parameters, in standard errors of the first model."""
+    first, every = next(iter(fit.estimates)), np.concatenate(farthest)
+    high = 1.3 * max(2 * SIGMAS, float(np.max(every, where=np.isfinite(every), initial=0.0)))
+    what = "error" if fit.truth else f"difference from {first}"
+    return Signed(f"{what} / sigma of {first}; bars: 2 sigma", -high, high, 1.0)
 
 
 def _singular_values(stream: Stream, at: str, fit: Fit, number: int) -> None:

@@ -160,7 +160,7 @@ def iterations(shelf: Shelf) -> Part:
 
 def parameters(shelf: Shelf) -> Part:
     """Return every parameter with its interval beside the truth, and how every estimate comes about."""
-    found = charts(shelf, "{1}: parameters {3}", "identify/*/parameters/*", SQUARE)
+    found = charts(shelf, "{1}: {4}", "identify/*/parameters/*/*", SQUARE, 0.2)
     names = sorted(shelf.last("identify/*/*/estimate/*"), key=_order)
     table, running = text(shelf, "identify/*/report"), _estimates(shelf, names) if names else None
     if not found:  # of a log that still grows
@@ -168,7 +168,7 @@ def parameters(shelf: Shelf) -> Part:
     if len(found) == len(shelf.methods):  # few parameters: everything beside each other
         shown = tabbed([grid("all", found, 1), table], "estimates")
         return side_by_side("parameters", shown, running, shares=[1, 1])
-    return tabbed([grid("all", found, 3), running, table], "parameters")
+    return tabbed([grid("all", found, 3 if len(found) <= 2 * FEW else 4), running, table], "parameters")
 
 
 def _in_grid(name: str, parts: Sequence[Part]) -> Part:
