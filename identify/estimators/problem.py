@@ -12,7 +12,9 @@ from identify.arrays import Array
 from identify.basis.basis import Basis
 from identify.data.motion_log import MotionLog
 from identify.errors import IdentificationError, LogError
+from identify.estimators.given_logs import require_logs, same_form
 from identify.estimators.log_rows import LogRows
+from identify.estimators.long_problem import Piece, bias_counts, pieces
 from identify.estimators.simulator import Simulation
 from identify.models.explicit import ExplicitModel
 from identify.models.model import AbstractModel
@@ -22,22 +24,16 @@ from identify.noise.restricted_likelihood import likely, likely_levels
 from identify.noise.row_weights import floor_of, reciprocal_root
 from identify.noise.spectral_levels import position_noise, spectral_levels
 from identify.rows.chain import Chain
-from identify.rows.factors import Factor, Factors, Fit, triangular
-from identify.rows.long_logs import is_long, piece_of
+from identify.rows.factors import Factors, Fit, triangular
+from identify.rows.long_logs import is_long
 from identify.rows.rows import Rows
 from identify.signals.signals import Signals
 
 Weights = Literal["measured", "own"]
 Reduced = TypeVar("Reduced")
 
-ROUNDING = 1e-9
-"""Share by which frequencies may differ that are the same: of a file they are the mean of its steps."""
-
 SAMPLED = 8
 """Pieces of long logs from which noise is estimated and propagated."""
-
-MOVED = 0.02
-"""Sigma by which what noise adds to W may move an estimate of long logs for it to be left there."""
 
 BEGIN, LEAST = (1.0, 0.1, 0.1), 1e-4
 """Shares of the errors of rows of which one kind is not alike, to begin with, and at least."""
@@ -70,9 +66,7 @@ class Problem:
     _explicit: "Problem | None" = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        if not self.logs:
-            raise LogError("there is no log to identify")
-        _require_logs(self.logs)
+        require_logs(self.logs)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -165,7 +159,7 @@ class Problem:
         """The triangular factor of the rows made independent, W without what noise adds to it, shape (..., p + 1, p + 1)."""
         if not self.long:
             return triangular(np.concatenate([part.whitening.whiten(part.unbiased.joined) for part in self.parts], axis=-2))
-        biased = self._biased
+        biased = bias_counts(self.parts, self.names, self.share)
 
         def factor(part: LogRows) -> Array:
             return triangular(part.whitening.whiten((part.unbiased if biased else part.rows).joined))
@@ -253,9 +247,8 @@ class Problem:
         """
         self.require_rows("rows at another log need those of this one, and ")
         logs = [log] if isinstance(log, MotionLog) else list(log)
-        _require_logs(logs)
-        alike = len(logs) == len(self.logs) and all(map(_alike, logs, self.logs))
-        if not alike:
+        require_logs(logs)
+        if len(logs) != len(self.logs) or not all(map(same_form, logs, self.logs)):
             raise LogError(
                 "rows at other logs need one log for each of the problem's, of the same length, frequency and joints"
             )
@@ -289,25 +282,8 @@ class Problem:
         return self.chain.rows(signals, self.basis, self.model)
 
     @cached_property
-    def _pieces(self) -> list[tuple[Chain, MotionLog, tuple[int, int]]]:
-        """The chain, its mask suited to the whole log, the log, first sample and end of every piece of long logs."""
-        suited = [replace(self.chain, mask=self.chain.mask.suited(_speeds(log, self.chain))) for log in self.logs]
-        each = zip(suited, self.logs, strict=True)
-        return [(chain, log, piece) for chain, log in each for piece in chain.pieces(log, piece_of(log))]
-
-    @cached_property
-    def _biased(self) -> bool:
-        """Whether what noise adds to W moves the estimate of long logs, as some pieces show, by anything that counts."""
-        plain, better = (
-            Factor(triangular(np.concatenate([part.whitening.whiten(each) for part, each in rows])), np.array(0), self.names)
-            for rows in (
-                [(part, part.rows.joined) for part in self.parts],
-                [(part, part.unbiased.joined) for part in self.parts],
-            )
-        )
-        known = np.array(plain.determined & better.determined)
-        sigma = np.sqrt(np.diagonal(better.inverse(known)) * self.share)
-        return not (np.abs(plain.solution(known) - better.solution(known)) < MOVED * sigma).all()
+    def _pieces(self) -> list[Piece]:
+        return pieces(self.chain, self.logs)
 
     def _of_pieces(self, reduced: Callable[[LogRows], Reduced]) -> list[Reduced]:
         """Return what is made of every piece of long logs; the plain factors of their rows are made in passing."""
@@ -317,20 +293,3 @@ class Problem:
             found.append(reduced(part))
         self.__dict__.setdefault("factors", Factors.merged(plain))
         return found
-
-
-def _speeds(log: MotionLog, chain: Chain) -> Array:
-    """Return the velocities of a log, shape (joint, time), without anything else that its signals keep."""
-    q = chain.prefilter.apply(np.ascontiguousarray(np.swapaxes(log.q, -1, -2)), log.fs)
-    return chain.differentiator.derivative(q, log.fs)
-
-
-def _alike(one: MotionLog, other: MotionLog) -> bool:
-    """Return whether two logs have the same samples, joints and, but for rounding, frequency."""
-    return one.q.shape[-2:] == other.q.shape[-2:] and abs(one.fs / other.fs - 1) < ROUNDING
-
-
-def _require_logs(logs: Sequence[object]) -> None:
-    for log in logs:
-        if not isinstance(log, MotionLog):
-            raise LogError(f"{log!r:.60} is given where a MotionLog is needed, such as read_log(path)")
