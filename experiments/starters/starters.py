@@ -63,6 +63,15 @@ def new_study(name: str, out: Path) -> None:
     _write(out, {"": _rendered("study.toml.j2", {"name": _checked(name)})})
 
 
+def new_example(name: str, out: Path) -> None:
+    """Write an arm and two of its logs into a new folder; raise ExperimentError if that is not possible."""
+    from experiments.starters.example import example_files
+
+    _checked(name)
+    _require_free(out)
+    _write(out, example_files())
+
+
 def new_plugin(name: str, kind: str, out: Path) -> None:
     """Write the package of a plug-in that installs and keeps its contract.
 
@@ -103,10 +112,14 @@ def _rendered(template: str, words: Mapping[str, str]) -> str:
     return made.from_string(text).render(words)
 
 
-def _write(out: Path, contents: Mapping[str, str]) -> None:
-    """Write files into a new folder, or a new file if there is but one without a name."""
+def _require_free(out: Path) -> None:
     if out.exists():
         raise ExperimentError(f"{out} exists: choose another name, or --out")
+
+
+def _write(out: Path, contents: Mapping[str, str]) -> None:
+    """Write files into a new folder, or a new file if there is but one without a name."""
+    _require_free(out)
     try:
         with hidden_folder(folder_for(out.absolute().parent, "--out")) as hidden:
             for name, text in contents.items():

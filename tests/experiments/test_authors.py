@@ -99,3 +99,17 @@ def test_what_cannot_be_begun_or_checked_is_refused(here, capsys):
 def test_alone_it_says_what_there_is_to_do_in_ten_lines(capsys):
     assert main([]) == 0
     assert len([line for line in capsys.readouterr().out.splitlines() if line.strip()]) <= 10
+
+
+@pytest.mark.thorough
+def test_an_example_is_an_arm_with_two_logs_that_agree(here, capsys):
+    """As README types it: one is fitted, the other validates; a folder that is there stays as it is."""
+    assert main(["new", "example", "mine"]) == 0
+    assert "idbench identify mine/log.csv --robot mine/arm.xml" in capsys.readouterr().out
+    assert sorted(path.name for path in (here / "mine").iterdir()) == ["arm.xml", "log.csv", "second.csv"]
+    words = ["--robot", "mine/arm.xml", "--torque", "held", "--torque-delay", "estimate", "--validate", "mine/second.csv"]
+    assert main(["identify", "mine/log.csv", *words]) == 0
+    last = capsys.readouterr().out.strip().splitlines()[-1]
+    assert last.startswith("Result: good (explicit model)")
+    assert main(["new", "example", "mine"]) == 2
+    assert "mine exists" in capsys.readouterr().err

@@ -6,21 +6,27 @@ from rich.text import Text
 
 from experiments.cli.options.authors import Check, New
 from experiments.cli.page import new_page
+from experiments.cli.progress import stages_of
 from experiments.contracts.contract import Example
 from experiments.contracts.contracts import found, keeps
 from experiments.errors import ExperimentError
-from experiments.starters.starters import new_plugin, new_scenario, new_study
+from experiments.starters.starters import new_example, new_plugin, new_scenario, new_study
 
 
 def begin(options: New) -> None:
     """Write what to start from."""
-    page, out = new_page(), options.out or Path(options.name if options.what == "plugin" else f"{options.name}.toml")
+    folder = options.what in ("plugin", "example")
+    page, out = new_page(), options.out or Path(options.name if folder else f"{options.name}.toml")
     if options.what == "scenario":
         new_scenario(options.name, options.like, out)
         how = f"uv run idbench run {out}"
     elif options.what == "study":
         new_study(options.name, out)
         how = f"uv run idbench study {out}"
+    elif options.what == "example":
+        with stages_of("simulating an arm"):
+            new_example(options.name, out)
+        how = f"uv run idbench identify {out / 'log.csv'} --robot {out / 'arm.xml'} --torque held --torque-delay estimate"
     else:
         new_plugin(options.name, options.kind, out)
         how = f"uv pip install -e {out}, then: uv run idbench check {options.name}"

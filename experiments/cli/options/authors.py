@@ -14,9 +14,9 @@ from experiments.option_types import File, Json
 @final
 @dataclass(frozen=True)
 class New(Command, action="authors:begin"):
-    """Create a scenario, a study, or a plug-in package: a commented template that runs."""
+    """Create a scenario, a study, or a plug-in package: a commented template that runs; or an example: an arm and its logs."""
 
-    what: tyro.conf.Positional[Literal["scenario", "study", "plugin"]]
+    what: tyro.conf.Positional[Literal["scenario", "study", "plugin", "example"]]
     """What to create."""
     name: tyro.conf.Positional[str]
     """Its name."""
