@@ -150,8 +150,9 @@ def print_held_out(console: Console, one: HeldOut | Unjudged, whole: Sequence[st
     apart = [f"{joint} {rms:.2g}" for joint, rms in zip(joints, first.standing, strict=True) if isfinite(rms)]
     if apart:
         console.print(Text(f"at rest and reversing, where friction is not determined: {', '.join(apart)} N m"), soft_wrap=True)
-    for words, models in _alike({model: (v.word, *v.reasons) for model, v in one.verdicts.items()}).items():
-        console.print(Text(f"{', '.join(models)}: {words[0]}: {'; '.join(words[1:])}"), soft_wrap=True)
+    for words, (model, *others) in _alike({model: (v.word, *v.reasons) for model, v in one.verdicts.items()}).items():
+        same = f" ({', '.join(others)}: the same)" if others else ""
+        console.print(Text(f"{model}: {words[0]}: {'; '.join(words[1:])}{same}"), soft_wrap=True)
     reasons = dict.fromkeys(verdict.unsimulated for verdict in one.verdicts.values() if verdict.unsimulated)
     for why in reasons:
         models = [model for model, verdict in one.verdicts.items() if verdict.unsimulated == why]

@@ -157,7 +157,7 @@ def test_the_last_line_says_what_to_check_first_and_models_alike_are_one(csv, ca
     lines = capsys.readouterr().out.strip().splitlines()
     assert lines[-1].startswith("Result: ")
     assert lines[-1].endswith("next: check the torque's delay")
-    assert any(line.startswith("explicit, implicit: ") for line in lines)
+    assert any(line.startswith("explicit: ") and line.endswith(" (implicit: the same)") for line in lines)
 
 
 def test_a_log_with_a_gap_is_resampled_by_the_command_that_is_told(csv, tmp_path, complaint, monkeypatch):
