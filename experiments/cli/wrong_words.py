@@ -55,7 +55,7 @@ def require_once(words: Sequence[str]) -> None:
 def _said(event: parser.ParseErrorEvent, words: Sequence[str], commands: Mapping[str, type]) -> str:
     """Return what is wrong, and what to type instead."""
     name = words[0]
-    help_ = f"uv run idbench {name} --help" if name in commands else "uv run idbench --help"
+    help_ = f"uv run idbench {name} --help-all" if name in commands else "uv run idbench --help"
     match event:
         case parser.InvalidChoice():
             known = sorted(choice for choice in event.choices if choice != "None")

@@ -73,10 +73,6 @@ class BandedCovariance:
         total[..., : few.shape[-4], :, :, :] += few
         return type(self)(total)
 
-    def scaled(self, factor: Array) -> Self:
-        """Return the covariance times a number for each run, shape (...)."""
-        return type(self)(self.bands * factor[..., None, None, None, None])
-
     def kept(self, rows: npt.NDArray[np.bool_]) -> Self:
         """Return the covariance with zeros for rows that are not kept, shape (..., r)."""
         lags, count, kinds = self.bands.shape[-4:-1]
