@@ -66,7 +66,7 @@ def test_every_plugin_is_in_its_table(root):
 def test_the_causes_in_the_docs_are_those_computed(root, table1):
     from experiments.paper.causes import causes
 
-    text = (root / "docs" / "table1.md").read_text()
+    text = (root / "docs" / "appendix.md").read_text()
     for name, worst in causes(table1):
         cells = [f"{error:.1g}" for w in worst.values() for error in (w.inertia, w.friction)]
         if name == "all three":
@@ -76,7 +76,7 @@ def test_the_causes_in_the_docs_are_those_computed(root, table1):
 
 
 def pages(root):
-    return re.findall(r"```python\n(.*?)```", (root / "docs" / "your-own-log.md").read_text(), re.DOTALL)
+    return re.findall(r"```python\n(.*?)```", (root / "docs" / "python.md").read_text(), re.DOTALL)
 
 
 @pytest.mark.thorough
@@ -84,7 +84,7 @@ def test_the_recipe_for_a_log_in_csv_works(root, tmp_path, table1):
     log = table1.log
     columns = np.column_stack([log.t, log.q, log.tau])
     np.savetxt(tmp_path / "log.csv", columns, delimiter=",", header="t,q1,q2,tau1,tau2", comments="")
-    recipe = pages(root)[0].replace('"held", delay=0.002', '"instantaneous"')
+    recipe = pages(root)[1].replace('"held", delay=0.002', '"instantaneous"')
     done = subprocess.run([sys.executable, "-c", recipe], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     printed = {line.split()[0]: float(line.split()[1]) for line in done.stdout.splitlines()[1:9]}
@@ -94,7 +94,7 @@ def test_the_recipe_for_a_log_in_csv_works(root, tmp_path, table1):
 def test_the_pendulum_of_the_docs_is_identified_by_all_models(root):
     """Its torque is written down here once more, by hand."""
     page = {}
-    exec(compile(pages(root)[1], "your-own-log.md", "exec"), page)
+    exec(compile(pages(root)[-1], "python.md", "exec"), page)
     t = np.arange(6000) / 100
     q = 0.9 * np.sin(2 * t) + 0.6 * np.sin(3.1 * t)
     qd = 1.8 * np.cos(2 * t) + 1.86 * np.cos(3.1 * t)

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import is_dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -14,8 +15,8 @@ from mkdocs.structure.files import File, Files
 ROOT = Path(__file__).parent.parent.parent
 
 COMMANDS = (
-    *("table1", "table2", "run", "view", "identify", "log", "robot", "excite", "study", "scenario", "new", "check", "list"),
-    *("resample", "export", "search"),
+    *("run", "view", "identify", "table1", "table2", "log", "robot", "excite", "payload", "gains", "study", "scenario", "new"),
+    *("check", "list", "resample", "export", "search"),
 )
 """In the order in which people meet them."""
 
@@ -30,21 +31,37 @@ def on_files(files: Files, config: Any) -> Files:
     """Add the pages that are made of the code."""
     sys.path[:0] = [str(ROOT), str(Path(__file__).parent)]
     from notebooks import pages as notebook_pages
+    from site_recordings import recordings
 
     made = {"reference/commands.md": commands(), "reference/settings.md": "\n".join(settings())}
-    made |= {"reference/identify.md": "\n".join(package("identify")), "reference/sim.md": "\n".join(simulator())}
+    made |= {"reference/names.md": "\n".join([*package("identify"), *simulator()])}
     made |= notebook_pages()
     for path, text in made.items():
         files.append(File.generated(config, path, content=text))
+    for place, path in (viewer_files() | recordings()).items():
+        files.append(File.generated(config, place, abs_src_path=str(path)))
     return files
+
+
+def viewer_files() -> dict[str, Path]:
+    """Return the files of rerun's viewer for browsers, by their place in the site."""
+    static = Path(str(find_spec("rerun_notebook").submodule_search_locations[0])) / "static"
+    return {f"viewer/{name}": static / name for name in ("widget.js", "re_viewer_bg.wasm")}
 
 
 def commands() -> str:
     """Return what every command says of itself."""
-    pages = ["# Commands\n\n`idbench COMMAND --help`, as it is printed. `uv run idbench` runs it from a clone."]
-    for name in COMMANDS:
-        pages.append(f"## {name}\n\n```text\n{_help(name)}\n```")
+    pages = ["# Commands\n\n`idbench COMMAND --help-all`, as it is printed. `uv run idbench` runs it from a clone.\n"]
+    helps = {name: _help(name) for name in COMMANDS}
+    pages[0] += "\n| command | what it does |\n|---|---|\n"
+    pages[0] += "\n".join(f"| [{name}](#{name}) | {_summary(text)} |" for name, text in helps.items())
+    pages += [f"## {name}\n\n```text\n{text}\n```" for name, text in helps.items()]
     return "\n\n".join(pages)
+
+
+def _summary(text: str) -> str:
+    """Return the first sentence of a help text, between the usage and the options."""
+    return " ".join(text.split("\n\n")[1].split()).split(". ")[0].rstrip(".").replace("|", "&#124;") + "."
 
 
 def _help(name: str) -> str:
@@ -109,7 +126,8 @@ def package(name: str) -> Iterator[str]:
 
     named = {key: value for key, value in vars(identify).items() if not key.startswith("_")}
     public = [key for key, value in named.items() if not isinstance(value, ModuleType)]
-    yield f"# {name}\n\nWhat `from {name} import ...` has. Shapes and units stand in [ ]; equation numbers are the paper's.\n"
+    yield f"# {name}\n\nWhat `from {name} import ...` has, and [what of sim](#sim). Shapes and units are in [ ]; equation numbers are the paper's.\n"
+    yield "Notebooks: [the paper's comparison](../notebooks/comparison.md), [identify your arm](../notebooks/your-arm.md).\n"
     taken = set[str]()
     for title, names in KINDS_OF_NAMES:
         taken |= set(names)
@@ -125,7 +143,7 @@ def package(name: str) -> Iterator[str]:
 
 def simulator() -> Iterator[str]:
     """Yield what of the simulator other programs use."""
-    yield "# sim\n\nThe virtual robot. Its settings are on [a page of their own](settings.md).\n"
+    yield "# sim\n\nThe virtual robot: `from sim import load_robot, load_scenario, run, Robot, kinematic_tree`.\n"
     yield "\n".join(
         f"::: {name}\n"
         for name in (

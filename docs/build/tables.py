@@ -20,7 +20,7 @@ from results import DOCS, RESULTS, Cell, Column, by_settings, cells, coverage, k
 from reversal_tables import reversals
 
 sys.path.insert(0, str(DOCS.parent))
-PAGES = ("answers.md", "any-arm.md", "estimators.md", "excitation.md", "noise.md", "table2.md")
+PAGES = ("answers.md", "any-arm.md", "estimators.md", "excitation.md", "noise.md", "appendix.md")
 MARK = re.compile(r"<!-- table: ([\w-]+) -->\n.*?<!-- end -->", re.DOTALL)
 
 I, P = "idbench", "paper"
