@@ -49,11 +49,23 @@ class Picture:
     at: float = 0.3
 
 
+@dataclass(frozen=True)
+class Movie(Picture):
+    """A moving picture: from one share of the time to another, in so many frames."""
+
+    until: float = 0.4
+    frames: int = 36
+
+
 DELAY = ("run delay --out OUT", "identify OUT --torque held --torque-delay 0 --label no-delay")
 COGGING = ("run ripple --out OUT --inner 10 10.004",)
 GAIN = ("run gain --out OUT",)
 
+MILLISECONDS = 120
+"""Time of a frame [ms]."""
+
 PICTURES = {
+    "delay": Movie(DELAY, "", 0.3, until=0.42),
     "recording-overview": Picture(("run quantization --out OUT",)),
     "recording-filters": Picture(("run quantization --out OUT",), "filters"),
     "recording-excitation": Picture(("run quantization --out OUT",), "excitation"),
@@ -85,7 +97,7 @@ def make(names: list[str]) -> None:
                     if idbench(command.replace("OUT", str(out)).split()):
                         sys.exit(f"{command} failed")
             with viewer(Path(folder)) as client:  # one a picture: a viewer keeps the layout that it opens first
-                take(client, done[picture.commands], picture, DOCS / f"{name}.png")
+                take(client, done[picture.commands], picture, DOCS / name)
             if (report := done[picture.commands] / "report.html").is_file():
                 photograph(report, DOCS / f"{picture.commands[0].split()[0]}.png")
 
@@ -100,7 +112,7 @@ def called(name: str, picture: Picture) -> str:
 
 def take(client, out: Path, picture: Picture, path: Path) -> None:  # type: ignore[no-untyped-def]
     """Open a recording and write what is seen, once it has stopped changing."""
-    one = out / f"{path.stem}.rrd"
+    one = out / f"{path.name}.rrd"
     folders = [str(out)] if (out / "summary.json").is_file() else sorted(str(run) for run in out.iterdir() if run.is_dir())
     if idbench(["view", *folders, "--tab", picture.tab, "--save", str(one)]):
         sys.exit(f"{one} cannot be written")
@@ -109,17 +121,30 @@ def take(client, out: Path, picture: Picture, path: Path) -> None:  # type: igno
         time.sleep(0.2)
     (shown,) = state.recordings
     client.set_location(shown.location)
-    for timeline in shown.timelines:  # a study has none
-        if timeline.name == "sim_time":
-            now = np.timedelta64(timeline.start + int(picture.at * (timeline.end - timeline.start)), "ns")
-            client.set_time("sim_time", duration=now, play_state="paused")
-    start, last, image = time.monotonic(), b"", client.take_screenshot(max_size=1600)
-    while time.monotonic() - start < 15 and (image != last or time.monotonic() - start < 4):
-        time.sleep(0.5)  # axes fit themselves over some frames, and notices fade; some views never rest
-        last, image = image, client.take_screenshot(max_size=1600)
-    Image.open(BytesIO(image)).convert("RGB").quantize(256, kmeans=1).save(path, optimize=True)
+    span = next(((line.start, line.end) for line in shown.timelines if line.name == "sim_time"), None)  # a study has none
+    if isinstance(picture, Movie):
+        assert span is not None
+        shares = np.linspace(picture.at, picture.until, picture.frames)
+        frames = [_still(client, span, share, 15 if share == picture.at else 1) for share in shares]
+        small = [frame.resize((1120, 630)) for frame in frames]
+        small[0].save(path.with_suffix(".webp"), save_all=True, append_images=small[1:], duration=MILLISECONDS, loop=0, quality=60)
+    else:
+        image = _still(client, span, picture.at, 15)
+        image.quantize(256, kmeans=1).save(path.with_suffix(".png"), optimize=True)
     complaints = [f"{view.name}: {report.summary}" for view in client.get_state().views for report in view.reports]
     print(f"{path.name}: {', '.join(complaints) or 'no complaints'}")
+
+
+def _still(client, span: tuple[int, int] | None, share: float, patience: float) -> Image.Image:  # type: ignore[no-untyped-def]
+    """Return what is seen at a share of the time, once it rests: axes fit themselves over some frames, and notices fade."""
+    if span:
+        now = np.timedelta64(span[0] + int(share * (span[1] - span[0])), "ns")
+        client.set_time("sim_time", duration=now, play_state="paused")
+    start, last, image = time.monotonic(), b"", client.take_screenshot(max_size=1600)
+    while time.monotonic() - start < patience and (image != last or time.monotonic() - start < patience / 4):
+        time.sleep(min(0.5, patience / 4))
+        last, image = image, client.take_screenshot(max_size=1600)
+    return Image.open(BytesIO(image)).convert("RGB")
 
 
 def photograph(page: Path, path: Path) -> None:

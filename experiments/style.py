@@ -7,13 +7,13 @@ Color = Sequence[int]
 JOINTS: tuple[Color, ...] = (
     (31, 119, 180),
     (255, 127, 14),
-    (44, 160, 44),
-    (214, 39, 40),
-    (148, 103, 189),
-    (140, 86, 75),
+    (23, 190, 207),
     (227, 119, 194),
+    (188, 189, 34),
+    (140, 86, 75),
+    (135, 150, 185),
 )
-"""Colours of the joints' curves; the first two are those of the SCARA's links."""
+"""Colours of the joints' curves, none of which is a model's; the first two are those of the SCARA's links."""
 
 GREY: Color = (150, 150, 150)
 """What was measured, the truth, and marks."""
@@ -22,15 +22,15 @@ FORMS: dict[str, Color] = {
     "explicit": (44, 160, 44),
     "implicit": (148, 103, 189),
     "power": (214, 39, 40),
-    "energy": (140, 86, 75),
+    "energy": (0, 110, 90),
 }
 """Colours of the models."""
 
 AGAIN: dict[str, tuple[Color, ...]] = {
     "explicit": ((190, 230, 120), (0, 150, 150)),
     "implicit": ((215, 190, 240), (90, 100, 230)),
-    "power": ((255, 175, 120), (255, 110, 200)),
-    "energy": ((210, 170, 140), (240, 200, 60)),
+    "power": ((250, 150, 150), (170, 20, 60)),
+    "energy": ((120, 190, 170), (0, 70, 60)),
 }
 """Colours of the models in a second and a third identification of a log."""
 
@@ -39,9 +39,9 @@ MEASURED: Color = (90, 210, 220)
 """Colours of the planned arm and of that which the encoders see; the true arm has its own."""
 
 STATES: dict[str, Color] = {
-    "slides": (70, 130, 90),
-    "reversal": (200, 150, 50),
-    "stands": (150, 60, 60),
+    "moves": (70, 130, 90),
+    "reverses": (200, 150, 50),
+    "rests": (150, 60, 60),
     "saturated": (230, 60, 200),
     "used": (70, 130, 90),
     "partly": (200, 150, 50),

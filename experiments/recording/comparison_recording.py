@@ -41,6 +41,7 @@ def compare(folders: Sequence[Path], tab: str, out: Path) -> None:
             _send_differences(stream, runs[0], run, shift)
     text = "\n\n".join([*notes, estimates(runs)])
     stream.keep("comparison", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+    stream.keep_sizes()
     stream.arrange(tabs(stream.paths, tab))
     stream.write(out)
 

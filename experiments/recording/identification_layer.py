@@ -82,6 +82,7 @@ class Layer:
             ("noise", noise_table(self._fit, self._joints)),
         ):
             self.stream.keep(f"{self._at}/{name}", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+        self.stream.keep_sizes()
         self.stream.arrange(tabs(self._known | self.stream.paths))
         self.stream.breathe(0.0)
 

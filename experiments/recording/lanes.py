@@ -8,7 +8,7 @@ from experiments.recording.stream import Stream
 from identify import Array
 
 STILL = 0.01
-"""Share of the speed up to which a joint turns, up to which it stands: a 16-bit encoder shows one step of it in 0.1 s."""
+"""Share of the speed up to which a joint reverses, below which it rests: a 16-bit encoder shows one step of it in 0.1 s."""
 
 
 class Lanes:
@@ -37,22 +37,22 @@ class Lanes:
 
 
 def joint_states(qd: Array, slow: float, limited: Array | None, before: float) -> npt.NDArray[np.str_]:
-    """Return what a joint does: it slides, turns or stands, or its drive is at a limit, whatever it does.
+    """Return what a joint does: it moves, reverses or rests, or its drive is at a limit, whatever it does.
 
     Parameters
     ----------
     qd : Array, shape (time,)
         Velocity [rad/s].
     slow : float
-        Speed [rad/s] up to which it turns.
+        Speed [rad/s] up to which it reverses.
     limited : Array, shape (time,), optional
         Share of each sample for which the drive was at its limit of current or voltage.
     before : float
         Velocity one sample before, or 0.
     """
     speed = np.abs(qd)
-    turns = np.concatenate([[before], qd[:-1]]) * qd < 0  # a fast joint turns between two samples
-    states = np.where(speed <= STILL * slow, "stands", np.where(turns | (speed <= slow), "reversal", "slides"))
+    reverses = np.concatenate([[before], qd[:-1]]) * qd < 0  # a fast joint reverses between two samples
+    states = np.where(speed <= STILL * slow, "rests", np.where(reverses | (speed <= slow), "reverses", "moves"))
     return states if limited is None else np.where(limited > 0, "saturated", states)
 
 

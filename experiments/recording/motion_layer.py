@@ -92,7 +92,7 @@ class Base:
         signals, poses : mapping of str to Array, shape (time, joint)
             Curves by their path, and positions [rad] of the arms by their role.
         qd : Array, shape (time, joint)
-            Velocities [rad/s] by which joints count as standing.
+            Velocities [rad/s] by which joints count as at rest.
         limited : Array, shape (time, joint), optional
             Share of each sample for which a drive was at a limit of its.
         """
@@ -132,6 +132,7 @@ class Base:
     def finish(self, text: str) -> None:
         """Send a text about it all, and the layout."""
         self.stream.keep("about", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+        self.stream.keep_sizes()
         self.stream.arrange(tabs(self._paths))
 
     @property

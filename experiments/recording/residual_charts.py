@@ -68,24 +68,25 @@ class ResidualCharts:
     def _color(self, name: str) -> Color:
         return COLORS.get(name) or model_color(name, self.number)
 
-    def _state(self, kind: str, j: int, left: Instants) -> Array:
-        state = left.equations.signals.state
-        return (state.qd if kind == "over_velocity" else state.q)[j, left.inner]
-
     def _over(self, kind: str, j: int, left: Mapping[str, Instants]) -> None:
-        """Send the residual over velocity or position: dots of the first model, and the mean of every one."""
+        """Send the residual over velocity or position: dots of the first model, and the mean of every one.
+
+        Over velocity it is the residual of the rows: at every sample, noise of differentiated positions would hide a delay.
+        Over position it is that of every sample: cogging may be faster than the band of the fit.
+        """
         force, way = self.fit.subject.units(j)
-        leading = next(iter(left.values()))
-        seen, weight = self._state(kind, j, leading), leading.weight[j]
+        if kind == "over_velocity":
+            points = {form: FrictionCurves(self.fit, self.fit.estimates[form].X).residual(j) for form in left}
+        else:
+            points = {f: (x.equations.signals.state.q[j, x.inner], x.residual[j], x.weight[j]) for f, x in left.items()}
+        seen, residual, weight = next(iter(points.values()))
         x = linear(f"qd [{way}/s]" if kind == "over_velocity" else f"q [{way}]", seen)
         edges: Array = np.linspace(seen.min(), seen.max(), BINS[kind] + 1)
         enough = np.histogram(seen[weight > 0], edges)[0] >= FEWEST
-        means = {
-            form: np.where(enough, binned(seen, one.residual[j], one.weight[j], edges), np.nan) for form, one in left.items()
-        }
-        y = linear(f"residual of {self.joints[j]} [{force}]", _most(leading.residual[j][weight > 0]), *means.values())
+        means = {form: np.where(enough, binned(seen, y, w, edges), np.nan) for form, (_, y, w) in points.items()}
+        y = linear(f"residual of {self.joints[j]} [{force}]", _most(residual[weight > 0]), *means.values())
         chart = Chart(self.stream, f"{self.at}/{kind}/{self.joints[j]}", x, y, NARROW)
-        self._dots(chart, seen, leading.residual[j], weight, GREY)
+        self._dots(chart, seen, residual, weight, GREY)
         for form, mean in means.items():
             width = 2.5 if form == next(iter(left)) else 1.2  # models may agree: what is below shows
             chart.line(f"mean, {form}", (edges[1:] + edges[:-1]) / 2, mean, self._color(form), width)

@@ -24,30 +24,34 @@ from identify.basis.body_regressor import KINDS
 
 DIGITS = "0123456789"
 
+LANES = (0.45, 0.22)
+"""Height of a view of lanes, and of each lane in it, in heights of a plot: all lanes are in sight."""
+
 ESTIMATES = 12
 """Plots of estimates that have room beside each other."""
 
 FEW = 3
 """Kinds of row that have room one above the other."""
 
-JOINT_STATES = "green slides, amber turns, red stands, pink saturated"
-MASK_STATES = "green used, amber in part, red masked"
+JOINT_STATES = "green: moves, amber: reverses, red: rests, pink: saturated"
+MASK_STATES = "green: used, amber: partly, red: masked"
 
 
 def overview(shelf: Shelf) -> Part:
     """Return where to begin: the arm, the motion, torques measured and predicted, residuals, parameters."""
-    rows = _rows(shelf)
+    rows, states = _rows(shelf), lanes(shelf, JOINT_STATES, "state/*")
     motion = column(
         plot(shelf, "q [rad]", "q/planned", "q/true") or plot(shelf, "q [rad]", "q/measured"),
         plot(shelf, "qd [rad/s]", "qd/planned", "qd/true"),
         plot(shelf, "torque in the log [N m]", "torque/log") or plot(shelf, "torque commanded [N m]", "torque/command"),
         None if rows else plot(shelf, "tracking error [rad]", "error/tracking"),
         None if rows else plot(shelf, "torque, true - commanded [N m]", "torque/disturbance"),
-        lanes(shelf, JOINT_STATES, "state/*"),
+        states,
+        shares=[1, 1, 1, 1, 1, LANES[0] + LANES[1] * len(shelf.joints)],
     )
     left = column(arm(shelf), text(shelf, "identify/*/estimates") or text(shelf, "about"), shares=[5, 4])
     fits, left_over = column(*_fits(shelf, rows)), column(*residuals(shelf))
-    return side_by_side("overview", left, motion, fits, left_over, shares=[7, 7, 5, 5])
+    return side_by_side("overview", left, motion, fits, left_over, shares=[6, 7, 5, 6])
 
 
 def torques(shelf: Shelf) -> Part:

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import Chunk, RrdReader
@@ -15,6 +16,9 @@ from experiments.style import STATES, Color
 from identify import Array
 
 APPLICATION = "idbench"
+
+SIZES = "rms"
+"""Where the sizes of curves are kept: rms/SMALLEST_LARGEST/PATH."""
 
 
 class Stream:
@@ -35,7 +39,7 @@ class Stream:
 
     def __init__(self, name: str, audience: Audience | None = None, *, layer: bool = False) -> None:
         self.name, self.paths, self._audience = name, set[str](), audience
-        self._draft, self._drafted = False, set[str]()
+        self._draft, self._drafted, self._squares = False, set[str](), dict[str, tuple[int, Array]]()
         self._file = rr.RecordingStream(APPLICATION, recording_id=name, send_properties=not layer)
         self._file.set_log_time_enabled(False)
         self._bytes = rr.binary_stream(self._file)
@@ -92,6 +96,18 @@ class Stream:
     def curves(self, path: str, times: Times, values: Array) -> None:
         """Send values of shape (time, curve) or (time,)."""
         self.send(path, times, scalars(values))
+        if not self._draft:
+            count, squares = self._squares.get(path, (0, np.zeros(1)))
+            columns = np.asarray(values, dtype=np.float64).reshape(len(values), -1)
+            self._squares[path] = count + len(values), squares + np.nansum(columns**2, axis=0)
+
+    def keep_sizes(self) -> None:
+        """Send the rms of the curves so far, as names of entities: layouts see names alone, and an axis may read only 0."""
+        for path, (count, squares) in self._squares.items():
+            if path.startswith("truth/"):
+                continue
+            rms = np.sqrt(squares / max(count, 1))
+            self.keep(f"{SIZES}/{compact(rms.min())}_{compact(rms.max())}/{path}", rr.TextDocument(path))
 
     def curve(self, path: str, times: Times, values: Array, name: str, color: Color, width: float) -> None:
         """Announce one curve, once, and send values of shape (time,)."""
@@ -151,3 +167,8 @@ class Stream:
         if self._live:
             audience.leave(self._live)
             self._live = None
+
+
+def compact(x: float) -> str:
+    """Return a number to two digits, of letters that paths may have."""
+    return f"{x:.2g}".replace("e+0", "e").replace("e-0", "e-").replace("e+", "e")

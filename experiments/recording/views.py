@@ -29,7 +29,9 @@ class Shelf:
     """
 
     def __init__(self, paths: AbstractSet[str]) -> None:
-        stripped = [path.strip("/") for path in paths]
+        named = [path.strip("/") for path in paths]
+        stripped = [path for path in named if not path.startswith("rms/")]
+        self.sizes = {path: size.split("_") for _, size, path in (name.split("/", 2) for name in set(named) - set(stripped))}
         numbered = sorted(path.split("/")[1:] for path in stripped if path.startswith("joints/"))
         self.joints = [joint for _, joint in numbered]
         self.paths = sorted(stripped, key=self._place)
@@ -53,6 +55,14 @@ class Shelf:
         same = self._ending.get((len(pattern), pattern[-1]), [])
         return [path for path, parts in same if all(parts[at] == part for at, part in fixed)]
 
+    def rms(self, paths: Iterable[str]) -> str:
+        """Return what a title says of the size of curves: the viewer's axes may have no number but 0."""
+        known = [size for path in paths for size in self.sizes.get(path, ())]
+        if not known:
+            return ""
+        low, high = min(known, key=float), max(known, key=float)
+        return f", rms {high}" if low == high else f", rms ≤ {high}"
+
     def parents(self, pattern: str) -> list[str]:
         """Return what the parts before the last of the matching entities are, each once."""
         return list(dict.fromkeys(path.split("/")[-2] for path in self.of(pattern)))
@@ -75,6 +85,7 @@ def plot(shelf: Shelf, name: str, *patterns: str) -> Part:
     found = shelf.of(*patterns)
     if not found:
         return None
+    name += shelf.rms(found)
     linked = rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal)
     hidden = rrb.PlotLegend(visible=False)
     return rrb.TimeSeriesView(name=name, contents=_contents(found), axis_x=linked, plot_legend=hidden)

@@ -60,12 +60,21 @@ class FrictionCurves:
 
     def measured(self, j: int) -> tuple[Array, Array, Array]:
         """Return velocities of a joint, its torque less the rigid body's, and the weights of the mask, shape (row,) each."""
-        v, torque, weight = (np.concatenate(each) for each in zip(*((x[j] for x in part) for part in self._rows), strict=True))
-        return v, torque, weight
+        v, left, law, weight = self._joined(j)
+        return v, left + law, weight
+
+    def residual(self, j: int) -> tuple[Array, Array, Array]:
+        """Return velocities of a joint, the residual torque in the band of the fit, and the weights, shape (row,) each."""
+        v, left, _, weight = self._joined(j)
+        return v, left, weight
+
+    def _joined(self, j: int) -> tuple[Array, Array, Array, Array]:
+        v, left, law, weight = (np.concatenate(x) for x in zip(*((x[j] for x in part) for part in self._rows), strict=True))
+        return v, left, law, weight
 
     @cached_property
-    def _rows(self) -> list[tuple[Array, Array, Array]]:
-        """The same of all joints, log by log, shape (joint, row) each."""
+    def _rows(self) -> list[tuple[Array, Array, Array, Array]]:
+        """Velocity, residual, law and weight of all joints, log by log, shape (joint, row) each."""
         found, (laws, X) = [], self._laws
         for part in self.fit.problem.parts:
             rows, signals = part.rows, part.signals
@@ -73,7 +82,7 @@ class FrictionCurves:
             residual = rows.Y - rows.predicted(self.X)
             left = np.stack([residual[rows.group == j] for j in range(self.fit.basis.n)])
             qd, chain = filtered(signals, self.fit.processing)["qd"], self.fit.processing
-            found.append((qd, left + _rows_of(signals, chain, friction), _rows_of(signals, chain, signals.weight)))
+            found.append((qd, left, _rows_of(signals, chain, friction), _rows_of(signals, chain, signals.weight)))
         return found
 
     def laws(self, j: int) -> Iterator[Curve]:

@@ -83,10 +83,10 @@ def test_states_are_those_of_the_velocity(recorded):
         ns, states = recorded.column(f"state/joint{j + 1}", "StateChange:state")
         at = np.searchsorted(ns, np.arange(len(qd)) * TICK, side="right") - 1
         played, speed = np.array(states)[at], np.abs(qd[:, j])
-        assert set(played) == {"stands", "reversal", "slides"}
+        assert set(played) == {"rests", "reverses", "moves"}
         slow = 0.05 * np.sqrt(np.mean(speed**2))  # to a fifth: of the planned motion
-        assert (speed[played == "slides"] > 0.8 * slow).all()
-        assert (speed[played == "stands"] <= 0.012 * slow).all()
+        assert (speed[played == "moves"] > 0.8 * slow).all()
+        assert (speed[played == "rests"] <= 0.012 * slow).all()
         assert (np.diff(at) <= 1).all()
         assert all(a != b for a, b in itertools.pairwise(states))
 
