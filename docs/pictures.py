@@ -127,7 +127,9 @@ def take(client, out: Path, picture: Picture, path: Path) -> None:  # type: igno
         shares = np.linspace(picture.at, picture.until, picture.frames)
         frames = [_still(client, span, share, 15 if share == picture.at else 1) for share in shares]
         small = [frame.resize((1120, 630)) for frame in frames]
-        small[0].save(path.with_suffix(".webp"), save_all=True, append_images=small[1:], duration=MILLISECONDS, loop=0, quality=60)
+        small[0].save(
+            path.with_suffix(".webp"), save_all=True, append_images=small[1:], duration=MILLISECONDS, loop=0, quality=60
+        )
     else:
         image = _still(client, span, picture.at, 15)
         image.quantize(256, kmeans=1).save(path.with_suffix(".png"), optimize=True)

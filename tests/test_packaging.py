@@ -39,5 +39,5 @@ def test_no_registry_and_no_machine_is_named(root):
     for name in listed.stdout.split():
         path = root / name
         assert name != "uv.lock"
-        if path.suffix not in {".png", ".rrd", ".parquet"} and path.is_file():
+        if path.suffix not in {".png", ".webp", ".rrd", ".parquet"} and path.is_file():
             assert not pattern.search(path.read_text()), name

@@ -126,7 +126,8 @@ def package(name: str) -> Iterator[str]:
 
     named = {key: value for key, value in vars(identify).items() if not key.startswith("_")}
     public = [key for key, value in named.items() if not isinstance(value, ModuleType)]
-    yield f"# {name}\n\nWhat `from {name} import ...` has, and [what of sim](#sim). Shapes and units are in [ ]; equation numbers are the paper's.\n"
+    yield f"# {name}\n\nWhat `from {name} import ...` has, and [what of sim](#sim). Shapes and units are in [ ]."
+    yield "Equation numbers are the paper's.\n"
     yield "Notebooks: [the paper's comparison](../notebooks/comparison.md), [identify your arm](../notebooks/your-arm.md).\n"
     taken = set[str]()
     for title, names in KINDS_OF_NAMES:

@@ -1,6 +1,6 @@
 """The recordings that open in the page: made once, kept beside the pages, not committed.
 
-A folder docs/recordings that is deleted is made anew with the next site; that takes half a minute.
+A folder docs/build/recordings that is deleted is made anew with the next site; that takes half a minute.
 """
 
 import os
@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 DOCS = Path(__file__).absolute().parent.parent
-FOLDER = DOCS / "recordings"
+FOLDER = DOCS / "build" / "recordings"
 
 RECORDINGS = {
     "delay": ("run delay --out OUT", "identify OUT --torque held --torque-delay 0 --label no-delay"),
@@ -51,6 +51,8 @@ def _short_panda() -> str:
 def _idbench(words: list[str], folder: Path) -> None:
     code = "from experiments.cli import entry; entry()"
     path = os.environ | {"PYTHONPATH": str(DOCS.parent)}
-    done = subprocess.run([sys.executable, "-c", code, *words], cwd=folder, env=path, capture_output=True, check=False, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code, *words], cwd=folder, env=path, capture_output=True, check=False, text=True
+    )
     if done.returncode:
         raise RuntimeError(f"idbench {' '.join(words)}: {done.stderr}")

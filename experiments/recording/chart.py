@@ -49,9 +49,6 @@ LETTER, GAP = 0.5, 1.4
 LETTER_BESIDE = 0.016
 """Half the width of a letter beside the upright axis, of a chart that is some 220 points high."""
 
-FILLS = 8
-"""Lines that fill a cell."""
-
 RAISE = 0.05
 """How far texts are raised: the viewer writes them below where they belong."""
 
@@ -115,16 +112,6 @@ class Chart:
         self._strips(
             f"marks/{part(name)}", [at + shape for at in where[np.isfinite(where).all(axis=1)]], color, 1.0, MARK_ORDER
         )
-
-    def cells(self, x: Array, y: Array, colors: Sequence[Color], texts: Sequence[str]) -> None:
-        """Fill a cell around each pair of names, and write into it."""
-        half = 0.47 * np.array([self._width, HEIGHT]) / np.abs([self._x.high - self._x.low, self._y.high - self._y.low])
-        where, turns = self._where(x, y), np.linspace(-1, 1, FILLS)
-        zigzag = np.stack([np.tile([-1, 1, 1, -1], FILLS // 2), np.repeat(turns, 2)], axis=1)  # boxes have no inside in 2D
-        thick = [half[1] / FILLS]
-        fills = rr.LineStrips2D([at + half * zigzag for at in where], colors=colors, radii=thick, draw_order=GRID_ORDER)
-        self._stream.keep(f"{self._path}/cells", fills)
-        self._texts("values", where, texts, (230, 230, 230))
 
     def write(self, name: str, x: Array, y: Array, texts: Sequence[str], color: Color = TEXT) -> None:
         """Write at values."""

@@ -33,7 +33,7 @@ PAGE = 8
 
 def table2(shelf: Shelf) -> Part:
     """Return Table 2: the twin's errors by both processings, and what each imperfection does alone."""
-    if not (causes := charts(shelf, "error [%] of each parameter by each cause alone, {1} model", "attribution/*", words=0.75)):
+    if (causes := text(shelf, "attribution/*")) is None:
         return None
     found = charts(shelf, "error [%], {1}'s steps", "processing/*", NARROW)
     signals = column(
@@ -42,7 +42,7 @@ def table2(shelf: Shelf) -> Part:
     )
     left = column(side_by_side("twin", arm(shelf), signals, shares=[1, 1]), text(shelf, "table2"), shares=[3, 5])
     steps = column(*found)
-    return side_by_side("table2", left, steps, column(*causes), shares=[5, 4, 10])
+    return side_by_side("table2", left, steps, causes, shares=[6, 4, 7])
 
 
 def compare(shelf: Shelf) -> Part:

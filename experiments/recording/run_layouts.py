@@ -198,12 +198,27 @@ def _estimate(shelf: Shelf, name: str) -> Part:
 def _fits(shelf: Shelf, rows: Sequence[str]) -> Iterator[Part]:
     for row in rows:  # models that share rows share their torque: the first is enough
         measured = shelf.of(f"identify/*/*/measured/{row}")[0]
-        yield plot(shelf, f"{row} [{_unit(row)}]", measured, f"identify/*/*/predicted/{row}")
+        yield plot(shelf, f"{row} [{_unit(row)}]", measured, *_of_models(shelf, "predicted", row), legend=_many(shelf))
 
 
 def residuals(shelf: Shelf) -> list[Part]:
     """Return what models leave over, a plot for each kind of row."""
-    return [plot(shelf, f"residual {row} [{_unit(row)}]", f"identify/*/*/residual/{row}") for row in _rows(shelf)]
+    return [
+        plot(shelf, f"residual {row} [{_unit(row)}]", *_of_models(shelf, "residual", row), legend=_many(shelf))
+        for row in _rows(shelf)
+    ]
+
+
+def _many(shelf: Shelf) -> bool:
+    """Return whether so many identifications lie over each other that a legend is needed to switch them."""
+    return len(shelf.methods) > FEW
+
+
+def _of_models(shelf: Shelf, kind: str, row: str) -> list[str]:
+    """Return the curves of a row: of all models, or, of many identifications, of the first model of each."""
+    if not _many(shelf):
+        return shelf.of(f"identify/*/*/{kind}/{row}")
+    return [path for method in shelf.methods for path in shelf.of(f"identify/{method}/*/{kind}/{row}")[:1]]
 
 
 def _rows(shelf: Shelf) -> list[str]:

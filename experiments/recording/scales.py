@@ -15,6 +15,11 @@ from identify import Array
 TICKS = 6
 """Values that have room beside an axis."""
 
+DECADE_STEPS = (1.0,), (1.0, 3.0), (1.0, 2.0, 5.0)
+"""Values within a decade that are written beside a logarithmic axis: the first that are more than `ENOUGH`."""
+
+ENOUGH = 2
+
 ROOM = 0.04
 """Share of an axis that stays free at either end."""
 
@@ -83,9 +88,11 @@ class Decades(AbstractScale):
         return np.log10(np.maximum(x, SMALL))
 
     def _values(self) -> Array:
-        found = np.asarray(LogLocator(numticks=TICKS).tick_values(self.low, self.high))
-        inside = np.count_nonzero((found >= self.low) & (found <= self.high))
-        return found if inside > 1 else np.asarray(MaxNLocator(TICKS - 1).tick_values(self.low, self.high))
+        for steps in DECADE_STEPS:  # of a short axis, values between the powers of ten, too
+            found = np.asarray(LogLocator(subs=steps, numticks=TICKS).tick_values(self.low, self.high))
+            if np.count_nonzero((found >= self.low) & (found <= self.high)) > ENOUGH:
+                return found
+        return np.asarray(MaxNLocator(TICKS - 1).tick_values(self.low, self.high))
 
 
 @final

@@ -97,9 +97,8 @@ class Stream:
         """Send values of shape (time, curve) or (time,)."""
         self.send(path, times, scalars(values))
         if not self._draft:
-            count, squares = self._squares.get(path, (0, np.zeros(1)))
-            columns = np.asarray(values, dtype=np.float64).reshape(len(values), -1)
-            self._squares[path] = count + len(values), squares + np.nansum(columns**2, axis=0)
+            count, squares = self._squares.get(path, (0, np.zeros(())))
+            self._squares[path] = count + len(values), squares + np.nansum(np.square(values), axis=0)
 
     def keep_sizes(self) -> None:
         """Send the rms of the curves so far, as names of entities: layouts see names alone, and an axis may read only 0."""

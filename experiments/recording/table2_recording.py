@@ -7,19 +7,18 @@ from experiments.paper.table2 import PAPER, Table2
 from experiments.recording.chart import NARROW, SYMBOLS, Chart
 from experiments.recording.identification_recording import ROLES, RunRecording
 from experiments.recording.layouts import tabs
-from experiments.recording.scales import listed, named, signed
+from experiments.recording.scales import listed, signed
 from experiments.recording.stream import Stream
 from experiments.recording.texts import about
-from experiments.style import FORMS, Color
+from experiments.reports.estimates import markdown
+from experiments.style import FORMS
+from experiments.text import percent
 
 BEND = 0.01
-"""Error [%] up to which axes are linear, and that has the darkest cell."""
+"""Error [%] up to which axes are linear."""
 
-WORST = 100.0
-"""Error [%] from which on a cell is as bright as it can be."""
-
-DARKEST, BRIGHTEST = np.array([32.0, 32.0, 36.0]), np.array([205.0, 60.0, 40.0])
-"""Colours of cells: on a logarithmic scale that all causes share."""
+NOTABLE = 1.0
+"""Error [%] from which on it is written in bold."""
 
 
 def finish_table2(recording: RunRecording, table: Table2) -> list[tuple[str, Stream]]:
@@ -53,17 +52,14 @@ def _send_processings(stream: Stream, table: Table2) -> None:
 
 
 def _send_causes(stream: Stream, table: Table2, form: str) -> None:
-    """Send the error of every parameter by each cause alone, as a table whose cells are coloured on one scale."""
-    causes, names = list(table.attribution), list(table.truth)
-    chart = Chart(stream, f"attribution/{form}", named("", names), listed("", causes))
-    errors = np.array([table.attribution[cause][form] for cause in causes])
-    y, x = np.indices(errors.shape).astype(np.float64)
-    chart.cells(x.ravel(), y.ravel(), [_shade(e) for e in errors.ravel()], [f"{e:+.2g}" for e in errors.ravel()])
+    """Send the error of every parameter by each cause alone, as a table; large ones in bold."""
+    rows = ([cause, *(_emphasized(e) for e in errors[form])] for cause, errors in table.attribution.items())
+    text = markdown(f"Error [%] of each parameter by each cause alone, **{form}** model", list(table.truth), rows)
+    stream.keep(f"attribution/{form}", rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
 
 
-def _shade(error_percent: float) -> Color:
-    share = np.log10(max(abs(error_percent), BEND) / BEND) / np.log10(WORST / BEND)
-    return [round(c) for c in DARKEST + min(share, 1.0) * (BRIGHTEST - DARKEST)]
+def _emphasized(error_percent: float) -> str:
+    return f"**{percent(error_percent)}**" if abs(error_percent) > NOTABLE else percent(error_percent)
 
 
 def _markdown(table: Table2) -> str:

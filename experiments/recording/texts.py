@@ -1,10 +1,14 @@
 """Texts in recordings."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import chain
 
 from experiments.identification.fit import Fit
+from experiments.identification.lack import lacking
 from experiments.reports.estimates import EstimatesTable, markdown
+
+WHERE = {"velocity": "friction", "position": "friction", "load": "friction", "time": "parameters"}
+"""Tabs that show what residuals depend on."""
 
 
 def estimates_table(fit: Fit) -> str:
@@ -17,7 +21,16 @@ def estimates_table(fit: Fit) -> str:
 def short_table(fit: Fit) -> str:
     """Return the estimates of the models alone, beside the truth if it is known, as a markdown table."""
     table, known = EstimatesTable(fit), ["true"] * (fit.truth is not None)
-    return f"{markdown(_title(fit), [*known, *fit.estimates], table.short())}\n\n{table.legend}"
+    found = [f"{markdown(_title(fit), [*known, *fit.estimates], table.short())}", table.legend, *_pointers(fit)]
+    return "\n\n".join(filter(None, found))
+
+
+def _pointers(fit: Fit) -> Iterator[str]:
+    """Yield where to look at what the fit lacks."""
+    wrong = lacking(fit.lack)
+    for over, tab in WHERE.items():
+        if joints := [fit.subject.robot.joints[lack.joint] for lack in wrong if lack.over == over]:
+            yield f"The residual torque of {', '.join(joints)} depends on {over}: tab *{tab}*."
 
 
 def noise_table(fit: Fit, joints: Sequence[str]) -> str:

@@ -77,18 +77,18 @@ class Shelf:
         return list(dict.fromkeys(path.rsplit("/", 1)[-1] for path in self.of(pattern)))
 
 
-def plot(shelf: Shelf, name: str, *patterns: str) -> Part:
+def plot(shelf: Shelf, name: str, *patterns: str, legend: bool = False) -> Part:
     """Return a view of curves over time, its time axis that of all others; none if there is nothing to show.
 
-    It has no legend, which would cover curves: `keys` is one for all.
+    A legend, in which curves can be switched off and on, covers some of them: `keys` is one for all views.
     """
     found = shelf.of(*patterns)
     if not found:
         return None
     name += shelf.rms(found)
     linked = rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal)
-    hidden = rrb.PlotLegend(visible=False)
-    return rrb.TimeSeriesView(name=name, contents=_contents(found), axis_x=linked, plot_legend=hidden)
+    shown = rrb.PlotLegend(visible=legend)
+    return rrb.TimeSeriesView(name=name, contents=_contents(found), axis_x=linked, plot_legend=shown)
 
 
 def window(shelf: Shelf, name: str, *patterns: str) -> Part:
@@ -148,7 +148,7 @@ def text(shelf: Shelf, *patterns: str) -> Part:
 
 
 def _title(path: str) -> str:
-    return path.split("/")[1] if path.startswith("identify/") else path
+    return path.split("/")[1] if path.startswith(("identify/", "attribution/")) else path
 
 
 def arm(shelf: Shelf) -> Part:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -31,6 +32,9 @@ WIDTH = 11.0
 FEW = 2
 """Joints from which on panels stand in two columns."""
 
+ACROSS, FEW_NAMES = 30, 18
+"""Names of parameters that have room beside each other, upright and level."""
+
 OUTSIDE = 1e6
 """Per cent of a parameter's value beyond which it is drawn no farther: a friction that was moved to zero has none."""
 
@@ -56,6 +60,21 @@ def torques_figure(one: HeldOut) -> str:
     return svg(figure)
 
 
+def residuals_figure(one: HeldOut) -> str:
+    """Return the residual torques of the first model on a held-out log over time, joint by joint, with the noise of the log."""
+    rows, model = one.problem.rows, next(iter(one.torques))
+    figure, panels = _panels(rows.kinds, 1.1)
+    residual = rows.Y - rows.predicted(one.fit.estimates[model].X)
+    for j, panel in enumerate(panels):
+        own = rows.group == j
+        shown = np.where(rows.valid[own], residual[own], np.nan)
+        panel.axhline(0.0, color="0.8", lw=0.8)
+        panel.plot(rows.time[own], shown, color=_color(model), lw=0.8)
+        panel.set_title(one.fit.subject.robot.joints[j], loc="left")
+    _last(panels, "time [s]", f"residual [{_units(one.fit)[0]}]")
+    return svg(figure)
+
+
 def _share(x: Array, size: Array) -> Array:
     """Return x in per cent of a size, far outside of the picture where that is next to nothing."""
     return np.clip(100 * x / size, -OUTSIDE, OUTSIDE)
@@ -64,27 +83,33 @@ def _share(x: Array, size: Array) -> Array:
 def parameters_figure(fit: Fit) -> str:
     """Return estimates with intervals, over the size of each: those of the first model, and how others differ."""
     names = fit.basis.names
-    models = list(fit.estimates)
-    leading = fit.estimates[models[0]].X
+    lines = -(-len(names) // ACROSS)  # names that would run together go on in another panel
+    figure, panels = _panels(lines, 2.4, columns=1)
+    for panel, members in zip(panels, np.array_split(np.arange(len(names)), lines), strict=True):
+        _parameters_panel(panel, fit, members)
+    _legend(figure, panels[0])
+    return svg(figure)
+
+
+def _parameters_panel(panel: Axes, fit: Fit, members: npt.NDArray[np.intp]) -> None:
+    names, models = [fit.basis.names[p] for p in members], list(fit.estimates)
+    leading = fit.estimates[models[0]].X[members]
     size = np.maximum(np.abs(leading), 1e-300)
-    figure, (panel,) = _panels(1, 2.9)
     at = np.arange(len(names))
     for i, model in enumerate(models):
         estimate = fit.estimates[model]
-        off, half = _share(estimate.X - leading, size), _share(SIGMAS * estimate.best_sigma, size)
+        off, half = _share(estimate.X[members] - leading, size), _share(SIGMAS * estimate.best_sigma[members], size)
         x = at + 0.22 * (i - (len(models) - 1) / 2)
         panel.errorbar(x, off, half, fmt="o", ms=2.5, lw=1.2, color=_color(model), label=model)
     if fit.truth is not None:
-        true = np.array(list(fit.truth.values()))
+        true = np.array(list(fit.truth.values()))[members]
         panel.plot(at, _share(true - leading, size), "_", ms=9, color="black", label="true")
     panel.set_yscale("symlog", linthresh=1.0, linscale=0.6)
     panel.set_ylim(-300, 300)
     panel.set_yticks([-100, -10, -1, 0, 1, 10, 100], ["-100", "-10", "-1", "0", "1", "10", "100"])
-    panel.set_xticks(at, names, rotation=90, fontsize=6)
+    panel.set_xticks(at, names, rotation=90 if len(names) > FEW_NAMES else 0, fontsize=7)
     panel.set_xlim(-1, len(names))
     panel.set_ylabel(f"difference from {models[0]}, with\n95 % interval [% of its value]")
-    _legend(figure, panel)
-    return svg(figure)
 
 
 def friction_figure(fit: Fit) -> str:
@@ -117,7 +142,7 @@ def friction_figure(fit: Fit) -> str:
 def spectra_figure(fit: Fit) -> str:
     """Return spectra of what the first model leaves, and of the noise that was found, joint by joint; of the first log."""
     form = next(iter(fit.estimates))
-    every = list(spectra(fit, {form: left_over(fit)[form]}))
+    every = [found for found in spectra(fit, {form: left_over(fit)[form]}) if found.lines[form].max()]  # of joints that move
     figure, panels = _panels(len(every), 1.6)
     for panel, found in zip(panels, every, strict=True):
         panel.set_title(f"{found.row} [{found.unit}/√Hz]", loc="left")
@@ -128,8 +153,6 @@ def spectra_figure(fit: Fit) -> str:
         for cutoff in cutoffs(fit.processing, fit.logs.fitted[0].fs).values():
             panel.axvline(cutoff, color="0.8", lw=1.0)
         top = found.lines[form].max()
-        if not top:  # a joint that never moves
-            continue
         panel.set_xscale("log")
         panel.set_yscale("log")
         panel.set_ylim(top * 1e-5, top * 3)
@@ -145,9 +168,9 @@ def _units(fit: Fit) -> tuple[str, str]:
     return ", ".join(dict.fromkeys(force for force, _ in each)), ", ".join(dict.fromkeys(f"{way}/s" for _, way in each))
 
 
-def _panels(count: int, height: float) -> tuple[Figure, list[Axes]]:
-    """Return a figure with a panel each, in two columns if there are many."""
-    columns = 2 if count > FEW else 1
+def _panels(count: int, height: float, columns: int = 0) -> tuple[Figure, list[Axes]]:
+    """Return a figure with a panel each, in two columns if there are many and no number of columns is given."""
+    columns = columns or (2 if count > FEW else 1)
     lines = -(-count // columns)
     whole = height * lines + 0.5
     figure = Figure(figsize=(WIDTH, whole))

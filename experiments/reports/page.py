@@ -11,6 +11,7 @@ from experiments.reports.estimates import EstimatesTable
 from experiments.reports.figures import (
     friction_figure,
     parameters_figure,
+    residuals_figure,
     spectra_figure,
     torques_figure,
 )
@@ -66,12 +67,15 @@ def _figure(attempts: Attempts, name: str, draw: Callable[[T], str], shown: T) -
 
 
 def _verdicts(one: HeldOut) -> Iterator[tuple[str, str, str]]:
+    alike: dict[tuple[str, str], list[str]] = {}
     for model, verdict in one.verdicts.items():
-        yield model, verdict.word, "; ".join(verdict.reasons)
+        alike.setdefault((verdict.word, "; ".join(verdict.reasons)), []).append(model)
+    for (word, reasons), models in alike.items():
+        yield f"{' and '.join(models)} model{'s' if len(models) > 1 else ''}", word, reasons
 
 
-def _held_out(one: HeldOut, attempts: Attempts) -> tuple[str, str, list[str], list[list[str]]]:
-    """Return title, figure and table of a held-out log."""
+def _held_out(one: HeldOut, attempts: Attempts) -> tuple[str, str, str, list[str], list[list[str]]]:
+    """Return title, figures of torques and residuals, and table of a held-out log."""
     torques = one.torques
     heads = ["rms of the torque", *(f"{model} {what}" for model in torques for what in ("rms", "%", "R2"))]
     rows = []
@@ -79,7 +83,8 @@ def _held_out(one: HeldOut, attempts: Attempts) -> tuple[str, str, list[str], li
         first = next(iter(torques.values()))
         cells = [cell for v in torques.values() for cell in (f"{v.rms[j]:.3g}", percentage(v.percent[j]), f"{v.R2[j]:.4f}")]
         rows.append([joint, f"{first.level[j]:.3g}", *cells])
-    return one.title, _figure(attempts, "torques", torques_figure, one), heads, rows
+    figures = _figure(attempts, "torques", torques_figure, one), _figure(attempts, "residuals", residuals_figure, one)
+    return one.title, *figures, heads, rows
 
 
 def _parameters(fit: Fit, table: EstimatesTable) -> Iterator[list[str]]:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes as Panel
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from experiments.reports.html import svg
@@ -17,6 +18,9 @@ from identify import Array
 
 OTHER = [90, 90, 90]
 """Colour of models that have none of their own."""
+
+MANY = 16
+"""Parameters beyond which one picture shows all of them, instead of a panel each."""
 
 ACROSS = 3
 """Panels beside each other."""
@@ -63,7 +67,10 @@ def _last(cells: Sequence[Cell]) -> str:
 
 
 def error_figure(cells: Sequence[Cell], axis: Axis) -> str:
-    """Return spread and bias of every parameter against an axis, a curve a model."""
+    """Return spread and bias of every parameter against an axis, a curve a model; of many parameters their rms error."""
+    if len(cells[0].parameters) > MANY:
+        values = 100 * np.array([cell.rmse for cell in cells])
+        return matrix_figure(_rows_of(cells, axis), cells[0].parameters, values, "rms error [%]")
     figure, panels = _panels(cells[0].parameters)
     for p, (name, panel) in enumerate(panels.items()):
         for model, group in _models(cells).items():
@@ -80,7 +87,11 @@ def error_figure(cells: Sequence[Cell], axis: Axis) -> str:
 
 
 def coverage_figure(cells: Sequence[Cell], axis: Axis) -> str:
-    """Return the share of truths within two sigma against an axis: corrected, and the paper's."""
+    """Return the share of truths within two sigma against an axis: corrected, and the paper's; of many parameters corrected."""
+    if len(cells[0].parameters) > MANY:
+        values = 100 * np.array([cell.coverage(cell.sigma) for cell in cells])
+        title = f"truth within {SIGMAS:g} sigma [%]"
+        return matrix_figure(_rows_of(cells, axis), cells[0].parameters, values, title, log=False)
     figure, panels = _panels(cells[0].parameters)
     for p, (name, panel) in enumerate(panels.items()):
         panel.axhline(100 * RIGHT, color="black", lw=1.0, ls="--")
@@ -98,11 +109,33 @@ def coverage_figure(cells: Sequence[Cell], axis: Axis) -> str:
     return _finished(figure, panels, axis.field, f"truth within {SIGMAS:g} sigma [%]")
 
 
+def matrix_figure(rows: Sequence[str], parameters: Sequence[str], values: Array, title: str, *, log: bool = True) -> str:
+    """Return numbers of many parameters as one picture: a row each of `rows`, a column a parameter, a colour a number."""
+    figure = Figure(figsize=(12, 1.4 + 0.24 * len(rows)), layout="constrained")
+    panel: Any = figure.subplots()
+    shown = np.where(values > 0, values, np.nan) if log else values
+    norm = LogNorm() if log and np.isfinite(shown).any() else None
+    image = panel.imshow(shown, aspect="auto", cmap="viridis", norm=norm)
+    panel.set_yticks(range(len(rows)), rows)
+    panel.set_xticks(range(len(parameters)), parameters, rotation=90, fontsize=7)
+    panel.grid(visible=False)
+    figure.colorbar(image, ax=panel, label=title)
+    return svg(figure)
+
+
+def _rows_of(cells: Sequence[Cell], axis: Axis) -> list[str]:
+    return [f"{value(cell.settings[axis.field])} {cell.names[2]}" if cell.settings else cell.names[2] for cell in cells]
+
+
 def bars_figure(cells: Sequence[Cell]) -> str:
     """Return mean and standard deviation of every parameter's error, a bar a method, against the least that noise allows.
 
-    A panel reaches as far as four times the median of the bars; what is beyond points there.
+    A panel reaches as far as four times the median of the bars; what is beyond points there. Many parameters are one picture
+    of their rms errors.
     """
+    if len(cells[0].parameters) > MANY:
+        rows = [_name(cell, cells) for cell in cells]
+        return matrix_figure(rows, cells[0].parameters, 100 * np.array([cell.rmse for cell in cells]), "rms error [%]")
     figure, panels = _panels(cells[0].parameters, below=1.1, gap=0.65)
     for p, (name, panel) in enumerate(panels.items()):
         mean = 100 * np.array([cell.bias[p] for cell in cells])

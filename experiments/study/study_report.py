@@ -72,13 +72,18 @@ def _comparisons(study: Study, cells: Sequence[Cell]) -> Iterator[tuple[str, lis
 
 
 def worst_runs(cells: Sequence[Cell]) -> list[tuple[Cell, str, float, int]]:
-    """Return the identifications with the largest relative errors: cell, parameter, error, run; one a run."""
+    """Return the identifications with the largest relative errors: cell, parameter, error, run.
+
+    The worst run of each combination and model comes first, so that not all are of one kind; each run is there once.
+    """
     found = []
     for cell in cells:
         p = np.nan_to_num(np.abs(cell.error)).argmax(axis=1)
         found += [(cell, cell.parameters[j], float(cell.error[i, j]), int(cell.run[i])) for i, j in enumerate(p)]
+    found.sort(key=lambda entry: -abs(entry[2]))
+    firsts = {id(entry[0]): entry for entry in reversed(found)}
     worst: dict[int, tuple[Cell, str, float, int]] = {}
-    for entry in sorted(found, key=lambda entry: -abs(entry[2])):
+    for entry in [*sorted(firsts.values(), key=lambda entry: -abs(entry[2])), *found]:
         worst.setdefault(entry[3], entry)
     return list(worst.values())[:WORST]
 
