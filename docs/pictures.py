@@ -61,6 +61,9 @@ DELAY = ("run delay --out OUT", "identify OUT --torque held --torque-delay 0 --l
 COGGING = ("run ripple --out OUT --inner 10 10.004",)
 GAIN = ("run gain --out OUT",)
 
+BAR = 0.04
+"""Height of the viewer's own bar, as a share of a picture."""
+
 MILLISECONDS = 120
 """Time of a frame [ms]."""
 
@@ -126,7 +129,7 @@ def take(client, out: Path, picture: Picture, path: Path) -> None:  # type: igno
         assert span is not None
         shares = np.linspace(picture.at, picture.until, picture.frames)
         frames = [_still(client, span, share, 15 if share == picture.at else 1) for share in shares]
-        small = [frame.resize((1120, 630)) for frame in frames]
+        small = [frame.resize((1120, round(1120 * frame.height / frame.width))) for frame in frames]
         small[0].save(
             path.with_suffix(".webp"), save_all=True, append_images=small[1:], duration=MILLISECONDS, loop=0, quality=60
         )
@@ -146,7 +149,12 @@ def _still(client, span: tuple[int, int] | None, share: float, patience: float) 
     while time.monotonic() - start < patience and (image != last or time.monotonic() - start < patience / 4):
         time.sleep(min(0.5, patience / 4))
         last, image = image, client.take_screenshot(max_size=1600)
-    return Image.open(BytesIO(image)).convert("RGB")
+    return _cropped(Image.open(BytesIO(image)).convert("RGB"))
+
+
+def _cropped(image: Image.Image) -> Image.Image:
+    """Return a picture without the viewer's own bar, which speaks of the machine."""
+    return image.crop((0, round(BAR * image.height), image.width, image.height))
 
 
 def photograph(page: Path, path: Path) -> None:
@@ -159,6 +167,7 @@ def photograph(page: Path, path: Path) -> None:
         "--no-sandbox",
         "--disable-gpu",
         "--window-size=1200,900",
+        "--hide-scrollbars",
         f"--screenshot={path}",
         page.absolute().as_uri(),
     ]

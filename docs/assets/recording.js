@@ -4,7 +4,13 @@
 
   async function open(place, state) {
     const { default: widget } = await import(new URL("../viewer/widget.js", here));
-    const settings = { _url: new URL(`../${place.dataset.recording}`, here).href, _width: "auto", _height: "auto" };
+    const settings = {
+      _url: new URL(`../${place.dataset.recording}`, here).href,
+      _width: "auto",
+      _height: 720,
+      _theme: "dark",
+      _panel_states: { top: "hidden", blueprint: "hidden", selection: "hidden", time: "collapsed" },
+    };
     const model = {
       get: (key) => settings[key],
       on: () => {},

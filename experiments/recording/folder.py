@@ -63,10 +63,10 @@ def merge(paths: Sequence[Path], tab: str, out: Path) -> None:
         If a file cannot be read or written, or the recording has no such layout.
     """
     name, entities = known(paths)
-    layout, stream = tabs(entities, tab), Stream(name)
+    stream = Stream(name)
+    stream.open_with(tabs(entities, tab))
     for path in reversed(paths):
         stream.copy(RrdReader(path))
-    stream.arrange(layout)
     stream.write(out)
 
 

@@ -139,6 +139,10 @@ class Stream:
         self._file.send_blueprint(blueprint, make_active=False, make_default=True)
         self.show(blueprint)
 
+    def open_with(self, blueprint: rrb.Blueprint) -> None:
+        """Send the layout of a file that is opened alone: browsers take no other than an active one."""
+        self._file.send_blueprint(blueprint, make_active=True, make_default=True)
+
     def show(self, blueprint: rrb.Blueprint) -> None:
         """Send a layout to who watches."""
         if self._live:
