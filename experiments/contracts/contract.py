@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from experiments.errors import ExperimentError
+from experiments.identification.robot_model import RobotModel
 from experiments.identification.simulators import RobotPlant, ScenarioLoop
-from experiments.identification.subject import Subject
 from experiments.paper.table1 import SCENARIO, Table1
 from identify import Array, MotionLog, Simulation
 from identify.blame import is_mistake
@@ -57,8 +57,8 @@ class Example:
     @property
     def simulation(self) -> Simulation:
         """What simulates it."""
-        loop = ScenarioLoop(Subject(), (self.run.scenario,), (self.run.alone(),))
-        return Simulation(loop, RobotPlant(Subject()))
+        loop = ScenarioLoop(RobotModel(), (self.run.scenario,), (self.run.alone(),))
+        return Simulation(loop, RobotPlant(RobotModel()))
 
     @property
     def robot(self) -> Robot:

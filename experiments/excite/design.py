@@ -11,7 +11,7 @@ from experiments.excite.excitation import EXCITATIONS, AbstractExcitation
 from experiments.excite.limit_use import FS, Inspector, LimitUse
 from experiments.excite.planning import plan_for
 from experiments.identification.parameters import Parameters
-from experiments.identification.subject import Subject
+from experiments.identification.robot_model import RobotModel
 from identify import CHAINS, Array, MotionLog, NoiseLevels
 from identify.data.limits import Limits
 from identify.design.criteria import CRITERIA, AbstractCriterion, LogSigma
@@ -90,7 +90,7 @@ class Design:
     parameters: Parameters = Parameters()  # noqa: RUF009  # frozen
 
     def __post_init__(self) -> None:
-        names = self.subject.basis.names
+        names = self.robot_model.basis.names
         for name in self.weights:
             if name not in names:
                 raise ExperimentError(
@@ -102,13 +102,13 @@ class Design:
             hint = did_you_mean(self.criterion, known)
             raise ExperimentError(f"--criterion {self.criterion}: no such criterion{hint}; known: {', '.join(known)}")
         for log in self.logs:
-            if log.n != self.subject.robot.n:
-                raise ExperimentError(f"an earlier log has {log.n} joints, robot {self.robot} {self.subject.robot.n}")
+            if log.n != self.robot_model.robot.n:
+                raise ExperimentError(f"an earlier log has {log.n} joints, robot {self.robot} {self.robot_model.robot.n}")
 
     @cached_property
-    def subject(self) -> Subject:
+    def robot_model(self) -> RobotModel:
         """The robot."""
-        return Subject(self.robot, self.parameters)
+        return RobotModel(self.robot, self.parameters)
 
     @cached_property
     def excitation(self) -> AbstractExcitation:
@@ -118,12 +118,12 @@ class Design:
     @cached_property
     def limits(self) -> Limits:
         """Limits of the joints."""
-        return limits_of(self.subject.robot, self.asked)
+        return limits_of(self.robot_model.robot, self.asked)
 
     @cached_property
     def home(self) -> Array:
         """Where the arm comes from [rad], shape (joint,)."""
-        return home_of(self.subject.robot, self.asked, self.limits)
+        return home_of(self.robot_model.robot, self.asked, self.limits)
 
     @cached_property
     def clearance(self) -> Clearance:
@@ -173,12 +173,12 @@ class Design:
     @cached_property
     def X(self) -> Array:
         """Parameters as the robot's file has them."""
-        return np.array(list(self.subject.truth(self.subject.robot).values()))
+        return np.array(list(self.robot_model.truth(self.robot_model.robot).values()))
 
     @cached_property
     def levels(self) -> NoiseLevels:
         """Noise of the log."""
-        n = self.subject.robot.n
+        n = self.robot_model.robot.n
         levels = NoiseLevels(self.scenario.torque.spread(n), self.scenario.encoder.spread(n))
         if not (levels.torque > 0).all():
             raise ExperimentError("sigmas need a noise of the torques above 0 N m: give --torque-noise, or another --noise")
@@ -188,7 +188,7 @@ class Design:
     def known(self) -> Array:
         """Information of earlier logs, shape (p, p)."""
         p, chain = len(self.X), CHAINS.create("idbench")
-        each = [predicted_information(log, self.subject.basis, self.X, self.levels, chain) for log in self.logs]
+        each = [predicted_information(log, self.robot_model.basis, self.X, self.levels, chain) for log in self.logs]
         return np.sum(each, axis=0) if each else np.zeros((p, p))
 
     @cached_property
@@ -206,13 +206,13 @@ class Design:
     @cached_property
     def sigma_criterion(self) -> LogSigma:
         """The mean of ln sigma, weighted as asked."""
-        weights = np.array([self.weights.get(name, 1.0) for name in self.subject.basis.names])
+        weights = np.array([self.weights.get(name, 1.0) for name in self.robot_model.basis.names])
         return LogSigma(tuple(weights / weights.sum()))
 
     @cached_property
     def inspector(self) -> Inspector:
         """What looks at motions."""
-        return Inspector(self.subject.robot, self.limits, self.asked, self.clearance, self.subject.basis, self.X)
+        return Inspector(self.robot_model.robot, self.limits, self.asked, self.clearance, self.robot_model.basis, self.X)
 
     def trajectory(self, c: Array, repeat: int | None = None) -> AbstractTrajectory:
         """Return the trajectory of coefficients."""
@@ -225,10 +225,10 @@ class Design:
         share = np.sqrt(fs / self.scenario.fs)
         levels = NoiseLevels(self.levels.torque * share, self.levels.position * share)
         for i in range(0, len(each), TOGETHER):
-            planned = [self.trajectory(c, 1).motion(self.subject.robot).sample(fs).q for c in each[i : i + TOGETHER]]
+            planned = [self.trajectory(c, 1).motion(self.robot_model.robot).sample(fs).q for c in each[i : i + TOGETHER]]
             q = np.stack(planned)
             log = MotionLog(fs, q, np.zeros_like(q), self.scenario.channel)
-            found.append(predicted_information(log, self.subject.basis, self.X, levels, CHAINS.create("idbench")))
+            found.append(predicted_information(log, self.robot_model.basis, self.X, levels, CHAINS.create("idbench")))
         return self.known + self.repeat * np.concatenate(found)
 
     def random_motions(self, count: int = RANDOM) -> tuple[list[Array], int]:
@@ -242,9 +242,9 @@ class Design:
 
     def ways(self, c: Array, fs: float, pace: float) -> tuple[Reference, Reference]:
         """Return the ways from home to where a motion starts, and back, sampled at `fs` [Hz], at a share of the limits."""
-        start = self.trajectory(c, 1).motion(self.subject.robot).at(np.zeros(1), fs).q[0]
+        start = self.trajectory(c, 1).motion(self.robot_model.robot).at(np.zeros(1), fs).q[0]
         most = np.stack([self.limits.velocity, self.limits.acceleration, self.limits.jerk])
-        there = approach(self.subject.robot, self.home, start, fs, WAY * pace * np.where(np.isfinite(most), most, MOST))
+        there = approach(self.robot_model.robot, self.home, start, fs, WAY * pace * np.where(np.isfinite(most), most, MOST))
         return there, Reference(fs, there.q[::-1], -there.qd[::-1], there.qdd[::-1])
 
     def pace(self, c: Array) -> float:
@@ -256,4 +256,4 @@ class Design:
 
     def look(self, c: Array) -> LimitUse:
         """Return how far a motion uses its limits."""
-        return self.inspector.look(self.trajectory(c, 1).motion(self.subject.robot).sample(FS))
+        return self.inspector.look(self.trajectory(c, 1).motion(self.robot_model.robot).sample(FS))

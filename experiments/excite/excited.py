@@ -13,7 +13,7 @@ from experiments.excite.design import Design
 from experiments.excite.excitation import REST
 from experiments.excite.limit_use import FS, LimitUse
 from experiments.excite.stages import searched
-from experiments.identification.subject import absolute
+from experiments.identification.robot_model import absolute
 from identify import Array
 from identify.design.criteria import sigmas_of
 from sim.engine.simulation import Progress
@@ -71,7 +71,7 @@ class Excited:
                 "joints, or try another --duration, --frequency, --seed or home"
             )
         if not np.isfinite(found.sigma).all():
-            lost = [name for name, s in zip(design.subject.basis.names, found.sigma, strict=True) if not np.isfinite(s)]
+            lost = [name for name, s in zip(design.robot_model.basis.names, found.sigma, strict=True) if not np.isfinite(s)]
             raise ExperimentError(
                 f"the motion tells nothing of {', '.join(lost)}: give a longer --duration, wider limits, or leave them out: "
                 f"--without {' '.join(lost)}"
@@ -188,14 +188,14 @@ class Excited:
 
     def planned(self, fs: float) -> tuple[Array, Reference]:
         """Return the part of each sample (0 there, 1 motion, 2 back), and the whole way of the arm, from home to home."""
-        main = self.design.trajectory(self.c).motion(self.design.subject.robot).sample(fs)
+        main = self.design.trajectory(self.c).motion(self.design.robot_model.robot).sample(fs)
         there, back = self.design.ways(self.c, fs, self.pace)
         whole = [np.concatenate([getattr(x, name) for x in (there, main, back)]) for name in ("q", "qd", "qdd")]
         return np.repeat([0.0, 1.0, 2.0], [len(there.q), len(main.q), len(back.q)]), Reference(fs, *whole)
 
     def summary(self) -> dict[str, Any]:
         """Return summary.json."""
-        d, names = self.design, self.design.subject.basis.names
+        d, names = self.design, self.design.robot_model.basis.names
         median, best = self.ratios
         table = {"sigma": self.sigma, "random_median": self.median, "random_best": self.best}
         if self.earlier is not None:
@@ -232,7 +232,7 @@ class Excited:
     def floor(self) -> float | None:
         """Height of the floor [m], where one is kept clear of."""
         d = self.design
-        return floor_of(d.subject.robot, d.asked) if d.clearance.checks else None
+        return floor_of(d.robot_model.robot, d.asked) if d.clearance.checks else None
 
     @property
     def unchecked(self) -> str:

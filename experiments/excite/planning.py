@@ -60,19 +60,19 @@ def plan_for(design: "Design") -> Plan:
 
 def _information(design: "Design", rate: float, noise: bool) -> Information:
     """Return what motions tell, with their noise, or as if all rows were alike."""
-    basis, fs, n = design.subject.basis, design.scenario.fs, design.subject.robot.n
+    basis, fs, n = design.robot_model.basis, design.scenario.fs, design.robot_model.robot.n
     levels = design.levels if noise else NoiseLevels(np.ones(n), np.zeros(n))
     return Information(basis, levels, _inertia(design), fs, rate, min(PASS, fs / 2))
 
 
 def _inertia(design: "Design") -> Array:
     """Return M(q), on average over postures."""
-    q, qd, qdd = random_states(design.subject.tree, POSTURES)
-    return np.asarray(slopes(design.subject.basis, design.X, q, qd, qdd, qd).inertia.mean(axis=-1))
+    q, qd, qdd = random_states(design.robot_model.tree, POSTURES)
+    return np.asarray(slopes(design.robot_model.basis, design.X, q, qd, qdd, qd).inertia.mean(axis=-1))
 
 
 def _require_enough(design: "Design") -> None:
-    p, rows = len(design.X), 2 * PASS * design.duration * design.subject.robot.n
+    p, rows = len(design.X), 2 * PASS * design.duration * design.robot_model.robot.n
     if rows < p:
         raise ExperimentError(
             f"{design.duration:g} s make {rows:.0f} rows behind a filter at {PASS:g} Hz, fewer than the {p} parameters: "

@@ -45,7 +45,7 @@ class Round:
     @property
     def weakest(self) -> str:
         """The parameter that has it."""
-        return self.excited.design.subject.basis.names[int(self.shares.argmax())]
+        return self.excited.design.robot_model.basis.names[int(self.shares.argmax())]
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,19 +105,19 @@ class MotionSequence:
 
 
 def _summary(found: Round) -> dict[str, Any]:
-    X, sigma = found.estimate.X.tolist(), found.estimate.best_sigma.tolist()
+    X, sigma = found.estimate.X.tolist(), found.estimate.standard_errors.tolist()
     return {"brisk_share": found.share, "weakest": found.weakest, "estimate": X, "sigma": sigma}
 
 
 def _judged(excited: Excited, logs: tuple[MotionLog, ...]) -> Round:
-    subject = excited.design.subject
-    estimate = identify(logs, subject.basis, ExplicitModel())
-    shares = brisk_shares(subject.tree, subject.basis, estimate.X, estimate.best_sigma)
+    robot_model = excited.design.robot_model
+    estimate = identify(logs, robot_model.basis, ExplicitModel())
+    shares = brisk_shares(robot_model.tree, robot_model.basis, estimate.X, estimate.standard_errors)
     return Round(excited, logs[-1], estimate, shares)
 
 
 def _weak(last: Round, wished: float, weights: Mapping[str, float]) -> dict[str, float]:
     """Return weights for the next motion: what is not known well enough counts as much more as it is off."""
-    names = last.excited.design.subject.basis.names
+    names = last.excited.design.robot_model.basis.names
     each = zip(names, last.shares, strict=True)
     return {name: float(weights.get(name, 1.0) * max(ENOUGH, share / wished)) for name, share in each}

@@ -46,7 +46,7 @@ CLOSER = 1.005
 
 def searched(design: Design, random: Sequence[Array], progress: Callable[[float], None] | None = None) -> Search:
     """Return the search of the best motion, begun with the best of random ones and those of the kind's own."""
-    rng, starts = np.random.default_rng([design.seed, 2]), max(STARTS, BASINS // design.subject.robot.n)
+    rng, starts = np.random.default_rng([design.seed, 2]), max(STARTS, BASINS // design.robot_model.robot.n)
     own = design.excitation.starts(rng, design.plan, design.duration, design.frequency, starts - bool(random))
     cheapest = sorted(random, key=lambda c: design.plan.value(c)[0])[:1]
     total = sum((stage.keep or starts) * stage.steps for stage in STAGES)

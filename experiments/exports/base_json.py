@@ -18,8 +18,8 @@ ABOUT = (
 
 def json_text(fit: Fit, model: str) -> str:
     """Return the text: parameters, sigma, covariance, the tree of links, and which columns the regressor has."""
-    subject, estimate = fit.subject, fit.estimates[model]
-    standard = subject.grouping.standard
+    robot_model, estimate = fit.robot_model, fit.estimates[model]
+    standard = robot_model.grouping.standard
     parameters = [
         {
             "name": p.name,
@@ -32,20 +32,20 @@ def json_text(fit: Fit, model: str) -> str:
             "scale": p.scale,
             "made_of": _made_of(fit, p),
         }
-        for p, x, s in zip(fit.basis.parameters, estimate.X, estimate.best_sigma, strict=True)
+        for p, x, s in zip(fit.basis.parameters, estimate.X, estimate.standard_errors, strict=True)
     ]
     content = {
         "format": "idbench base parameters 1",
         "version": version("idbench"),
         "about": ABOUT,
-        "robot": subject.tree.name,
+        "robot": robot_model.tree.name,
         "model": model,
         "estimator": fit.request.estimator,
         "logs": list(fit.logs.names),
         "parameters": parameters,
-        "covariance": np.asarray(estimate.best_covariance).tolist(),
+        "covariance": np.asarray(estimate.covariance).tolist(),
         "letters_of_links": list(INERTIAL),
-        "gravity": [float(x) for x in subject.tree.gravity],
+        "gravity": [float(x) for x in robot_model.tree.gravity],
         "tree": [
             {
                 "joint": joint.name,
@@ -57,7 +57,7 @@ def json_text(fit: Fit, model: str) -> str:
                 "anchor": joint.anchor.tolist(),
                 "zero": float(joint.zero),
             }
-            for joint in subject.tree.joints
+            for joint in robot_model.tree.joints
         ],
     }
     return json.dumps(content, indent=1, allow_nan=False) + "\n"
@@ -65,6 +65,6 @@ def json_text(fit: Fit, model: str) -> str:
 
 def _made_of(fit: Fit, parameter: Parameter) -> dict[str, float]:
     """Return the standard parameters of a base parameter, and their factors."""
-    base = fit.subject.grouping
+    base = fit.robot_model.grouping
     row = base.K[base.parameters.index(parameter)]
     return {base.standard.names[k]: float(row[k]) for k in np.flatnonzero(row)}

@@ -19,8 +19,8 @@ def python_text(fit: Fit, model: str, target: Path) -> str:
     ExperimentError
         If the estimate has a law of friction that the function does not have.
     """
-    require_known(fit.subject, target)
-    tree, values = fit.subject.tree, standard_of(fit, model)
+    require_known(fit.robot_model, target)
+    tree, values = fit.robot_model.tree, standard_of(fit, model)
     n = tree.n
     each = {x: [values.get(f"{x}{j + 1}", 0.0) for j in range(n)] for x in ("Ia", "Fv", "Fs", "off")}
     text = files("experiments.exports").joinpath("inverse_dynamics.py.txt").read_text(encoding="utf-8")

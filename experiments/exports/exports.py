@@ -8,7 +8,7 @@ from experiments.exports.controller import python_text
 from experiments.exports.standard import require_known
 from experiments.identification.consistent_robot import Written
 from experiments.identification.fit import Fit
-from experiments.identification.subject import Subject
+from experiments.identification.robot_model import RobotModel
 from sim.robot.rewrite import rewritten
 
 Exported = tuple[str, list[str]]
@@ -28,13 +28,13 @@ def urdf(fit: Fit, model: str, path: Path) -> Exported:
     """Return the robot as URDF with the parameters."""
     from sim.robot.write_urdf import urdf_text
 
-    written, subject = Written(fit, model), fit.subject
-    drives = [p.name for p in subject.grouping.standard.parameters if p.kind in ("rotor inertia", "stiffness")]
+    written, robot_model = Written(fit, model), fit.robot_model
+    drives = [p.name for p in robot_model.grouping.standard.parameters if p.kind in ("rotor inertia", "stiffness")]
     left = [name for name in drives if written.values.get(name)]
     lost = [f"{', '.join(left)} have no place in a URDF: rotors and springs are left out of {path}"] if left else []
-    turned = [float(x) for x in subject.tree.gravity] != EARTH
-    aside = [f"gravity {subject.tree.gravity.tolist()} has no place in a URDF"] if turned else []
-    text = urdf_text(subject.name, subject.robot, subject.tree, written.values, subject.mounting)
+    turned = [float(x) for x in robot_model.tree.gravity] != EARTH
+    aside = [f"gravity {robot_model.tree.gravity.tolist()} has no place in a URDF"] if turned else []
+    text = urdf_text(robot_model.name, robot_model.robot, robot_model.tree, written.values, robot_model.mounting)
     return text, [*written.warnings, *lost, *aside]
 
 
@@ -49,17 +49,17 @@ def controller(fit: Fit, model: str, path: Path) -> Exported:
     return python_text(fit, model, path), []
 
 
-def require_written_back(subject: Subject, path: Path) -> None:
+def require_written_back(robot_model: RobotModel, path: Path) -> None:
     """Raise BenchError if the file of a robot cannot be written with parameters of one's own choice."""
-    rewritten(subject.name, {}, path.absolute().parent, subject.mounting)
+    rewritten(robot_model.name, {}, path.absolute().parent, robot_model.mounting)
 
 
-def require_nothing(subject: Subject, path: Path) -> None:
+def require_nothing(robot_model: RobotModel, path: Path) -> None:
     """Accept all robots."""
-    del subject, path
+    del robot_model, path
 
 
-EXPORTS: dict[str, tuple[str, Callable[[Fit, str, Path], Exported], Callable[[Subject, Path], None]]] = {
+EXPORTS: dict[str, tuple[str, Callable[[Fit, str, Path], Exported], Callable[[RobotModel, Path], None]]] = {
     ".xml": ("the robot", mjcf, require_written_back),
     ".urdf": ("the robot", urdf, require_written_back),
     ".json": ("base parameters and regressor", base_parameters, require_nothing),

@@ -7,7 +7,7 @@ import numpy as np
 from experiments.errors import ExperimentError
 from experiments.exports.friction_terms import TERMS
 from experiments.identification.fit import Fit
-from experiments.identification.subject import Subject
+from experiments.identification.robot_model import RobotModel
 from identify.basis.parameter import BODY
 
 if TYPE_CHECKING:
@@ -23,17 +23,17 @@ def standard_of(fit: Fit, model: str) -> dict[str, float]:
     Base parameters stand for themselves, what is grouped with them is zero: no body need have them, but the torques are those
     of the estimate to the last digit.
     """
-    subject, estimate = fit.subject, fit.estimates[model]
-    grouping = subject.grouping
+    robot_model, estimate = fit.robot_model, fit.estimates[model]
+    grouping = robot_model.grouping
     values: Array = np.zeros(len(grouping.standard.names))
     for parameter, x in zip(estimate.problem.basis.parameters, estimate.X, strict=True):
         values[grouping.standard.places[parameter]] = x / parameter.scale
     return dict(zip(grouping.standard.names, map(float, values), strict=True))
 
 
-def require_known(subject: Subject, target: object) -> None:
+def require_known(robot_model: RobotModel, target: object) -> None:
     """Raise ExperimentError if a robot has what a controller's function does not: springs, other laws, coupled drives."""
-    strange = [p for p in subject.grouping.standard.parameters if p.kind not in BODY and (p.symbol not in KNOWN or p.drive)]
+    strange = [p for p in robot_model.grouping.standard.parameters if p.kind not in BODY and (p.symbol not in KNOWN or p.drive)]
     if strange:
         names = ", ".join(parameter.name for parameter in strange[:6])
         raise ExperimentError(

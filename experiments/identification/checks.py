@@ -30,7 +30,7 @@ def checks(judgement: Judgement, *, delay: bool) -> dict[str, list[str]]:
     """
     result = judgement.fit
     of_logs = list(warnings_of_logs(judgement))
-    found: dict[str, list[str]] = {LOG: of_logs, DELAY: [], FILE: warnings_of_robot(result.subject.robot)}
+    found: dict[str, list[str]] = {LOG: of_logs, DELAY: [], FILE: warnings_of_robot(result.robot_model.robot)}
     found |= {MOTION: [], MODEL: []}
     if any(map(unusable, result.logs.fitted)):  # all else may be its doing
         return found
@@ -42,13 +42,13 @@ def checks(judgement: Judgement, *, delay: bool) -> dict[str, list[str]]:
         # Friction absorbs a wrong delay, and the verdict may be good: the log itself is asked.
         found[DELAY] += delay_advice(result) if delay else ()
         found[MODEL] += () if judgement.good else Remedies(hardest).options()
-    found[MODEL] += advice_on_lack(result.lack, result.subject.robot.joints)
+    found[MODEL] += advice_on_lack(result.lack, result.robot_model.robot.joints)
     return found
 
 
 def warnings_of_logs(judgement: Judgement) -> Iterator[str]:
     """Yield what is suspicious about the logs, fitted and held out."""
-    logs, tree = judgement.fit.logs, judgement.fit.subject.tree
+    logs, tree = judgement.fit.logs, judgement.fit.robot_model.tree
     several = len(logs.fitted) > 1
     every = [(f"{logs.name(k)}: " if several else "", log) for k, log in enumerate(logs.fitted)]
     every += [(f"{name}: ", log) for name, log in (logs.held_out or {}).items()]

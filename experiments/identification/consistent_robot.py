@@ -35,31 +35,31 @@ class Written:
     @cached_property
     def consistent(self) -> Consistent:
         """Its standard parameters."""
-        return consistent_of(self.fit.subject, self.fit.estimates[self.model])
+        return consistent_of(self.fit.robot_model, self.fit.estimates[self.model])
 
     @cached_property
     def robot(self) -> Robot:
         """The robot of the file."""
-        return compiled(self.fit.subject.name, self.text())
+        return compiled(self.fit.robot_model.name, self.text())
 
     @cached_property
     def values(self) -> dict[str, float]:
         """The standard parameters by name; those that were not asked for are zero."""
-        found, subject = self.consistent, self.fit.subject
-        without = {f"Ia{j + 1}": 0.0 for j in range(subject.basis.n)} if subject.asked.armature == "none" else {}
+        found, robot_model = self.consistent, self.fit.robot_model
+        without = {f"Ia{j + 1}": 0.0 for j in range(robot_model.basis.n)} if robot_model.asked.armature == "none" else {}
         for letters, law in (("Fv", "viscous"), ("Fs", "coulomb")):
-            without |= {f"{letters}{j + 1}": 0.0 for j, own in enumerate(subject.laws.names) if law not in own}
+            without |= {f"{letters}{j + 1}": 0.0 for j, own in enumerate(robot_model.laws.names) if law not in own}
         return without | dict(zip(found.names, map(float, found.standard), strict=True))
 
     def text(self, folder: Path | None = None) -> str:
         """Return the file, to stand in a folder; in that of the robot's own file by default."""
-        subject = self.fit.subject
-        return rewritten(subject.name, self.values, folder, subject.mounting)
+        robot_model = self.fit.robot_model
+        return rewritten(robot_model.name, self.values, folder, robot_model.mounting)
 
     @property
     def warnings(self) -> list[str]:
         """What is wrong about it."""
-        found, names = self.consistent, self.fit.subject.grouping.names
+        found, names = self.consistent, self.fit.robot_model.grouping.names
         messages = []
         if not found.agrees:
             far = [f"{n} by {abs(d):.1f}" for n, d in zip(names, found.departure, strict=True) if abs(d) > SIGMAS]
@@ -74,5 +74,5 @@ class Written:
     @property
     def lost(self) -> dict[str, float]:
         """Standard parameters that have no place in the file, and their values."""
-        known = standard_parameters(self.fit.subject.robot)
+        known = standard_parameters(self.fit.robot_model.robot)
         return {name: value for name, value in self.values.items() if name not in known}

@@ -11,7 +11,7 @@ from experiments.identification.friction_choice import chosen_friction
 from experiments.identification.lack import advice_on_lack
 from experiments.identification.logs import Logs
 from experiments.identification.request import Request
-from experiments.identification.subject import Subject
+from experiments.identification.robot_model import RobotModel
 from experiments.identification.suited_mask import suited_mask
 from experiments.results.summaries import finite, summarize
 from identify import (
@@ -49,7 +49,7 @@ def fit(request: Request, logs: Logs) -> "Fit":
         If no model has an estimate.
     """
     choice = None
-    if request.subject.laws.auto:
+    if request.robot_model.laws.auto:
         with stage("laws of friction"):
             request, choice = chosen_friction(request, logs.fitted)
     problem = request.problem(logs.fitted)
@@ -61,7 +61,7 @@ def fit(request: Request, logs: Logs) -> "Fit":
     leading = next(iter(found.outcomes.values()))
     while isinstance(leading, ExcitationError) and leading.hidden and len(leading.hidden) < len(found.basis.names):
         hidden += leading.hidden
-        request = replace(found.request, subject=found.subject.without(leading.hidden))
+        request = replace(found.request, robot_model=found.robot_model.without(leading.hidden))
         found = _fit(request, logs, request.problem(logs.fitted))
         leading = next(iter(found.outcomes.values()))
     if not found.estimates and isinstance(leading, IdentificationError):
@@ -77,7 +77,7 @@ def _with_its_cause(found: "Fit", error: IdentificationError) -> IdentificationE
         lack = lack_of_fit(found.problem, ESTIMATORS.create("GLS").fit(found.problem.explicit).X)
     except IdentificationError:
         return error
-    causes = list(advice_on_lack(lack, found.subject.robot.joints))
+    causes = list(advice_on_lack(lack, found.robot_model.robot.joints))
     return IdentificationError(f"{error}; with GLS, {'; '.join(causes)}") if causes else error
 
 
@@ -91,7 +91,7 @@ def _moved(request: Request, outcome: Estimate | IdentificationError) -> Estimat
     if request.consistent == "no" or isinstance(outcome, IdentificationError):
         return outcome
     try:
-        return made_consistent(request.subject, outcome, request.consistent)
+        return made_consistent(request.robot_model, outcome, request.consistent)
     except IdentificationError as error:
         return error
 
@@ -131,9 +131,9 @@ class Fit:
     raised: tuple[int, ...] = ()
 
     @property
-    def subject(self) -> Subject:
+    def robot_model(self) -> RobotModel:
         """The robot."""
-        return self.request.subject
+        return self.request.robot_model
 
     @property
     def basis(self) -> Basis:
@@ -187,7 +187,7 @@ class Fit:
         alone = replace(logs, fitted=logs.fitted[k : k + 1], names=logs.names[k : k + 1])
         problem = Problem(alone.fitted, self.basis, self.problem.model, self.processing)
         seen: Outcomes = {
-            name: replace(e, problem=problem.with_model(e.problem.model), solution=None, calibrated=e.best_covariance, fits={})
+            name: replace(e, problem=problem.with_model(e.problem.model), solution=None, calibrated=e.covariance, fits={})
             for name, e in self.estimates.items()
         }
         return replace(self, logs=alone, problem=problem, unconstrained=seen, outcomes=seen)
@@ -218,7 +218,7 @@ class Fit:
     def left_open(self) -> dict[str, Array]:
         """Standard error of the torque that every estimate predicts on its own log, over that torque's rms, shape (joint,)."""
         W = self.problem.factors.R[..., :-1]
-        spread = {name: np.sum(W @ e.best_covariance * W, axis=(-2, -1)) for name, e in self.estimates.items()}
+        spread = {name: np.sum(W @ e.covariance * W, axis=(-2, -1)) for name, e in self.estimates.items()}
         squares = np.maximum(self._torque_squares, 1e-300)
         return {name: np.sqrt(np.maximum(found, 0.0) / squares) for name, found in spread.items()}
 
@@ -257,9 +257,9 @@ class Fit:
         return {
             "parameters": list(self.basis.names),
             "units": list(self.basis.units),
-            "made_of": self.subject.grouping.groupings,
+            "made_of": self.robot_model.grouping.groupings,
             "truth": truth,
-            "robot": self.subject.name,
+            "robot": self.robot_model.name,
             "chain": self.request.chain,
             "estimator": self.request.estimator,
             "consistent": self.request.consistent,

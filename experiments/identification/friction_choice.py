@@ -19,17 +19,19 @@ def chosen_friction(request: Request, logs: tuple[MotionLog, ...], most: int | N
 
     At most so many are added to a joint.
     """
-    subject = request.subject
+    robot_model = request.robot_model
     seen = {"temperature": "temperature" in logs[0].conditions, "tanh": isinstance(request.processing.mask, NoMask)}
     candidates = {name: law_of(name) for name in COMPARED if seen.get(name, True)}
     with blamed():
-        problem = Problem(logs, subject.basis, ExplicitModel(), request.processing)
+        problem = Problem(logs, robot_model.basis, ExplicitModel(), request.processing)
         choice = choose_friction(problem, candidates, most=most)
     # A motor that turns with several joints has the laws that all of them have: theirs stay.
-    turned = {j for coupling in subject.tree.couplings for j, weight in enumerate(coupling.weights) if weight}
+    turned = {j for coupling in robot_model.tree.couplings for j, weight in enumerate(coupling.weights) if weight}
     choice = replace(choice, idle=tuple(() if j in turned else own for j, own in enumerate(choice.idle)))
-    asked = replace(subject.asked, friction=subject.laws.chosen(choice.laws, choice.idle).texts(subject.robot.joints))
-    return replace(request, subject=replace(subject, asked=asked)), choice
+    asked = replace(
+        robot_model.asked, friction=robot_model.laws.chosen(choice.laws, choice.idle).texts(robot_model.robot.joints)
+    )
+    return replace(request, robot_model=replace(robot_model, asked=asked)), choice
 
 
 def words(choice: FrictionChoice, laws: Sequence[Sequence[str]], joints: Sequence[str]) -> list[str]:

@@ -67,7 +67,7 @@ class HeldOut:
     @cached_property
     def torques(self) -> dict[str, Validation]:
         """How well each model predicts the torques."""
-        return {model: validate(self.problem, e.X, e.best_covariance) for model, e in self.fit.estimates.items()}
+        return {model: validate(self.problem, e.X, e.covariance) for model, e in self.fit.estimates.items()}
 
     @cached_property
     def replays(self) -> dict[str, Replay | str]:

@@ -38,7 +38,7 @@ def _far_from_least_squares(fit: Fit, model: str, estimate: Estimate) -> Iterato
     """Yield what it means if an estimator that believes the simulated loop does not agree with the measured motion."""
     plain = identified_by(estimate.problem, WeightedLeastSquares(), throw=False)
     # Its own sigma would be as large as the loop is wrong.
-    off = np.abs(estimate.X - plain.X) / plain.corrected_sigma
+    off = np.abs(estimate.X - plain.X) / plain.calibrated_sigma
     if not np.nanmax(off) < FAR:
         k = int(np.nanargmax(off))
         yield (

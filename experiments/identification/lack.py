@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from experiments.identification.friction_laws import said
-from experiments.identification.subject import Subject
+from experiments.identification.robot_model import RobotModel
 from experiments.text import probability
 from identify.judge.lack_of_fit import WRONG, Lack
 
@@ -25,15 +25,15 @@ def lacking(found: Sequence[Lack]) -> tuple[Lack, ...]:
     return tuple(first.values())
 
 
-def words_of_lack(found: Sequence[Lack], subject: Subject) -> str:
+def words_of_lack(found: Sequence[Lack], robot_model: RobotModel) -> str:
     """Return what the test says, in a line."""
     if not found:
         return "lack of fit: not tested, the rows are too few or do not allow it"
     if not (wrong := lacking(found)):
         return f"lack of fit: none over velocity, position, load and time (p = {probability(found[0].p)})"
-    joints = subject.robot.joints
+    joints = robot_model.robot.joints
     each = (
-        f"{joints[x.joint]} over its {x.over} ({x.size:.2g} {subject.units(x.joint)[0]} rms, p = {probability(x.p)})"
+        f"{joints[x.joint]} over its {x.over} ({x.size:.2g} {robot_model.units(x.joint)[0]} rms, p = {probability(x.p)})"
         for x in wrong
     )
     return f"lack of fit: {'; '.join(each)}: sigma is too small"

@@ -79,7 +79,7 @@ def load(paths: Sequence[Path], options: ReadOptions, request: Request, *, band:
     _require_other_samples(read_)
     of_band = list[str]()
     if band:
-        p, least = len(request.subject.basis.names) + more, request.processing.operator.cutoff  # type: ignore[attr-defined]
+        p, least = len(request.robot_model.basis.names) + more, request.processing.operator.cutoff  # type: ignore[attr-defined]
         needed = Band.of([log for one in read_ for log in one.logs], p, least)
         if needed.cutoff > least:
             request, of_band = in_band(request, needed.cutoff), [needed.words(p, least)]

@@ -113,10 +113,10 @@ class ReadLog:
 
 def read(path: Path, options: ReadOptions, request: Request) -> ReadLog:
     """Return the log, its torque read as the options say; its delay is that which is stated."""
-    columns, delay, joints = columns_of(path, options.columns), options.delay, request.subject.mounting.joints
+    columns, delay, joints = columns_of(path, options.columns), options.delay, request.robot_model.mounting.joints
     columns = columns if columns.joints or len(joints) != columns.n else replace(columns, joints=joints)
     try:
-        columns = columns.ordered(request.subject.robot.joints)
+        columns = columns.ordered(request.robot_model.robot.joints)
     except LogError as error:
         raise ExperimentError(
             f"{path}: {error}; name the robot of the log with --robot{_joints_of(columns, request)}"
@@ -138,7 +138,7 @@ def read(path: Path, options: ReadOptions, request: Request) -> ReadLog:
     notes += ["no --torque-delay was given, 0 is assumed: `estimate` finds it"] if assumed else []
     if options.columns.resample or columns.t_tau is not None:
         repaired = Repaired.of(columns, channel)
-        words = [*repaired.words(request.subject.robot.joints), *notes]
+        words = [*repaired.words(request.robot_model.robot.joints), *notes]
         return ReadLog(path, repaired.logs, columns, channel, repaired, tuple(words))
     try:
         log = MotionLog.at_times(columns.t, columns.q, columns.tau, channel, columns.conditions)
@@ -164,10 +164,10 @@ def with_delays(every: Sequence[ReadLog], request: Request) -> list[ReadLog]:
     for meaning in {log.logs[0].torque.meaning for log in every}:
         alike = [log for read in every for log in read.logs if log.torque.meaning == meaning]
         try:
-            found[meaning] = estimate_delay(alike, request.subject.basis, request.processing)
+            found[meaning] = estimate_delay(alike, request.robot_model.basis, request.processing)
         except RangeError as error:
-            laws = " ".join(request.subject.asked.friction)
-            without = "" if request.subject.laws.standard else f", with --friction {laws}: does that fit the robot?"
+            laws = " ".join(request.robot_model.asked.friction)
+            without = "" if request.robot_model.laws.standard else f", with --friction {laws}: does that fit the robot?"
             raise ExperimentError(f"--torque-delay estimate: {error}{without}") from error
     return [_delayed(log, found[log.logs[0].torque.meaning]) for log in every]
 
@@ -207,7 +207,7 @@ def columns_of(path: Path, options: ColumnOptions) -> LogColumns:
 
 def _joints_of(columns: LogColumns, request: Request) -> str:
     """Return how to say which joints a log has, where they are fewer than the robot's."""
-    known = request.subject.robot.joints
+    known = request.robot_model.robot.joints
     if columns.n >= len(known):
         return ""
     those = columns.joints if set(columns.joints) <= set(known) and columns.joints else known[: columns.n]
@@ -226,7 +226,7 @@ def _require_seconds(path: Path, t: Array) -> None:
 
 def _turned(path: Path, q: Array, request: Request, unwrap: bool) -> Array:
     """Return positions whose hinges do not jump by a turn, undone if that is wanted; raise ExperimentError if it is not."""
-    tree, q = request.subject.tree, q.copy()
+    tree, q = request.robot_model.tree, q.copy()
     for j, joint in enumerate(tree.joints):
         jumps = np.abs(np.abs(np.diff(q[:, j])) - TURN) < NEARLY * TURN
         if joint.kind != "hinge" or not jumps.any():

@@ -11,7 +11,7 @@ from experiments.identification.fit import Fit
 from experiments.identification.friction_choice import chosen_friction
 from experiments.identification.held_out import HeldOut
 from experiments.identification.request import Request
-from experiments.identification.subject import Subject
+from experiments.identification.robot_model import RobotModel
 from experiments.identification.warnings import wrong_sign
 from experiments.text import error_percentage
 from identify import IdentificationError, RangeError, WeightedLeastSquares, estimate, validate
@@ -76,7 +76,7 @@ class Remedies:
                 continue
             try:
                 with stage(f"trying {option}"):
-                    after = self._worst(replace(request, subject=make()))
+                    after = self._worst(replace(request, robot_model=make()))
             except (IdentificationError, ExperimentError, BenchError):
                 continue
             if option == AUTO and after > WORTH * least:  # it finds what the others say, too
@@ -86,21 +86,21 @@ class Remedies:
                 fall = f"from {error_percentage(before)} to {error_percentage(after)}"
                 yield f"with {option} the worst joint's error falls {fall}"
 
-    def _others(self) -> dict[str, Callable[[], Subject]]:
+    def _others(self) -> dict[str, Callable[[], RobotModel]]:
         """Return the options, and what makes the robot that each describes."""
-        request, found = self.held_out.fit.request, dict[str, Callable[[], Subject]]()
-        subject = request.subject
-        asked, mounting, joints = subject.asked, subject.mounting, subject.robot.joints
-        if not all(joint.armature for joint in subject.tree.joints):
-            found["--armature all"] = lambda: replace(subject, asked=replace(asked, armature="all"))
+        request, found = self.held_out.fit.request, dict[str, Callable[[], RobotModel]]()
+        robot_model = request.robot_model
+        asked, mounting, joints = robot_model.asked, robot_model.mounting, robot_model.robot.joints
+        if not all(joint.armature for joint in robot_model.tree.joints):
+            found["--armature all"] = lambda: replace(robot_model, asked=replace(asked, armature="all"))
         if "offset" not in asked.add:
-            found["--add offset"] = lambda: replace(subject, asked=replace(asked, add=(*asked.add, "offset")))
-        if len(joints) > 1 and not subject.tree.couplings:
+            found["--add offset"] = lambda: replace(robot_model, asked=replace(asked, add=(*asked.add, "offset")))
+        if len(joints) > 1 and not robot_model.tree.couplings:
             drive = f"motor{len(joints)}", ((joints[-2], 1.0), (joints[-1], 1.0))
             option = f"--coupling {drive[0]}={joints[-2]}+{joints[-1]}"
-            found[option] = lambda: replace(subject, mounting=replace(mounting, couplings=(drive,)))
-        if subject.laws.standard and asked.friction == ("standard",):
-            found[AUTO] = lambda: chosen_friction(request, self.held_out.fit.logs.fitted, most=1)[0].subject
+            found[option] = lambda: replace(robot_model, mounting=replace(mounting, couplings=(drive,)))
+        if robot_model.laws.standard and asked.friction == ("standard",):
+            found[AUTO] = lambda: chosen_friction(request, self.held_out.fit.logs.fitted, most=1)[0].robot_model
         return found
 
     def _worst(self, request: Request) -> float:

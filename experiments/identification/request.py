@@ -8,8 +8,8 @@ import numpy as np
 from experiments.errors import ExperimentError
 from experiments.identification.choices import Consistency, Start
 from experiments.identification.defaults import CHAIN, ESTIMATOR
+from experiments.identification.robot_model import RobotModel
 from experiments.identification.simulators import RobotPlant, ScenarioLoop
-from experiments.identification.subject import Subject
 from identify import CHAINS, ESTIMATORS, MODELS, AbstractEstimator, Chain, ExplicitModel, MotionLog, Problem, Simulation
 from identify.blame import blamed
 from identify.estimators.settle import settled
@@ -23,7 +23,7 @@ class Request:
 
     Parameters
     ----------
-    subject : Subject
+    robot_model : RobotModel
         The robot.
     models : tuple of str
         Names of the models.
@@ -50,7 +50,7 @@ class Request:
         If a name is unknown, or a setting would not be used.
     """
 
-    subject: Subject = field(default_factory=Subject)
+    robot_model: RobotModel = field(default_factory=RobotModel)
     models: tuple[str, ...] = ("explicit", "implicit", "power")
     chain: str = CHAIN
     estimator: str = ESTIMATOR
@@ -63,13 +63,13 @@ class Request:
     mask_speed: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        _ = self.subject.basis, self.processing, self.solver, [MODELS.create(name) for name in self.models]
+        _ = self.robot_model.basis, self.processing, self.solver, [MODELS.create(name) for name in self.models]
         if self.mask_speed and not isinstance(self.processing.mask, ReversalMask):
             raise ExperimentError(
                 f"--mask-speed {' '.join(f'{x:g}' for x in self.mask_speed)}: --chain {self.chain} with these options masks "
                 "nothing; leave it out"
             )
-        n, given = self.subject.robot.n, " ".join(f"{x:g}" for x in self.mask_speed)
+        n, given = self.robot_model.robot.n, " ".join(f"{x:g}" for x in self.mask_speed)
         if len(self.mask_speed) not in (0, 1, n) or not all(0 < x < np.inf for x in self.mask_speed):
             raise ExperimentError(f"--mask-speed {given} must be one speed above 0 for all {n} joints, or one for each")
         if self.start != "least-squares" and not self.solver.begins:
@@ -82,7 +82,7 @@ class Request:
         """The chain."""
         chain = self.method[0] if self.method else CHAINS.create(self.chain)
         if isinstance(chain.mask, ReversalMask):
-            couplings = tuple(c.weights for c in self.subject.tree.couplings)
+            couplings = tuple(c.weights for c in self.robot_model.tree.couplings)
             mask = replace(chain.mask, couplings=couplings, threshold=self.mask_speed or chain.mask.threshold)
             chain = replace(chain, mask=mask)
         return chain if self.trim is None else replace(chain, trim=self.trim)
@@ -104,13 +104,13 @@ class Request:
 
     def problem(self, logs: Sequence[MotionLog]) -> Problem:
         """Return logs, robot and chain, by the explicit model; nonlinear parameters at their operating point."""
-        basis, simulation = self.subject.basis, self._simulation(tuple(logs))
+        basis, simulation = self.robot_model.basis, self._simulation(tuple(logs))
         with blamed():
             return settled(Problem(tuple(logs), basis, ExplicitModel(), self.processing, simulation))
 
     def _simulation(self, logs: tuple[MotionLog, ...]) -> Simulation:
         """Return how the robot is simulated, for estimators that need it."""
-        needs, subject = self.solver.needs, self.subject
-        start = None if self.start == "least-squares" else np.array(list(subject.truth(subject.robot).values()))
-        loop = ScenarioLoop.of(subject, self.loops, logs) if "loop" in needs and self.loops else None
-        return Simulation(loop, RobotPlant(subject) if "plant" in needs else None, start)
+        needs, robot_model = self.solver.needs, self.robot_model
+        start = None if self.start == "least-squares" else np.array(list(robot_model.truth(robot_model.robot).values()))
+        loop = ScenarioLoop.of(robot_model, self.loops, logs) if "loop" in needs and self.loops else None
+        return Simulation(loop, RobotPlant(robot_model) if "plant" in needs else None, start)

@@ -45,7 +45,7 @@ class ScenarioRun:
 
     def __post_init__(self) -> None:
         # A robot that does not fit is reported before the simulation.
-        self.request.subject.truth(self.scenario.real_robot, self.scenario.friction)
+        self.request.robot_model.truth(self.scenario.real_robot, self.scenario.friction)
 
     def require_bearable(self, yes: bool) -> None:
         """Say how long a simulation is that takes long; raise ExperimentError if it would hardly end, unless that is wanted."""
@@ -66,7 +66,7 @@ class ScenarioRun:
     def fit(self) -> Fit:
         """What the models make of its log."""
         robot, friction = self.run.robots[0], self.scenario.friction
-        truth, log = friction.truth(robot) | self.request.subject.truth(robot, friction), self.run.alone()
+        truth, log = friction.truth(robot) | self.request.robot_model.truth(robot, friction), self.run.alone()
         if not np.any(log.tau):
             raise ExperimentError(f"scenario {self.scenario.name}: all torques of the log are 0: {self._why_nothing}")
         return fit(replace(self.request, loops=(self.scenario,)), Logs((log,), truth=truth))

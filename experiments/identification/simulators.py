@@ -8,7 +8,7 @@ from typing import Self, final
 import numpy as np
 import numpy.typing as npt
 
-from experiments.identification.subject import Subject
+from experiments.identification.robot_model import RobotModel
 from identify import AbstractLoop, AbstractPlant, Array, IdentificationError, MotionLog, Simulated
 from sim.encoders import ExactEncoder
 from sim.engine.shooting import shoot
@@ -38,16 +38,16 @@ class Fields:
 
     Parameters
     ----------
-    subject : Subject
+    robot_model : RobotModel
         The robot.
     """
 
-    subject: Subject
+    robot_model: RobotModel
 
     @cached_property
     def robot(self) -> Robot:
         """The robot as its file describes it."""
-        return self.subject.robot
+        return self.robot_model.robot
 
     def of(self, X: Array, *, exact: bool = True) -> dict[str, Array]:
         """Return the fields of robots with parameters X, shape (nsim, p): those nearest to the file's standard parameters.
@@ -59,9 +59,9 @@ class Fields:
         IdentificationError
             If a parameter is of a law of friction that the simulated robot does not have.
         """
-        grouping = self.subject.grouping
+        grouping = self.robot_model.grouping
         base = np.zeros((len(X), len(grouping.names)))
-        base[:, [grouping.basis.places[parameter] for parameter in self.subject.basis.parameters]] = X
+        base[:, [grouping.basis.places[parameter] for parameter in self.robot_model.basis.parameters]] = X
         given = np.array([self._given.get(name, 0.0) for name in grouping.standard.names])
         unknown = [name for name in grouping.standard.names if name not in self._given]
         if unknown and exact:
@@ -83,7 +83,7 @@ class Fields:
 
     @cached_property
     def _back(self) -> Array:
-        grouping = self.subject.grouping
+        grouping = self.robot_model.grouping
         given = np.array([self._given.get(name, 0.0) for name in grouping.standard.names])
         scale = np.where(given == 0, 1.0, np.abs(given))
         return scale[:, None] * np.linalg.pinv(grouping.K * scale)
@@ -96,7 +96,7 @@ class ScenarioLoop(AbstractLoop):
 
     Parameters
     ----------
-    subject : Subject
+    robot_model : RobotModel
         The robot.
     scenarios : tuple of Scenario
         Controller, timing, drive and motion of each log.
@@ -106,13 +106,13 @@ class ScenarioLoop(AbstractLoop):
         Planned motions of all runs of the only log, where they differ; those of the scenarios by default.
     """
 
-    subject: Subject
+    robot_model: RobotModel
     scenarios: tuple[Scenario, ...]
     logs: tuple[MotionLog, ...]
     motions: tuple[Reference, ...] = ()
 
     @classmethod
-    def of(cls, subject: Subject, scenarios: tuple[Scenario, ...], logs: tuple[MotionLog, ...]) -> Self:
+    def of(cls, robot_model: RobotModel, scenarios: tuple[Scenario, ...], logs: tuple[MotionLog, ...]) -> Self:
         """Return the loops of logs, which may be the beginnings of what the scenarios make.
 
         Raises
@@ -124,10 +124,10 @@ class ScenarioLoop(AbstractLoop):
             raise IdentificationError(f"{len(scenarios)} loops are given for {len(logs)} logs: one scenario is needed for each")
         try:
             for scenario, log in zip(scenarios, logs, strict=True):
-                _require_matching(scenario, log, subject)
+                _require_matching(scenario, log, robot_model)
         except BenchError as error:
             raise IdentificationError(f"the loop cannot be simulated: {error}") from error
-        return cls(subject, scenarios, logs)
+        return cls(robot_model, scenarios, logs)
 
     def repeat(self, X: Array, *, informed: bool = False, exact: bool = True) -> Simulated:
         """Return the logs that robots with these parameters give."""
@@ -155,7 +155,7 @@ class ScenarioLoop(AbstractLoop):
 
     @cached_property
     def _fields(self) -> Fields:
-        return Fields(self.subject)
+        return Fields(self.robot_model)
 
 
 @final
@@ -165,11 +165,11 @@ class RobotPlant(AbstractPlant):
 
     Parameters
     ----------
-    subject : Subject
+    robot_model : RobotModel
         The robot.
     """
 
-    subject: Subject
+    robot_model: RobotModel
 
     def shoot(self, X: Array, q: Array, qd: Array, log: MotionLog, first: npt.NDArray[np.intp], count: int) -> Array:
         """Return the positions of robots that start somewhere in a log."""
@@ -180,7 +180,7 @@ class RobotPlant(AbstractPlant):
 
     @cached_property
     def _fields(self) -> Fields:
-        return Fields(self.subject)
+        return Fields(self.robot_model)
 
 
 def noiseless(scenario: Scenario) -> Scenario:
@@ -196,14 +196,14 @@ def noiseless(scenario: Scenario) -> Scenario:
     )
 
 
-def _require_matching(scenario: Scenario, log: MotionLog, subject: Subject) -> None:
+def _require_matching(scenario: Scenario, log: MotionLog, robot_model: RobotModel) -> None:
     """Raise IdentificationError if a scenario is no loop of a log: other robot, frequency or duration."""
     name, other = f"loop {scenario.name}", scenario.nominal_robot
-    if other.joints != subject.robot.joints:
+    if other.joints != robot_model.robot.joints:
         raise IdentificationError(
-            f"{name} moves robot {scenario.robot}, whose joints are {', '.join(other.joints)}: it is none of {subject.name}"
+            f"{name} moves robot {scenario.robot}, whose joints are {', '.join(other.joints)}: it is none of {robot_model.name}"
         )
-    if missing := {c.name for c in subject.tree.couplings} - {c.name for c in kinematic_tree(other).couplings}:
+    if missing := {c.name for c in robot_model.tree.couplings} - {c.name for c in kinematic_tree(other).couplings}:
         names = " and ".join(sorted(missing))
         raise IdentificationError(
             f"{name} moves robot {scenario.robot}, whose file has no drive {names}: write a file with it (--coupling describes "

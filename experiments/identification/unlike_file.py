@@ -18,10 +18,10 @@ def unlike_file(fit: Fit) -> list[str]:
 
     If only friction is, or only what has inertia, that is said: the file has placeholders.
     """
-    subject, R = fit.subject, fit.problem.factors.R
-    if subject.robot.weightless:
+    robot_model, R = fit.robot_model, fit.problem.factors.R
+    if robot_model.robot.weightless:
         return []
-    filed = np.array(list(subject.truth(subject.robot).values()))
+    filed = np.array(list(robot_model.truth(robot_model.robot).values()))
     expected = np.linalg.norm(R[..., :-1] @ filed, axis=-1)
     j = int(np.argmax(expected))  # the joint of which the file expects most
     measured = float(np.linalg.norm(R[j, ..., -1]))
@@ -35,7 +35,7 @@ def unlike_file(fit: Fit) -> list[str]:
     if len(far) == len(ratios):
         return [f"{words}: are they in N m?"]
     each = ", ".join(f"its {part} {ratio:.2g} times" for part, ratio in ratios.items())
-    return [f"{words}, {each} at {subject.robot.joints[j]}: are the file's values of {' and '.join(far)} placeholders?"]
+    return [f"{words}, {each} at {robot_model.robot.joints[j]}: are the file's values of {' and '.join(far)} placeholders?"]
 
 
 def _far(ratio: float) -> bool:

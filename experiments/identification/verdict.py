@@ -47,7 +47,7 @@ class Verdict:
     @classmethod
     def of(cls, judged: Fit, validation: Validation, unsimulated: str = "") -> Self:
         """Return the verdict on a model of a fit."""
-        return cls(judged.subject.robot.joints, validation, tuple(wrong_sign(judged)), unsimulated)
+        return cls(judged.robot_model.robot.joints, validation, tuple(wrong_sign(judged)), unsimulated)
 
     @cached_property
     def word(self) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 
 from experiments.identification.fit import Fit
 from experiments.identification.log_warnings import resting, warnings_of_base
-from experiments.identification.subject import Subject
+from experiments.identification.robot_model import RobotModel
 from experiments.identification.unlike_file import unlike_file
 from identify import MotionLog, brisk_shares, showing_moves
 from identify.basis.parameter import NOT_NEGATIVE
@@ -69,7 +69,7 @@ def _link_side(fit: Fit) -> Iterator[str]:
     estimate = next(iter(fit.estimates.values()))
     rotors = [
         name
-        for p, name, x, sigma in zip(fit.basis.parameters, estimate.names, estimate.X, estimate.best_sigma, strict=True)
+        for p, name, x, sigma in zip(fit.basis.parameters, estimate.names, estimate.X, estimate.standard_errors, strict=True)
         if p.kind == "rotor inertia" and x < -LINK_SIDE * sigma
     ]
     if rotors:
@@ -91,7 +91,7 @@ def doubtful(fit: Fit) -> dict[str, list[tuple[str, str, str]]]:
     """Return, of each model, a mark for every parameter's estimate, its error and its sigma; blank where nothing is wrong."""
     marks = {}
     for model, estimate in fit.estimates.items():
-        negative, sigma = _negative(fit, model), estimate.best_sigma
+        negative, sigma = _negative(fit, model), estimate.standard_errors
         off = np.zeros(len(sigma)) if fit.truth is None else np.abs(estimate.X - list(fit.truth.values()))
         marks[model] = [
             ("!" if name in negative else " ", "*" if error > FAR * s > 0 else " ", "?" if s > WEAK * abs(x) else " ")
@@ -109,7 +109,7 @@ def used(marks: Mapping[str, Sequence[Sequence[str]]]) -> list[str]:
 def _negative(fit: Fit, model: str) -> list[str]:
     """Return parameters that must be positive and are significantly negative."""
     estimate = fit.estimates[model]
-    friction = zip(fit.basis.parameters, estimate.X, estimate.best_sigma, strict=True)
+    friction = zip(fit.basis.parameters, estimate.X, estimate.standard_errors, strict=True)
     return [p.name for p, x, sigma in friction if p.kind in NOT_NEGATIVE and _surely_negative(x, sigma)]
 
 
@@ -125,14 +125,14 @@ def _too_little(fit: Fit, name: str) -> Iterator[str]:
     yield (
         f"the {name} model identifies too little: {int(estimate.row_count)} rows for {len(estimate.names)} parameters, Cond(W) "
         f"{float(estimate.condition_number):.2g}, one sigma of its parameters makes {100 * shares[worst]:.0f} % of the torque "
-        f"of {fit.subject.robot.joints[worst]}: take {f'the {others[0]} model' if others else longer}"
+        f"of {fit.robot_model.robot.joints[worst]}: take {f'the {others[0]} model' if others else longer}"
         + (f", or {longer}" if others else "")
     )
 
 
 def _badly_explained(fit: Fit, name: str) -> Iterator[str]:
     """Yield which torques a model does not explain: the log is suspected, unless another model explains them."""
-    joints = fit.subject.robot.joints
+    joints = fit.robot_model.robot.joints
     shares = dict(enumerate(fit.explained[name]))
     if nothing := [joints[j] for j, share in shares.items() if np.isnan(share)]:
         yield (
@@ -161,7 +161,7 @@ def hidden_notes(fit: Fit) -> list[str]:
     """Return which parameters the logs do not show, and what would show them."""
     if not fit.hidden:
         return []
-    moves = helpful_moves(fit.subject, fit.logs.fitted[0], fit.hidden)
+    moves = helpful_moves(fit.robot_model, fit.logs.fitted[0], fit.hidden)
     return [f"this log does not show {', '.join(fit.hidden)}: left out, as if zero{f' ({moves})' if moves else ''}"]
 
 
@@ -176,12 +176,12 @@ def warnings_of_robot(robot: Robot) -> list[str]:
 def wrong_sign(fit: Fit) -> list[str]:
     """Return which torques have the wrong sign: those that drive their joint by friction."""
     model, estimate = next(iter(fit.estimates.items()))
-    values = zip(fit.basis.parameters, estimate.X, estimate.best_sigma, strict=True)
+    values = zip(fit.basis.parameters, estimate.X, estimate.standard_errors, strict=True)
     known = {(p.kind, p.joint): (x, sigma) for p, x, sigma in values}
     nothing = (0.0, 0.0)
     wrong = [
         joint
-        for j, joint in enumerate(fit.subject.robot.joints)
+        for j, joint in enumerate(fit.robot_model.robot.joints)
         if known.get(("viscous friction", j), nothing)[0] < 0 and _surely_negative(*known.get(("Coulomb friction", j), nothing))
     ]
     if not wrong:
@@ -206,28 +206,28 @@ def _work(log: MotionLog) -> float:
 
 def _left_open(fit: Fit) -> list[str]:
     """Return which base parameters the log leaves open so far that a brisk motion shows it, and the moves to make."""
-    subject, (model, estimate) = fit.subject, next(iter(fit.estimates.items()))
-    shares = brisk_shares(subject.tree, fit.basis, estimate.X, estimate.best_sigma)
+    robot_model, (model, estimate) = fit.robot_model, next(iter(fit.estimates.items()))
+    shares = brisk_shares(robot_model.tree, fit.basis, estimate.X, estimate.standard_errors)
     names = [name for name, share in zip(fit.basis.names, shares, strict=True) if share > OPEN]
     if not names:
         return []
     return [f"one sigma of these parameters is above {100 * OPEN:g} % of a brisk motion's torque ({model} model): "
-            f"{_moves(subject, names)}"]  # fmt: skip
+            f"{_moves(robot_model, names)}"]  # fmt: skip
 
 
-def helpful_moves(subject: Subject, log: MotionLog, names: Sequence[str]) -> str:
+def helpful_moves(robot_model: RobotModel, log: MotionLog, names: Sequence[str]) -> str:
     """Return what would show parameters that a log hides: joints that never move, or else moves; empty if that is not known."""
-    if still := resting(log, subject.tree):
+    if still := resting(log, robot_model.tree):
         return f"{', '.join(still)} never moves in this log: move it"
-    return _moves(subject, names)
+    return _moves(robot_model, names)
 
 
-def _moves(subject: Subject, names: Sequence[str]) -> str:
+def _moves(robot_model: RobotModel, names: Sequence[str]) -> str:
     """Return parameters by the joints that show them when they move."""
     moves: dict[tuple[int, ...], list[str]] = {}
-    for name, joints in showing_moves(subject.tree, subject.grouping, names).items():
+    for name, joints in showing_moves(robot_model.tree, robot_model.grouping, names).items():
         moves.setdefault(joints, []).append(name)
-    each = [f"{', '.join(shown)} (move {_joints(subject, joints)})" for joints, shown in sorted(moves.items(), key=_size)]
+    each = [f"{', '.join(shown)} (move {_joints(robot_model, joints)})" for joints, shown in sorted(moves.items(), key=_size)]
     return "; ".join(each)
 
 
@@ -235,5 +235,7 @@ def _size(move: tuple[tuple[int, ...], list[str]]) -> int:
     return len(move[0])
 
 
-def _joints(subject: Subject, joints: Sequence[int]) -> str:
-    return "all joints" if len(joints) == subject.robot.n > 1 else " with ".join(subject.robot.joints[j] for j in joints)
+def _joints(robot_model: RobotModel, joints: Sequence[int]) -> str:
+    return (
+        "all joints" if len(joints) == robot_model.robot.n > 1 else " with ".join(robot_model.robot.joints[j] for j in joints)
+    )

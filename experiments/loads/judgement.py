@@ -73,9 +73,9 @@ class LoadJudgement:
     @cached_property
     def verdicts(self) -> dict[str, Verdict]:
         """How well the estimate of all logs predicts the torques of each."""
-        found, joints = self.estimate, self.request.subject.robot.joints
+        found, joints = self.estimate, self.request.robot_model.robot.joints
         each = [Problem((log,), found.problem.basis, ExplicitModel(), self.robot.chain) for log in found.problem.logs]
-        judged = [validate(problem, found.X, found.best_covariance) for problem in each]
+        judged = [validate(problem, found.X, found.covariance) for problem in each]
         return {name: Verdict(joints, validation) for name, validation in zip(self.names, judged, strict=True)}
 
     def word(self, doubts: Mapping[str, Sequence[str]]) -> str:
@@ -97,7 +97,7 @@ class LoadJudgement:
             yield from (f"{name}: {doubt}" for doubt in self._of_log(log))
 
     def _of_log(self, log: MotionLog) -> list[str]:
-        found = warnings_of_log(log, self.request.subject.tree)
+        found = warnings_of_log(log, self.request.robot_model.tree)
         try:
             alone = fit(replace(self.request, models=("explicit",)), Logs((log,)))
         except IdentificationError:  # too short for a fit of its own

@@ -10,7 +10,7 @@ import numpy as np
 
 from experiments.errors import ExperimentError
 from experiments.identification.parameters import Parameters
-from experiments.identification.subject import Subject
+from experiments.identification.robot_model import RobotModel
 from identify import Array, IdentificationError
 from identify.data.kinematics import INERTIAL
 from identify.loads.drive_gains import identify_drive_gains
@@ -101,9 +101,9 @@ class Pairs:
             )
 
     @cached_property
-    def subject(self) -> Subject:
+    def robot_model(self) -> RobotModel:
         """The robot."""
-        return Subject(self.scenario.robot, self.parameters)
+        return RobotModel(self.scenario.robot, self.parameters)
 
     @cached_property
     def simulated(self) -> tuple[Run, Run]:
@@ -116,7 +116,7 @@ class Pairs:
     @cached_property
     def truth(self) -> dict[str, float]:
         """The parameters of the payload."""
-        link = self.subject.tree.n
+        link = self.robot_model.tree.n
         before, after = (standard_parameters(run.robots[0]) for run in self.simulated)
         return {f"{x}L": after[f"{x}{link}"] - before[f"{x}{link}"] for x in INERTIAL}
 
@@ -124,7 +124,7 @@ class Pairs:
         """Return the robot with the logs of a run, currents as if its drives had these gains."""
         logs = [replace(each.alone(run), tau=each.alone(run).tau / gains) for each in self.simulated]
         first, second = ((log,) for log in logs)
-        return LoadedRobot(self.subject.tree, self.subject.grouping.standard, first, second, known=known)
+        return LoadedRobot(self.robot_model.tree, self.robot_model.grouping.standard, first, second, known=known)
 
     def payloads(self, told: Told) -> dict[str, Score]:
         """Return how well each way finds the payload."""
@@ -136,7 +136,7 @@ class Pairs:
 
     def gains(self, known: Mapping[str, float], told: Told) -> Score:
         """Return how well gains that are drawn for each run are found, with what is known of the payload."""
-        rng, n = np.random.default_rng(self.scenario.seed), self.subject.tree.n
+        rng, n = np.random.default_rng(self.scenario.seed), self.robot_model.tree.n
         true = rng.uniform(*GAINS, (self.runs, n))
 
         def found(run: int) -> Found:

@@ -51,14 +51,14 @@ class Imperfection:
         An ideal loop but for it.
     chain : Chain
         Chain `idbench`, but for what it is about.
-    believed : TorqueChannel, optional
+    assumed : TorqueChannel, optional
         What identification believes of the torque; by default what is true.
     """
 
     name: str
     scenario: Scenario
     chain: Chain
-    believed: TorqueChannel | None = None
+    assumed: TorqueChannel | None = None
 
 
 def imperfections(table2: Scenario) -> list[Imperfection]:
@@ -90,8 +90,8 @@ def imperfections(table2: Scenario) -> list[Imperfection]:
 def errors_of(imperfection: Imperfection) -> Errors:
     """Return the signed error [%] of every parameter in each model."""
     log, truth = _ideal_but_for(json.dumps(to_dict(imperfection.scenario)))
-    believed = MotionLog(log.fs, log.q, log.tau, imperfection.believed or log.torque)
-    estimates = identify_each(believed, scara(), COMPARED, imperfection.chain, WeightedLeastSquares())
+    assumed = MotionLog(log.fs, log.q, log.tau, imperfection.assumed or log.torque)
+    estimates = identify_each(assumed, scara(), COMPARED, imperfection.chain, WeightedLeastSquares())
     return {form: estimate.error_percent(truth) for form, estimate in estimates.items()}
 
 

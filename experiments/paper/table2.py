@@ -15,7 +15,7 @@ from experiments.errors import ExperimentError
 from experiments.identification.fit import Fit, fit
 from experiments.identification.logs import Logs
 from experiments.identification.request import Request
-from experiments.identification.subject import Subject
+from experiments.identification.robot_model import RobotModel
 from experiments.paper.attribution import Errors
 from experiments.paper.parallel_attribution import ParallelAttribution
 from identify import CHAINS, TorqueChannel
@@ -126,7 +126,7 @@ class Table2:
     def _identified(self, processing: str, model: str) -> Fit:
         logs = tuple(self.run.alone(i) for i in range(REALIZATIONS[model]))
         chain, estimator = PROCESSINGS[processing]
-        request = Request(Subject(self.scenario.robot), (model,), chain, estimator, trim=self.rest)
+        request = Request(RobotModel(self.scenario.robot), (model,), chain, estimator, trim=self.rest)
         return fit(request, Logs(logs, truth=self.truth))
 
     @property

@@ -45,7 +45,7 @@ def _twin(table: Table2, model: str) -> Table:
 def _with_sigma(estimate: Estimate, i: int, truth: list[float]) -> tuple[str, str, str, str]:
     return (
         f"{estimate.X[i]:.4f}",
-        f"{2 * estimate.sigma[i]:.2g}",
+        f"{2 * estimate.own_sigma[i]:.2g}",
         f"{estimate.relative_sigma_percent[i]:.2g}",
         percent(float(estimate.error_percent(truth)[i])),
     )

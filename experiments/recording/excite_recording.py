@@ -38,7 +38,7 @@ NOTABLE = 0.2
 
 def record_excited(found: Excited, audience: Audience | None = None) -> list[tuple[str, Stream]]:
     """Return the stream of the recording, by the name of its file."""
-    scenario, robot = found.scenario, found.design.subject.robot
+    scenario, robot = found.scenario, found.design.robot_model.robot
     _, motion = found.planned(SHOWN)
     base = Base(recording_id(scenario.name, to_toml(scenario).encode()), robot, SHOWN, ("planned",), motion.qd, audience)
     base.stream.describe(scenario=to_toml(scenario), seed=str(found.design.seed), fs_hz=f"{scenario.fs:g}")
@@ -67,7 +67,7 @@ def _send_sigmas(stream: Stream, found: Excited) -> None:
     """Send predicted sigmas over those of the median random motion."""
     if not found.random:
         return
-    names = found.design.subject.basis.names
+    names = found.design.robot_model.basis.names
     others = np.sort(found.sigmas[1:] / found.median, axis=0)
     x = decades("sigma relative to the median random motion", others, found.sigma / found.median)
     for at, members in _parts(names):
@@ -83,7 +83,7 @@ def _send_sigmas(stream: Stream, found: Excited) -> None:
 
 def _send_told(stream: Stream, found: Excited) -> None:
     """Send which stretch of the motion tells how much of each parameter."""
-    names, shares, duration = found.design.subject.basis.names, found.shares, found.design.duration
+    names, shares, duration = found.design.robot_model.basis.names, found.shares, found.design.duration
     begin = len(found.ways[0].q) / FS + REST
     middles = begin + (np.arange(STRETCHES) + 0.5) * duration / STRETCHES
     for at, members in _parts(names):

@@ -9,8 +9,8 @@ from rerun.chunk import RrdReader
 from experiments.errors import ResultsError
 from experiments.identification.defaults import CHAIN
 from experiments.identification.fit import Fit
+from experiments.identification.robot_model import RobotModel
 from experiments.identification.scenario_run import ScenarioRun
-from experiments.identification.subject import Subject
 from experiments.recording.audience import Audience
 from experiments.recording.columns import parts
 from experiments.recording.folder import BASE, INNER, files, known, layer_file, rearranged
@@ -43,7 +43,7 @@ class RunRecording:
         Who watches.
     window : tuple of float, optional
         From when to when signals inside the loop are shown at their full rate [s].
-    subject : Subject, optional
+    robot_model : RobotModel, optional
         What is identified of the robot while it moves, for who watches; all of it by default.
     """
 
@@ -52,7 +52,7 @@ class RunRecording:
         scenario: Scenario,
         audience: Audience | None = None,
         window: tuple[float, float] | None = None,
-        subject: Subject | None = None,
+        robot_model: RobotModel | None = None,
     ) -> None:
         self._audience, written = audience, to_toml(scenario)
         robot, fs = scenario.real_robot, scenario.fs
@@ -62,8 +62,8 @@ class RunRecording:
         if audience:  # so that the view holds the whole motion from the beginning
             self.base.make_room(planned.q)
             joints = parts(robot.joints)
-            subject = Subject(scenario.robot) if subject is None else subject
-            self.base.live = LiveIdentification(self.base.stream, subject, CHAIN, scenario.channel, scenario.fs, joints)
+            robot_model = RobotModel(scenario.robot) if robot_model is None else robot_model
+            self.base.live = LiveIdentification(self.base.stream, robot_model, CHAIN, scenario.channel, scenario.fs, joints)
         self.watch = Watch(self.base.stretch, audience.every if audience else UNWATCHED, window)
 
     def end(self, run: Run) -> list[tuple[str, Stream]]:
@@ -83,7 +83,7 @@ class RunRecording:
 
 def record_log(fit: Fit, audience: Audience | None = None) -> list[tuple[str, Stream]]:
     """Return the streams of an identified log's recording, by the name of their file."""
-    log, robot = fit.logs.fitted[0], fit.subject.robot
+    log, robot = fit.logs.fitted[0], fit.robot_model.robot
     qd = measured_state(log, fit.processing).qd.T
     base = Base(recording_id("log", log.q.tobytes() + log.tau.tobytes()), robot, log.fs, ("measured",), qd, audience)
     channel = log.torque
@@ -110,7 +110,7 @@ def add_layer(folder: Path, fit: Fit, audience: Audience | None = None) -> list[
     name, there = known(others)
     if audience:
         show(name, others, audience)
-    made = layer(name, fit, fit.subject.robot.joints, there, audience)
+    made = layer(name, fit, fit.robot_model.robot.joints, there, audience)
     return [made, *rearranged(others, made[1])]
 
 

@@ -25,7 +25,7 @@ def send_iterations(stream: Stream, at: str, fit: Fit) -> None:
 
 def _send(stream: Stream, at: str, estimate: Estimate) -> None:
     path = np.array(estimate.path)
-    sigma = np.where(estimate.best_sigma > 0, estimate.best_sigma, 1.0)
+    sigma = np.where(estimate.standard_errors > 0, estimate.standard_errors, 1.0)
     off, rounds = (path - estimate.X) / sigma, np.arange(float(len(path)))
     high = max(float(np.nanmax(np.abs(off))), 10 * LEAST)
     scale = Signed("away from the last [sigma]", -1.3 * high, 1.3 * high, LEAST)

@@ -10,7 +10,7 @@ from experiments.faults import reason, report
 from experiments.identification.fit import Fit, fit
 from experiments.identification.logs import Logs
 from experiments.identification.request import Request
-from experiments.identification.subject import Subject
+from experiments.identification.robot_model import RobotModel
 from experiments.recording.columns import part, seconds
 from experiments.recording.identification_layer import row_names, send_rows
 from experiments.recording.stream import Stream
@@ -34,7 +34,7 @@ class LiveIdentification:
     ----------
     stream : Stream
         Where it is shown.
-    subject : Subject
+    robot_model : RobotModel
         The robot.
     chain : str
         Name of the signal processing.
@@ -47,10 +47,10 @@ class LiveIdentification:
     """
 
     def __init__(
-        self, stream: Stream, subject: Subject, chain: str, channel: TorqueChannel, fs: float, joints: Sequence[str]
+        self, stream: Stream, robot_model: RobotModel, chain: str, channel: TorqueChannel, fs: float, joints: Sequence[str]
     ) -> None:
         self._stream, self._channel, self._fs = stream, channel, fs
-        self._request = Request(subject, chain=chain, estimator=ESTIMATOR, name=LABEL)
+        self._request = Request(robot_model, chain=chain, estimator=ESTIMATOR, name=LABEL)
         self._joints, self._q, self._tau = joints, list[Array](), list[Array]()
         self._identified, self._shown, self._broken = 0, dict[str, float](), False
         self.fit: Fit | None = None
@@ -85,7 +85,7 @@ class LiveIdentification:
 
     def _show(self, form: str, estimate: Estimate, now: float) -> None:
         at, color = f"identify/{LABEL}/{form}", FORMS.get(form, GREY)
-        for name, x, sigma in zip(estimate.names, estimate.X, estimate.best_sigma, strict=True):
+        for name, x, sigma in zip(estimate.names, estimate.X, estimate.standard_errors, strict=True):
             if form not in self._shown:
                 self._stream.keep(f"{at}/estimate/{part(name)}", rr.Measurements.from_fields(names=[form], colors=[color]))
             columns = rr.Measurements.columns(values=[x], variances=[sigma**2])

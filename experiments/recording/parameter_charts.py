@@ -26,10 +26,10 @@ ASIDE = 0.22
 
 def send_parameters(stream: Stream, at: str, fit: Fit, number: int = 0) -> None:
     """Send every parameter's error, or its deviation from the first model's, in standard errors; and the singular values."""
-    reference, unit = _reference(fit), next(iter(fit.estimates.values())).best_sigma
+    reference, unit = _reference(fit), next(iter(fit.estimates.values())).standard_errors
     relative = 100 * unit / np.where(reference == 0, np.nan, np.abs(reference))
     off = {form: (estimate.X - reference) / unit for form, estimate in fit.estimates.items()}
-    reach = {form: SIGMAS * estimate.best_sigma / unit for form, estimate in fit.estimates.items()}
+    reach = {form: SIGMAS * estimate.standard_errors / unit for form, estimate in fit.estimates.items()}
     scale = _scale(fit, [np.abs(off[form]) + reach[form] for form in off])
     for k, (title, members) in enumerate(_parts(fit, np.nan_to_num(relative, nan=np.inf))):
         names = [_label(fit.basis.names[p], relative[p]) for p in members]
@@ -59,7 +59,7 @@ def _parts(fit: Fit, relative: Array) -> Iterator[tuple[str, npt.NDArray[np.intp
     joints = np.array([parameter.joint or 0 for parameter in fit.basis.parameters])
     for j in np.unique(joints):
         mine = every[joints == j]
-        yield fit.subject.robot.joints[j], mine[np.argsort(-relative[mine], kind="stable")]
+        yield fit.robot_model.robot.joints[j], mine[np.argsort(-relative[mine], kind="stable")]
 
 
 def _reference(fit: Fit) -> Array:

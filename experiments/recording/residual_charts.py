@@ -74,7 +74,7 @@ class ResidualCharts:
         Over velocity it is the residual of the rows: at every sample, noise of differentiated positions would hide a delay.
         Over position it is that of every sample: cogging may be faster than the band of the fit.
         """
-        force, way = self.fit.subject.units(j)
+        force, way = self.fit.robot_model.units(j)
         if kind == "over_velocity":
             points = {form: FrictionCurves(self.fit, self.fit.estimates[form].X).residual(j) for form in left}
         else:
@@ -102,7 +102,7 @@ class ResidualCharts:
         """Send the torque minus that of the rigid body, over velocity, the laws that were found, and the true one."""
         if not any(p.kind in FRICTIONS and p.joint == j for p in self.fit.basis.parameters):
             return
-        force, way = self.fit.subject.units(j)
+        force, way = self.fit.robot_model.units(j)
         found = {form: self.fit.estimates[form].X for form in left}
         if self.fit.truth is not None:
             found["true"] = np.array(list(self.fit.truth.values()))

@@ -29,7 +29,7 @@ def _pointers(fit: Fit) -> Iterator[str]:
     """Yield where to look at what the fit lacks."""
     wrong = lacking(fit.lack)
     for over, tab in WHERE.items():
-        if joints := [fit.subject.robot.joints[lack.joint] for lack in wrong if lack.over == over]:
+        if joints := [fit.robot_model.robot.joints[lack.joint] for lack in wrong if lack.over == over]:
             yield f"The residual torque of {', '.join(joints)} depends on {over}: tab *{tab}*."
 
 

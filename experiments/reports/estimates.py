@@ -81,11 +81,11 @@ class EstimatesTable:
 
     def _cells(self, model: str, estimate: Estimate, i: int) -> Iterator[str]:
         if self.fit.truth is None:
-            second = f"{estimate.best_sigma[i]:.2g}"
+            second = f"{estimate.standard_errors[i]:.2g}"
         else:
             error = float(estimate.error_percent(list(self.fit.truth.values()))[i])
             second = percent(error) if isfinite(error) else ""
-        share = 100 * estimate.best_sigma[i] / abs(estimate.X[i]) if estimate.X[i] else float("inf")
+        share = 100 * estimate.standard_errors[i] / abs(estimate.X[i]) if estimate.X[i] else float("inf")
         cells = number(estimate.X[i]), second, percentage(share) or f">{WORTHLESS:g}"
         marks = self._marks[model][i] if self.legend else ("", "", "")
         return (f"{cell}{mark}" for cell, mark in zip(cells, marks, strict=True))

@@ -22,7 +22,7 @@ def report(found: Excited, command: str) -> str:
     return rendered(
         "experiments.reports",
         "excite.html.j2",
-        title=f"A motion for {d.subject.robot.name}",
+        title=f"A motion for {d.robot_model.robot.name}",
         design=d,
         headline=lines(found)[0],
         notes=lines(found)[1:],
@@ -52,13 +52,13 @@ def _rows(found: Excited) -> list[list[str]]:
             percentage(100 * found.sigma[i] / abs(d.X[i])) if d.X[i] else "",
             *(f"{x[i]:.2g}" if np.isfinite(x[i]) else "" for x in others),
         ]
-        for i, name in enumerate(d.subject.basis.names)
+        for i, name in enumerate(d.robot_model.basis.names)
     ]
 
 
 def _sigma_figure(found: Excited) -> str:
     """Return sigmas over those of the median random motion, parameter by parameter."""
-    names = found.design.subject.basis.names
+    names = found.design.robot_model.basis.names
     figure = Figure(figsize=(11, 3.2), layout="constrained")
     panel, at = figure.subplots(), np.arange(len(names))
     if found.random:
@@ -83,7 +83,7 @@ def _sigma_figure(found: Excited) -> str:
 def _motion_figure(found: Excited) -> str:
     """Return positions, velocities and torques of all joints, as shares of their limits."""
     d, step = found.design, max(1, round(FS / PLOTTED))
-    motion = d.trajectory(found.c, 1).motion(d.subject.robot).sample(FS)
+    motion = d.trajectory(found.c, 1).motion(d.robot_model.robot).sample(FS)
     shown = {
         "position": (motion.q - d.limits.middle) / d.limits.sizes[0],
         "velocity": motion.qd / d.limits.velocity,
@@ -105,7 +105,7 @@ def _motion_figure(found: Excited) -> str:
 
 def _told_figure(found: Excited) -> str:
     """Return which stretch of the motion tells how much of which parameter."""
-    names, shares = found.design.subject.basis.names, 100 * found.shares
+    names, shares = found.design.robot_model.basis.names, 100 * found.shares
     figure = Figure(figsize=(11, 0.13 * len(names) + 1.1), layout="constrained")
     panel = figure.subplots()
     d = found.design

@@ -15,7 +15,7 @@ from identify import brisk_shares
 def print_excited(console: Console, found: Excited) -> None:
     """Print the predicted sigma of every parameter beside random motions, and how limits are used."""
     d = found.design
-    title = f"{d.subject.robot.name}: {d.kind}, {d.duration:g} s" + (f" x {d.repeat}" if d.repeat > 1 else "")
+    title = f"{d.robot_model.robot.name}: {d.kind}, {d.duration:g} s" + (f" x {d.repeat}" if d.repeat > 1 else "")
     _print_sigmas(console, found, title)
     _print_limits(console, found)
     for line in lines(found):
@@ -47,8 +47,8 @@ def _print_sigmas(console: Console, found: Excited, title: str) -> None:
     d = found.design
     heads = ["X", "sigma", "%sigma", "of brisk\ntorque %", "random\nmedian", "random\nbest"]
     grid = new_table("", [*heads, *(["earlier\nlogs"] if found.earlier is not None else [])])
-    brisk = 100 * brisk_shares(d.subject.tree, d.subject.basis, d.X, found.sigma)
-    for i, name in enumerate(d.subject.basis.names):
+    brisk = 100 * brisk_shares(d.robot_model.tree, d.robot_model.basis, d.X, found.sigma)
+    for i, name in enumerate(d.robot_model.basis.names):
         share = 100 * found.sigma[i] / abs(d.X[i]) if d.X[i] else np.inf
         percent = (percentage(share) or f">{WORTHLESS:g}") if d.X[i] else "-"
         own = [number(d.X[i]), f"{found.sigma[i]:.2g}", percent, f"{brisk[i]:.2g}"]
@@ -74,9 +74,9 @@ def _print_limits(console: Console, found: Excited) -> None:
 def print_sequence(console: Console, sequence: MotionSequence) -> None:
     """Print what each motion left open."""
     grid = new_table("", ["weakest\nparameter", "its sigma, of\nbrisk torque %", "typical\nsigma, of first"])
-    first = np.log(sequence.rounds[0].estimate.best_sigma).mean()
+    first = np.log(sequence.rounds[0].estimate.standard_errors).mean()
     for k, each in enumerate(sequence.rounds, 1):
-        typical = np.exp(np.log(each.estimate.best_sigma).mean() - first)
+        typical = np.exp(np.log(each.estimate.standard_errors).mean() - first)
         grid.add_row(f"motion {k}", each.weakest, f"{100 * each.share:.3g}", f"{typical:.2f}")
     print_titled(console, "motions one after the other, identified together", grid)
     last = sequence.rounds[-1]

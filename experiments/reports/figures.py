@@ -53,7 +53,7 @@ def torques_figure(one: HeldOut) -> str:
             predicted = np.where(rows.valid[own], rows.predicted(X)[own], np.nan)
             panel.plot(rows.time[own], predicted, color=_color(model), lw=1.0, label=model)
         validation = one.torques[models[0]]
-        joint, (force, _) = one.fit.subject.robot.joints[j], one.fit.subject.units(j)
+        joint, (force, _) = one.fit.robot_model.robot.joints[j], one.fit.robot_model.units(j)
         panel.set_title(f"{joint}: {validation.rms[j]:.2g} {force} off, {percentage(validation.percent[j])} %", loc="left")
     _last(panels, "time [s]", f"torque [{_units(one.fit)[0]}]")
     _legend(figure, panels[0])
@@ -70,7 +70,7 @@ def residuals_figure(one: HeldOut) -> str:
         shown = np.where(rows.valid[own], residual[own], np.nan)
         panel.axhline(0.0, color="0.8", lw=0.8)
         panel.plot(rows.time[own], shown, color=_color(model), lw=0.8)
-        panel.set_title(one.fit.subject.robot.joints[j], loc="left")
+        panel.set_title(one.fit.robot_model.robot.joints[j], loc="left")
     _last(panels, "time [s]", f"residual [{_units(one.fit)[0]}]")
     return svg(figure)
 
@@ -98,7 +98,7 @@ def _parameters_panel(panel: Axes, fit: Fit, members: npt.NDArray[np.intp]) -> N
     at = np.arange(len(names))
     for i, model in enumerate(models):
         estimate = fit.estimates[model]
-        off, half = _share(estimate.X[members] - leading, size), _share(SIGMAS * estimate.best_sigma[members], size)
+        off, half = _share(estimate.X[members] - leading, size), _share(SIGMAS * estimate.standard_errors[members], size)
         x = at + 0.22 * (i - (len(models) - 1) / 2)
         panel.errorbar(x, off, half, fmt="o", ms=2.5, lw=1.2, color=_color(model), label=model)
     if fit.truth is not None:
@@ -132,7 +132,7 @@ def friction_figure(fit: Fit) -> str:
             panel.plot(line.v[inside], line.torque[inside], color=_color("explicit"), lw=1.6, label=label)
             beyond = np.where(inside, np.nan, line.torque)
             panel.plot(line.v, beyond, ":", color=_color("power"), lw=1.6, label=label and "beyond the speeds of the log")
-        panel.set_title(f"{fit.subject.robot.joints[j]}: {' + '.join(fit.subject.laws.names[j])}", loc="left")
+        panel.set_title(f"{fit.robot_model.robot.joints[j]}: {' + '.join(fit.robot_model.laws.names[j])}", loc="left")
     force, velocity = _units(fit)
     _last(panels, f"velocity [{velocity}]", f"friction [{force}]")
     _legend(figure, panels[0])
@@ -164,7 +164,7 @@ def spectra_figure(fit: Fit) -> str:
 
 def _units(fit: Fit) -> tuple[str, str]:
     """Return the units of the torques and velocities of all joints: those of slides stand beside those of hinges."""
-    each = [fit.subject.units(j) for j in range(fit.basis.n)]
+    each = [fit.robot_model.units(j) for j in range(fit.basis.n)]
     return ", ".join(dict.fromkeys(force for force, _ in each)), ", ".join(dict.fromkeys(f"{way}/s" for _, way in each))
 
 

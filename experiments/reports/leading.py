@@ -39,7 +39,7 @@ def in_lines(fit: Fit, whole: Sequence[str]) -> Iterator[str]:
         share = _range(fit.explained[model])
         words = f"{model}: Cond(W) {estimate.condition_number:.1f}, {estimate.row_count} rows, explains {share} of the torques"
         if model not in whole:
-            sigma = np.maximum(np.hypot(estimate.best_sigma, lead.best_sigma), 1e-300)
+            sigma = np.maximum(np.hypot(estimate.standard_errors, lead.standard_errors), 1e-300)
             far = float(np.max(np.abs(estimate.X - lead.X) / sigma))
             words += f"; parameters within {far:.2g} sigma of the {whole[0]} model's (--model {model} shows them)"
         yield words

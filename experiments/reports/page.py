@@ -31,13 +31,13 @@ def report(
     """
     fit, hardest = judgement.fit, judgement.hardest
     table = EstimatesTable(fit)
-    subject = fit.subject
+    robot_model = fit.robot_model
     cutoff = getattr(fit.processing.operator, "cutoff", None)
     return rendered(
         "experiments.reports",
         "identify.html.j2",
-        title=f"{subject.tree.name}: {fit.logs.title}",
-        subtitle=f"{subject.tree.n} joints, {len(fit.basis.names)} parameters, {fit.request.estimator}",
+        title=f"{robot_model.tree.name}: {fit.logs.title}",
+        subtitle=f"{robot_model.tree.n} joints, {len(fit.basis.names)} parameters, {fit.request.estimator}",
         verdicts=[] if hardest is None else list(_verdicts(hardest)),
         unjudged="; ".join(one.why for one in judgement.on if isinstance(one, Unjudged)),
         failures=fit.failures,
@@ -49,12 +49,12 @@ def report(
         legend=table.legend,
         friction=_figure(attempts, "friction", friction_figure, fit),
         spectra=_figure(attempts, "spectra", spectra_figure, fit),
-        joints=subject.robot.joints,
+        joints=robot_model.robot.joints,
         logs=list(_logs(fit)),
         notes=notes,
         command=command,
         version=version("idbench"),
-        robot=subject.name,
+        robot=robot_model.name,
         chain=fit.request.chain,
         cutoff="" if cutoff is None else f"{cutoff:g} Hz",
         estimator=fit.request.estimator,
@@ -79,7 +79,7 @@ def _held_out(one: HeldOut, attempts: Attempts) -> tuple[str, str, str, list[str
     torques = one.torques
     heads = ["rms of the torque", *(f"{model} {what}" for model in torques for what in ("rms", "%", "R2"))]
     rows = []
-    for j, joint in enumerate(one.fit.subject.robot.joints):
+    for j, joint in enumerate(one.fit.robot_model.robot.joints):
         first = next(iter(torques.values()))
         cells = [cell for v in torques.values() for cell in (f"{v.rms[j]:.3g}", percentage(v.percent[j]), f"{v.R2[j]:.4f}")]
         rows.append([joint, f"{first.level[j]:.3g}", *cells])
@@ -88,7 +88,7 @@ def _held_out(one: HeldOut, attempts: Attempts) -> tuple[str, str, str, list[str
 
 
 def _parameters(fit: Fit, table: EstimatesTable) -> Iterator[list[str]]:
-    made = fit.subject.grouping.groupings
+    made = fit.robot_model.grouping.groupings
     for (name, *cells), unit in zip(table.rows(), fit.basis.units, strict=True):
         yield [f"{name} [{unit}]", *cells, made[name]]
 

@@ -79,11 +79,11 @@ def _told(fit: Fit) -> Iterator[str]:
         yield words
     yield from _rotors(fit)
     if fit.raised:
-        joints, speeds = fit.subject.robot.joints, fit.request.mask_speed
-        each = ", ".join(f"{joints[j]} up to {speeds[j]:.2g} {fit.subject.units(j)[1]}/s" for j in fit.raised)
+        joints, speeds = fit.robot_model.robot.joints, fit.request.mask_speed
+        each = ", ".join(f"{joints[j]} up to {speeds[j]:.2g} {fit.robot_model.units(j)[1]}/s" for j in fit.raised)
         yield f"slow motion is left out, as its friction is not that of faster motion: {each} (--mask-speed gives other speeds)"
     yield _noise(fit)
-    yield words_of_lack(fit.lack, fit.subject)
+    yield words_of_lack(fit.lack, fit.robot_model)
     yield from words_of_iterations(fit)
     for model, why in fit.left_out.items():
         yield f"{model}: reversals are left out, as ML does: {why}"
@@ -95,7 +95,7 @@ def _told(fit: Fit) -> Iterator[str]:
 def _print_logs(console: Console, fit: Fit) -> None:
     """Print the torque error of the first estimate, log by log."""
     model, errors = next(iter(fit.torque_errors.items()))
-    grid = new_table("", fit.subject.robot.joints)
+    grid = new_table("", fit.robot_model.robot.joints)
     for k in range(len(fit.logs.fitted)):
         grid.add_row(fit.logs.name(k), *(f"{x:.2g}" if isfinite(x) else "" for x in errors[k]))
     print_titled(console, f"what the {model} model leaves of each log while joints move: rms torque error [N m, N]", grid)
@@ -103,7 +103,7 @@ def _print_logs(console: Console, fit: Fit) -> None:
 
 def _rotors(fit: Fit) -> Iterator[str]:
     """Yield why no joint has the inertia of a rotor, if none has."""
-    asked, filed = fit.subject.asked.armature, bool(fit.subject.robot.model.dof_armature.any())
+    asked, filed = fit.robot_model.asked.armature, bool(fit.robot_model.robot.model.dof_armature.any())
     if asked == "none":
         words = "no armature is identified and reversals are not masked, as where torques are measured at the links"
         yield f"{words} (--armature none)" + ("" if filed else "; the robot's file has none either")
@@ -116,7 +116,7 @@ def _rotors(fit: Fit) -> Iterator[str]:
 def _noise(fit: Fit) -> str:
     """Return the noise of a log in words, joint by joint."""
     torque, position = (" ".join("?" if x is None else f"{x:.2g}" for x in fit.noise[name]) for name in ("torque", "position"))
-    slides = [joint.kind == "slide" for joint in fit.subject.tree.joints]
+    slides = [joint.kind == "slide" for joint in fit.robot_model.tree.joints]
     force, length = ("N m, N", "rad, m") if any(slides) else ("N m", "rad")
     words = f"noise found in the log: torque {torque} {force}, position {position} {length}"
     steps = fit.noise["encoder_step"]
@@ -137,7 +137,7 @@ def print_held_out(console: Console, one: HeldOut | Unjudged, whole: Sequence[st
         return
     best = leading({model: validation.rms for model, validation in one.torques.items()})
     torques = one.torques if len(whole) == len(one.torques) else {best: one.torques[best]}
-    joints = one.fit.subject.robot.joints
+    joints = one.fit.robot_model.robot.joints
     simulated = any(one.position_error(model) is not None for model in torques)
     heads = [f"{model}\n{what}" for model in torques for what in ("rms", "%", "R2", "q rms")[: 3 + simulated]]
     grid, first = new_table("", ["noise of\nthe log %", *heads]), next(iter(torques.values()))

@@ -43,7 +43,7 @@ def spectra(fit: Fit, left: Mapping[str, Instants]) -> Iterator[Spectrum]:
     """Yield the spectra of all joints, then those of models that have other rows; what is masked counts as like the rest."""
     alone, fs, joined = fit.on(0), fit.logs.fitted[0].fs, of_joints(fit, left)
     noise: dict[str, Array] = {}
-    for j, joint in enumerate(fit.subject.robot.joints) if joined else ():
+    for j, joint in enumerate(fit.robot_model.robot.joints) if joined else ():
         lines = {form: _density(one, j, fs) for form, one in joined.items()}
         f = next(iter(lines.values()))[0]
         if "explicit" in joined and not noise:
@@ -51,7 +51,7 @@ def spectra(fit: Fit, left: Mapping[str, Instants]) -> Iterator[Spectrum]:
             each = noise_spectra(alone.problem, levels, f)
             noise = dict(zip(("torque noise", "position noise"), each, strict=True))
         shown = {form: density for form, (_, density) in lines.items()} | {kind: each[j] for kind, each in noise.items()}
-        yield Spectrum(joint, j, fit.subject.units(j)[0], f[1:], {name: density[1:] for name, density in shown.items()})
+        yield Spectrum(joint, j, fit.robot_model.units(j)[0], f[1:], {name: density[1:] for name, density in shown.items()})
     for form in (form for form in left if form not in joined):
         f, density = _density(left[form], 0, fs)
         yield Spectrum(form, None, "W", f[1:], {form: density[1:]})

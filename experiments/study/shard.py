@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from experiments.identification.robot_model import RobotModel
 from experiments.identification.simulators import RobotPlant, ScenarioLoop
-from experiments.identification.subject import Subject
 from experiments.study.bound import bounds_of
 from experiments.study.method import Method
 from experiments.study.statistics import BOUNDS
@@ -65,7 +65,7 @@ def run_shard(study: Study, runs: range, *, threads: int = 1, progress: Progress
         start, tell = time.perf_counter(), _part(progress, done, len(together), steps * len(runs))
         try:
             simulated = _simulate(scenarios, together, threads, tell)
-            known = {laws: _known(study, subject, simulated) for laws, subject in study.subjects.items()}
+            known = {laws: _known(study, robot_model, simulated) for laws, robot_model in study.subjects.items()}
         except BenchError as error:
             _fail(shard, study, scenarios, list(together), str(error))
             continue
@@ -98,10 +98,10 @@ def _groups(study: Study, scenarios: Mapping[int, Scenario], shard: Shard) -> It
     yield from groups.values()
 
 
-def _known(study: Study, subject: Subject, simulated: Run) -> tuple[dict[str, float], dict[str, Array]]:
+def _known(study: Study, robot_model: RobotModel, simulated: Run) -> tuple[dict[str, float], dict[str, Array]]:
     """Return the truth of a robot's parameters, and the least errors that noise allows, if they are asked for."""
-    truth = subject.truth(simulated.robots[0], simulated.scenario.friction)
-    return truth, bounds_of(subject.basis, simulated, truth) if study.bound else {}
+    truth = robot_model.truth(simulated.robots[0], simulated.scenario.friction)
+    return truth, bounds_of(robot_model.basis, simulated, truth) if study.bound else {}
 
 
 def _simulate(
@@ -156,12 +156,12 @@ def _simulation(
 ) -> Simulation:
     """Return how the robots of runs are simulated anew, by estimators that need it, and where these begin."""
     motions = tuple(motion for motion in together.values() if motion is not None)
-    needs, subject, start = method.estimator.needs, study.subjects[method.friction], None
-    loop = ScenarioLoop(subject, (simulated.scenario,), (simulated.log,), motions) if "loop" in needs else None
+    needs, robot_model, start = method.estimator.needs, study.subjects[method.friction], None
+    loop = ScenarioLoop(robot_model, (simulated.scenario,), (simulated.log,), motions) if "loop" in needs else None
     if study.start:
         drawn = np.stack([np.random.default_rng([seed, START]).standard_normal(len(truth)) for seed in simulated.seeds])
         start = np.array(list(truth.values())) * (1 + study.start * np.clip(drawn, -FARTHEST, FARTHEST))
-    return Simulation(loop, RobotPlant(subject) if "plant" in needs else None, start)
+    return Simulation(loop, RobotPlant(robot_model) if "plant" in needs else None, start)
 
 
 def _failure(outcome: Estimate | IdentificationError, i: int) -> str:
@@ -178,7 +178,7 @@ def _failure(outcome: Estimate | IdentificationError, i: int) -> str:
 def _columns(estimate: Estimate, truth: Mapping[str, float], bounds: Mapping[str, Array]) -> dict[str, list[Any]]:
     """Return what an estimate of many runs found, a list with the value of each run."""
     runs = len(estimate.X)
-    found = estimate.X, estimate.best_sigma, estimate.sigma, np.tile(list(truth.values()), (runs, 1))
+    found = estimate.X, estimate.standard_errors, estimate.own_sigma, np.tile(list(truth.values()), (runs, 1))
     parts = {**dict(zip(PARTS, found, strict=True)), **bounds}
     columns = {
         "condition_number": estimate.condition_number.tolist(),

@@ -14,7 +14,7 @@ from pydantic import Field
 from experiments.errors import StudyError
 from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.parameters import Parameters
-from experiments.identification.subject import Subject
+from experiments.identification.robot_model import RobotModel
 from experiments.study.axis import FRICTION, Axis, Setting
 from experiments.study.method import Method, combinations, methods_of, whole_first
 from identify import MODELS, AbstractModel
@@ -153,14 +153,14 @@ class Study:
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the parameters that are identified, with any of the laws of friction."""
-        return tuple(dict.fromkeys(name for subject in self.subjects.values() for name in subject.basis.names))
+        return tuple(dict.fromkeys(name for robot_model in self.subjects.values() for name in robot_model.basis.names))
 
     @cached_property
-    def subjects(self) -> dict[str, Subject]:
+    def subjects(self) -> dict[str, RobotModel]:
         """The robot of all its runs, by the laws of friction that are identified."""
-        found = {laws: Subject(self._first.robot, Parameters(friction=tuple(laws.split()))) for laws in self.friction}
-        for subject in found.values():
-            subject.require_laws()
+        found = {laws: RobotModel(self._first.robot, Parameters(friction=tuple(laws.split()))) for laws in self.friction}
+        for robot_model in found.values():
+            robot_model.require_laws()
         return found
 
     def with_seeds(self, seeds: int) -> "Study":

@@ -120,21 +120,21 @@ class Basis:
         return replace(self, blocks=tuple(new if block is old else block for block in self.blocks))
 
     @property
-    def adaptive(self) -> bool:
-        """Whether some columns depend on parameters, so that the basis holds about an estimate alone."""
-        return any(block.adaptive for block in self.blocks)
+    def is_nonlinear(self) -> bool:
+        """Whether some columns depend on parameters, so that the basis is linearized at an operating point."""
+        return any(block.is_nonlinear for block in self.blocks)
 
     def split(self) -> tuple[Self, Self]:
         """Return the basis of the blocks that depend on no estimate, with all that is held, and that of the others."""
-        adaptive = {parameter for block in self.blocks if block.adaptive for parameter in block.parameters(self.n)}
-        fixed = [parameter for parameter in self.parameters if parameter not in adaptive]
-        rest = [parameter for parameter in self.parameters if parameter in adaptive]
+        nonlinear = {parameter for block in self.blocks if block.is_nonlinear for parameter in block.parameters(self.n)}
+        fixed = [parameter for parameter in self.parameters if parameter not in nonlinear]
+        rest = [parameter for parameter in self.parameters if parameter in nonlinear]
         return self.of(fixed), replace(self, held={}).of(rest)
 
     @property
-    def believed(self) -> dict[int, Array | float]:
-        """Where parameters are believed to be that enter nonlinearly, shape (...), by their places: columns are slopes."""
-        found = {parameter: value for block in self.blocks for parameter, value in block.believed(self.n).items()}
+    def operating_point(self) -> dict[int, Array | float]:
+        """Operating point of the nonlinear parameters, shape (...), by their places: their columns are derivatives there."""
+        found = {parameter: value for block in self.blocks for parameter, value in block.operating_point(self.n).items()}
         return {k: found[parameter] for parameter, k in self.places.items() if parameter in found}
 
     def value(self, parameter: Parameter, X: Array) -> Array | None:
@@ -189,5 +189,5 @@ class Basis:
         """
         own = block.parameters(self.n) if self.held else ()
         found = {parameter: self.held[parameter] for parameter in own if parameter in self.held}
-        believed = block.believed(self.n).items()
+        believed = block.operating_point(self.n).items()
         return found | {parameter: -np.asarray(value) for parameter, value in believed if parameter in self.places}

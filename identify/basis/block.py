@@ -51,7 +51,7 @@ class AbstractBlock(ABC):
         """Return the columns of the dissipated power qd' Gamma_f in row 0 (Eq. 10)."""
 
     @property
-    def adaptive(self) -> bool:
+    def is_nonlinear(self) -> bool:
         """Whether columns depend on parameters, so that the block holds about an estimate alone: see `adapted`."""
         return False
 
@@ -60,8 +60,8 @@ class AbstractBlock(ABC):
         del basis, X
         return self
 
-    def believed(self, n: int) -> Mapping[Parameter, Array | float]:
-        """Return where parameters are believed to be that enter nonlinearly, shape (...): their columns are slopes there."""
+    def operating_point(self, n: int) -> Mapping[Parameter, Array | float]:
+        """Return the operating point of nonlinear parameters, shape (...): their columns are derivatives there."""
         del n
         return {}
 

@@ -35,7 +35,7 @@ class DriveGains(AbstractJointLaw):
     X: Array | None = None
 
     @property
-    def adaptive(self) -> bool:
+    def is_nonlinear(self) -> bool:
         """True."""
         return True
 
@@ -49,7 +49,7 @@ class DriveGains(AbstractJointLaw):
             return {"kg": np.ones_like(state.qd)}
         return {"kg": -combined(self.model.explicit(state), self.X, np.zeros(state.q.shape))}
 
-    def believed(self, n: int) -> Mapping[Parameter, Array | float]:
+    def operating_point(self, n: int) -> Mapping[Parameter, Array | float]:
         """Return ones."""
         return dict.fromkeys(self.parameters(n), 1.0) if self.model is not None else {}
 

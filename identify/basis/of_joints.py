@@ -54,17 +54,19 @@ class OfJoints(AbstractBlock):
         return self._of(self.block.dissipation(state))
 
     @property
-    def adaptive(self) -> bool:
+    def is_nonlinear(self) -> bool:
         """Whether the block is."""
-        return self.block.adaptive
+        return self.block.is_nonlinear
 
     def adapted(self, basis: "Basis", X: Array) -> Self:
         """Return the block about an estimate."""
         return replace(self, block=self.block.adapted(basis, X))
 
-    def believed(self, n: int) -> Mapping[Parameter, Array | float]:
-        """Return where parameters of the joints are believed to be that enter nonlinearly."""
-        return {parameter: value for parameter, value in self.block.believed(n).items() if parameter.joint in self.joints}
+    def operating_point(self, n: int) -> Mapping[Parameter, Array | float]:
+        """Return the operating point of the joints' nonlinear parameters."""
+        return {
+            parameter: value for parameter, value in self.block.operating_point(n).items() if parameter.joint in self.joints
+        }
 
     def _of(self, columns: BlockColumns) -> BlockColumns:
         return {address: column for address, column in columns.items() if address[1].joint in self.joints}

@@ -29,12 +29,12 @@ class Estimate:
         Logs, robot, model and rows.
     X : Array, shape (..., p)
         Estimated parameters; NaN where the rows cannot be solved.
-    covariance : Array, shape (..., p, p)
-        Covariance of the error of X, as the estimator has it: of OLS and WLS as if rows were independent.
+    own_covariance : Array, shape (..., p, p)
+        Covariance of the error of X, as the estimator has it: of OLS and WLS as if rows were independent (section 7.3).
     solution : AbstractSolution, optional
-        How X follows from the rows; without it there is no corrected sigma.
+        How X follows from the rows; without it standard errors are the estimator's own.
     calibrated : Array, shape (..., p, p), optional
-        Covariance of the error of X that the noise of the logs makes, if the estimator knows it; by default from `solution`.
+        Covariance of the error of X due to the noise of the logs, if the estimator knows it; by default from `solution`.
     levels : NoiseLevels, optional
         The noise of the logs as the estimator found it; by default that of the problem.
     fits : mapping of tuple of int to JointFit
@@ -49,7 +49,7 @@ class Estimate:
 
     problem: Problem
     X: Array
-    covariance: Array
+    own_covariance: Array
     solution: AbstractSolution | None = None
     calibrated: Array | None = None
     levels: NoiseLevels | None = None
@@ -79,7 +79,7 @@ class Estimate:
             That of section 7.3 by default: sigma_rho^2 (W' W)^-1 with sigma_rho^2 = |Y - W X|^2 / (r - p).
         influence : Array, shape (..., r, p), optional
             G with which X = G' Y to first order: what the estimate changes by if a row of Y, or the error of a row, does. It
-            is what the corrected sigma is computed from.
+            is what standard errors are computed from.
         """
         shape, p = problem.factors.together.status.shape, len(problem.names)
         x = _real_array("X", X, (*shape, p))
@@ -108,13 +108,13 @@ class Estimate:
         return self.problem.rows
 
     @property
-    def sigma(self) -> Array:
-        """Standard deviation of every parameter, as the estimator has it, shape (..., p)."""
-        return _roots(self.covariance)
+    def own_sigma(self) -> Array:
+        """Standard error of every parameter, as the estimator has it, shape (..., p)."""
+        return _roots(self.own_covariance)
 
     @cached_property
-    def corrected_covariance(self) -> Array:
-        """Covariance of the error of X that the noise of the logs makes, shape (..., p, p); NaN if it is not known.
+    def calibrated_covariance(self) -> Array:
+        """Covariance of the error of X due to the noise of the logs, shape (..., p, p); NaN if it is not known.
 
         X = G' Y, and each row is a linear function of the samples of a log, whose torques and positions are noisy. So X is such
         a function, too: rows may overlap, be weighted or multiplied by velocities, and joints may differ.
@@ -122,7 +122,7 @@ class Estimate:
         if self.calibrated is not None:
             return self.calibrated
         if self.solution is None:
-            return np.full(self.covariance.shape, np.nan)
+            return np.full(self.own_covariance.shape, np.nan)
         parts = self.problem.parts
         influence, weights = self.solution.influence(parts), self.solution.weights(parts)
         found = noise_covariance(self.problem, influence)
@@ -142,30 +142,30 @@ class Estimate:
 
     @property
     def noise_levels(self) -> NoiseLevels:
-        """Standard deviations of the noise in torques and positions, on which the corrected sigma rests."""
+        """Standard deviations of the noise in torques and positions, on which standard errors are based."""
         return self.levels or self.problem.noise
 
     @property
-    def corrected_sigma(self) -> Array:
-        """Standard deviation of every parameter, from `corrected_covariance`, shape (..., p)."""
-        return _roots(self.corrected_covariance)
+    def calibrated_sigma(self) -> Array:
+        """Standard error of every parameter, from `calibrated_covariance`, shape (..., p)."""
+        return _roots(self.calibrated_covariance)
 
     @property
-    def best_covariance(self) -> Array:
-        """The corrected covariance, or the estimator's own where that is not known, shape (..., p, p)."""
-        known = np.isfinite(self.corrected_covariance).all(axis=(-2, -1), keepdims=True)
-        return np.where(known, self.corrected_covariance, self.covariance)
+    def covariance(self) -> Array:
+        """Covariance of the error of X, calibrated where the noise of the logs is known, shape (..., p, p)."""
+        known = np.isfinite(self.calibrated_covariance).all(axis=(-2, -1), keepdims=True)
+        return np.where(known, self.calibrated_covariance, self.own_covariance)
 
     @property
-    def best_sigma(self) -> Array:
-        """Standard deviation of every parameter, from `best_covariance`, shape (..., p)."""
-        return _roots(self.best_covariance)
+    def standard_errors(self) -> Array:
+        """Standard error (sigma) of every parameter, from `covariance`, shape (..., p)."""
+        return _roots(self.covariance)
 
     @property
     def relative_sigma_percent(self) -> Array:
-        """%sigma of section 7.3, 100 sigma / |X|, shape (..., p)."""
+        """%sigma of section 7.3, 100 sigma / |X| with the estimator's own sigma, shape (..., p)."""
         zero = self.X == 0
-        return np.where(zero, np.inf, 100 * self.sigma / np.where(zero, 1.0, np.abs(self.X)))
+        return np.where(zero, np.inf, 100 * self.own_sigma / np.where(zero, 1.0, np.abs(self.X)))
 
     @property
     def status(self) -> npt.NDArray[np.intp]:
@@ -201,8 +201,8 @@ class Estimate:
         if self.X.ndim > 1:
             return f"estimates of {', '.join(self.names)} in {self.X.shape[:-1]} runs"
         lines = [f"{'':8}{'X':>12}{'sigma':>12}{'%sigma':>9}"]
-        values = zip(self.names, self.X, self.sigma, self.relative_sigma_percent, strict=True)
-        lines += [f"{name:8}{x:12.5g}{s:12.2g}{percent:9.2g}" for name, x, s, percent in values]
+        values = zip(self.names, self.X, self.standard_errors, strict=True)
+        lines += [f"{name:8}{x:12.5g}{s:12.2g}{100 * s / abs(x) if x else np.inf:9.2g}" for name, x, s in values]
         return "\n".join(
             [*lines, f"Cond(W) = {self.condition_number:.1f}, {self.row_count} rows, residual rms {self.residual_rms:.3g}"]
         )

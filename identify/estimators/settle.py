@@ -49,7 +49,7 @@ def settled(problem: Problem) -> Problem:
     Where it has settled, other shapes are looked at once more, joint by joint: the misfit has several minima.
     Of logs too long for their rows to be kept, some pieces say what the shapes are.
     """
-    if not problem.basis.adaptive:
+    if not problem.basis.is_nonlinear:
         return problem
     rows = AdaptiveRows(problem.explicit)
     basis = _settled(rows, _scanned(rows, problem.basis, COARSE))
@@ -77,7 +77,7 @@ def _settled(rows: "AdaptiveRows", here: Basis) -> Basis:
 
 def _estimate(factors: Factors, basis: Basis) -> Array:
     """Return the estimate; where it leaves the shapes of friction open, that of the others, the shapes as they are."""
-    X, shapes = factors.fit(2).X, basis.believed
+    X, shapes = factors.fit(2).X, basis.operating_point
     if np.isfinite(X).all():
         return X
     rest = _rest(basis)
@@ -90,7 +90,7 @@ def _estimate(factors: Factors, basis: Basis) -> Array:
 
 def _rest(basis: Basis) -> list[int]:
     """Return the places of what is linear."""
-    return [place for place in basis.places.values() if place not in basis.believed]
+    return [place for place in basis.places.values() if place not in basis.operating_point]
 
 
 def _step(rows: "AdaptiveRows", here: Basis, X: Array, cost: Array) -> tuple[Basis, Array]:
@@ -108,7 +108,7 @@ def _step(rows: "AdaptiveRows", here: Basis, X: Array, cost: Array) -> tuple[Bas
 def _between(basis: Basis, X: Array, share: Array) -> Array:
     """Return X with the shapes of friction moved by a share of their step alone."""
     found = X.copy()
-    for place, old in basis.believed.items():
+    for place, old in basis.operating_point.items():
         found[..., place] = old + share * (X[..., place] - old)
     return found
 
@@ -144,7 +144,7 @@ class AdaptiveRows:
 
     def misfit(self, basis: Basis) -> Array:
         """Return the misfit with the current nonlinear parameters of friction, shape (...)."""
-        return misfit(self.factors(basis).only(_rest(basis), basis.believed))
+        return misfit(self.factors(basis).only(_rest(basis), basis.operating_point))
 
     @cached_property
     def _last(self) -> list[Any]:
@@ -204,7 +204,7 @@ def _best(rows: AdaptiveRows, basis: Basis, shaped: ShapedFriction, joints: Sequ
     candidates = Candidates(shaped.law, (*grid, *here))
     rest = basis.of([parameter for parameter in basis.parameters if parameter not in shaped.parameters(n)])
     there = rest + OfJoints(candidates, tuple(joints))
-    factors, shapes, plain = rows.factors(there), rest.believed, _rest(rest)
+    factors, shapes, plain = rows.factors(there), rest.operating_point, _rest(rest)
     chosen = np.full((*factors.R.shape[:-3], n), len(grid), dtype=np.intp)
     for run in np.ndindex(chosen.shape[:-1]):
         alone = Factors(factors.R[run], factors.rows[run], factors.names)
@@ -241,7 +241,7 @@ class Candidates(AbstractJointLaw):
     grid: tuple[Mapping[str, Any], ...]
 
     @property
-    def adaptive(self) -> bool:
+    def is_nonlinear(self) -> bool:
         """True: it stands for what is yet to be found."""
         return True
 

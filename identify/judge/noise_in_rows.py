@@ -61,7 +61,7 @@ def noise_in_rows(estimate: Estimate) -> NoiseInRows:
     assert of_IV is not None
     plain = with_weights(rows.Y, rows.W, kinds.weights(np.nan_to_num(estimate.residual)))
     apart = Given(np.nan_to_num(of_IV - plain.G)).influence(problem.parts)
-    V, size = np.nan_to_num(noise_covariance(problem, apart)), np.nan_to_num(estimate.sigma, nan=1.0)
+    V, size = np.nan_to_num(noise_covariance(problem, apart)), np.nan_to_num(estimate.own_sigma, nan=1.0)
     size = np.where(size > 0, size, 1.0)
     values, axes = np.linalg.eigh(V / size[..., :, None] / size[..., None, :])
     along = np.matmul(np.swapaxes(axes, -1, -2), (np.nan_to_num(estimate.X - plain.X) / size)[..., None])[..., 0]
@@ -69,5 +69,5 @@ def noise_in_rows(estimate: Estimate) -> NoiseInRows:
     statistic = np.sum(np.where(told, along**2 / np.where(told, values, 1.0), 0.0), axis=-1)
     freedom = np.sum(told, axis=-1)
     probability = scipy.stats.chi2.sf(statistic, np.maximum(freedom, 1))
-    best = np.where(estimate.best_sigma > 0, estimate.best_sigma, 1.0)
+    best = np.where(estimate.standard_errors > 0, estimate.standard_errors, 1.0)
     return NoiseInRows(statistic, freedom, probability, (plain.X - estimate.X) / best)

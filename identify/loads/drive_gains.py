@@ -99,7 +99,7 @@ def identify_drive_gains(robot: LoadedRobot) -> GainEstimate:
         )
     final = robot.estimator.fit(with_gains)
     gains = final.X[-n:] * ratio * np.broadcast_to(robot.loaded[0].torque.gain, (n,))
-    relative = final.best_sigma[-n:] / final.X[-n:]
+    relative = final.standard_errors[-n:] / final.X[-n:]
     return GainEstimate(gains, np.abs(gains) * relative, final)
 
 

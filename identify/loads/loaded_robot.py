@@ -111,4 +111,4 @@ def marked(logs: Sequence[MotionLog], share: float) -> tuple[MotionLog, ...]:
 def of_payload(found: Estimate, names: Sequence[str]) -> tuple[Array, Array]:
     """Return the parameters of these names, and their covariance."""
     place = [found.names.index(name) for name in names]
-    return found.X[place], found.best_covariance[np.ix_(place, place)]
+    return found.X[place], found.covariance[np.ix_(place, place)]

@@ -97,7 +97,7 @@ def together(robot: LoadedRobot) -> Payload:
 def fixed(robot: LoadedRobot) -> Payload:
     """Identify the robot without the payload, then the payload alone, the robot's parameters held."""
     first = robot.estimated(robot.without, robot.robot.basis)
-    return with_known_robot(robot, first.names, first.X, first.best_covariance)
+    return with_known_robot(robot, first.names, first.X, first.covariance)
 
 
 def with_known_robot(robot: LoadedRobot, names: tuple[str, ...], X: Array, covariance: Array) -> Payload:
@@ -134,7 +134,7 @@ def apart(robot: LoadedRobot) -> Payload:
     basis = robot.robot.basis
     first, second = robot.estimated(robot.without, basis), robot.estimated(robot.loaded, basis)
     T, known = _as_link(robot)
-    difference, C = second.X - first.X - known, first.best_covariance + second.best_covariance
+    difference, C = second.X - first.X - known, first.covariance + second.covariance
     rows = [i for i, name in enumerate(basis.names) if np.any(T[i])]
     A, root = T[rows], np.linalg.cholesky(C[np.ix_(rows, rows)])
     W, y = (scipy.linalg.solve_triangular(root, x, lower=True) for x in (A, difference[rows]))

@@ -50,7 +50,7 @@ def forty_seconds(folder: Path) -> None:
     for _ in range(TIMES):
         ran = replace(whole)
         vars(ran)["run"] = replace(run, log=MotionLog(100.0, part.q[None], part.tau[None], part.torque))
-        _ = [estimate.corrected_sigma for estimate in ran.fit.estimates.values()]
+        _ = [estimate.calibrated_sigma for estimate in ran.fit.estimates.values()]
         recording = RunRecording(whole.scenario)
         seconds.append(timed(partial(record, recording, ran, heard[0], folder)))
     size = sum(path.stat().st_size for path in folder.glob("*.rrd"))

@@ -10,7 +10,7 @@ from experiments.identification.fit import fit
 from experiments.identification.held_out import on_log
 from experiments.identification.logs import Logs
 from experiments.identification.request import Request
-from experiments.identification.subject import Subject
+from experiments.identification.robot_model import RobotModel
 from identify import MODELS
 from sim.engine.simulation import simulate
 from sim.robot.robot import Robot
@@ -31,9 +31,9 @@ def scenario(robot, moves, seed):
 @pytest.fixture(scope="module", params=["panda"])
 def arm(request):
     """Return an identification of all models, and a held-out motion; of the larger arm."""
-    subject = Subject(request.param)
+    robot_model = RobotModel(request.param)
     log, unseen = (simulate(scenario(request.param, *how)).alone() for how in ((20, 0), (6, 7)))
-    return on_log(fit(Request(subject), Logs((log,), truth=subject.truth(subject.robot))), "second", unseen)
+    return on_log(fit(Request(robot_model), Logs((log,), truth=robot_model.truth(robot_model.robot))), "second", unseen)
 
 
 @pytest.mark.parametrize("model", MODELS.builtin)
@@ -43,11 +43,11 @@ def test_well_excited_base_parameters_are_true_within_2_percent(arm, model):
     """
     estimate = arm.fit.estimates[model]
     truth = np.array(list(arm.fit.truth.values()))
-    well = estimate.corrected_sigma < 0.01 * np.abs(estimate.X)
+    well = estimate.calibrated_sigma < 0.01 * np.abs(estimate.X)
     assert np.count_nonzero(well) >= len(well) * (0.35 if model == "power" else 0.55)
     assert estimate.relative_error_percent(truth)[well].max() < 2
     # And those that are not are wrong by no more than their sigma says: 4 sigma are beyond one in ten thousand.
-    errors = (estimate.X - truth) / estimate.corrected_sigma
+    errors = (estimate.X - truth) / estimate.calibrated_sigma
     assert np.abs(errors).max() < 4
     assert 0.5 < np.sqrt(np.mean(errors**2)) < 1.5  # of 52, whose errors go together: 0.6 to 1.4 over rates and motions
 
@@ -74,27 +74,27 @@ def test_round_trip_from_file_to_file(arm, tmp_path):
 
     Torques are compared as means over 0.2 s: the noise that encoder counts make through the controller differs at once.
     """
-    subject = arm.fit.subject
+    robot_model = arm.fit.robot_model
     path = tmp_path / "out.xml"
     path.write_text(Written(arm.fit, "explicit").text(tmp_path))
     made = Robot.load(str(path))
-    truth, written = standard_parameters(subject.robot), standard_parameters(made)
-    base = [subject.grouping.base(np.array([x[n] for n in subject.grouping.standard.names])) for x in (truth, written)]
-    sigma = arm.fit.estimates["explicit"].corrected_sigma
+    truth, written = standard_parameters(robot_model.robot), standard_parameters(made)
+    base = [robot_model.grouping.base(np.array([x[n] for n in robot_model.grouping.standard.names])) for x in (truth, written)]
+    sigma = arm.fit.estimates["explicit"].calibrated_sigma
     assert np.abs((base[1] - base[0]) / sigma).max() < 4
-    again = replace(scenario(subject.name, 6, 7), robot=str(path))
-    first, second = simulate(scenario(subject.name, 6, 7)), simulate(again)
+    again = replace(scenario(robot_model.name, 6, 7), robot=str(path))
+    first, second = simulate(scenario(robot_model.name, 6, 7)), simulate(again)
     assert np.abs(first.q - second.q).max() < 1e-4  # rad: two counts of the encoders
-    means = [x[0, : len(x[0]) // 100 * 100].reshape(-1, 100, subject.robot.n).mean(axis=1) for x in (first.tau, second.tau)]
-    moving = (np.abs(first.qd[0, : len(first.qd[0]) // 100 * 100]).reshape(-1, 100, subject.robot.n) > 0.1).all(axis=1)
+    means = [x[0, : len(x[0]) // 100 * 100].reshape(-1, 100, robot_model.robot.n).mean(axis=1) for x in (first.tau, second.tau)]
+    moving = (np.abs(first.qd[0, : len(first.qd[0]) // 100 * 100]).reshape(-1, 100, robot_model.robot.n) > 0.1).all(axis=1)
     for gap, tau, clear in zip((means[0] - means[1]).T, means[0].T, moving.T, strict=True):
         assert np.sqrt(np.mean(gap[clear] ** 2)) < 0.01 * np.sqrt(np.mean(tau[clear] ** 2))
 
 
 def test_the_scara_as_a_tree_says_what_its_closed_form_says(log):
     """From the same log, by file and by name: the parameters that mean the same are the same."""
-    by_file = fit(Request(Subject(str(Robot.path("scara")))), Logs((log,)))
-    by_name = fit(Request(Subject("scara")), Logs((log,)))
+    by_file = fit(Request(RobotModel(str(Robot.path("scara")))), Logs((log,)))
+    by_name = fit(Request(RobotModel("scara")), Logs((log,)))
     for model in MODELS.builtin:
         tree = dict(zip(by_file.basis.names, by_file.estimates[model].X, strict=True))
         form = dict(zip(by_name.basis.names, by_name.estimates[model].X, strict=True))

@@ -120,15 +120,15 @@ def test_the_log_says_which_law(tmp_path, monkeypatch, capsys):
 def test_simulated_laws_are_identified(friction, name, tolerance):
     """Without noise, to what the physics step leaves of loads, and reversals of slow joints."""
     from experiments.identification.parameters import Parameters
-    from experiments.identification.subject import Subject
+    from experiments.identification.robot_model import RobotModel
     from identify import ExplicitModel, identify
 
     trajectory = {"kind": "random", "moves": 10, "durations": [2.0, 2.0], "rest": 1.0}
     scenario = from_dict({"name": "law", "trajectory": trajectory, "friction": friction})
     run = simulate(scenario)
-    subject = Subject("scara", Parameters(friction=(name,)))
-    truth = subject.truth(run.robots[0], scenario.friction)
-    found = identify(run.alone(), subject.basis, ExplicitModel())
+    robot_model = RobotModel("scara", Parameters(friction=(name,)))
+    truth = robot_model.truth(run.robots[0], scenario.friction)
+    found = identify(run.alone(), robot_model.basis, ExplicitModel())
     for letters in ("Fst", "vs", "Fl", "off", "Fva", "FvT"):
         for key in (key for key in truth if key.startswith(letters) and truth[key]):
             assert found.X[found.names.index(key)] == pytest.approx(truth[key], rel=tolerance), key

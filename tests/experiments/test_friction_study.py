@@ -9,7 +9,7 @@ from experiments.identification.fit import fit
 from experiments.identification.friction_choice import chosen_friction
 from experiments.identification.logs import Logs
 from experiments.identification.request import Request
-from experiments.identification.subject import Subject
+from experiments.identification.robot_model import RobotModel
 from identify import ExplicitModel, MotionLog, Problem, TorqueChannel, validate
 from identify.signals.masks import NoMask
 from sim.robot.inverse_dynamics import inverse_dynamics
@@ -59,9 +59,9 @@ def motion(rng, n, duration, speed):
     return (factor * q).T, (factor * qd).T, (factor * qdd).T
 
 
-def log(subject, joints, rng, duration, speed):
+def log(robot_model, joints, rng, duration, speed):
     """Return a log with 17 bits and torque noise of 1 %."""
-    robot = subject.robot
+    robot = robot_model.robot
     q, qd, qdd = motion(rng, robot.n, duration, speed * rng.uniform(0.7, 1.3, robot.n))
     rigid = inverse_dynamics(robot, q, qd, qdd) - robot.model.dof_damping * qd
     friction = [a.coulomb * (a.viscous * v + LAWS[a.law](v, load, a)) for a, v, load in zip(joints, qd.T, rigid.T, strict=True)]
@@ -72,14 +72,14 @@ def log(subject, joints, rng, duration, speed):
 
 def studied(name, seed, laws, masked):
     """Return laws of a robot's joints, those that were found, and unseen torque over that of standard friction, worst joint."""
-    rng, subject = np.random.default_rng([seed, 11]), Subject(name)
-    model = subject.robot.model
+    rng, robot_model = np.random.default_rng([seed, 11]), RobotModel(name)
+    model = robot_model.robot.model
     coulomb, viscous = (np.where(x > 0, x, least) for x, least in ((model.dof_frictionloss, 1.0), (model.dof_damping, 0.1)))
     joints = [Joint(rng, *own, laws) for own in zip(coulomb, viscous, strict=True)]
     fitted, unseen = (
-        log(subject, joints, np.random.default_rng([seed, k]), *own) for k, own in ((1, (40, 1.5)), (2, (20, 2.0)))
+        log(robot_model, joints, np.random.default_rng([seed, k]), *own) for k, own in ((1, (40, 1.5)), (2, (20, 2.0)))
     )
-    request = Request(subject, models=("explicit",), estimator="WLS")
+    request = Request(robot_model, models=("explicit",), estimator="WLS")
     if not masked:
         request = replace(request, method=(replace(request.processing, mask=NoMask()), request.solver))
     auto, _ = chosen_friction(request, (fitted,))
@@ -88,7 +88,7 @@ def studied(name, seed, laws, masked):
         found = fit(each, Logs((fitted,)))
         problem = Problem((unseen,), found.basis, ExplicitModel(), found.processing)
         rms.append(np.asarray(validate(problem, found.estimates["explicit"].X).rms))
-    return [a.law for a in joints], auto.subject.laws.names, float((rms[1] / rms[0]).max())
+    return [a.law for a in joints], auto.robot_model.laws.names, float((rms[1] / rms[0]).max())
 
 
 def expected(law, mask):

@@ -79,9 +79,9 @@ def test_the_body_can_exist(robot):
 
 def test_a_robot_known_beforehand_gives_what_fixed_gives(robot):
     first = robot.estimated(robot.without, robot.robot.basis)
-    found = with_known_robot(replace(robot, without=()), first.names, first.X, first.best_covariance)
+    found = with_known_robot(replace(robot, without=()), first.names, first.X, first.covariance)
     np.testing.assert_allclose(found.X, WAYS["fixed"](robot).X, rtol=1e-9)
-    exact = with_known_robot(replace(robot, without=()), first.names, first.X, 0 * first.best_covariance)
+    exact = with_known_robot(replace(robot, without=()), first.names, first.X, 0 * first.covariance)
     assert (exact.sigma <= found.sigma).all()  # what is open of the robot is open of the payload
 
 

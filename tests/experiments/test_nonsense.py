@@ -189,7 +189,7 @@ def test_a_plain_robot_is_asked_for_its_speeds_at_once(tmp_path, complaint, monk
         + '<geom size="0.05" pos="0.2 0 0"/></body></body></worldbody></mujoco>'
     )  # fmt: skip
     asked = []
-    monkeypatch.setattr("experiments.identification.subject.BaseParameters.of", lambda *args: asked.append(args))
+    monkeypatch.setattr("experiments.identification.robot_model.BaseParameters.of", lambda *args: asked.append(args))
     line = complaint("excite", "arm.xml")
     assert "add --velocity with rad/s of all joints or of each, such as --velocity 1.5" in line
     assert "add --acceleration" in complaint("excite", "arm.xml", "--velocity", "1.5")

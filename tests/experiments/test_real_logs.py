@@ -233,16 +233,16 @@ def test_the_function_of_true_parameters_is_mujocos_inverse_dynamics(robot, tmp_
     from experiments.identification.fit import Fit
     from experiments.identification.logs import Logs
     from experiments.identification.request import Request
-    from experiments.identification.subject import Subject
+    from experiments.identification.robot_model import RobotModel
     from identify import ExplicitModel, Problem
     from identify.estimators.estimate import Estimate
 
-    subject = Subject(robot)
-    arm, rng = subject.robot, np.random.default_rng(1)
+    robot_model = RobotModel(robot)
+    arm, rng = robot_model.robot, np.random.default_rng(1)
     log = MotionLog(100.0, rng.normal(size=(400, arm.n)), rng.normal(size=(400, arm.n)), TorqueChannel("held"))
-    request = Request(subject, models=("explicit",))
-    X = np.array(list(subject.truth(arm).values()))
-    estimate = Estimate(Problem((log,), subject.basis, ExplicitModel(), request.processing), X, np.eye(len(X)))
+    request = Request(robot_model, models=("explicit",))
+    X = np.array(list(robot_model.truth(arm).values()))
+    estimate = Estimate(Problem((log,), robot_model.basis, ExplicitModel(), request.processing), X, np.eye(len(X)))
     known = Fit(request, Logs((log,)), estimate.problem, {}, {"explicit": estimate})
     text = python_text(known, "explicit", tmp_path)
     (tmp_path / "arm.py").write_text(text)

@@ -12,7 +12,7 @@ from experiments.identification.logs import Logs
 from experiments.identification.parameters import Parameters
 from experiments.identification.remedies import Remedies, delay_advice
 from experiments.identification.request import Request
-from experiments.identification.subject import Subject
+from experiments.identification.robot_model import RobotModel
 from experiments.identification.warnings import warnings_of_result
 from identify import MotionLog
 from identify.files.log_file import read_log
@@ -39,11 +39,11 @@ def pair(logs):
 
 def validated(pair, asked=Parameters(), models=("explicit",)):  # noqa: B008  # frozen
     first, second = pair
-    return on_log(fit(Request(Subject(PUMA, asked), models), Logs((first,))), "second", second)
+    return on_log(fit(Request(RobotModel(PUMA, asked), models), Logs((first,))), "second", second)
 
 
 def without(letters):
-    names = Subject(PUMA).basis.names
+    names = RobotModel(PUMA).basis.names
     return Parameters(without=tuple(name for name in names if name.startswith(letters)))
 
 
@@ -109,7 +109,7 @@ def test_options_are_advised_that_help_and_by_how_much(pair):
 def test_a_starved_power_model_is_told_to_be_so_and_the_explicit_one_recommended(pair):
     """A third of a log: hardly more rows than parameters in the power model; the explicit one has six times as many."""
     part = pair[0].part(0, int(0.4 * pair[0].samples))
-    found = fit(Request(Subject(PUMA), ("explicit", "power")), Logs((part,)))
+    found = fit(Request(RobotModel(PUMA), ("explicit", "power")), Logs((part,)))
     rows, p = int(found.estimates["power"].row_count), len(found.basis.names)
     assert p < rows < 4 * p
     warnings = [warning for warning in warnings_of_result(found)["the motion"] if "identifies too little" in warning]
@@ -130,7 +130,7 @@ def test_a_dead_torque_column_is_poor_and_named(pair):
     dead = [torques(log, lambda tau: tau * [1, 0, 1, 1, 1, 1]) for log in pair]
     made = validated(dead)
     assert made.verdicts["explicit"].word == "poor"
-    assert warnings_of_log(dead[0], made.fit.subject.tree) == ["the torque of joint2 never changes: is it logged?"]
+    assert warnings_of_log(dead[0], made.fit.robot_model.tree) == ["the torque of joint2 never changes: is it logged?"]
 
 
 def test_a_delay_beyond_the_range_that_is_looked_at_is_told(pair):

@@ -16,7 +16,7 @@ from experiments.cli import main
 from experiments.identification.fit import fit
 from experiments.identification.logs import Logs
 from experiments.identification.request import Request
-from experiments.identification.subject import Subject
+from experiments.identification.robot_model import RobotModel
 from identify import MotionLog, TorqueChannel
 from identify.basis.parameter import BODY
 from identify.data.kinematics import INERTIAL
@@ -83,13 +83,13 @@ class Real:
 
     def __init__(self, name, folder, series):
         path = path_of(name, folder)
-        self.subject, self.model = Subject(path), pin.buildModelFromUrdf(path)
+        self.robot_model, self.model = RobotModel(path), pin.buildModelFromUrdf(path)
         self.rng = np.random.default_rng(len(name))
         for inertia in list(self.model.inertias)[1:]:
             share = 1 + 0.3 * self.rng.uniform(-1, 1)
             inertia.mass, inertia.inertia = inertia.mass * share, inertia.inertia * share * (1 + 0.1 * self.rng.uniform(-1, 1))
         self.data = self.model.createData()
-        joints = self.subject.robot.joints
+        joints = self.robot_model.robot.joints
         self.joints = [self.model.joints[self.model.getJointId(joint)] for joint in joints]
         self.q, self.qd, self.qdd = self._motion(series)
         bare = self.torques(self.q, self.qd, self.qdd)
@@ -112,7 +112,7 @@ class Real:
     def torques(self, q, qd, qdd, model=None):
         """Return the torques of a model's bodies, shape (time, joint)."""
         model = model or self.model
-        data, joints = model.createData(), [model.joints[model.getJointId(name)] for name in self.subject.robot.joints]
+        data, joints = model.createData(), [model.joints[model.getJointId(name)] for name in self.robot_model.robot.joints]
         return np.array(
             [[pin.rnea(model, data, *state)[j.idx_v] for j in joints] for state in _states(model, joints, q, qd, qdd)]
         )
@@ -144,9 +144,9 @@ class Real:
             values = dict(zip(ORDER, self.model.inertias[joint.id].toDynamicParameters(), strict=True))
             standard |= {f"{letters}{j + 1}": values[letters] for letters in INERTIAL}
             standard |= {f"Fs{j + 1}": self.Fs[j], f"Fv{j + 1}": self.Fv[j]}
-        grouping = self.subject.grouping
+        grouping = self.robot_model.grouping
         base = grouping.base(np.array([standard.get(name, 0.0) for name in grouping.standard.names]))
-        return base[[grouping.basis.places[parameter] for parameter in self.subject.basis.parameters]]
+        return base[[grouping.basis.places[parameter] for parameter in self.robot_model.basis.parameters]]
 
 
 @pytest.fixture(scope="module", params=ROBOTS)
@@ -157,11 +157,11 @@ def real(request, tmp_path_factory, series):
 def deviations(real, found):
     """Return by how many sigma each parameter is off."""
     estimate = found.estimates["explicit"]
-    return (estimate.X - real.truth) / estimate.best_sigma
+    return (estimate.X - real.truth) / estimate.standard_errors
 
 
 def test_torques_of_others_are_explained_and_sigma_holds_the_truth(real):
-    found = fit(Request(real.subject, models=("explicit",)), Logs((real.log,)))
+    found = fit(Request(real.robot_model, models=("explicit",)), Logs((real.log,)))
     assert not found.hidden
     assert found.explained["explicit"].min() > 0.999
     off = np.abs(deviations(real, found))
@@ -172,19 +172,21 @@ def test_torques_of_others_are_explained_and_sigma_holds_the_truth(real):
 def test_two_sigma_hold_95_percent_over_all_robots(tmp_path, series):
     """Of 623 parameters: 93 to 97 % is 2.4 standard deviations of a binomial number of so many."""
     every = (Real(name, tmp_path, series) for name in ROBOTS)
-    off = np.concatenate([deviations(one, fit(Request(one.subject, models=("explicit",)), Logs((one.log,)))) for one in every])
+    off = np.concatenate(
+        [deviations(one, fit(Request(one.robot_model, models=("explicit",)), Logs((one.log,)))) for one in every]
+    )
     assert 0.93 < np.mean(np.abs(off) < 2) < 0.97
 
 
 def test_base_parameters_are_as_many_as_by_pinocchio(real):
-    assert sum(parameter.kind in BODY for parameter in real.subject.basis.parameters) == real.rank
+    assert sum(parameter.kind in BODY for parameter in real.robot_model.basis.parameters) == real.rank
 
 
 def off_of_files(real, folder, monkeypatch):
     """Return how far the torques of written files are from the true ones anywhere within the motion, in each joint's torque."""
     monkeypatch.chdir(folder)
     write_log(real.log, folder / "log.csv")
-    words = ["identify", "log.csv", "--robot", real.subject.name, "--torque", "instantaneous", "--model", "explicit"]
+    words = ["identify", "log.csv", "--robot", real.robot_model.name, "--torque", "instantaneous", "--model", "explicit"]
     assert main([*words, "--no-rerun", "--write", "a.urdf", "c.py", "--write-mjcf", "d.xml"]) == 0
     states = q, qd, qdd = real.anywhere()
     rigid = real.torques(*states)
@@ -213,7 +215,7 @@ def measured(series):
         with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
             one = Real(name, Path(folder), series)
             began = time.monotonic()
-            result = fit(Request(one.subject, models=("explicit",)), Logs((one.log,)))
+            result = fit(Request(one.robot_model, models=("explicit",)), Logs((one.log,)))
             seconds = time.monotonic() - began
             off = off_of_files(one, Path(folder), patch)
         found.append({
@@ -258,7 +260,7 @@ def test_every_way_ends_with_a_result(real, way, tmp_path, monkeypatch, capsys):
     words = WAYS[way]
     if way == "stribeck" and len(real.joints) > MANY:
         words = ["--friction", "standard", *(f"{j}=standard+stribeck" for j in (1, 2, 3)), *words[2:]]
-    code = main(["identify", "log.csv", "--robot", real.subject.name, "--torque", "instantaneous", "--no-rerun", *words])
+    code = main(["identify", "log.csv", "--robot", real.robot_model.name, "--torque", "instantaneous", "--no-rerun", *words])
     assert not code, capsys.readouterr().err
     assert all(Path(file).stat().st_size for file in words if file.startswith(("a.", "b.", "c.", "d.")))
     shown = capsys.readouterr().out
@@ -282,13 +284,13 @@ PLACEHOLDERS = {"run": "state [friction]", "excite": "of its limit"}
 @pytest.mark.parametrize("command", COMMANDS)
 def test_other_commands_take_it(real, command, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    robot = real.subject.robot
+    robot = real.robot_model.robot
     free = [joint for joint, ends in zip(robot.joints, robot.ranges, strict=True) if not np.isfinite(ends).all()]
     Path("limits.toml").write_text("[position]\n" + "".join(f'"{joint}" = [-3.0, 3.0]\n' for joint in free))
-    words = [*COMMANDS[command], real.subject.name] if command == "run" else [real.subject.name, *COMMANDS[command]]
+    words = [*COMMANDS[command], real.robot_model.name] if command == "run" else [real.robot_model.name, *COMMANDS[command]]
     code = main([command, *words, *(["--limits", "limits.toml"] if command == "excite" and free else [])])
     said = capsys.readouterr().err
-    if command in PLACEHOLDERS and real.subject.name.endswith(ROBOTS["a hand"]):
+    if command in PLACEHOLDERS and real.robot_model.name.endswith(ROBOTS["a hand"]):
         assert code == 2
         assert PLACEHOLDERS[command] in said
     else:

@@ -9,7 +9,7 @@ from experiments.cli import main
 from experiments.identification.fit import fit
 from experiments.identification.logs import Logs
 from experiments.identification.request import Request
-from experiments.identification.subject import Subject
+from experiments.identification.robot_model import RobotModel
 from identify import MotionLog, TorqueChannel
 from identify.files.log_file import write_log
 from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
@@ -61,8 +61,8 @@ class Real:
         self.path, rng = folder / "robot.xml", np.random.default_rng(len(name))
         self.path.write_text(FILES[name])
         (folder / "arm.xml").write_text(INCLUDED)
-        self.subject = Subject(str(self.path))
-        file = self.subject.robot
+        self.robot_model = RobotModel(str(self.path))
+        file = self.robot_model.robot
         ranges = np.where(np.isfinite(file.ranges), file.ranges, np.pi * np.array([-1, 1]))
         self.motion = series(rng, np.arange(0, SECONDS, 1 / FS), ranges.T, np.full(file.n, 2.0))
         level = np.sqrt(np.mean(inverse_dynamics(file, *self.motion) ** 2, axis=0))
@@ -85,7 +85,7 @@ class Real:
 
     @property
     def truth(self):
-        return np.array(list(self.subject.truth(self.true).values()))
+        return np.array(list(self.robot_model.truth(self.true).values()))
 
 
 @pytest.fixture(scope="module", params=FILES)
@@ -94,10 +94,10 @@ def real(request, tmp_path_factory, series):
 
 
 def test_torques_are_explained_and_sigma_holds_the_truth(real):
-    found = fit(Request(real.subject, models=("explicit",)), Logs((real.log,)))
+    found = fit(Request(real.robot_model, models=("explicit",)), Logs((real.log,)))
     estimate = found.estimates["explicit"]
     assert found.explained["explicit"].min() > 0.999
-    assert np.abs((estimate.X - real.truth) / estimate.best_sigma).max() < 4.5
+    assert np.abs((estimate.X - real.truth) / estimate.standard_errors).max() < 4.5
 
 
 WAYS = {

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from experiments.identification.subject import Subject
+from experiments.identification.robot_model import RobotModel
 from identify import (
     AbstractBlock,
     AbstractConservativeBlock,
@@ -154,7 +154,7 @@ def test_the_scara_is_a_tree_in_the_letters_of_the_paper(function):
     """Against the closed form of section 7.1, whatever the length of link 1."""
     form = Basis(2, (ScaraLinks(), ViscousFriction(), CoulombFriction()))
     closed = getattr(form, function)(AT)
-    arm = Subject("scara").basis
+    arm = RobotModel("scara").basis
     for basis in (scara(), arm):
         found = getattr(basis, function)(AT)
         assert {(row, basis.names[k]) for row, k in found} >= {(row, form.names[k]) for row, k in closed}

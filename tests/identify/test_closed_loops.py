@@ -80,7 +80,7 @@ def test_a_chopper_gives_the_parameters_of_its_average(robot):
     )
     for form in forms:
         a, s = averaged[form], switched[form]
-        assert (np.mean(np.abs(a.X - s.X) / (a.sigma + s.sigma), axis=-1) < 1).all()
+        assert (np.mean(np.abs(a.X - s.X) / (a.own_sigma + s.own_sigma), axis=-1) < 1).all()
 
 
 def foreign(fs=100.0, bits=18, noise=(0.0, 0.0), seed=0):
@@ -137,4 +137,4 @@ def test_such_noise_on_the_papers_own_robot_stays_within_three_sigma(truth):
     noisy = replace(load("ideal"), torque=TorqueMeasurement(noise=(0.05, 0.0025)), encoder=IncrementalEncoder(lines=2**14))
     run = simulate(noisy, range(5))
     for form, estimate in identify_each(run.log, scara(), FORMS).items():
-        assert (np.abs(estimate.X - truth) < 3 * estimate.sigma).mean() > 0.97, form
+        assert (np.abs(estimate.X - truth) < 3 * estimate.own_sigma).mean() > 0.97, form

@@ -34,8 +34,8 @@ def test_two_corrected_sigma_hold_the_truth_in_93_to_97_percent(estimator, sigma
     for start in range(0, RUNS, BATCH):
         log = MotionLog(FS, q[start : start + BATCH], noisy[start : start + BATCH], TorqueChannel("instantaneous"))
         for name, found in identify_each(log, scara(), models, estimator=ESTIMATORS.create(estimator)).items():
-            inside[name].append(np.abs(found.X - truth) < 2 * found.corrected_sigma)
-            papers[name].append(np.abs(found.X - truth) < 2 * found.sigma)
+            inside[name].append(np.abs(found.X - truth) < 2 * found.calibrated_sigma)
+            papers[name].append(np.abs(found.X - truth) < 2 * found.own_sigma)
     for name in models:
         share = np.concatenate(inside[name]).mean(axis=0)
         assert share.min() >= 0.93, (name, share)

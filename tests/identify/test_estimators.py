@@ -9,8 +9,8 @@ import pytest
 from experiments.identification.fit import fit
 from experiments.identification.logs import Logs
 from experiments.identification.request import Request
+from experiments.identification.robot_model import RobotModel
 from experiments.identification.simulators import RobotPlant, ScenarioLoop
-from experiments.identification.subject import Subject
 from identify import (
     ESTIMATORS,
     AbstractLoop,
@@ -49,7 +49,7 @@ WIDE = replace(idbench_chain(), operator=replace(idbench_chain().operator, cutof
 
 
 def loop_of(scenario, log, start=None):
-    return Simulation(ScenarioLoop.of(Subject(), (scenario,), (log,)), RobotPlant(Subject()), start)
+    return Simulation(ScenarioLoop.of(RobotModel(), (scenario,), (log,)), RobotPlant(RobotModel()), start)
 
 
 def closed(bits=None, runs=1, **parts):
@@ -83,7 +83,7 @@ def test_five_simulations_are_enough_from_inertias_that_are_half(name, sixteen, 
     scenario, log = sixteen
     found = identify(log, scara(), ExplicitModel(), estimator=ESTIMATORS.create(name), simulation=loop_of(scenario, log, off))
     assert found.simulations <= 5
-    assert np.abs((found.X - truth) / found.best_sigma).max() < 4
+    assert np.abs((found.X - truth) / found.standard_errors).max() < 4
     assert np.abs(found.X / truth - 1)[[0, 3, 4]].max() < 1e-3
     np.testing.assert_array_equal(found.path[0], off)
 
@@ -94,16 +94,16 @@ def test_six_joints_take_no_more_than_six(name, most):
     """Positions to 1.75e-5 rad, torques to 0.05 N m: errors are then those of the noise."""
     birdy = load("excited/puma560-birdy")
     scenario = replace(birdy, encoder=IncrementalEncoder(lines=2**22, noise=1.75e-5), torque=TorqueMeasurement(noise=0.05))
-    subject, log = Subject("puma560"), simulate(scenario).alone()
-    standard, grouping = standard_parameters(subject.robot), subject.grouping
+    robot_model, log = RobotModel("puma560"), simulate(scenario).alone()
+    standard, grouping = standard_parameters(robot_model.robot), robot_model.grouping
     values = np.array([standard[name] for name in grouping.standard.names])
     inertia = np.array([re.fullmatch(r"([XYZ]{2}|Ia)\d", name) is not None for name in grouping.standard.names])
     truth, start = grouping.base(values), grouping.base(np.where(inertia, 0.5, 1.0) * values)
-    simulation = Simulation(ScenarioLoop.of(subject, (scenario,), (log,)), start=start)
-    found = identify(log, subject.basis, ExplicitModel(), estimator=ESTIMATORS.create(name), simulation=simulation)
+    simulation = Simulation(ScenarioLoop.of(robot_model, (scenario,), (log,)), start=start)
+    found = identify(log, robot_model.basis, ExplicitModel(), estimator=ESTIMATORS.create(name), simulation=simulation)
     assert found.simulations <= most
-    assert np.sqrt(np.mean(((start - truth) / found.best_sigma) ** 2)) > 10
-    assert np.sqrt(np.mean(((found.X - truth) / found.best_sigma) ** 2)) < 2
+    assert np.sqrt(np.mean(((start - truth) / found.standard_errors) ** 2)) > 10
+    assert np.sqrt(np.mean(((found.X - truth) / found.standard_errors) ** 2)) < 2
 
 
 @pytest.mark.thorough
@@ -139,9 +139,9 @@ def test_a_wrong_loop_makes_didim_wrong_and_iv_not(part, sixteen, truth):
     scenario, log = sixteen
     problem = Problem((log,), scara(), ExplicitModel(), idbench_chain(), loop_of(replace(scenario, **part), log))
     iv, didim = (estimate(problem, way) for way in (InstrumentalVariables(), DirectInverse()))
-    assert np.abs((iv.X - truth) / iv.corrected_sigma).max() < 4
+    assert np.abs((iv.X - truth) / iv.calibrated_sigma).max() < 4
     assert np.abs(iv.X / truth - 1).max() < 0.02
-    assert np.abs((didim.X - truth) / didim.best_sigma).max() > 6
+    assert np.abs((didim.X - truth) / didim.standard_errors).max() > 6
     assert np.abs(didim.X / truth - 1).max() > 5 * np.abs(iv.X / truth - 1).max()
 
 
@@ -158,10 +158,10 @@ def test_several_logs_with_a_loop_each_are_one_fit_and_looked_at_one_by_one(sixt
         )
         for some in (both, both[:1], both[1:])
     )
-    sigma, *each = (found.estimates["explicit"].corrected_sigma for found in (whole, *alone))
+    sigma, *each = (found.estimates["explicit"].calibrated_sigma for found in (whole, *alone))
     assert all((sigma < one).all() for one in each)
     seen = whole.on(1)
-    np.testing.assert_array_equal(seen.estimates["explicit"].best_sigma, sigma)
+    np.testing.assert_array_equal(seen.estimates["explicit"].standard_errors, sigma)
     assert len(seen.problem.rows.time) == len(alone[1].problem.rows.time)
 
 
@@ -174,7 +174,7 @@ def test_every_estimator_finds_what_didim_finds_from_the_same_torques(sixteen, t
         identify(log, scara(), ExplicitModel(), estimator=ESTIMATORS.create(name), simulation=simulation)
         for name in ("CLIE", "DIDIM")
     )
-    assert np.abs((input_error.X - direct.X) / direct.best_sigma).max() < 2
+    assert np.abs((input_error.X - direct.X) / direct.standard_errors).max() < 2
     assert input_error.simulations % 9 == 1  # p + 1 a round, after one of DIDIM
 
 
@@ -214,7 +214,7 @@ def test_a_loop_that_is_not_that_of_the_log_is_refused(change, message, sixteen)
     with pytest.raises(IdentificationError, match=message):
         loop_of(replace(scenario, **change), log)
     with pytest.raises(IdentificationError, match="1 loops are given for 2 logs"):
-        ScenarioLoop.of(Subject(), (scenario,), (log, log))
+        ScenarioLoop.of(RobotModel(), (scenario,), (log, log))
 
 
 @pytest.mark.parametrize(("name", "message"), [("IV", "--loop"), ("CLOE", "--loop"), ("OE", "the caller gave no simulator")])
@@ -235,7 +235,7 @@ def test_endless_memory_is_weighted_least_squares_and_a_short_one_knows_less(six
         estimate(problem, e) for e in (WeightedLeastSquares(), RecursiveLeastSquares(1e9), RecursiveLeastSquares(3.0))
     )
     np.testing.assert_allclose(endless.X, every.X, rtol=1e-3)
-    assert (short.corrected_sigma > endless.corrected_sigma).all()
+    assert (short.calibrated_sigma > endless.calibrated_sigma).all()
 
 
 @pytest.mark.thorough

@@ -102,7 +102,7 @@ def test_the_column_of_a_shape_is_its_slope():
     v, vs, size = qd, np.array([[0.2], [0.4]]), np.array([[0.7], [-0.2]])
     slope = size * 2 * v**2 / vs**3 * np.exp(-((v / vs) ** 2)) * np.sign(v)
     np.testing.assert_allclose(law.torques(State(q, qd, np.zeros_like))["vs"], slope, atol=1e-7)
-    assert {p.name: x for p, x in law.believed(2).items()} == {"vs1": 0.2, "vs2": 0.4}
+    assert {p.name: x for p, x in law.operating_point(2).items()} == {"vs1": 0.2, "vs2": 0.4}
 
 
 @pytest.mark.thorough
@@ -114,7 +114,7 @@ def test_sigma_of_nonlinear_parameters_is_calibrated():
     found = identify(log, scara() + BLOCKS.create("stribeck"), ExplicitModel(), estimator=ESTIMATORS.create("WLS"))
     true = np.array([*X, 0.3, 0.3, 0.15, 0.25])
     assert found.names[-4:] == ("Fst1", "vs1", "Fst2", "vs2")
-    z = (found.X - np.median(found.X, axis=0)) / found.best_sigma
+    z = (found.X - np.median(found.X, axis=0)) / found.standard_errors
     assert 0.90 < np.mean(np.abs(z) < 2) < 0.99
     assert np.abs(np.median(found.X, axis=0) - true).max() < 0.02
 
@@ -125,7 +125,7 @@ def test_a_shape_has_one_minimum_out_of_several():
     wrong = replace(law, size=np.array([-0.5, -0.5]), values={"vs": np.array([1.0, 1.0])})
     problem = Problem((made(stribeck_law, 0.002),), scara() + wrong, ExplicitModel(), idbench_chain())
     found = settled(problem)
-    assert found.basis.believed[found.basis.names.index("vs1")] == pytest.approx(0.3, rel=0.05)
+    assert found.basis.operating_point[found.basis.names.index("vs1")] == pytest.approx(0.3, rel=0.05)
 
 
 def test_laws_of_single_joints():

@@ -85,7 +85,7 @@ def test_it_solves_the_normal_equations_with_the_covariance_of_the_rows(model, l
     if model != "power":  # whose rows have noise of their own
         C = found.problem.parts[0].noisy.covariance(found.problem.likely_noise)
         C = dense(replace(C, bands=C.bands[0]))
-        np.testing.assert_allclose(np.diag(G.T @ C @ G), found.sigma[0] ** 2, rtol=1e-6)
+        np.testing.assert_allclose(np.diag(G.T @ C @ G), found.own_sigma[0] ** 2, rtol=1e-6)
 
 
 @pytest.mark.thorough
@@ -121,8 +121,8 @@ def test_errors_against_weighted_least_squares(position, torque, most, log, trut
     for name, found in general.items():
         error, other = (np.sqrt(np.mean((each.X - truth) ** 2, axis=0)) for each in (found, weighted[name]))
         assert np.exp(np.mean(np.log(error / other))) < most
-        assert np.sqrt(np.mean(((found.X - truth) / found.corrected_sigma) ** 2)) == pytest.approx(1, abs=0.25)
-        np.testing.assert_array_equal(found.sigma, found.corrected_sigma)
+        assert np.sqrt(np.mean(((found.X - truth) / found.calibrated_sigma) ** 2)) == pytest.approx(1, abs=0.25)
+        np.testing.assert_array_equal(found.own_sigma, found.calibrated_sigma)
 
 
 def test_no_noise_is_put_in_where_a_joint_stands(log):
@@ -144,7 +144,7 @@ def test_no_noise_is_put_in_where_a_joint_stands(log):
 def test_every_operator_has_a_covariance_to_solve_with(operator, log, truth):
     chain = replace(idbench_chain(), operator=OPERATORS.create(operator))
     found = identify(noisy(log, BITS16, (0.01, 0.001), 20), scara(), EVERY["explicit"], chain, GLS)
-    assert np.sqrt(np.mean(((found.X - truth) / found.sigma) ** 2)) < 1.5
+    assert np.sqrt(np.mean(((found.X - truth) / found.own_sigma) ** 2)) < 1.5
 
 
 def test_a_run_that_cannot_be_solved_leaves_the_others(log):
@@ -159,20 +159,20 @@ def test_a_log_without_any_noise_is_solved(log, truth):
     """Levels end at their least; nothing is singular."""
     found = identify(log, scara(), EVERY["explicit"], estimator=GLS)
     np.testing.assert_allclose(found.X, truth, rtol=1e-3)
-    assert np.isfinite(found.sigma).all()
+    assert np.isfinite(found.own_sigma).all()
 
 
 def test_two_logs_are_worth_two_and_long_ones_come_in_pieces(log, monkeypatch):
     one = noisy(log, BITS16, (0.1, 0.005), 1).part(0, log.samples)
     single = MotionLog(log.fs, one.q[0], one.tau[0], log.torque)
-    sigma = identify(single, scara(), EVERY["explicit"], estimator=GLS).sigma
+    sigma = identify(single, scara(), EVERY["explicit"], estimator=GLS).own_sigma
     double = identify([single, single], scara(), EVERY["explicit"], estimator=GLS)
-    np.testing.assert_allclose(np.sqrt(2) * double.sigma, sigma, rtol=0.1)
+    np.testing.assert_allclose(np.sqrt(2) * double.own_sigma, sigma, rtol=0.1)
     monkeypatch.setattr(long_logs, "LONG", 1e4)
     monkeypatch.setattr(long_logs, "PIECE", 4e3)
     pieces = identify(single, scara(), EVERY["explicit"], estimator=GLS)
     assert pieces.problem.long
-    np.testing.assert_allclose(pieces.sigma, sigma, rtol=0.25)
+    np.testing.assert_allclose(pieces.own_sigma, sigma, rtol=0.25)
     assert (np.abs(pieces.X - double.X) < 3 * sigma).all()
 
 
@@ -191,12 +191,12 @@ def test_what_noise_adds_to_W_is_taken_from_it(log, truth):
     Means of 100 draws are known to a tenth of a sigma; with W as it is, some are off by more than one.
     """
     found = identify(noisy(log, 16 * BITS16, (0.0, 0.0)), scara(), EVERY["explicit"], estimator=GLS)
-    assert np.abs(np.mean((found.X - truth) / found.sigma, axis=0)).max() < 0.5
+    assert np.abs(np.mean((found.X - truth) / found.own_sigma, axis=0)).max() < 0.5
     problem, whole = found.problem, found.rows
     whitening = problem.parts[0].whitening
     solved = np.swapaxes(whitening.solve(whole.W), -1, -2)
     plain = np.linalg.solve(solved @ whole.W, solved @ whole.Y[..., None])[..., 0]
-    assert np.abs(np.mean((plain - truth) / found.sigma, axis=0)).max() > 1
+    assert np.abs(np.mean((plain - truth) / found.own_sigma, axis=0)).max() > 1
 
 
 def test_rows_of_one_model_that_are_too_few_leave_the_others(log):

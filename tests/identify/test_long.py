@@ -55,10 +55,10 @@ def test_estimates_are_those_of_all_rows(estimator, noisy, short, monkeypatch):
         assert found.condition_number == pytest.approx(estimate.condition_number, rel=1e-9)
         # Power rows are weighted by the noise of eight pieces, as all are by GLS, for which pieces are independent: as good.
         tolerance = 0.2 if (name, estimator) == ("power", "WLS") or estimator == "GLS" else 1e-6
-        assert np.abs((found.X - estimate.X) / estimate.sigma).max() < tolerance, name
-        np.testing.assert_allclose(found.sigma, estimate.sigma, rtol=0.1 if tolerance == 0.2 else 1e-6)
+        assert np.abs((found.X - estimate.X) / estimate.own_sigma).max() < tolerance, name
+        np.testing.assert_allclose(found.own_sigma, estimate.own_sigma, rtol=0.1 if tolerance == 0.2 else 1e-6)
         np.testing.assert_allclose(found.residual_rms, estimate.residual_rms, rtol=1e-3)
-        np.testing.assert_allclose(found.corrected_sigma, estimate.corrected_sigma, rtol=0.3)  # from eight pieces, rows cut
+        np.testing.assert_allclose(found.calibrated_sigma, estimate.calibrated_sigma, rtol=0.3)  # from eight pieces, rows cut
 
 
 @pytest.mark.parametrize("chain", CHAINS.builtin)

@@ -118,7 +118,7 @@ def test_errors_against_weighted_least_squares(position, torque, most, exact, tr
     weighted, likely = (identify(log, scara(), EXPLICIT, estimator=each) for each in (WeightedLeastSquares(), ML))
     error, other = (np.sqrt(np.mean((found.X - truth) ** 2, axis=0)) for found in (likely, weighted))
     assert np.exp(np.mean(np.log(error / other))) < most
-    z = (likely.X - truth) / likely.corrected_sigma
+    z = (likely.X - truth) / likely.calibrated_sigma
     assert np.sqrt(np.mean(z**2)) == pytest.approx(1, abs=0.25)
 
 
@@ -133,7 +133,7 @@ def test_friction_a_hundred_times_larger_than_what_moves_a_joint(coulomb, truth)
     log = MotionLog(log.fs, log.q + BITS16 * rng.standard_normal(log.q.shape), tau, log.torque)
     found, true = identify(log, scara(), EXPLICIT, estimator=ML), truth.copy()
     true[[2, 7]] = coulomb
-    assert (np.abs(found.X - true) < 4 * found.sigma).all()
+    assert (np.abs(found.X - true) < 4 * found.own_sigma).all()
     np.testing.assert_allclose(found.noise_levels.torque, [3.0, 0.5], rtol=0.1)
 
 
@@ -143,7 +143,7 @@ def test_a_stated_delay_is_taken_into_account(delay, truth):
     made = scenario(timing=replace(load("ideal").timing, delay=delay))
     log = simulate(made).alone()
     found = identify(noisy(log, BITS16, 0.0), scara(), EXPLICIT, estimator=ML)
-    assert (np.abs(found.X - truth) < 5 * found.sigma).all()
+    assert (np.abs(found.X - truth) < 5 * found.own_sigma).all()
 
 
 def test_two_logs_are_worth_two(exact):
@@ -151,8 +151,8 @@ def test_two_logs_are_worth_two(exact):
     one, two = noisy(one, BITS16, 0.02), noisy(two, BITS16, 0.02)
     both = identify([one, two], scara(), EXPLICIT, estimator=ML)
     alone = [identify(log, scara(), EXPLICIT, estimator=ML) for log in (one, two)]
-    together = 1 / np.sqrt(sum(1 / found.sigma**2 for found in alone))
-    np.testing.assert_allclose(both.sigma, together, rtol=0.25)
+    together = 1 / np.sqrt(sum(1 / found.own_sigma**2 for found in alone))
+    np.testing.assert_allclose(both.own_sigma, together, rtol=0.25)
 
 
 def test_other_models_are_refused_and_leave_the_explicit_one(exact):
@@ -212,7 +212,7 @@ def test_the_delay_is_found_with_the_parameters(stated, truth):
     assert sigma < 5e-5
     assert abs(stated + fit.delay - 0.004) < 5 * sigma
     assert smoothed_log(fit).torque.delay == pytest.approx(stated + fit.delay)
-    assert (np.abs(found.X - truth) < 5 * found.sigma).all()
+    assert (np.abs(found.X - truth) < 5 * found.own_sigma).all()
 
 
 def test_one_run_does_not_take_the_others_away(exact):

@@ -163,7 +163,7 @@ def test_encoder_noise_makes_no_more_of_sigma_than_it_should(log, truth):
     draws = log.q + 2.77e-5 * np.random.default_rng(7).standard_normal((80, *log.q.shape))
     noisy = MotionLog(log.fs, draws, np.broadcast_to(log.tau, draws.shape), log.torque)
     for name, found in identify_each(noisy, scara(), EVERY).items():
-        z = (found.X - truth) / found.corrected_sigma
+        z = (found.X - truth) / found.calibrated_sigma
         assert np.sqrt(np.mean(z**2)) == pytest.approx(1, abs=0.3), name
 
 
@@ -207,9 +207,9 @@ def test_the_corrected_sigma_is_the_scatter(sigma, estimator, log):
     off = []
     for name, found in identify_each(noisy(log, sigma), scara(), EVERY, estimator=ESTIMATORS.create(estimator)).items():
         scatter = found.X.std(axis=0)
-        rms = np.sqrt(np.mean(found.corrected_sigma**2, axis=0))
+        rms = np.sqrt(np.mean(found.calibrated_sigma**2, axis=0))
         np.testing.assert_allclose(rms, scatter, rtol=0.16, err_msg=name)
-        off.append(found.sigma.mean(axis=0) / scatter)
+        off.append(found.own_sigma.mean(axis=0) / scatter)
     assert np.min(off) < 0.85
     assert estimator != "OLS" or np.max(off) > 2
 
@@ -239,7 +239,7 @@ def test_what_comes_before_the_operator_is_not_counted_twice(log, operator, pref
     draws, weighted = noisy(replace(log, torque=channel), (300.0, 300.0), 100), WeightedLeastSquares()
     found = identify(draws, scara(), EVERY["explicit"], chain, weighted)
     np.testing.assert_allclose(np.sqrt(np.mean(found.problem.noise.torque**2, axis=0)), 300.0, rtol=0.04)
-    rms = np.sqrt(np.mean(found.corrected_sigma**2, axis=0))
+    rms = np.sqrt(np.mean(found.calibrated_sigma**2, axis=0))
     np.testing.assert_allclose(rms, found.X.std(axis=0), rtol=0.28)  # four times what 100 draws leave
 
 
@@ -252,14 +252,14 @@ def test_two_logs_are_worth_two(log):
     whole = noise_covariance(double.problem, parts)
     half = double.problem.parts[0].covariance.of_sums(parts[0])
     np.testing.assert_allclose(whole, 2 * half, rtol=1e-9)
-    np.testing.assert_allclose(2 * double.corrected_covariance, single.corrected_covariance, rtol=0.1)
+    np.testing.assert_allclose(2 * double.calibrated_covariance, single.calibrated_covariance, rtol=0.1)
 
 
 def test_without_an_influence_nothing_is_said(log):
     """But the estimator's own sigma is there to be shown."""
     estimate = Estimate.judge(Problem((log,), scara(), EVERY["explicit"], paper_chain()), np.ones(8))
-    assert np.isnan(estimate.corrected_sigma).all()
-    np.testing.assert_array_equal(estimate.best_sigma, estimate.sigma)
+    assert np.isnan(estimate.calibrated_sigma).all()
+    np.testing.assert_array_equal(estimate.standard_errors, estimate.own_sigma)
 
 
 def test_a_run_that_cannot_be_solved_has_none(log, rng):
@@ -268,8 +268,8 @@ def test_a_run_that_cannot_be_solved_has_none(log, rng):
     tau = log.tau + 0.1 * rng.standard_normal(q.shape)
     both = identify(MotionLog(log.fs, q, tau, log.torque), scara(), EVERY["explicit"], throw=False)
     alone = identify(MotionLog(log.fs, q[0], tau[0], log.torque), scara(), EVERY["explicit"])
-    assert np.isnan(both.corrected_sigma[1]).all()
-    np.testing.assert_array_equal(both.corrected_sigma[0], alone.corrected_sigma)
+    assert np.isnan(both.calibrated_sigma[1]).all()
+    np.testing.assert_array_equal(both.calibrated_sigma[0], alone.calibrated_sigma)
 
 
 @pytest.mark.parametrize("estimator", ["WLS", "GLS"])

@@ -48,7 +48,7 @@ def test_wild_samples_cost_less_than_twice_the_error(noisy, truth):
 def test_irls_has_a_calibrated_sigma(noisy, truth):
     """Of eight runs with eight parameters, to a quarter; with wild samples it says more than is wrong, never less."""
     clean, wild, _ = (identify(log, scara(), ExplicitModel(), estimator=IterativelyReweighted()) for log in noisy)
-    rms = [np.sqrt(np.mean(((found.X - truth) / found.best_sigma) ** 2)) for found in (clean, wild)]
+    rms = [np.sqrt(np.mean(((found.X - truth) / found.standard_errors) ** 2)) for found in (clean, wild)]
     assert rms[0] == pytest.approx(1, abs=0.25)
     assert 0.4 < rms[1] < 1.1
 

@@ -74,9 +74,9 @@ def test_output_error_uses_the_log(rng):
     basis = Basis(1, (Armature(), ViscousFriction()))
     found = identify(MotionLog(100.0, q, tau, exact.torque), basis, ExplicitModel(), estimator=OutputError())
     np.testing.assert_allclose(found.X, [2.0, 0.7], rtol=1e-3)
-    assert (np.abs(found.X - [2.0, 0.7]) < 5 * found.sigma).all()
-    assert np.isnan(found.corrected_sigma).all()
-    np.testing.assert_array_equal(found.best_sigma, found.sigma)
+    assert (np.abs(found.X - [2.0, 0.7]) < 5 * found.own_sigma).all()
+    assert np.isnan(found.calibrated_sigma).all()
+    np.testing.assert_array_equal(found.standard_errors, found.own_sigma)
 
 
 def test_a_basis_may_be_exchanged_and_signals_stay(log):
@@ -93,7 +93,7 @@ def test_an_estimator_that_needs_rows_is_refused_a_log_too_long_for_them(log, mo
     problem = Problem((log,), scara(), ExplicitModel(), idbench_chain())
     with pytest.raises(IdentificationError, match="IRLS needs rows, and the rows of 4600 samples"):
         estimate(problem, ESTIMATORS.create("IRLS"))
-    assert np.isfinite(estimate(problem, WeightedLeastSquares()).corrected_sigma).all()
+    assert np.isfinite(estimate(problem, WeightedLeastSquares()).calibrated_sigma).all()
 
 
 def test_without_a_log_there_is_no_problem():

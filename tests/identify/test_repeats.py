@@ -115,6 +115,6 @@ def test_sigma_of_counts_alone_holds_the_truth(motion, bits, truth):
     q = np.array([rounded(one[0], bits, rng)[0] for one in every])
     log = logged(q, np.array([torque(truth, *one) for one in every]))
     found = identify(log, scara(), MODELS.create("explicit"))
-    z = (found.X - truth) / found.best_sigma
+    z = (found.X - truth) / found.standard_errors
     assert np.sqrt(np.mean(z**2)) == pytest.approx(1.0, abs=0.1)
     assert 0.93 < np.mean(np.abs(z) < 2) < 0.98

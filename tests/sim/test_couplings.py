@@ -124,15 +124,15 @@ def test_what_is_no_coupling_is_refused(text, message):
 
 def test_a_wrist_is_identified_with_its_coupling(wrist):
     """On noise-free data, to the differences' own error; without the coupling it is far off."""
-    from experiments.identification.subject import Subject
+    from experiments.identification.robot_model import RobotModel
     from identify import identify
     from sim.engine.simulation import simulate
     from sim.scenario.scenario_file import from_dict
 
     trajectory = {"kind": "random", "moves": 12, "durations": [1.0, 1.4], "rest": 1.0}
     run = simulate(from_dict({"name": "wrist", "robot": wrist, "trajectory": trajectory, "fs": 200.0}))
-    subject = Subject(wrist)
-    truth = subject.truth(run.robots[0])
-    found = identify(run.alone(), subject.basis, ExplicitModel())
+    robot_model = RobotModel(wrist)
+    truth = robot_model.truth(run.robots[0])
+    found = identify(run.alone(), robot_model.basis, ExplicitModel())
     for name in ("Ia_motor", "Fv_motor", "Fs_motor", "K_motor", "K1"):
         assert found.X[found.names.index(name)] == pytest.approx(truth[name], rel=2e-3), name

@@ -18,7 +18,7 @@ from experiments.excite.motion_file import write_motion
 from experiments.excite.sequence import MotionSequence
 from experiments.identification.reading import ReadOptions, file_of, read
 from experiments.identification.request import Request
-from experiments.identification.subject import Subject, absolute
+from experiments.identification.robot_model import RobotModel, absolute
 from experiments.identification.warnings import FILE, warnings_of_robot
 from experiments.recording.audience import Audience
 from experiments.reports.excite_printed import print_excited, print_sequence
@@ -59,7 +59,7 @@ def excite(options: Excite) -> None:
             sequence = MotionSequence.of(design, share, progress) if share else None
             found = sequence.last if sequence else Excited.of(design, progress)
             print_excited(page, found)
-        page.warn({FILE: warnings_of_robot(design.subject.robot), "limits": looser(design.subject.robot, design.asked)})
+        page.warn({FILE: warnings_of_robot(design.robot_model.robot), "limits": looser(design.robot_model.robot, design.asked)})
         if sequence:
             print_sequence(page, sequence)
         what, hint = command.removeprefix("uv run idbench excite "), options.watching.hint(folder.out)
@@ -104,13 +104,13 @@ def _designed(options: Excite) -> Design:
         raise ExperimentError(f"--seed {options.seed} must be at least 0")
     if options.until is not None and options.log:
         raise ExperimentError("--until simulates its own logs: leave --log out")
-    subject, limits = Subject(absolute(options.robot), options.parameters), _limits(options)
-    limits_of(subject.robot, limits)  # what is missing is said before the parameters are grouped
-    subject.require_linear()
-    if len(options.torque_noise) not in (0, 1, subject.robot.n):
+    robot_model, limits = RobotModel(absolute(options.robot), options.parameters), _limits(options)
+    limits_of(robot_model.robot, limits)  # what is missing is said before the parameters are grouped
+    robot_model.require_linear()
+    if len(options.torque_noise) not in (0, 1, robot_model.robot.n):
         count = len(options.torque_noise)
         raise ExperimentError(
-            f"--torque-noise has {count} values for {subject.robot.n} joints: give one for all, or one per joint"
+            f"--torque-noise has {count} values for {robot_model.robot.n} joints: give one for all, or one per joint"
         )
     return Design(
         robot=absolute(options.robot),
@@ -123,7 +123,7 @@ def _designed(options: Excite) -> Design:
         seed=options.seed,
         weights=_weights(options.weigh),
         criterion=options.criterion,
-        logs=tuple(_log(path, subject) for path in options.log),
+        logs=tuple(_log(path, robot_model) for path in options.log),
         parameters=options.parameters,
     )
 
@@ -193,6 +193,6 @@ def _percent(text: str | None) -> float | None:
     return share
 
 
-def _log(path: Path, subject: Subject) -> MotionLog:
+def _log(path: Path, robot_model: RobotModel) -> MotionLog:
     """Return an earlier log: of its torques nothing counts, so that their meaning is not asked for."""
-    return read(file_of(path), ReadOptions(fallback=TorqueChannel("held")), Request(subject)).longest
+    return read(file_of(path), ReadOptions(fallback=TorqueChannel("held")), Request(robot_model)).longest

@@ -146,13 +146,13 @@ class Follower:
         from experiments.recording.motion_layer import Base
         from experiments.recording.stream import Stream
 
-        subject, name = self.request.subject, f"following-{self.path.stem}"
+        robot_model, name = self.request.robot_model, f"following-{self.path.stem}"
         if self.audience:
             qd = measured_state(log, self.request.processing).qd.T
-            self._base = Base(name, subject.robot, log.fs, ("measured",), qd, self.audience)
+            self._base = Base(name, robot_model.robot, log.fs, ("measured",), qd, self.audience)
         stream = self._base.stream if self._base else Stream(name)
-        joints = parts(subject.robot.joints)
-        self._live = LiveIdentification(stream, subject, self.request.chain, log.torque, log.fs, joints)
+        joints = parts(robot_model.robot.joints)
+        self._live = LiveIdentification(stream, robot_model, self.request.chain, log.torque, log.fs, joints)
         return self._live
 
 
@@ -161,7 +161,7 @@ def _words(live: "LiveIdentification", now: float) -> str:
     if live.fit is None:
         return f"{now:.1f} s"
     estimate = next(iter(live.fit.estimates.values()))
-    shares = 100 * estimate.best_sigma / np.maximum(np.abs(estimate.X), 1e-300)
+    shares = 100 * estimate.standard_errors / np.maximum(np.abs(estimate.X), 1e-300)
     weakest = int(np.argmax(np.nan_to_num(shares, nan=np.inf)))
     known = np.count_nonzero(shares < KNOWN)
     return (

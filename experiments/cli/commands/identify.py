@@ -52,7 +52,7 @@ def identify(options: Identify) -> None:
     command, read = command_of("identify", options, "log", LEFT_OUT), _read(options, request)
     whole = command_of("identify", options, "log", LEFT_OUT, absolute=True)
     folder = ResultsFolder(options.out, "identify", whole, options.force, read) if options.out else None
-    require_targets(options, request.subject, folder, read)
+    require_targets(options, request.robot_model, folder, read)
     require_layer(options, request.label, command)
     with ExitStack() as stack:
         stack.enter_context(shown(page))
@@ -91,7 +91,7 @@ def _read(options: Identify, request: Request) -> tuple[Path, ...]:
     logs = [file_of(path).absolute() for path in (*options.log, *options.validate)]
     named = (options.chain_file, options.reading.layout, *options.loop)
     more = [Path(name) for name in named if name is not None]
-    return (*logs, Robot.path(request.subject.name), *(path.absolute() for path in more if path.suffix))
+    return (*logs, Robot.path(request.robot_model.name), *(path.absolute() for path in more if path.suffix))
 
 
 def _followed(stack: ExitStack, options: Identify, request: Request, audience: Audience | None) -> Identify:
@@ -115,22 +115,22 @@ def _fitted(options: Identify, request: Request, stated: dict[str, Any]) -> Fit:
     try:
         return fit(loaded.request, logs)
     except IdentificationError as error:
-        doubts = [f"warning: {doubt}" for log in logs.fitted for doubt in warnings_of_log(log, request.subject.tree)]
+        doubts = [f"warning: {doubt}" for log in logs.fitted for doubt in warnings_of_log(log, request.robot_model.tree)]
         raise ExperimentError("; ".join([str(error), *doubts])) from error
 
 
 def _truth(stated: dict[str, Any], request: Request) -> dict[str, float] | None:
     """Return the truth that the folder of a run states, if it is of the same parameters."""
     truth: dict[str, float] | None = stated.get("truth")
-    return truth if truth and tuple(truth) == request.subject.basis.names else None
+    return truth if truth and tuple(truth) == request.robot_model.basis.names else None
 
 
 def _show_fit(page: Page, result: Fit, options: Identify, log: Path) -> None:
     """Show the estimates."""
     print_fit(page, result, ", ".join(map(str, options.log)), shown_whole(result, options.model is not None))
-    notes, choice, subject = list(result.logs.notes), result.choice, result.subject
+    notes, choice, robot_model = list(result.logs.notes), result.choice, result.robot_model
     if choice is not None:
-        notes += words(choice, subject.laws.names, subject.robot.joints)
+        notes += words(choice, robot_model.laws.names, robot_model.robot.joints)
         page.found["friction"] = summary(choice)
     for note in notes:
         page.print(Text(note), soft_wrap=True)

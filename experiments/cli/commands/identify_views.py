@@ -13,7 +13,7 @@ from experiments.errors import ExperimentError, ResultsError
 from experiments.exports.exports import EXPORTS
 from experiments.identification.fit import Fit
 from experiments.identification.judgement import Judgement
-from experiments.identification.subject import Subject
+from experiments.identification.robot_model import RobotModel
 from experiments.recording.audience import Audience
 from experiments.results.attempts import Attempts
 from experiments.results.folder import RECORDING, ResultsFolder
@@ -151,7 +151,7 @@ def _targets(options: Identify) -> list[tuple[str, Path]]:
     return [*own, *(("--write", path) for path in options.write)]
 
 
-def require_targets(options: Identify, subject: Subject, folder: ResultsFolder | None, read: Sequence[Path]) -> None:
+def require_targets(options: Identify, robot_model: RobotModel, folder: ResultsFolder | None, read: Sequence[Path]) -> None:
     """Raise ExperimentError if what is asked for cannot be written there; before the work, not after it."""
     for option, path in _targets(options):
         if option == "--write-mjcf" and path.suffix != ".xml":
@@ -160,7 +160,7 @@ def require_targets(options: Identify, subject: Subject, folder: ResultsFolder |
             raise ExperimentError(f"--write {path}: its name must end with {', '.join(EXPORTS)}")
         if not (folder and folder.goes_beside(path, option)):
             require_free(path, option, force=options.force, read=read)
-        EXPORTS[path.suffix][2](subject, path)
+        EXPORTS[path.suffix][2](robot_model, path)
     targets = [path.absolute() for _, path in _targets(options)]
     if twice := next((path for k, path in enumerate(targets) if path in targets[:k]), None):
         raise ResultsError(f"{twice} is to be written twice: give each file a name of its own")

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from experiments.cli.page import Page
 from experiments.errors import ExperimentError
-from experiments.identification.subject import Subject
+from experiments.identification.robot_model import RobotModel
 from experiments.recording.audience import Audience, Watching
 from sim.scenario.scenario import Scenario
 
@@ -32,9 +32,9 @@ def recording_of(
     scenario: Scenario,
     audience: Audience | None,
     window: tuple[float, float] | None = None,
-    subject: Subject | None = None,
+    robot_model: RobotModel | None = None,
 ) -> "RunRecording":
     """Return the recording of a scenario that is to be simulated."""
     from experiments.recording.identification_recording import RunRecording
 
-    return RunRecording(scenario, audience, window, subject)
+    return RunRecording(scenario, audience, window, robot_model)

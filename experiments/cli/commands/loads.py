@@ -19,7 +19,7 @@ from experiments.identification.friction_choice import chosen_friction, words
 from experiments.identification.load import in_band, load
 from experiments.identification.reading import file_of
 from experiments.identification.request import Request
-from experiments.identification.subject import Subject, absolute
+from experiments.identification.robot_model import RobotModel, absolute
 from experiments.loads.judgement import LoadJudgement, negative_mass
 from experiments.loads.known_load import known_of
 from experiments.loads.loads_text import body_of, gains_summary, payload_summary, print_gains, print_payloads
@@ -57,7 +57,7 @@ def payload(options: IdentifyPayload) -> None:
         with _finish(page, folder) as attempts:
             _judge(page, judgement, found, attempts, folder)
             if options.write_mjcf is not None:
-                attempts.attempt("--write-mjcf", lambda: _write_mjcf(page, options, judgement.request.subject, found))
+                attempts.attempt("--write-mjcf", lambda: _write_mjcf(page, options, judgement.request.robot_model, found))
 
 
 def gains(options: IdentifyGains) -> None:
@@ -89,12 +89,12 @@ def _identify_payload(page: Page, options: IdentifyPayload) -> tuple[LoadJudgeme
         judgement = replace(judgement, before=dict(zip(names, X.tolist(), strict=True)))
     else:
         found = _by_ways(robot, options)
-    print_payloads(page, found, request.subject.robot.joints[-1])
+    print_payloads(page, found, request.robot_model.robot.joints[-1])
     for note in notes:
         page.print(Text(note), soft_wrap=True)
     page.found |= {"experiment": "payload", "path": str(options.log[0].absolute()), "log": options.log[0].name}
     leading = next(p for p in found.values() if isinstance(p, Payload))
-    page.found |= {"robot": request.subject.name, **payload_summary(found)}
+    page.found |= {"robot": request.robot_model.name, **payload_summary(found)}
     return judgement, leading
 
 
@@ -130,13 +130,13 @@ def _by_ways(robot: LoadedRobot, options: IdentifyPayload) -> dict[str, Payload 
     return found
 
 
-def _write_mjcf(page: Page, options: IdentifyPayload, subject: Subject, found: Payload) -> None:
+def _write_mjcf(page: Page, options: IdentifyPayload, robot_model: RobotModel, found: Payload) -> None:
     """Write the robot's file with the payload as a body."""
     body, path = body_of(found), options.write_mjcf
     if path is None or "mass" not in body or negative_mass(found):
         raise ExperimentError(f"--write-mjcf {path}: {body.get('why', 'the mass of the payload is below zero')}")
     values = np.array(list(body["parameters"].values()))
-    text = with_body(subject.name, "payload", values, path.absolute().parent, subject.mounting)
+    text = with_body(robot_model.name, "payload", values, path.absolute().parent, robot_model.mounting)
     write_text(path, text, "--write-mjcf", force=options.force, read=_read(options))
     page.print(Text(f"written to {path}: the robot with the payload as a body of its last link"), soft_wrap=True)
 
@@ -145,18 +145,18 @@ def _identify_gains(page: Page, options: IdentifyGains) -> LoadJudgement:
     if options.known.mass is None:
         raise ExperimentError("--mass is missing: the gains follow from a payload whose mass is known")
     judgement, notes = _loaded(options)
-    robot, subject = judgement.robot, judgement.request.subject
+    robot, robot_model = judgement.robot, judgement.request.robot_model
     found = identify_drive_gains(robot)
     given = np.broadcast_to(robot.loaded[0].torque.gain, (robot.tree.n,)) * judgement.gain
     found = replace(found, gains=found.gains * judgement.gain, sigma=found.sigma * judgement.gain)
-    joints = subject.robot.joints
+    joints = robot_model.robot.joints
     page.warn({"the gains": print_gains(page, found, given.tolist(), joints)})
     gains = np.where(found.shown, found.gains, given)
     page.print(Text(f"to read logs with them: --gain {' '.join(f'{gain:.5g}' for gain in gains)}"), soft_wrap=True)
     for note in notes:
         page.print(Text(note), soft_wrap=True)
     page.found |= {"experiment": "gains", "path": str(options.log[0].absolute()), "log": options.log[0].name}
-    page.found |= {"robot": subject.name, **gains_summary(found, given.tolist(), joints)}
+    page.found |= {"robot": robot_model.name, **gains_summary(found, given.tolist(), joints)}
     return judgement.with_gains(gains / given)
 
 
@@ -167,20 +167,20 @@ def _loaded(options: LoadOptions) -> tuple[LoadJudgement, list[str]]:
     if options.robot is None:
         raise ExperimentError("--robot is missing: the file that describes the arm, or the name of one that ships")
     known = known_of(options.known.mass, options.known.at, options.known.inertia)
-    subject = Subject(absolute(options.robot), options.parameters, options.mounting.mounting)
-    request = Request(subject, models=("explicit",), estimator=options.estimator, mask_speed=options.mask_speed)
+    robot_model = RobotModel(absolute(options.robot), options.parameters, options.mounting.mounting)
+    request = Request(robot_model, models=("explicit",), estimator=options.estimator, mask_speed=options.mask_speed)
     if options.cutoff is not None:
         request = in_band(request, options.cutoff)
     paths, band = (*options.unloaded, *options.log), options.cutoff is None
     loaded = load(paths, read_options(options), request, band=band, more=len(LETTERS))
     request, notes, first = loaded.request, list(loaded.notes), len(options.unloaded)
     without, with_it = loaded.logs(slice(first)), loaded.logs(slice(first, None))
-    if subject.laws.auto:
+    if robot_model.laws.auto:
         request, choice = chosen_friction(request, without or with_it)
-        notes += words(choice, request.subject.laws.names, subject.robot.joints)
-    subject = request.subject
-    standard = subject.grouping.standard
-    robot = LoadedRobot(subject.tree, standard, without, with_it, request.processing, request.solver, known)
+        notes += words(choice, request.robot_model.laws.names, robot_model.robot.joints)
+    robot_model = request.robot_model
+    standard = robot_model.grouping.standard
+    robot = LoadedRobot(robot_model.tree, standard, without, with_it, request.processing, request.solver, known)
     return LoadJudgement(robot, request, loaded.names, np.array(loaded.read[-1].columns.gain or 1.0)), notes
 
 

@@ -13,7 +13,7 @@ from experiments.identification.defaults import CHAIN
 from experiments.identification.load import in_band
 from experiments.identification.reading import ReadOptions
 from experiments.identification.request import Request
-from experiments.identification.subject import SCARA, Subject, absolute
+from experiments.identification.robot_model import SCARA, RobotModel, absolute
 from identify import CHAINS, ESTIMATORS, MODELS
 from identify.signals.masks import NoMask
 from sim.scenario.scenario_file import load
@@ -31,7 +31,7 @@ def request_of(options: Identify, stated: Mapping[str, Any]) -> Request:
     own = options.log[0] / "scenario.toml"
     loops = options.loop or ([str(own)] if len(options.log) == 1 and own.is_file() else [])
     request = Request(
-        Subject(robot, options.parameters, options.mounting.mounting),
+        RobotModel(robot, options.parameters, options.mounting.mounting),
         tuple(MODELS) if options.model in (None, "all") else (MODELS.load(options.model),),
         CHAINS.load(options.chain),
         options.estimator,

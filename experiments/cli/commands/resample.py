@@ -9,7 +9,7 @@ from experiments.cli.options.log import Export, Resample
 from experiments.cli.page import new_page, shown
 from experiments.errors import ExperimentError
 from experiments.identification.reading import channel_of, columns_of, stated_by
-from experiments.identification.subject import SCARA
+from experiments.identification.robot_model import SCARA
 from experiments.results.writing import folder_for, new_file, require_free
 from identify import MotionLog
 from identify.data.resample import Repaired

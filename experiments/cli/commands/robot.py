@@ -11,7 +11,7 @@ from rich.text import Text
 from experiments.cli.options.robot import DescribeRobot
 from experiments.cli.page import new_page
 from experiments.identification.budget import Budget
-from experiments.identification.subject import Subject, absolute
+from experiments.identification.robot_model import RobotModel, absolute
 from experiments.identification.warnings import FILE, warnings_of_robot
 from experiments.text import new_table, print_titled
 from sim.errors import BenchError
@@ -23,45 +23,45 @@ MANY = 30
 
 def describe(options: DescribeRobot) -> None:
     """Show what can be identified of a robot."""
-    subject, page = (
-        Subject(absolute(options.name), options.parameters, options.mounting.mounting),
+    robot_model, page = (
+        RobotModel(absolute(options.name), options.parameters, options.mounting.mounting),
         new_page(machine=options.json),
     )
-    subject.require_laws()
-    if subject.robot.n > MANY:
-        sys.stderr.write(f"idbench: grouping the parameters of {subject.robot.n} joints takes a while\n")
-    truth = subject.truth(subject.robot)
-    _print_joints(page, subject)
-    _print_parameters(page, subject, truth)
+    robot_model.require_laws()
+    if robot_model.robot.n > MANY:
+        sys.stderr.write(f"idbench: grouping the parameters of {robot_model.robot.n} joints takes a while\n")
+    truth = robot_model.truth(robot_model.robot)
+    _print_joints(page, robot_model)
+    _print_parameters(page, robot_model, truth)
     try:
-        moves = RandomMoves(moves=20, durations=(0.8, 1.6), velocity=(2.0,)).sample(subject.robot, 100.0)
-        _print_budget(page, Budget(subject.robot, moves))
+        moves = RandomMoves(moves=20, durations=(0.8, 1.6), velocity=(2.0,)).sample(robot_model.robot, 100.0)
+        _print_budget(page, Budget(robot_model.robot, moves))
     except BenchError as error:  # the parameters are worth knowing all the same
         page.print(Text(f"no torque budget: {error}"), soft_wrap=True)
-    page.warn({FILE: warnings_of_robot(subject.robot)})
-    page.found |= _summary(subject, truth)
+    page.warn({FILE: warnings_of_robot(robot_model.robot)})
+    page.found |= _summary(robot_model, truth)
     page.close()
 
 
-def _summary(subject: Subject, truth: dict[str, float]) -> dict[str, Any]:
+def _summary(robot_model: RobotModel, truth: dict[str, float]) -> dict[str, Any]:
     """Return what --json says of a robot."""
-    tree = subject.tree
+    tree = robot_model.tree
     return {
-        "robot": subject.name,
+        "robot": robot_model.name,
         "joints": [
             {"name": joint.name, "kind": joint.kind, "range": [x if isfinite(x) else None for x in joint.range]}
             for joint in tree.joints
         ],
         "parameters": [
             {"name": p.name, "unit": p.unit, "kind": p.kind, "joint": p.joint, "value": truth[p.name]}
-            for p in subject.basis.parameters
+            for p in robot_model.basis.parameters
         ],
-        "made_of": subject.grouping.groupings,
+        "made_of": robot_model.grouping.groupings,
     }
 
 
-def _print_joints(page: Console, subject: Subject) -> None:
-    tree, found = subject.tree, subject.robot
+def _print_joints(page: Console, robot_model: RobotModel) -> None:
+    tree, found = robot_model.tree, robot_model.robot
     grid = new_table("", ["kind", "on", "from [rad, m]", "to", "armature", "Fv", "Fs"])
     model = found.model
     for j, joint in enumerate(tree.joints):
@@ -74,8 +74,8 @@ def _print_joints(page: Console, subject: Subject) -> None:
         page.print(Text("the file gives no joint an armature; behind gears rotors weigh more than links: --armature all"))
 
 
-def _print_parameters(page: Console, subject: Subject, truth: dict[str, float]) -> None:
-    basis, base = subject.basis, subject.grouping
+def _print_parameters(page: Console, robot_model: RobotModel, truth: dict[str, float]) -> None:
+    basis, base = robot_model.basis, robot_model.grouping
     grid = new_table("", ["of the file", "unit"])
     grid.add_column("made of")
     for parameter, unit in zip(basis.names, basis.units, strict=True):

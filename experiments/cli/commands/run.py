@@ -16,8 +16,8 @@ from experiments.errors import ExperimentError
 from experiments.identification.log_warnings import warnings_of_log
 from experiments.identification.parameters import Parameters
 from experiments.identification.request import Request
+from experiments.identification.robot_model import RobotModel, absolute
 from experiments.identification.scenario_run import ScenarioRun
-from experiments.identification.subject import Subject, absolute
 from experiments.identification.warnings import FILE, LOG, warnings_of_robot
 from experiments.plugin_tables import plugin_conflicts
 from experiments.reports.leading import shown_whole
@@ -49,8 +49,8 @@ def run(options: Run) -> None:
     folder.check()
     made.require_bearable(options.yes)
     with watching.audience() as audience, shown(page), folder.held():
-        subject = made.request.subject
-        recording = recording_of(made.scenario, audience, options.inner, subject) if watching.rerun else None
+        robot_model = made.request.robot_model
+        recording = recording_of(made.scenario, audience, options.inner, robot_model) if watching.rerun else None
         with stages_of(name) as told:
             watch = recording.watch if recording else None
             ran = replace(made, progress=lambda share: told(f"simulating, {share:.0%}", share), watch=watch)
@@ -85,9 +85,9 @@ def _described(page: Page, options: Run) -> ScenarioRun:
         scenario = _with_robot(page, load(_alone(options.scenario, options.study, options.index)), options.robot)
         names, name, chosen = (CHAINS.load(options.chain), options.estimator), "", None
         parameters = options.parameters
-    subject = Subject(scenario.robot, parameters)
+    robot_model = RobotModel(scenario.robot, parameters)
     request = Request(
-        subject,
+        robot_model,
         chain=names[0],
         estimator=names[1],
         method=chosen,
@@ -101,7 +101,7 @@ def _described(page: Page, options: Run) -> ScenarioRun:
 def _print_run(page: Page, ran: ScenarioRun) -> None:
     """Print the estimates, and what to check."""
     print_fit(page, ran.fit, f"Scenario {ran.scenario.name}", shown_whole(ran.fit, asked=False))
-    of_log = warnings_of_log(ran.run.alone(), ran.fit.subject.tree)
+    of_log = warnings_of_log(ran.run.alone(), ran.fit.robot_model.tree)
     page.warn({LOG: of_log, FILE: [*warnings_of_robot(ran.run.robots[0]), *plugin_conflicts()]})
 
 

@@ -48,7 +48,7 @@ class LoadFriction(AbstractJointLaw):
         return combined(self.bodies.explicit(state), self.X, np.zeros(state.q.shape))
 
     @property
-    def adaptive(self) -> bool:
+    def is_nonlinear(self) -> bool:
         """True."""
         return True
 

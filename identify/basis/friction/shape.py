@@ -33,7 +33,7 @@ class Shape(NamedTuple):
     """Its unit."""
 
     start: float
-    """Where it is believed to be while nothing is known."""
+    """Its operating point while nothing is known."""
 
     range: tuple[float, float]
     """Within which it is looked for."""
@@ -46,7 +46,7 @@ class Shape(NamedTuple):
 @final
 @dataclass(frozen=True)
 class ShapedFriction(AbstractJointLaw):
-    """A friction law F g(qd; b) with unknown shapes b, linear about where they are believed to be.
+    """A friction law F g(qd; b) with unknown shapes b, linearized at their operating point.
 
     With the size F0 and the shapes b0 of an estimate, the columns are g(qd; b0) of F and F0 dg/db of b: at the optimum, where
     F0 and b0 are the estimate itself, these are the slopes of the residual, and sigma is that of nonlinear least squares.
@@ -84,13 +84,13 @@ class ShapedFriction(AbstractJointLaw):
             found[shape.letters] = size * slope
         return found
 
-    def believed(self, n: int) -> Mapping[Parameter, Array | float]:
+    def operating_point(self, n: int) -> Mapping[Parameter, Array | float]:
         """Return b0."""
         at, found = self.at_joints(n), {s.letters: s.setting for s in self.shapes}
         return {p: at[found[p.symbol]][..., p.joint] for p in self.parameters(n) if p.symbol in found}
 
     @property
-    def adaptive(self) -> bool:
+    def is_nonlinear(self) -> bool:
         """True."""
         return True
 

@@ -106,4 +106,4 @@ def recursive_least_squares(estimate: Estimate, t: Array, halo: float = 0.0) -> 
     X = factor.solution(solvable)
     variance = factor.squares(X) / np.maximum(factor.rows - p, 1)
     sigma = np.sqrt(variance[:, None] * np.diagonal(factor.inverse(solvable), axis1=-2, axis2=-1))
-    return Recursive(t, X[:-1], sigma[:-1] * estimate.best_sigma / sigma[-1])
+    return Recursive(t, X[:-1], sigma[:-1] * estimate.standard_errors / sigma[-1])

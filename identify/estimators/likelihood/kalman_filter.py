@@ -76,7 +76,7 @@ class UnscentedKalmanFilter(AbstractEstimator):
             raise IdentificationError(
                 "UKF has the robot's equation, not rows: it has the explicit model alone (--model explicit)"
             )
-        if problem.basis.adaptive or any(log.conditions for log in problem.logs):
+        if problem.basis.is_nonlinear or any(log.conditions for log in problem.logs):
             raise IdentificationError("UKF knows friction of the velocity alone: take GLS for laws of load or temperature")
         start, h = starting_point(problem), small_steps(problem)
         sigma = np.maximum(self.spread * np.abs(start), UNSURE * h)

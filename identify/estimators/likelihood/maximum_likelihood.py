@@ -107,11 +107,11 @@ class MaximumLikelihood(AbstractEstimator):
         own = NoiseLevels(np.where(np.isfinite(levels.torque), levels.torque, rms), levels.position, levels.repeats)
         begin = JointFit.start(logs, problem.basis, start.X[run], own, find_delay=self.find_delay)
         found = _through_reversals(begin, EXACT * rms) if self.reversals else begin.solved(EXACT * rms)
-        X, sigma = start.X[run], start.sigma[run]
+        X, sigma = start.X[run], start.own_sigma[run]
         if found.delay is not None:
             later = [replace(log, torque=replace(log.torque, delay=log.torque.delay + found.delay)) for log in alone]
             again = GeneralizedLeastSquares().solve(Problem(tuple(later), problem.basis, problem.model, problem.chain))
-            X, sigma = again.X, again.sigma
+            X, sigma = again.X, again.own_sigma
         _require_near(found, X, sigma, problem.names)
         if (found.levels.torque > NOTHING * rms).all():
             raise IdentificationError(f"the motion explains none of the torques, which are all noise to it: {CHECK}")

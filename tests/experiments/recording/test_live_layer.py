@@ -7,7 +7,7 @@ import rerun as rr
 from experiments.identification.fit import fit
 from experiments.identification.logs import Logs
 from experiments.identification.request import Request
-from experiments.identification.subject import Subject
+from experiments.identification.robot_model import RobotModel
 from experiments.recording.live_layer import LiveIdentification
 from experiments.recording.stream import Stream
 from identify import MotionLog
@@ -19,7 +19,7 @@ JOINTS = ("joint1", "joint2")
 def grown(table1):
     """An identification that took in a log second by second, when it was made anew, and its stream."""
     stream, log = Stream("grown"), table1.log
-    live = LiveIdentification(stream, Subject(), "idbench", log.torque, log.fs, JOINTS)
+    live = LiveIdentification(stream, RobotModel(), "idbench", log.torque, log.fs, JOINTS)
     anew = [live.grow(log.q[k : k + 100], log.tau[k : k + 100]) for k in range(0, 2000, 100)]
     return live, anew, stream
 
@@ -57,7 +57,7 @@ def test_a_fault_in_it_is_told_once_and_the_run_goes_on(table1, monkeypatch, cap
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     monkeypatch.setattr("experiments.recording.live_layer.fit", broken)
     log = table1.log
-    live = LiveIdentification(Stream("broken"), Subject(), "idbench", log.torque, log.fs, JOINTS)
+    live = LiveIdentification(Stream("broken"), RobotModel(), "idbench", log.torque, log.fs, JOINTS)
     assert not any(live.grow(log.q[k : k + 500], log.tau[k : k + 500]) for k in range(0, 2000, 500))
     assert len(told := capsys.readouterr().err.splitlines()) == 1
     assert "LinAlgError: on purpose" in told[0]

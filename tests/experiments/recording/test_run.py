@@ -123,7 +123,7 @@ def test_running_estimates_end_at_the_estimate_with_its_sigma(recorded):
             _, variance = layer(recorded, f"{form}/estimate/{name}", "Measurements:variances")
             # The factor takes in rows in another order than the estimate did: rounding, times the condition of W squared.
             np.testing.assert_allclose(X[-1], estimate.X[p], rtol=1e-8)
-            np.testing.assert_allclose(variance[-1] ** 0.5, estimate.corrected_sigma[p], rtol=1e-6)
+            np.testing.assert_allclose(variance[-1] ** 0.5, estimate.calibrated_sigma[p], rtol=1e-6)
 
 
 def test_velocities_are_shown_as_measured_and_as_the_rows_see_them(recorded):
@@ -152,7 +152,7 @@ def test_the_table_and_the_chart_of_parameters_tell_the_errors(recorded):
         assert f"{name} | {true:g} |" in table
     labels = static(recorded, "parameters/00/all/ticks_y", "LineStrips2D:labels")
     assert [label.split()[0] for label in labels] == list(names)
-    unit = found.estimates["explicit"].best_sigma
+    unit = found.estimates["explicit"].standard_errors
     for form, estimate in found.estimates.items():
         strips = static(recorded, f"parameters/00/all/marks/{form}", "LineStrips2D:strips")
         x = np.array([(min(p[0] for p in strip) + max(p[0] for p in strip)) / 2 for strip in strips])

@@ -24,7 +24,7 @@ SCARA = "scara"
 
 @final
 @dataclass(frozen=True, eq=False)
-class Subject:
+class RobotModel:
     """A robot by its name or file, and which of its parameters are asked for.
 
     Parameters
@@ -74,7 +74,7 @@ class Subject:
     def require_linear(self) -> None:
         """Raise ExperimentError if its laws of friction hold about an estimate alone."""
         self.require_laws()
-        if self.basis.adaptive:
+        if self.basis.is_nonlinear:
             raise ExperimentError(
                 "--friction: motions are designed for laws that are linear; give their shapes, as in stribeck:0.1, and leave "
                 "load out"
