@@ -98,7 +98,7 @@ class Inspector:
         shares |= {name: np.abs(x) / getattr(self.limits, name) for name, x in rates.items()}
         tau = inverse_dynamics(self.robot, motion.q, motion.qd, motion.qdd) + coulomb_torque(self.robot, motion.qd)
         shares["torque"] = np.abs(tau) / (self.asked.torque_share * self.limits.torque)
-        shares["torque if off"] = (np.abs(tau) + self.asked.prior_error * self._spread(motion)) / self.limits.torque
+        shares["worst-case torque"] = (np.abs(tau) + self.asked.prior_error * self._spread(motion)) / self.limits.torque
         moves = motion.qd.any(axis=1)  # of a motion that is repeated, rest is at the ends alone
         squares = np.mean(tau[moves] ** 2, axis=0, keepdims=True) if moves.any() else 0 * tau[:1]
         shares["rms torque"] = np.sqrt(squares) / self.limits.rms_torque

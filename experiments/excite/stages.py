@@ -68,7 +68,7 @@ def searched(design: Design, random: Sequence[Array], progress: Callable[[float]
 def _closer(limits: Limits, use: LimitUse) -> Limits:
     """Return limits that are narrower by as much as a motion exceeds them."""
     over = {name: min(FARTHEST, CLOSER * float(share.max())) for name, share in use.largest.items() if share.max() > 1}
-    torque = max(over.get("torque", 1.0), over.get("torque if off", 1.0))
+    torque = max(over.get("torque", 1.0), over.get("worst-case torque", 1.0))
     rates = {name: getattr(limits, name) / over.get(name, 1.0) for name in ("velocity", "acceleration", "jerk")}
     return replace(limits, **rates, torque=limits.torque / torque, rms_torque=limits.rms_torque / over.get("rms torque", 1.0))
 

@@ -35,15 +35,15 @@ def chosen_friction(request: Request, logs: tuple[MotionLog, ...], most: int | N
 
 
 def words(choice: FrictionChoice, laws: Sequence[Sequence[str]], joints: Sequence[str]) -> list[str]:
-    """Return which laws each joint has, and what they take of its squared error on motion that was not fitted."""
+    """Return which laws each joint has, and the share of its squared error on held-out stretches that they explain."""
     said = []
     for j, joint in enumerate(joints):
         taken = {score.law: score for score in choice.scores if score.joint == j and score.taken}
-        instead = ", in the place of coulomb" if choice.idle[j] else ""
-        why = ", ".join(f"{law} takes {100 * score.share:.0f} %" for law, score in taken.items())
+        instead = ", instead of coulomb" if choice.idle[j] else ""
+        why = ", ".join(f"{law} explains {100 * score.share:.0f} %" for law, score in taken.items())
         said.append(
             f"friction of {joint}: {' + '.join(laws[j])}"
-            + (f" ({why} of the squared error of motion not fitted{instead})" if why else "")
+            + (f" ({why} of the squared error on held-out stretches{instead})" if why else "")
         )
     return said
 

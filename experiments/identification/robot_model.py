@@ -6,8 +6,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Self, final
 
-import numpy as np
-
 from experiments.errors import ExperimentError
 from experiments.identification.friction_laws import FrictionLaws, law_of
 from experiments.identification.parameters import Parameters
@@ -106,8 +104,7 @@ class RobotModel:
         What the simulated robot does not have, such as an offset, is zero.
         """
         standard = standard_parameters(robot) | (friction.truth(robot) if friction else {})
-        values = np.array([standard.get(name, 0.0) for name in self.grouping.standard.names])
-        known = dict(zip(self.grouping.names, map(float, self.grouping.base(values)), strict=True))
+        known = self.grouping.values(standard)
         return {name: known.get(name, 0.0) for name in self.basis.names}
 
     def _with_laws(self, basis: Basis) -> Basis:

@@ -26,21 +26,28 @@ def lines(found: Excited) -> list[str]:
     """Return what is to be said of a motion beside its tables."""
     median, best = found.ratios
     count = f"{len(found.random)} random motions of equal length and limits"
-    told = [f"typical sigma: {median:.2f} of the median of {count}, {best:.2f} of the best"] if found.random else []
+    told = []
+    if found.random:
+        told.append(f"standard errors {_below(median)} those of a typical random motion, {_below(best)} the best of {count}")
     if len(found.random) < found.drawn:
-        told.append(f"{found.drawn} random motions were drawn, {len(found.random)} keep the limits")
+        told.append(f"random motions: {found.drawn} drawn, {len(found.random)} within the limits")
     told.append(f"Cond(W) = {found.condition:.3g}, not a measure of quality")
     held = "; ".join(found.binding)
     told.append(
-        f"what holds the motion back: {held}" if held else "no limit holds the motion back: a higher --frequency may do"
+        f"active limits: {held}" if held else "no limit is active: a higher --frequency may excite more"
     )
     if found.floor is not None:
-        told.append(f"the floor counts as {found.floor:g} m high")
+        told.append(f"floor assumed at z = {found.floor:g} m")
     if found.unchecked:
         told.append(f"note: {found.unchecked}")
     if found.interrupted:
         told.append("interrupted: this is the best motion so far")
     return told
+
+
+def _below(ratio: float) -> str:
+    """Return a ratio of standard errors in words: 56 % below."""
+    return f"{100 * (1 - ratio):.0f} % below" if ratio <= 1 else f"{100 * (ratio - 1):.0f} % above"
 
 
 def _print_sigmas(console: Console, found: Excited, title: str) -> None:
@@ -68,7 +75,7 @@ def _print_limits(console: Console, found: Excited) -> None:
     for j, joint in enumerate(found.use.joints):
         cells = (f"{100 * share[j]:.0f} %{'!' if share[j] > BINDING else ' '}" for share in largest.values())
         grid.add_row(joint, *cells)
-    print_titled(console, "shares of the limits that it uses, at 1 kHz; ! holds it back", grid)
+    print_titled(console, "shares of the limits in use, checked at 1 kHz; ! marks active limits", grid)
 
 
 def print_sequence(console: Console, sequence: MotionSequence) -> None:

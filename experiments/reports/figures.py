@@ -113,9 +113,9 @@ def _parameters_panel(panel: Axes, fit: Fit, members: npt.NDArray[np.intp]) -> N
 
 
 def friction_figure(fit: Fit) -> str:
-    """Return friction over velocity: what the rigid body leaves of the torque, and the law that was found.
+    """Return friction over velocity: what the rigid body leaves of the torque, and the estimated law.
 
-    Beyond the speeds of the log the law is dotted. One that grows with the load is drawn at the least and most load of the log.
+    Beyond the speeds of the log the law is dotted. One that grows with the load is drawn at the smallest and largest load of the log.
     """
     estimate = fit.estimates[next(iter(fit.estimates))]
     if not any(p.kind in FRICTIONS for p in fit.basis.parameters):
@@ -125,10 +125,10 @@ def friction_figure(fit: Fit) -> str:
     for j, panel in enumerate(panels):
         v, torque, weight = curves.measured(j)
         v, torque = v[weight > WHOLE], torque[weight > WHOLE]
-        panel.plot(v, torque, ".", ms=2, color="0.6", label="torque less the rigid body's")
+        panel.plot(v, torque, ".", ms=2, color="0.6", label="torque minus that of the links")
         for number, line in enumerate(curves.laws(j)):
             inside = np.abs(line.v) <= np.abs(v).max(initial=0.0)
-            label = "law that was found" if number == 0 else None
+            label = "estimated law" if number == 0 else None
             panel.plot(line.v[inside], line.torque[inside], color=_color("explicit"), lw=1.6, label=label)
             beyond = np.where(inside, np.nan, line.torque)
             panel.plot(line.v, beyond, ":", color=_color("power"), lw=1.6, label=label and "beyond the speeds of the log")

@@ -25,6 +25,15 @@ def tree_basis(tree: KinematicTree, laws: tuple[AbstractBlock, ...] = (ViscousFr
 
     Friction laws are added as to any basis, as in ``tree_basis(tree) + Offset()``. Standard parameters cannot all be
     identified: `BaseParameters` groups them.
+
+    Examples
+    --------
+    >>> from identify import BaseParameters, tree_basis
+    >>> from sim import kinematic_tree, load_robot
+    >>> tree = kinematic_tree(load_robot("scara"))
+    >>> basis = tree_basis(tree)
+    >>> len(basis.names), BaseParameters.of(tree, basis).names
+    (25, ('ZZR1', 'Fv1', 'Fs1', 'ZZ2', 'MX2', 'MY2', 'Fv2', 'Fs2'))
     """
     driven = tuple(j for j, joint in enumerate(tree.joints) if joint.armature)
     sprung = {j: joint.spring for j, joint in enumerate(tree.joints) if joint.spring is not None}

@@ -170,6 +170,15 @@ class MotionLog:
         ------
         LogError
             If times are missing, decrease, or are not uniform; the worst step is named.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from identify import MotionLog, TorqueChannel
+        >>> t = np.arange(100) / 250.0
+        >>> log = MotionLog.at_times(t, np.zeros((100, 2)), np.zeros((100, 2)), TorqueChannel("instantaneous"))
+        >>> round(log.fs), log.n, log.samples
+        (250, 2, 100)
         """
         times, positions = _real("t", t), _real("q", q)
         if positions.ndim < 2:

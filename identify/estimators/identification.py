@@ -58,6 +58,15 @@ def identify(
     ------
     IdentificationError
         If the log, a setting, or the motion does not allow an estimate; the message says what to try.
+
+    Examples
+    --------
+    >>> from identify import MODELS, identify, scara
+    >>> from sim import load_scenario, run
+    >>> log = run(load_scenario("ideal")).alone()
+    >>> estimate = identify(log, scara(), MODELS.create("explicit"))
+    >>> estimate.names[0], round(float(estimate.X[0]), 3), bool(estimate.standard_errors[0] < 1e-3)
+    ('ZZR1', 3.5, True)
     """
     _require(model, AbstractModel, 'a model, such as MODELS.create("power")')
     problem = _problem(log, basis, model, chain, simulation)
@@ -74,7 +83,17 @@ def identify_each(
     simulation: Simulation | None = None,
     throw: bool = True,
 ) -> dict[str, Estimate]:
-    """Identify with several models, by name, from the same signals; otherwise as `identify`."""
+    """Identify with several models, by name, from the same signals; otherwise as `identify`.
+
+    Examples
+    --------
+    >>> from identify import MODELS, identify_each, scara
+    >>> from sim import load_scenario, run
+    >>> log = run(load_scenario("ideal")).alone()
+    >>> models = {name: MODELS.create(name) for name in ("explicit", "power")}
+    >>> [round(float(each.X[2]), 2) for each in identify_each(log, scara(), models).values()]
+    [0.5, 0.5]
+    """
     found = attempt_each(_problem(log, basis, ExplicitModel(), chain, simulation), models, estimator, throw=throw)
     for outcome in found.values():
         if isinstance(outcome, IdentificationError):

@@ -73,6 +73,17 @@ def read_log(path: Path | str, torque: TorqueChannel | None = None, joints: Sequ
     LogError
         If the file cannot be read, lacks a column, does not say what its torque means and `torque` does not either, or
         holds values that make no log.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import numpy as np
+    >>> from identify import MotionLog, TorqueChannel, read_log, write_log
+    >>> log = MotionLog(100.0, np.zeros((50, 2)), np.zeros((50, 2)), TorqueChannel("held", delay=0.002))
+    >>> path = tempfile.mkdtemp() + "/log.parquet"
+    >>> write_log(log, path)
+    >>> read_log(path).torque
+    TorqueChannel(meaning='held', delay=0.002, gain=1.0)
     """
     path = Path(path)
     found = read_columns(path)

@@ -70,6 +70,14 @@ class BaseParameters:
         """Return the grouping of a robot's standard parameters; some are `written` with other letters, and to another scale.
 
         What resists motion is never grouped with what has inertia, weight or springs: its torques turn with the velocity.
+
+        Examples
+        --------
+        >>> from identify import BaseParameters, tree_basis
+        >>> from sim import kinematic_tree, load_robot
+        >>> tree = kinematic_tree(load_robot("scara"))
+        >>> BaseParameters.of(tree, tree_basis(tree)).groupings["ZZR1"]
+        'ZZ1 + Ia1 + 0.25 M2'
         """
         W = _explicit_columns(tree, standard)
         large, count = _large(tree, standard, np.linalg.norm(W, axis=0)), len(standard.names)
@@ -125,6 +133,11 @@ class BaseParameters:
         values = np.asarray(standard, dtype=np.float64)
         total, size = values @ self.K.T, np.abs(values) @ np.abs(self.K.T)
         return np.where(np.abs(total) > ROUNDING * size, total, 0.0)
+
+    def values(self, standard: Mapping[str, float]) -> dict[str, float]:
+        """Return the values of the base parameters by name, from those of standard parameters; one that is missing is zero."""
+        known = np.array([standard.get(name, 0.0) for name in self.standard.names])
+        return dict(zip(self.names, map(float, self.base(known)), strict=True))
 
 
 def _explicit_columns(tree: KinematicTree, basis: Basis) -> Array:

@@ -21,6 +21,12 @@ def scara() -> Basis:
     ZZR1 = ZZ1 + Ia1 + L^2 M2 (both about joint 1), ZZ2 about joint 2, LMX2 = L MX2 and LMY2 = L MY2. The axes are parallel to
     gravity, so no parameter of it appears. The energy of ZZ2 is 1/2 (qd1 + qd2)^2; the paper prints 1/2 (qd1^2 + qd2^2), which
     neither Eq. 10 nor its own explicit columns agree with.
+
+    Examples
+    --------
+    >>> from identify import Offset, scara
+    >>> (scara() + Offset()).names[-2:]
+    ('off1', 'off2')
     """
     x, _, z = np.eye(3)
     joints = [Joint(f"joint{j + 1}", "hinge", j + GROUND, j * x, np.eye(3), z, 0 * x, armature=False) for j in range(JOINTS)]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from identify.data.motion_log import MotionLog
 from sim.robot.motors import Array
 from sim.robot.robot import Robot
+from sim.robot.tree import standard_parameters
 from sim.scenario.scenario import Scenario
 from sim.trajectories import Reference
 
@@ -46,6 +47,21 @@ class Run:
     tau: Array
     command: Array
     failures: dict[int, str]
+
+    @property
+    def truth(self) -> dict[str, float]:
+        """The true standard parameters of the first robot, with the friction of the scenario, by name.
+
+        `BaseParameters.values` groups them.
+
+        Examples
+        --------
+        >>> from sim import load_scenario, run
+        >>> run(load_scenario("ideal")).truth["Fs1"]
+        0.5
+        """
+        robot, friction = self.robots[0], self.scenario.friction
+        return standard_parameters(robot) | (friction.truth(robot) if friction else {})
 
     def alone(self, i: int = 0) -> MotionLog:
         """Return the log of simulation `i` by itself."""

@@ -61,6 +61,13 @@ def simulate(  # noqa: PLR0913  # all but two by their names
         If settings do not fit each other or the robot, a joint leaves its range, or the loop is unstable.
     RobotError
         If the robot does not have what the scenario asks of it.
+
+    Examples
+    --------
+    >>> from sim import load_scenario, run
+    >>> simulated = run(load_scenario("ideal"), seeds=range(2))
+    >>> simulated.log.q.shape, simulated.alone(1).q.shape
+    ((2, 4600, 2), (4600, 2))
     """
     seeds = tuple(seeds) or (scenario.seed,)
     robot = scenario.real_robot

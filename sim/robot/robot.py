@@ -71,6 +71,12 @@ class Robot:
         ------
         RobotError
             If there is no such robot or file, or MuJoCo cannot compile it.
+
+        Examples
+        --------
+        >>> from sim import load_robot
+        >>> load_robot("scara").joints
+        ('joint1', 'joint2')
         """
         spec, notes = cls.described(name)
         try:

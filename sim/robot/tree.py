@@ -21,6 +21,12 @@ def kinematic_tree(robot: Robot, couplings: Sequence[str] = ()) -> KinematicTree
     ------
     RobotError
         If equality constraints or spatial tendons close chains or couple joints; they are named.
+
+    Examples
+    --------
+    >>> from sim import kinematic_tree, load_robot
+    >>> [joint.kind for joint in kinematic_tree(load_robot("scara")).joints]
+    ['hinge', 'hinge']
     """
     model = robot.model
     _require_open(robot)

@@ -54,6 +54,12 @@ def load(name: str) -> Scenario:
     ------
     ScenarioError
         If there is none, it is not TOML, or a key is unknown, missing, of the wrong type or out of its range.
+
+    Examples
+    --------
+    >>> from sim import load_scenario
+    >>> load_scenario("quantization").encoder.lines
+    (4096,)
     """
     content = _content(name)
     try:

@@ -52,7 +52,7 @@ def test_it_writes_all_that_a_lab_needs(written):
     assert summary["over_random_median"] < 0.62
     assert summary["over_random_best"] < 0.75
     page = (written / "report.html").read_text()
-    assert "typical sigma" in page
+    assert "standard errors" in page
     assert "src=" not in page
 
 
@@ -94,7 +94,7 @@ def test_limits_hold_at_a_thousand_hertz_by_mujocos_own_torques(kind):
     tau = inverse_dynamics(robot, motion.q, motion.qd, motion.qdd) + coulomb_torque(robot, motion.qd)
     limit = np.array(TORQUES)
     assert (np.abs(tau) <= 0.8 * limit * (1 + 1e-6)).all()
-    assert found.use.largest["torque if off"].max() > 0.95
+    assert found.use.largest["worst-case torque"].max() > 0.95
     rng, model = np.random.default_rng(0), robot.model
     for k in range(20):
         for field in ("body_mass", "body_inertia", "dof_armature", "dof_damping", "dof_frictionloss"):

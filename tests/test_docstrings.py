@@ -1,0 +1,32 @@
+"""Examples in docstrings run, and print what they say."""
+
+import doctest
+from importlib import import_module
+
+import pytest
+
+EXAMPLES = {
+    "identify.data.motion_log": "MotionLog.at_times",
+    "identify.files.log_file": "read_log",
+    "identify.basis.tree_basis": "tree_basis",
+    "identify.parameters.base_parameters": "BaseParameters.of",
+    "identify.parameters.scara": "scara",
+    "identify.estimators.identification": "identify",
+    "sim.robot.robot": "Robot.load",
+    "sim.robot.tree": "kinematic_tree",
+    "sim.scenario.scenario_file": "load",
+    "sim.engine.run": "Run.truth",
+    "sim.engine.simulation": "simulate",
+}
+"""What people call from Python, by its module."""
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_examples_run(name):
+    module = import_module(name)
+    finder, runner = doctest.DocTestFinder(exclude_empty=True), doctest.DocTestRunner()
+    tests = [test for test in finder.find(module) if test.examples]
+    assert any(test.name.endswith(EXAMPLES[name]) for test in tests)
+    for test in tests:
+        runner.run(test)
+    assert runner.summarize(verbose=False).failed == 0
