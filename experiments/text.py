@@ -19,6 +19,14 @@ WORTHLESS = 999.0
 """Percentages from here on all say the same."""
 
 
+def of_each(said: Iterable[tuple[str, str]]) -> list[str]:
+    """Return what is said of logs, by their names, a line for what is said of several."""
+    names: dict[str, list[str]] = {}
+    for name, words in said:
+        names.setdefault(words, []).append(name)
+    return [f"{', '.join(of)}: {words}" for words, of in names.items()]
+
+
 def new_table(title: str, columns: Iterable[str]) -> Table:
     """Return an empty table, its first column of names, the others of numbers."""
     grid = Table(

@@ -163,7 +163,8 @@ def limits(cls: type, key: str) -> str:
     """Return the range of a setting, or of each of its values, such as `> 0, <= 1`; empty if there is none."""
     field = fields_of(cls)[key]
     found = [*field.metadata, *_metadata(field.annotation)]
-    return ", ".join(f"{sign} {getattr(m, name):g}" for m in found for name, sign in _SIGNS.items() if hasattr(m, name))
+    every = ((sign, getattr(m, name)) for m in found for name, sign in _SIGNS.items() if hasattr(m, name))
+    return ", ".join(f"{sign} {bound:g}" for sign, bound in every if abs(bound) < LARGEST)
 
 
 def _metadata(annotation: Any) -> list[Any]:

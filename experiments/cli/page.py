@@ -63,7 +63,7 @@ class Page(Console):
         for number, (about, warnings) in enumerate(there.items(), 1):
             if len(there) > 1:
                 self.print(Text(f"{number}. {about}"))
-            for warning in warnings:
+            for warning in dict.fromkeys(warnings):
                 self.print(Text(f"warning: {warning}"), soft_wrap=True)
         self.found["warnings"] = {**self.found.get("warnings", {}), **there}
 

@@ -12,6 +12,7 @@ from experiments.identification.chain_settings import with_cutoff
 from experiments.identification.logs import Logs
 from experiments.identification.reading import ReadLog, ReadOptions, file_of, read, with_delays
 from experiments.identification.request import Request
+from experiments.text import of_each
 from identify import LogError, MotionLog
 from identify.judge.band import Band
 from identify.telling import stage
@@ -86,9 +87,8 @@ def load(paths: Sequence[Path], options: ReadOptions, request: Request, *, band:
     if options.delay == "estimate":
         with stage("the delay of the torques"):
             read_ = with_delays(read_, request)
-    several = len(read_) > 1
     named = zip(read_, _names(read_), strict=True)
-    said = [(f"{name}: " if several else "") + note for one, name in named for note in one.notes]
+    said = of_each((name, note) for one, name in named for note in one.notes) if len(read_) > 1 else read_[0].notes
     return Loaded(request, tuple(read_), tuple(dict.fromkeys([*said, *of_band])))
 
 
@@ -104,7 +104,7 @@ def with_held_out(loaded: Loaded, paths: Sequence[Path], options: ReadOptions, t
     """
     known = loaded.read[0].channel  # as it was logged; its gain is of its own file
     delay = str(known.delay) if options.delay else None
-    options, held_out, notes = replace(options, delay=delay, fallback=replace(known, gain=1.0)), {}, list(loaded.notes)
+    options, held_out, said = replace(options, delay=delay, fallback=replace(known, gain=1.0)), {}, list[tuple[str, str]]()
     require_different(paths)
     for given in paths:
         path = file_of(given)
@@ -114,11 +114,11 @@ def with_held_out(loaded: Loaded, paths: Sequence[Path], options: ReadOptions, t
             words = f"--validate {error}" if str(path) in str(error) else f"--validate {path}: {error}"
             raise ExperimentError(words) from error
         pieces = [f"of its {len(one.logs)} pieces the longest is judged"] if len(one.logs) > 1 else []
-        notes += [f"{path.name}: {note}" for note in (*one.notes, *pieces)]
+        said += [(path.name, note) for note in (*one.notes, *pieces)]
         if any(_within(one.longest, log) for log in loaded.logs()):
             raise ExperimentError(f"--validate {path} holds the motion that is identified: give another motion, or none")
         held_out[str(given)] = one.longest
-    return Logs(loaded.logs(), loaded.names, held_out, tuple(notes), truth)
+    return Logs(loaded.logs(), loaded.names, held_out, (*loaded.notes, *of_each(said)), truth)
 
 
 def require_different(paths: Sequence[Path]) -> None:

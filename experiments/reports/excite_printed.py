@@ -33,9 +33,7 @@ def lines(found: Excited) -> list[str]:
         told.append(f"random motions: {found.drawn} drawn, {len(found.random)} within the limits")
     told.append(f"Cond(W) = {found.condition:.3g}, not a measure of quality")
     held = "; ".join(found.binding)
-    told.append(
-        f"active limits: {held}" if held else "no limit is active: a higher --frequency may excite more"
-    )
+    told.append(f"active limits: {held}" if held else "no limit is active: a higher --frequency may excite more")
     if found.floor is not None:
         told.append(f"floor assumed at z = {found.floor:g} m")
     if found.unchecked:

@@ -115,7 +115,7 @@ def _parameters_panel(panel: Axes, fit: Fit, members: npt.NDArray[np.intp]) -> N
 def friction_figure(fit: Fit) -> str:
     """Return friction over velocity: what the rigid body leaves of the torque, and the estimated law.
 
-    Beyond the speeds of the log the law is dotted. One that grows with the load is drawn at the smallest and largest load of the log.
+    Beyond the speeds of the log the law is dotted. One that grows with the load is drawn at the smallest and the largest load.
     """
     estimate = fit.estimates[next(iter(fit.estimates))]
     if not any(p.kind in FRICTIONS for p in fit.basis.parameters):

@@ -18,6 +18,9 @@ from sim.scenario.scenario import Scenario
 from sim.settings import description, for_all_joints, limits, make
 from sim.trajectories import TRAJECTORIES
 
+LONGEST = 1500
+"""Letters from which on a table comes after the others."""
+
 LONG = 60
 """Characters beyond which a value stands on lines of its own."""
 
@@ -172,6 +175,7 @@ def to_toml(scenario: Scenario) -> str:
             tables.append("\n".join(_table(key, value)))
         elif value not in ("", (), None):
             simple.append(_explained(type(scenario), key, value))
+    tables.sort(key=lambda table: len(table) > LONGEST)  # waypoints come last: the rest is what one changes
     return "\n\n".join(["\n".join(simple), *tables]) + "\n"
 
 

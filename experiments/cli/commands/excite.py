@@ -49,7 +49,7 @@ LEFT_OUT = ("out", "force", "json", "watching")
 def excite(options: Excite) -> None:
     """Design a motion, or a sequence of them, save and show it."""
     design, stem, share = _designed(options), Path(options.robot).stem, _percent(options.until)
-    command = command_of("excite", options, "robot", LEFT_OUT)
+    command = command_of("excite", options, "robot", ("force", "json", "watching"))
     whole = command_of("excite", options, "robot", LEFT_OUT, absolute=True)
     read = (Robot.path(options.robot), *options.log, *([options.limits] if options.limits else []))
     folder = ResultsFolder(options.out or Path("runs") / f"excited-{stem}", "excite", whole, options.force, read)

@@ -40,6 +40,9 @@ from sim.robot.robot import Robot
 LEFT_OUT = ("out", "force", "json", "watching", "write", "write_mjcf", "follow")
 """Options that make no difference to an identification."""
 
+NOT_MADE_AGAIN = tuple(name for name in LEFT_OUT if name != "out")
+"""Options that a report does not name where it says how to make it again."""
+
 
 def identify(options: Identify) -> None:
     """Identify logs, judge the result, save and show it."""
@@ -49,7 +52,7 @@ def identify(options: Identify) -> None:
         file_of(path)
     page, stated = new_page(machine=options.json), stated_by(options.log[0])
     request = request_of(options, stated)
-    command, read = command_of("identify", options, "log", LEFT_OUT), _read(options, request)
+    command, read = command_of("identify", options, "log", NOT_MADE_AGAIN), _read(options, request)
     whole = command_of("identify", options, "log", LEFT_OUT, absolute=True)
     folder = ResultsFolder(options.out, "identify", whole, options.force, read) if options.out else None
     require_targets(options, request.robot_model, folder, read)

@@ -10,9 +10,10 @@ def write(options: WriteScenario) -> None:
     """Write a scenario out, or list those that ship."""
     page = new_page()
     if options.name is None:
+        width = max(map(len, names()))
         for known in names():
-            page.out(f"{known:16} {load(known).origin}")
-        page.out(f"{len(designed())} more with motions of idbench excite, for its studies: {', '.join(designed())}")
+            page.out(f"{known:{width}}  {load(known).origin}")
+        page.out(f"{len(designed())} more for the studies of excitation, such as {designed()[0]}: excited/ROBOT-MOTION")
     elif options.out is None:
         page.out(to_toml(load(options.name)).rstrip("\n"))
     else:

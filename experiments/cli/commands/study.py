@@ -39,8 +39,9 @@ def study(options: Study) -> None:
         raise StudyError(f"--pace {watching.pace:g}: a study has no one time that could pass; leave it out")
     page = new_page(machine=options.json)
     if options.study is None and resume is None:
+        width = max(map(len, names()))
         for name in names():
-            page.out(f"{name:16} {load_study(name).question}")
+            page.out(f"{name:{width}}  {load_study(name).question}")
             page.found[name] = load_study(name).question
         page.close()
         return
