@@ -111,7 +111,7 @@ class PluginTable(Table[T]):
 
     @cached_property
     def _found(self) -> dict[str, list[EntryPoint]]:
-        """Entry points by their names; one that stands twice, word for word, counts once: the search path may repeat."""
+        """Entry points by their names; one that is given twice, word for word, counts once: the search path may repeat."""
         found: dict[str, dict[str, EntryPoint]] = {}
         for entry in entry_points(group=f"idbench.{self.point}"):
             found.setdefault(entry.name, {})[entry.value] = entry

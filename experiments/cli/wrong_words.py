@@ -43,7 +43,7 @@ def require_command(words: Sequence[str], commands: Mapping[str, type]) -> None:
 
 
 def require_once(words: Sequence[str]) -> None:
-    """Raise ExperimentError if an option stands twice: the parser would take the last, and drop the others."""
+    """Raise ExperimentError if an option is given twice: the parser would take the last, and drop the others."""
     places = [k for k, word in enumerate(words) if word.startswith("--") and word != "--"]
     options = [words[k].partition("=")[0].replace("_", "-") for k in places]
     if twice := next((option for k, option in enumerate(options) if option in options[:k]), None):

@@ -69,7 +69,7 @@ def block_names_its_parameters(block: Any, _: Example) -> None:
     """Its parameters have names, units and joints of their own."""
     parameters = block.parameters(2)
     names = [parameter.name for parameter in parameters]
-    require(len(set(names)) == len(names), f"a name stands twice in {names}")
+    require(len(set(names)) == len(names), f"a name is given twice in {names}")
     wrong = [p.name for p in parameters if not p.unit or p.joint not in range(2)]
     require(not wrong, f"{', '.join(wrong)}: no unit, or no joint of 0 and 1")
 

@@ -97,7 +97,7 @@ class FrictionLaws:
 def _twice(first: str, second: str, mark: str) -> str:
     """Return how to say that two texts give the laws of the same joints, and what may have been meant."""
     if first == second:
-        return f"--friction {first} {second}: the same stands twice: leave one out"
+        return f"--friction {first} {second}: the same is given twice: leave one out"
     whose = "that joint" if mark else "all joints"
     both = f"{first}+{second.rpartition('=')[2]}"
     return (
@@ -107,7 +107,7 @@ def _twice(first: str, second: str, mark: str) -> str:
 
 
 def _laws(text: str, laws: str) -> tuple[str, ...]:
-    """Return the names of a sum of laws; raise ExperimentError if one contradicts another or stands twice."""
+    """Return the names of a sum of laws; raise ExperimentError if one contradicts another or is given twice."""
     terms = laws.split("+")
     if AUTO in terms:
         raise ExperimentError(
@@ -117,7 +117,7 @@ def _laws(text: str, laws: str) -> tuple[str, ...]:
         raise ExperimentError(f"--friction {text}: none is no friction at all: leave out none, or the others")
     kinds = [term.partition(":")[0] for term in terms]
     if again := next((kind for kind in kinds if kind and kinds.count(kind) > 1), ""):
-        raise ExperimentError(f"--friction {text}: {again} stands twice in the sum: leave one out")
+        raise ExperimentError(f"--friction {text}: {again} is given twice in the sum: leave one out")
     found = tuple(dict.fromkeys(chain(*(GROUPS.get(name, (name,)) for name in laws.split("+")))))
     for name in found:
         try:

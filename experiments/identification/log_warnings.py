@@ -63,7 +63,7 @@ def _of_jumps(log: MotionLog, tree: KinematicTree) -> Iterator[str]:
     if len(every) > MOST_JUMPS:
         yield f"and {len(every) - MOST_JUMPS} more such jumps"
     if every:
-        yield "no advice is drawn from a log with jumps: the rest rests on them"
+        yield "a log with jumps gets no further advice: mend them first"
 
 
 def _reason(joint: Joint, ends: Array) -> str:

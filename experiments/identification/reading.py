@@ -248,7 +248,7 @@ def channel_of(stated: TorqueChannel | None, meaning: Meaning, delay: str | None
     seconds = _seconds(delay, stated.delay if stated.meaning == meaning else 0.0)
     if not abs(seconds) < LATEST:
         raise ExperimentError(
-            f"a torque delay of {seconds:g} s is none: it must be below {LATEST:g} s in size; is it in ms or in samples? "
+            f"a torque delay of {seconds:g} s is impossible: it must be below {LATEST:g} s in size; is it in ms or in samples? "
             "Write s, such as --torque-delay 0.002, or let --torque-delay estimate find it"
         )
     return replace(stated, meaning=meaning, delay=seconds)

@@ -74,7 +74,7 @@ class Request:
             raise ExperimentError(f"--mask-speed {given} must be one speed above 0 for all {n} joints, or one for each")
         if self.start != "least-squares" and not self.solver.begins:
             raise ExperimentError(
-                f"--start {self.start}: {self.estimator} needs no start; leave it out, or take --estimator IV or DIDIM"
+                f"--start {self.start}: {self.estimator} needs no start; leave it out, or use --estimator IV or DIDIM"
             )
 
     @property

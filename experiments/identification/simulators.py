@@ -24,7 +24,7 @@ from sim.scenario.ripple import Ripple
 from sim.scenario.scenario import Scenario
 from sim.trajectories import Reference
 
-IMPOSSIBLE = "; if the loop is right, the parameters are none that bodies can have: begin at a robot of --write-mjcf (--robot)"
+IMPOSSIBLE = "; if the loop is right, the parameters are not physically consistent: start from a robot of --write-mjcf (--robot)"
 """What else it may be."""
 
 SAME = 1e-6
@@ -66,7 +66,7 @@ class Fields:
         unknown = [name for name in grouping.standard.names if name not in self._given]
         if unknown and exact:
             raise IdentificationError(
-                f"{', '.join(unknown)} cannot be simulated: robots of MuJoCo have viscous and Coulomb friction alone; take IV, "
+                f"{', '.join(unknown)} cannot be simulated: robots of MuJoCo have viscous and Coulomb friction alone; use IV, "
                 "which does without them, an estimator that does not simulate, or leave these laws out"
             )
         # Robot by robot: a product of all of them at once would have other bits for other numbers of robots.

@@ -82,7 +82,7 @@ class Verdict:
         worst = int(np.nan_to_num(hidden).argmax())
         if self.word == "unsure":
             share_of = error_percentage(hidden[worst])
-            yield f"noise and sigma make {share_of} of the torque of {joints[worst]}: a wrong model could hide"
+            yield f"noise and sigma make {share_of} of the torque of {joints[worst]}: which could hide a wrong model"
 
     def _expected(self, j: int) -> str:
         noise, sigma = (self.validation.percent_of_level(x)[j] for x in (self.validation.noise, self.validation.open))

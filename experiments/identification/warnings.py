@@ -80,7 +80,7 @@ def _link_side(fit: Fit) -> Iterator[str]:
 
 
 FLAGS = {
-    "!": "below zero, which it cannot be",
+    "!": "below zero, but must be positive",
     "*": f"off by more than {FAR:g} sigma",
     "?": f"sigma above {100 * WEAK:g} % of its value",
 }
@@ -162,7 +162,7 @@ def hidden_notes(fit: Fit) -> list[str]:
     if not fit.hidden:
         return []
     moves = helpful_moves(fit.robot_model, fit.logs.fitted[0], fit.hidden)
-    return [f"this log does not show {', '.join(fit.hidden)}: left out, as if zero{f' ({moves})' if moves else ''}"]
+    return [f"this log does not excite {', '.join(fit.hidden)}: left out, as if zero{f' ({moves})' if moves else ''}"]
 
 
 def warnings_of_robot(robot: Robot) -> list[str]:

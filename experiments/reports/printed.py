@@ -81,7 +81,7 @@ def _told(fit: Fit) -> Iterator[str]:
     if fit.raised:
         joints, speeds = fit.robot_model.robot.joints, fit.request.mask_speed
         each = ", ".join(f"{joints[j]} up to {speeds[j]:.2g} {fit.robot_model.units(j)[1]}/s" for j in fit.raised)
-        yield f"slow motion is left out, as its friction is not that of faster motion: {each} (--mask-speed gives other speeds)"
+        yield f"slow motion is masked, because its friction differs from that of faster motion: {each} (--mask-speed gives other speeds)"
     yield _noise(fit)
     yield words_of_lack(fit.lack, fit.robot_model)
     yield from words_of_iterations(fit)
@@ -98,7 +98,7 @@ def _print_logs(console: Console, fit: Fit) -> None:
     grid = new_table("", fit.robot_model.robot.joints)
     for k in range(len(fit.logs.fitted)):
         grid.add_row(fit.logs.name(k), *(f"{x:.2g}" if isfinite(x) else "" for x in errors[k]))
-    print_titled(console, f"what the {model} model leaves of each log while joints move: rms torque error [N m, N]", grid)
+    print_titled(console, f"residual of the {model} model in each log while joints move: rms [N m, N]", grid)
 
 
 def _rotors(fit: Fit) -> Iterator[str]:
@@ -109,7 +109,7 @@ def _rotors(fit: Fit) -> Iterator[str]:
         yield f"{words} (--armature none)" + ("" if filed else "; the robot's file has none either")
     elif asked == "file" and not filed:
         yield (
-            "no armature is identified, as the robot's file has none: behind gears rotors weigh more than links, --armature all"
+            "no armature is identified, because the file has none; behind gears rotors have more inertia than links: --armature all"
         )
 
 

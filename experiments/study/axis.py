@@ -49,7 +49,7 @@ class Axis:
         elif self.spacing == "log" and (self.lowest or 0.0) <= 0:
             raise ValueError(f"axis {self.field}: lowest = {self.lowest:g} must be above 0 for spacing log")
         if len({self.label(value) for value in self.points}) < len(self.points):
-            raise ValueError(f"axis {self.field}: a value stands twice in {list(self.points)!r:.200}")
+            raise ValueError(f"axis {self.field}: a value is given twice in {list(self.points)!r:.200}")
         kinds = {_of_identification(field) for field in self.all_fields}
         if len(kinds) > 1:
             raise ValueError(f"axis {self.field}: also = {list(self.also)} mixes settings of simulation and identification")

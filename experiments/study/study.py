@@ -84,7 +84,7 @@ class Study:
             raise StudyError(f"an axis varies {', '.join(sorted(fixed))}, which a study draws itself: use seeds")
         for group in (self.models, self.chains, self.estimators, self.friction):
             if len(set(group)) < len(group):
-                raise StudyError(f"{', '.join(group)}: a name stands twice")
+                raise StudyError(f"{', '.join(group)}: a name is given twice")
         methods = prod(len(axis.points) for axis in self.every_axis if axis.identification)
         if methods > MOST_METHODS:
             raise StudyError(f"{methods:,} combinations of identification settings are more than {MOST_METHODS:,}")

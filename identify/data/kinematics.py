@@ -83,7 +83,7 @@ class Joint:
         if length == 0:
             raise KinematicsError(f"joint {self.name}: the axis has no length")
         if not np.allclose(self.rotation @ self.rotation.T, np.eye(3), atol=1e-6) or np.linalg.det(self.rotation) < 0:
-            raise KinematicsError(f"joint {self.name}: {self.rotation.tolist()} is no rotation")
+            raise KinematicsError(f"joint {self.name}: {self.rotation.tolist()} is not a rotation")
         object.__setattr__(self, "axis", frozen(_clean(self.axis / length)))
         object.__setattr__(self, "rotation", frozen(_clean(self.rotation)))
 

@@ -109,8 +109,8 @@ class MotionLog:
             _require_finite(name, values)
             if not np.abs(values).max() < largest:
                 raise LogError(
-                    f"{name} is {values.flat[np.abs(values).argmax()]:.3g} at some instant, where nothing beyond {largest:.0e} "
-                    "is believed: are columns exchanged, or is this a mark for missing samples?"
+                    f"{name} is {values.flat[np.abs(values).argmax()]:.3g} at some instant, more than {largest:.0e}, which is "
+                    "impossible: are columns exchanged, or is this a mark for missing samples?"
                 )
         object.__setattr__(self, "conditions", {name: self._condition(name, x) for name, x in self.conditions.items()})
         if np.size(self.torque.gain) not in (1, self.n):
@@ -221,7 +221,7 @@ def _real(name: str, values: npt.ArrayLike) -> Array:
     try:
         given = np.asarray(values)
     except ValueError as error:
-        raise LogError(f"{name} is no array: its rows differ in length") from error
+        raise LogError(f"{name} is not an array: its rows differ in length") from error
     if given.dtype.kind not in "iuf":
         raise LogError(f"{name} must be real numbers in SI units, not {given.dtype}")
     return given.astype(np.float64, copy=False)

@@ -83,9 +83,9 @@ class Velocities:
             each = [
                 f"{joint} (above {f:.2g} Hz)" for joint, f, use in zip(joints, self.crossover, self.used, strict=True) if use
             ]
-            found.append(f"logged velocities know better than differences of the positions, and are used: {', '.join(each)}")
+            found.append(f"logged velocities are less noisy than differences of the positions, and are used: {', '.join(each)}")
         elif self.consistent.all():
-            found.append("logged velocities agree with differences of the positions, which are as good and are used")
+            found.append("logged velocities agree with differences of the positions, which are as accurate and are used")
         known = list(zip(joints, self.scale, self.delay, self.consistent, strict=True))
         scaled = {joint: a for joint, a, _, same in known if not same and abs(a - 1) > ALIKE}
         late = {joint: 1e3 * d for joint, _, d, same in known if not same and joint not in scaled}

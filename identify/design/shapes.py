@@ -47,7 +47,7 @@ class Shapes:
         """
         if harmonics < 2:
             raise SettingError(
-                f"{harmonics} harmonic of {period:g} s does not rest: take a longer period or a higher frequency"
+                f"{harmonics} harmonic of {period:g} s does not rest: use a longer period or a higher frequency"
             )
         w = np.asarray(2 * np.pi * np.arange(1, harmonics + 1) / period)
         phase = w * t[:, None]

@@ -69,7 +69,7 @@ class AbstractEstimator(ABC):
                 )
             raise IdentificationError(
                 f"{self.called} gives NaN or infinity for {names}, where least squares finds all parameters: "
-                "it is the estimator that fails here, not the log; take another, such as WLS"
+                "the estimator fails here, not the log; use another, such as WLS"
             )
         return estimate
 

@@ -83,7 +83,7 @@ class Problem:
         if self.long:
             raise IdentificationError(
                 f"{who}the rows of {sum(log.samples for log in self.logs)} samples of {self.basis.n} joints are too many to be "
-                "kept: take an estimator that needs their triangular factors alone, such as WLS, or a part of the log"
+                "kept: use an estimator that needs their triangular factors alone, such as WLS, or a part of the log"
             )
 
     @cached_property

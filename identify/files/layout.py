@@ -139,7 +139,7 @@ class LogLayout:
         if not isinstance(joints, list) or not all(isinstance(name, str) and name for name in joints):
             raise LogError(f'joints = {joints!r:.60} must be names in quotes, such as joints = ["1", "2"]')
         if twice := sorted({name for name in joints if joints.count(name) > 1}):
-            raise LogError(f"joints = {joints!r:.60}: {', '.join(twice)} stands twice; each joint has a name of its own")
+            raise LogError(f"joints = {joints!r:.60}: {', '.join(twice)} is given twice; each joint has a name of its own")
         return cls(**sources, joints=tuple(joints), torque=channel, gain=gains, rows=rows, motors=_regular(matrix))
 
     def where(self, quantity: str, source: Source) -> Self:

@@ -76,7 +76,7 @@ def estimate_delay(
     SettingError
         If the range is empty, the chain does not read the delay, or the best delay lies at an end of the range.
     ExcitationError
-        If the motion does not show the parameters.
+        If the motion does not excite the parameters.
     """
     logs = manageable([log] if isinstance(log, MotionLog) else list(log))
     if any(one.q.ndim != 2 for one in logs):

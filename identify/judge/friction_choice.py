@@ -71,7 +71,7 @@ def choose_friction(problem: Problem, candidates: Mapping[str, AbstractBlock], *
     Raises
     ------
     IdentificationError
-        If the logs are too long for their rows to be kept, or the motion does not show the parameters.
+        If the logs are too long for their rows to be kept, or the motion does not excite the parameters.
     """
     problem.require_rows("laws of friction are compared by rows, and ")
     problem.factors.together.check()

@@ -70,7 +70,7 @@ def identify_drive_gains(robot: LoadedRobot) -> GainEstimate:
     SettingError
         If nothing is known of the payload, or there is no log without it.
     IdentificationError
-        If the gains do not settle, or the motion does not show the robot.
+        If the gains do not converge, or the motion does not excite the robot.
     """
     if not robot.known:
         raise SettingError("nothing is known of the payload: the gains need its mass at least")
@@ -94,7 +94,7 @@ def identify_drive_gains(robot: LoadedRobot) -> GainEstimate:
         ratio = ratio * np.clip(step, 1 / FACTOR, FACTOR)
     else:
         raise IdentificationError(
-            f"the gains of {', '.join(_names(robot, np.abs(step - 1) > sigma))} do not settle: move them more, with a heavier "
+            f"the gains of {', '.join(_names(robot, np.abs(step - 1) > sigma))} do not converge: move them more, with a heavier "
             "payload"
         )
     final = robot.estimator.fit(with_gains)

@@ -88,7 +88,7 @@ class LoadedRobot:
         basis = self.both.basis
         if missing := [name for name in self.known if name not in basis.names]:
             raise SettingError(
-                f"{', '.join(missing)} of a payload cannot be told from its other parameters on robot {self.tree.name!r}: give "
+                f"{', '.join(missing)} of a payload cannot be distinguished from its other parameters on robot {self.tree.name!r}: give "
                 f"values of {', '.join(self.names)}"
             )
         return basis.holding(**self.known) if self.known else basis

@@ -147,8 +147,8 @@ def difference(robot: LoadedRobot) -> Payload:
     pairs = list(zip(robot.without, robot.loaded, strict=False))
     if not pairs or len(robot.without) != len(robot.loaded) or not all(_repeated(*pair) for pair in pairs):
         raise LogError(
-            "the logs with the payload are no repetitions of those without it, sample by sample, on which the difference of "
-            "torques rests: take another way"
+            "the logs with the payload do not repeat those without it, sample by sample, on which the difference of "
+            "torques rests: use another way"
         )
     first = Problem(marked(robot.without, 0.0), robot.robot.basis, ExplicitModel(), robot.chain).rows
     own = robot.basis.of(robot.basis.named(*robot.names))

@@ -103,7 +103,7 @@ class Cholesky:
                 found[run] = np.nan if failed else root.T
         if refused and np.isnan(found[..., 0, 0]).all():
             raise IdentificationError(
-                "the covariance of the rows is singular: there is too little noise to weigh them by; take WLS, or a log of "
+                "the covariance of the rows is singular: there is too little noise to weigh them by; use WLS, or a log of "
                 "an encoder or torque sensor with noise"
             )
         return cls(found)

@@ -110,7 +110,7 @@ class BaseParameters:
 
     @property
     def without_effect(self) -> tuple[str, ...]:
-        """Standard parameters that no motion shows."""
+        """Standard parameters that no motion excites."""
         return tuple(name for name, used in zip(self.standard.names, np.any(self.K, axis=0), strict=True) if not used)
 
     @property

@@ -162,7 +162,7 @@ def _require_reached(off: Array, root: Array) -> None:
     """Raise IdentificationError if bodies had to be moved far to be ones that can exist: base values `off` by sigma."""
     if (distance := float(np.linalg.norm(np.linalg.solve(root, off)))) > REACHED:
         raise IdentificationError(
-            f"the solver left bodies that cannot exist, {distance:.2g} sigma from those that can: physically consistent "
+            f"the solver left inconsistent bodies, {distance:.2g} sigma from consistent ones: physically consistent "
             "parameters are not known; give a model whose bodies have about the size of the real ones"
         )
 

@@ -1,4 +1,4 @@
-"""What holds parameters that no motion shows near those of a given model: distances between bodies."""
+"""What holds unidentifiable parameters near those of a given model: distances between bodies."""
 
 from dataclasses import dataclass
 from types import ModuleType

@@ -94,7 +94,7 @@ class Factor:
         return np.sum(rest**2, axis=-1)
 
     def not_shown(self, run: tuple[int, ...] = ()) -> tuple[str, ...]:
-        """Return the parameters of `run` that the motion does not show, alone or in some combination."""
+        """Return the parameters of `run` that the motion does not excite, alone or in some combination."""
         _, values, directions = np.linalg.svd(self._scaled[run])
         null = directions[values <= NOT_SHOWN * values.max()]
         share = np.abs(null).max(axis=0, initial=0.0)
@@ -119,7 +119,7 @@ class Factor:
         IdentificationError
             If there are no more rows than parameters.
         ExcitationError
-            If the motion does not show every parameter; the message names those it does not show.
+            If the motion does not excite every parameter; the message names those it does not show.
         """
         failed = np.argwhere(self.status != Status.OK)
         if not len(failed):
@@ -141,8 +141,8 @@ class Factor:
             rows = f"{self.rows[run]} rows for {self.p} parameters identify {self.rank[run]} of them"
             return f"{rows}: use a longer log, in which all joints move"
         return (
-            f"the motion does not show {', '.join(self.not_shown(run))}: W has rank {self.rank[run]} of {self.p}; "
-            "move every joint, with others standing and moving, or leave these parameters out of the basis"
+            f"the motion does not excite {', '.join(self.not_shown(run))}: W has rank {self.rank[run]} of {self.p}; "
+            "move every joint, with the others at rest and moving, or leave these parameters out of the basis"
         )
 
     @cached_property

@@ -125,12 +125,12 @@ def limits_of(robot: Robot, asked: MotionLimits) -> Limits:
     rms = _each(robot, "rms_torque", asked.rms_torque, np.full(robot.n, np.inf))
     if unlimited := _names(robot, ~np.isfinite(velocity)):
         raise ScenarioError(
-            f"nothing says how fast {unlimited} may turn: add --velocity with rad/s of all joints or of each, such as "
+            f"{unlimited} has no velocity limit: add --velocity with rad/s of all joints or of each, such as "
             "--velocity 1.5, or write velocity = ... into a file of --limits"
         )
     if unlimited := _names(robot, ~np.isfinite(acceleration) & ~np.isfinite(torque)):
         raise ScenarioError(
-            f"nothing limits the acceleration or the torque of {unlimited}: add --acceleration with rad/s^2 of all joints "
+            f"{unlimited} has no limit of acceleration or torque: add --acceleration with rad/s^2 of all joints "
             "or of each, such as --acceleration 5, or write torque = ... [N m] into a file of --limits"
         )
     return Limits(position, velocity, acceleration, jerk, torque, rms)

@@ -84,7 +84,7 @@ def _described(path: Path, stated: Mapping[str, Any]) -> tuple[mujoco.MjSpec, li
         bodies[name] = last = _body(parent, name, place, values)
     if not bodies:
         raise RobotError(f"{path} has no [[joints]]")
-    return spec, ["no inertias, as a table has none: 1 g a link is taken, which matters for simulation alone"]
+    return spec, ["no inertias, as a table has none: 1 g per link is assumed, which matters only for simulation"]
 
 
 class _Values:

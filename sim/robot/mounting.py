@@ -86,7 +86,7 @@ def _couple(spec: mujoco.MjSpec, name: str, weights: Sequence[tuple[str, float]]
         )
     named = [joint for joint, _ in weights]
     if twice := sorted({joint for joint in named if named.count(joint) > 1}):
-        raise RobotError(f"--coupling {name}: {', '.join(twice)} stands twice: add its factors up")
+        raise RobotError(f"--coupling {name}: {', '.join(twice)} is given twice: add its factors up")
     if wrong := [f"{weight:g}*{joint}" for joint, weight in weights if not LEAST <= abs(weight) <= MOST]:
         raise RobotError(
             f"--coupling {name}: {', '.join(wrong)}: a factor must be from {LEAST:g} to {MOST:g} in size; leave joints out "

@@ -223,7 +223,7 @@ def _set_link(robot: Robot, bodies: list[ElementTree.Element], joint: int, wante
     about_origin = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     inertia = about_origin - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
     if mass <= 0 or np.linalg.eigvalsh(np.trace(inertia) / 2 * np.eye(3) - inertia)[0] < 0:
-        raise RobotError(f"link {joint + 1} with a mass of {mass:.4g} kg and this inertia cannot exist")
+        raise RobotError(f"link {joint + 1} with a mass of {mass:.4g} kg and this inertia is not physically consistent")
     for body in range(link, model.nbody):
         if model.body_weldid[body] == link:
             _give(bodies[body], mass * (body == link), centre, inertia * (body == link))

@@ -263,7 +263,7 @@ def _way_out(reason: str) -> str:
     if "mass and inertia" in reason:
         return "; give every body that a joint moves a mass and an inertia"
     if "eigenvalues" in reason or "A + B" in reason or "inertia must satisfy" in reason:
-        return "; correct the inertia of that body: it must be that of a body that can exist"
+        return "; correct the inertia of that body: it must be physically consistent"
     if "file" in reason.lower():
         return "; put the file there, or take what needs it out: identification needs the inertials alone"
     return ""

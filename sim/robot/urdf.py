@@ -75,9 +75,9 @@ def _mend(root: ElementTree.Element) -> Iterator[str]:
             _give(link, _mass(inertial), {} if origin is None else origin.attrib, possible)
             impossible.append(name)
     if missing:
-        yield f"no inertia of {', '.join(missing)}: 1 g is taken, which matters for simulation alone"
+        yield f"no inertia of {', '.join(missing)}: 1 g is assumed, which matters only for simulation"
     if impossible:
-        yield f"an inertia of {', '.join(impossible)} that no body has: one that can exist is taken"
+        yield f"an inertia of {', '.join(impossible)} that is impossible: a physically consistent one is assumed"
 
 
 def _carries(name: str, links: dict[str, ElementTree.Element], root: ElementTree.Element) -> bool:

@@ -33,9 +33,9 @@ class Ripple:
 
     def __post_init__(self) -> None:
         if not self.cogging and self.cogging_harmonics != (1.0,):
-            raise ScenarioError("cogging_harmonics say nothing without cogging above 0")
+            raise ScenarioError("cogging_harmonics have no effect without cogging above 0")
         if not any(self.commutation) and self.commutation_harmonics != (1.0,):
-            raise ScenarioError("commutation_harmonics say nothing without commutation above 0")
+            raise ScenarioError("commutation_harmonics have no effect without commutation above 0")
         if max(self.commutation) * sum(abs(a) for a in self.commutation_harmonics) >= 1:
             raise ScenarioError("commutation ripple must stay below the torque constant: lower commutation or its harmonics")
 

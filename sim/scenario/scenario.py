@@ -107,5 +107,5 @@ class Scenario:
     def quintic(self) -> Quintic:
         """Return the trajectory if it is given by waypoints and times; raise ScenarioError if not."""
         if not isinstance(self.trajectory, Quintic):
-            raise ScenarioError(f"scenario {self.name!r}: only a trajectory of kind quintic will do here")
+            raise ScenarioError(f"scenario {self.name!r}: only a trajectory of kind quintic is possible here")
         return self.trajectory

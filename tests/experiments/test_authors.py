@@ -78,7 +78,7 @@ def test_a_broken_contract_is_told(here, monkeypatch, capsys):
     printed, told = capsys.readouterr()
     assert "no   Explicit columns are d/dt momentum + remainder" in printed
     assert "the power of Fh1 is off by up to" in printed
-    assert "does not keep 1 of 3 parts of its contract" in told
+    assert "violates 1 of 3 parts of its contract" in told
 
 
 def test_what_cannot_be_begun_or_checked_is_refused(here, capsys):

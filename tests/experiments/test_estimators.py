@@ -90,7 +90,7 @@ def test_a_log_whose_loop_is_known_only_roughly_is_identified_by_instruments(idb
 def test_a_run_has_no_start_that_nobody_uses(idbench, scenario):
     code, _, err = idbench("run", scenario, "--estimator", "GLS", "--start", "file")
     assert code == 2
-    assert "--start file: GLS needs no start; leave it out, or take --estimator IV or DIDIM" in err
+    assert "--start file: GLS needs no start; leave it out, or use --estimator IV or DIDIM" in err
 
 
 def test_a_loop_that_is_believed_and_wrong_is_told(idbench, ran, scenario, tmp_path):

@@ -64,7 +64,7 @@ def test_the_difference_of_torques_takes_the_same_motion(robot):
     found = WAYS["difference"](robot)
     assert dict(zip(found.names, found.X, strict=True))["ML"] == pytest.approx(2.0, rel=0.02)
     other = replace(robot, loaded=(robot.loaded[0].part(100, robot.loaded[0].samples),))
-    with pytest.raises(LogError, match="are no repetitions"):
+    with pytest.raises(LogError, match="do not repeat those"):
         WAYS["difference"](other)
 
 

@@ -60,7 +60,7 @@ def test_tables_of_joints(gravity, first, message, tmp_path, complaint):
         ("--coupling m=0*joint1+joint2", "a factor must be from 1e-06"),
         ("--coupling m=1e300*joint1+joint2", "a factor must be from 1e-06"),
         ("--coupling joint1=joint1+joint2", "that is the name of a joint"),
-        ("--coupling m=joint1-joint1", "joint1 stands twice"),
+        ("--coupling m=joint1-joint1", "joint1 is given twice"),
         ("--gravity 0 0 1e9", "must be numbers up to 1000 m/s^2"),
     ],
 )
@@ -117,7 +117,7 @@ def test_options(words, message, csv, complaint):
     ("layout", "message"),
     [
         ("joints = [1, 2]", 'joints = [1, 2] must be names in quotes, such as joints = ["1", "2"]'),
-        ('joints = ["a", "a"]', "a stands twice"),
+        ('joints = ["a", "a"]', "a is given twice"),
         ("[t]\nfs = 1e308", "[t]: fs = 1e+308 must be between 0.001 and 1e+07 Hz"),
         ("[t]\nfs = -3", "fs = -3 must be between"),
     ],
@@ -221,7 +221,7 @@ def test_an_estimator_that_fails_is_not_a_short_log(monkeypatch, complaint, logs
     monkeypatch.setitem(ESTIMATORS._builtin, "nanny", Nanny)
     line = complaint("identify", str(logs / "first.parquet"), "--robot", "puma560", "--estimator", "nanny")
     assert "gives NaN or infinity" in line
-    assert "it is the estimator that fails here, not the log" in line
+    assert "the estimator fails here, not the log" in line
 
 
 def test_control_characters_do_not_reach_the_terminal(tmp_path, capfd):

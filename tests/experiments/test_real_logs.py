@@ -60,7 +60,7 @@ def test_several_logs_of_other_rates_meanings_and_kinds_in_one_fit(idbench, logs
     assert [log["name"] for log in summary["logs"]] == ["a.parquet", "b.csv"]
     errors = np.array([log["torque_error_rms"]["explicit"] for log in summary["logs"]])
     assert errors.shape == (2, 6)
-    assert "what the explicit model leaves of each log" in out
+    assert "residual of the explicit model in each log" in out
     words = ("--validate", logs / "second.parquet", "--out", "one", "--no-rerun", "--model", "explicit")
     assert idbench("identify", "a.parquet", *PUMA, *words)[0] == 0
     # Each half shows half of the motion: together they know more.
@@ -129,7 +129,7 @@ def test_a_short_fast_log_gets_the_band_that_it_needs(idbench, first, tmp_path):
     assert "instants for 52 parameters, where 5 Hz leave 70" in out
     assert found(tmp_path / "chosen")["models"]["power"]["rows"] > 150
     _, out, _ = idbench(*words, "power", "--cutoff", "5")
-    assert "this log does not show" in " ".join(out.split())
+    assert "this log does not excite" in " ".join(out.split())
 
 
 @pytest.mark.thorough

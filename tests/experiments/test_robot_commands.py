@@ -17,7 +17,7 @@ def test_robot_tells_what_can_be_identified(idbench):
     code, out, _ = idbench("robot", Robot.path("scara"))
     assert code == 0
     assert "ZZ1 + Ia1 + 0.25 M2" in out
-    assert "no motion shows" in out
+    assert "no motion excites" in out
     code, out, _ = idbench("robot", "puma560", "--armature", "all", "--add", "offset")
     assert "58 parameters that a motion can identify" in out  # 36 + 4 rotors of their own + 18 of friction
     assert "torque budget" in out
@@ -68,7 +68,7 @@ def test_a_fixed_trajectory_of_another_robot_is_replaced(idbench, tmp_path):
     (tmp_path / "two.toml").write_text(to_toml(replace(load("ideal"), name="two", fs=100.0)))
     code, out, err = idbench("run", "two.toml", "--robot", "panda", "--no-rerun", "--estimator", "WLS")
     assert code == 0, err
-    assert "is none for robot panda: it makes the random moves of scenario arm" in out
+    assert "does not fit robot panda: the random moves of scenario arm are used" in out
     assert (tmp_path / "runs" / "two-panda" / "summary.json").exists()
 
 

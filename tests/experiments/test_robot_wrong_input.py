@@ -59,7 +59,7 @@ def test_a_joint_that_stands_is_told_with_the_move_that_helps(idbench, changed):
 
     code, out, err = idbench("identify", changed(q=hold), "--robot", "puma560", "--model", "explicit")
     assert code == 0, err
-    assert "this log does not show" in out
+    assert "this log does not excite" in out
     assert "left out, as if zero (joint6 never moves in this log: move it)" in out
     assert "\n Fv5 " in out
     assert "\n Fv6 " not in out

@@ -28,9 +28,9 @@ SCARA = "--robot", "scara", "--model", "explicit", "--no-rerun"
         (("standard", "load"), r"--friction standard load: both give the laws of all joints.*write standard\+load"),
         (("1=standard", "1=load"), "both give the laws of that joint"),
         (("none+standard",), "none is no friction at all"),
-        (("standard", "standard"), "the same stands twice"),
+        (("standard", "standard"), "the same is given twice"),
         (("standard+auto",), "auto is no term of a sum"),
-        (("viscous+viscous",), "viscous stands twice in the sum"),
+        (("viscous+viscous",), "viscous is given twice in the sum"),
     ],
 )
 def test_laws_of_friction_that_would_get_lost_are_refused(texts, message):
@@ -244,7 +244,7 @@ def test_positions_that_jump_are_named_and_nothing_is_advised(idbench, scara_csv
     _, out, err = idbench("identify", scara_csv(jump), *SCARA, *HELD, "--estimator", "WLS")
     for word in words:
         assert word in out + err
-    assert "no advice is drawn from a log with jumps" in out + err
+    assert "a log with jumps gets no further advice" in out + err
     for advice in ("the worst joint's error falls", "are they in N m", "are units, signs"):
         assert advice not in out
 

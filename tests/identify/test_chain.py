@@ -108,7 +108,7 @@ def test_a_joint_that_never_moves_is_told_with_the_parameters_it_hides(table1):
     waypoints = tuple((q1, 0.3) for q1, _ in table1.scenario.trajectory.waypoints)
     still = replace(table1.scenario.trajectory, waypoints=waypoints)
     log = ideal_log(table1.robot, still.points.sample(100.0))
-    with pytest.raises(ExcitationError, match=r"does not show ZZR1, ZZ2, LMX2, LMY2, Fv2, Fs2: W has rank 3 of 8"):
+    with pytest.raises(ExcitationError, match=r"does not excite ZZR1, ZZ2, LMX2, LMY2, Fv2, Fs2: W has rank 3 of 8"):
         identify(log, scara(), ExplicitModel())
 
 
@@ -116,7 +116,7 @@ def test_a_joint_that_trembles_with_its_encoder_is_told_in_the_power_model(log, 
     """One count of 16 bits up and down: every column of joint 2 is there, and says nothing."""
     q = log.q.copy()
     q[:, 1] = rng.integers(0, 2, log.samples) * 2 * np.pi / 2**16
-    with pytest.raises(ExcitationError, match="does not show ZZR1"):
+    with pytest.raises(ExcitationError, match="does not excite ZZR1"):
         identify(MotionLog(log.fs, q, log.tau, log.torque), scara(), PowerModel(), paper_chain())
 
 

@@ -95,7 +95,7 @@ def test_what_the_solver_leaves_far_outside_is_no_result(monkeypatch, arm):
     grouping, X = arm
     moved = lambda self, standard: 1.1 * standard  # noqa: E731
     monkeypatch.setattr("identify.parameters.bodies.Bodies.projected", moved)
-    with pytest.raises(IdentificationError, match="the solver left bodies that cannot exist"):
+    with pytest.raises(IdentificationError, match="the solver left inconsistent bodies"):
         consistent_parameters(grouping, grouping.base(X), 1e-6 * np.eye(len(grouping.names)), X)
 
 
@@ -125,7 +125,7 @@ def test_what_cannot_be_used_is_refused(arm, monkeypatch):
         consistent_parameters(grouping, base, C - 2 * np.eye(len(C)), X)
     wrong = X.copy()
     wrong[grouping.standard.names.index("XX1")] = -1.0
-    with pytest.raises(IdentificationError, match="link 1 of the given model cannot exist"):
+    with pytest.raises(IdentificationError, match="link 1 of the given model is not physically consistent"):
         consistent_parameters(grouping, base, C, wrong)
     monkeypatch.setitem(sys.modules, "clarabel", None)
     with pytest.raises(IdentificationError, match="pip install clarabel"):

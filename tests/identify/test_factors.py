@@ -76,7 +76,7 @@ def test_a_direction_that_is_not_seen_is_named(rng):
     deficient = factor(W, rng.normal(size=50))
     assert deficient.status == Status.RANK_DEFICIENT
     assert deficient.not_shown() == ("a", "c")
-    with pytest.raises(ExcitationError, match="does not show a, c: W has rank 2 of 3"):
+    with pytest.raises(ExcitationError, match="does not excite a, c: W has rank 2 of 3"):
         deficient.check()
     assert np.isnan(deficient.solution(deficient.status == Status.OK)).all()
 

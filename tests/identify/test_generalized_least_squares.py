@@ -71,7 +71,7 @@ def test_band_algebra_is_that_of_the_whole_matrix(whitened, rng):
 
 
 def test_a_matrix_that_is_not_positive_is_refused():
-    with pytest.raises(IdentificationError, match=r"covariance of the rows is singular.*take WLS"):
+    with pytest.raises(IdentificationError, match=r"covariance of the rows is singular.*use WLS"):
         Cholesky.of(Band(np.array([[1.0, 2.0], [1.0, 0.0]])))
 
 

@@ -165,7 +165,7 @@ def test_other_models_are_refused_and_leave_the_explicit_one(exact):
 
 def test_logs_too_long_for_their_motion_are_refused(exact, monkeypatch):
     monkeypatch.setattr(maximum_likelihood, "MOST", 1e6)
-    with pytest.raises(IdentificationError, match=r"together take .* GB: take GLS, or at most \d+ samples"):
+    with pytest.raises(IdentificationError, match=r"together take .* GB: use GLS, or at most \d+ samples"):
         identify(MotionLog(exact.fs, exact.q[0], exact.tau[0], exact.torque), scara(), EXPLICIT, estimator=ML)
 
 
@@ -196,7 +196,7 @@ def test_torques_that_do_not_belong_to_the_motion_are_refused(exact):
 
 def test_a_motion_that_nothing_moves_is_refused(exact):
     log = noisy(MotionLog(exact.fs, exact.q[0], np.zeros_like(exact.tau[0]), exact.torque), BITS16, 0.0)
-    with pytest.raises(IdentificationError, match=r"the motion is not determined by this log: .*take GLS"):
+    with pytest.raises(IdentificationError, match=r"the motion is not determined by this log: .*use GLS"):
         identify(log, scara(), EXPLICIT, estimator=ML)
 
 

@@ -52,7 +52,7 @@ def test_names_paths_and_classes_in_place_of_objects(arguments, needed):
         (Q + 1j, "not complex128"),
         (Q.astype(bool), "not bool"),
         (Q.astype("datetime64[ns]"), "not datetime64"),
-        ([[0.0, 1.0], [0.0]], "q is no array: its rows differ in length"),
+        ([[0.0, 1.0], [0.0]], "q is not an array: its rows differ in length"),
     ],
 )
 def test_values_that_are_no_real_numbers(q, message):

@@ -29,11 +29,11 @@ def urdf(*links, joints="", head=""):
 @pytest.mark.parametrize(
     ("inertial", "note"),
     [
-        ("", "no inertia of l2: 1 g is taken"),
+        ("", "no inertia of l2: 1 g is assumed"),
         (SOLID.replace('"1"', '"0"'), "no inertia of l2"),
-        (SOLID.replace('ixx="0.1"', 'ixx="0.9"'), "an inertia of l2 that no body has"),
-        (SOLID.replace("0.1", "0"), "an inertia of l2 that no body has"),
-        (SOLID.replace('ixx="0.1"', 'ixx="-0.1"'), "an inertia of l2 that no body has"),
+        (SOLID.replace('ixx="0.1"', 'ixx="0.9"'), "an inertia of l2 that is impossible"),
+        (SOLID.replace("0.1", "0"), "an inertia of l2 that is impossible"),
+        (SOLID.replace('ixx="0.1"', 'ixx="-0.1"'), "an inertia of l2 that is impossible"),
     ],
     ids=["none", "no mass", "too long", "zero", "negative"],
 )

@@ -83,7 +83,7 @@ def test_every_setting_is_described():
         ({"trajectory": "ideal"}, "that scenario has none of its own; name 'brisk'"),
         ({"drive": {"kind": ["a"]}}, r"drive.kind = \['a'\] is unknown"),
         ({"ripple": {"cogging_harmonics": []}}, "ripple.cogging_harmonics"),
-        ({"ripple": {"cogging_harmonics": [1.0, 2.0]}}, "cogging_harmonics say nothing without cogging"),
+        ({"ripple": {"cogging_harmonics": [1.0, 2.0]}}, "cogging_harmonics have no effect without cogging"),
         ({"torque": {"cutoff": 50.0}}, "cutoff = 50 Hz needs source = 'current'"),
         ({"name": 3, "fs": -1.0}, r"name = 3: must be a valid string .*; fs = -1.0: must be greater"),
     ],

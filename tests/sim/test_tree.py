@@ -178,7 +178,7 @@ def test_a_rewritten_file_compiles_to_what_was_written(name, written, rng):
 def test_impossible_links_are_not_written():
     robot = Robot.load("scara")
     truth = standard_parameters(robot)
-    with pytest.raises(RobotError, match="link 2 with a mass of 2 kg and this inertia cannot exist"):
+    with pytest.raises(RobotError, match="link 2 with a mass of 2 kg and this inertia is not physically consistent"):
         rewritten("scara", {**truth, "ZZ2": 0.001})
 
 

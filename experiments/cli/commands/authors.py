@@ -47,4 +47,4 @@ def check(options: Check) -> None:
     page.found |= {"plugin": options.plugin, "point": table.point, "contract": dict(answers)}
     page.close()
     if broken:
-        raise ExperimentError(f"{options.plugin} does not keep {broken} of {len(answers)} parts of its contract")
+        raise ExperimentError(f"{options.plugin} violates {broken} of {len(answers)} parts of its contract")

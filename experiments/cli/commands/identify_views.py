@@ -76,7 +76,7 @@ def recording(shown: Shown, attempts: Attempts) -> None:
     if not rerun or (into is None and shown.audience is None):
         return
     if shown.fit.logs.long:
-        shown.page.print("not recorded: the rows of so long a log are not kept; identify a part of it to look inside")
+        shown.page.print("not recorded: the rows of such a long log are not kept; identify a part of it to look inside")
         return
     from experiments.recording.identification_recording import add_layer, record_log
     from experiments.results.streams import write_streams

@@ -43,7 +43,7 @@ def request_of(options: Identify, stated: Mapping[str, Any]) -> Request:
     )
     if options.loop and "loop" not in request.solver.needs:
         raise ExperimentError(
-            f"--loop: {options.estimator} simulates no loop; leave it out, or take --estimator IV, DIDIM, CLIE or CLOE"
+            f"--loop: {options.estimator} simulates no loop; leave it out, or use --estimator IV, DIDIM, CLIE or CLOE"
         )
     return _with_chain(options, request)
 

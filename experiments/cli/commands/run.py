@@ -62,7 +62,7 @@ def run(options: Run) -> None:
                 attempts.recording(lambda: recording.finish(ran))
                 doubt_window(page, options.inner, recording)
                 if ran.fit.logs.long:
-                    page.print("the identification is not recorded: the rows of so long a log are not kept")
+                    page.print("the identification is not recorded: the rows of such a long log are not kept")
 
 
 def _read(options: Run) -> tuple[Path, ...]:
@@ -111,7 +111,7 @@ def _with_robot(page: Page, scenario: Scenario, robot: str | None) -> Scenario:
         return scenario
     other = replace(scenario, robot=absolute(robot), name=f"{scenario.name}-{Path(robot).stem}")
     if isinstance(scenario.trajectory, Quintic) and Robot.load(robot).n != Robot.load(scenario.robot).n:
-        page.print(f"the trajectory of {scenario.name} is none for robot {robot}: it makes the random moves of scenario arm")
+        page.print(f"the trajectory of {scenario.name} does not fit robot {robot}: the random moves of scenario arm are used")
         other = replace(other, trajectory=load("arm").trajectory, start=())
     if not isinstance(other.drive, IdealDrive) and not _has_motors(robot):
         page.print(f"robot {robot} has no motors (dcmotor elements of MJCF): its drives are ideal, without ripple")
@@ -146,7 +146,7 @@ def _again(page: Page, folder: Path | None, index: int | None, method: int | Non
     chosen = methods[number]
     rows, known = compare_again(store, index)
     page.print(
-        f"run {index} of {folder}: all {len(rows)} rows come out again, bit for bit"
+        f"run {index} of {folder}: all {len(rows)} rows are the same again, bit for bit"
         if known
         else f"run {index} of {folder}, which the study has not finished yet"
     )

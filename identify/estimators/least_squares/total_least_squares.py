@@ -119,7 +119,7 @@ def _solved(R: Array, S: Array) -> tuple[Array, Array]:
     if not (of_W := _least(lower[:, :-1], noise_of[:-1, :-1])) ** 2 > APART * least**2:
         raise IdentificationError(
             "total least squares has no answer: noise makes the columns of W as dependent as those of [W Y] are (their least "
-            f"singular values over their noise are {of_W:.3g} and {least:.3g}): filter more (--cutoff), or take IV or GLS"
+            f"singular values over their noise are {of_W:.3g} and {least:.3g}): filter more (--cutoff), or use IV or GLS"
         )
     inverse = np.linalg.inv(R[:, :p].T @ R[:, :p] - least**2 * S[:p, :p])
     X = inverse @ (R[:, :p].T @ R[:, p] - least**2 * S[:p, p])

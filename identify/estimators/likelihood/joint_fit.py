@@ -38,7 +38,7 @@ are explained by motions that follow the noise, and would fall slowly."""
 PROBES, MOST_PROBES = 16_000, 6
 """Random signs, over all cells, by which the leverage of the torques is estimated, and at most so many for each cell."""
 
-CHECK = "check order and delay of the torques, and whether they were filtered, or take GLS"
+CHECK = "check order and delay of the torques, and whether they were filtered, or use GLS"
 """What helps where torques and motion do not go together."""
 
 UNKNOWN = 5.0
@@ -127,7 +127,7 @@ class JointFit:
                 break
             noises = now._noises()
         if moved > RESTLESS:
-            raise IdentificationError(f"motion and parameters together do not settle, they move by {moved:.2g} sigma: {CHECK}")
+            raise IdentificationError(f"motion and parameters together do not converge, they move by {moved:.2g} sigma: {CHECK}")
         same = np.allclose(now.levels.torque, before.torque, rtol=LIKE)
         return now if same else replace(now, covariance=now._reduced(now._noises())[2])
 

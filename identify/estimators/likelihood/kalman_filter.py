@@ -77,7 +77,7 @@ class UnscentedKalmanFilter(AbstractEstimator):
                 "UKF has the robot's equation, not rows: it has the explicit model alone (--model explicit)"
             )
         if problem.basis.is_nonlinear or any(log.conditions for log in problem.logs):
-            raise IdentificationError("UKF knows friction of the velocity alone: take GLS for laws of load or temperature")
+            raise IdentificationError("UKF knows friction of the velocity alone: use GLS for laws of load or temperature")
         start, h = starting_point(problem), small_steps(problem)
         sigma = np.maximum(self.spread * np.abs(start), UNSURE * h)
         runs, p = start.shape[:-1], start.shape[-1]
@@ -90,7 +90,7 @@ class UnscentedKalmanFilter(AbstractEstimator):
             own = NoiseLevels(np.maximum(np.nan_to_num(levels.torque[run]), LEAST), problem.position_noise[run])
             found = [way for tuning in TUNINGS if (way := _tried(problem, run, (start[run], sigma[run]), own, tuning))]
             if not found:
-                failures[run] = "the filter diverges from this start: begin nearer to the truth, or with less spread"
+                failures[run] = "the filter diverges from this start: start closer to the true parameters, or with less spread"
                 continue
             best = max(found, key=lambda each: each[0])
             _, X[run], covariance[run], torque[run] = best

@@ -74,7 +74,7 @@ class MaximumLikelihood(AbstractEstimator):
             If the model is not the explicit one, the logs are too long, or motion and parameters diverge.
         """
         if not isinstance(problem.model, ExplicitModel):
-            raise IdentificationError("ML has the torque equation of the explicit model: take --model explicit, or GLS")
+            raise IdentificationError("ML has the torque equation of the explicit model: use --model explicit, or GLS")
         _require_short(problem)
         # Rows show little of the positions' noise where torques are noisy; their differences show all of it.
         start, position = GeneralizedLeastSquares().solve(problem), np.maximum(problem.position_noise, SMALLEST)
@@ -114,7 +114,7 @@ class MaximumLikelihood(AbstractEstimator):
             X, sigma = again.X, again.own_sigma
         _require_near(found, X, sigma, problem.names)
         if (found.levels.torque > NOTHING * rms).all():
-            raise IdentificationError(f"the motion explains none of the torques, which are all noise to it: {CHECK}")
+            raise IdentificationError(f"the motion explains none of the torques, which look like noise: {CHECK}")
         return found
 
 
@@ -133,7 +133,7 @@ def _through_reversals(begin: JointFit, floor: Array) -> JointFit:
     if gained > 1 - WORTH:
         return used
     less = f"{100 * gained:.2g} % less" if gained > 0 else "no less"
-    return replace(masked, left_out=f"sigma would be {less}, for which friction near rest would have to be as its law says")
+    return replace(masked, left_out=f"sigma would be {less}, but only if friction near rest followed its law")
 
 
 def with_delay() -> MaximumLikelihood:
@@ -154,7 +154,7 @@ def _require_near(found: JointFit, X: Array, sigma: Array, names: tuple[str, ...
         return
     k = int(np.where(wrong, far, -1.0).argmax())
     raise IdentificationError(
-        f"motion and parameters together do not go with generalized least squares: {names[k]} is {found.X[k]:.4g} instead of "
+        f"motion and parameters together disagree with generalized least squares: {names[k]} is {found.X[k]:.4g} instead of "
         f"{X[k]:.4g}, sigma {np.sqrt(found.covariance[k, k]):.2g} instead of {sigma[k]:.2g}: {CHECK}"
     )
 
@@ -164,6 +164,6 @@ def _require_short(problem: Problem) -> None:
     samples = sum(log.samples for log in problem.logs)
     if (size := samples * 2 * n * (3 * p + 20 * n) * 8) > MOST:
         raise IdentificationError(
-            f"motion and parameters of {samples} samples of {n} joints together take {size / 1e9:.3g} GB: take GLS, or at most "
+            f"motion and parameters of {samples} samples of {n} joints together take {size / 1e9:.3g} GB: use GLS, or at most "
             f"{int(samples * MOST / size)} samples"
         )

@@ -120,7 +120,7 @@ class NormalEquations:
             solve_lower(L, both)
         if singular or not np.isfinite(both).all():
             raise IdentificationError(
-                "the motion is not determined by this log: a joint stands, or its torque is constant or another's: take GLS"
+                "the motion is not determined by this log: a joint is at rest, or its torque is constant or another's: use GLS"
             )
         return both[:, :p], both[:, p:], L
 

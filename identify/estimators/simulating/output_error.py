@@ -61,7 +61,7 @@ class OutputError(AbstractSimulating):
         assert plant is not None
         if len({log.fs for log in problem.logs}) > 1:
             each = ", ".join(f"{log.fs:g}" for log in problem.logs)
-            raise IdentificationError(f"OE takes logs of one frequency, these have {each} Hz: resample them, or take DIDIM")
+            raise IdentificationError(f"OE takes logs of one frequency, these have {each} Hz: resample them, or use DIDIM")
         rounds, h = self.begun(problem), small_steps(problem)
         shots = {run: [_Shots.of(problem, plant, k, run, self.length) for k in range(len(problem.logs))]
                  for run in np.ndindex(rounds.simulations.shape)}  # fmt: skip
@@ -123,7 +123,7 @@ class _Shots:
         first = np.arange(margin, log.samples - margin - count, count)
         if len(first) < 2:
             raise IdentificationError(
-                f"a log of {log.samples / log.fs:.3g} s has no two segments of {length:g} s: take a longer log"
+                f"a log of {log.samples / log.fs:.3g} s has no two segments of {length:g} s: use a longer log"
             )
         qd = np.swapaxes(signals.state.qd[run], -1, -2)[first]
         return cls(plant, log, first, count, np.concatenate([log.q[first], qd], axis=-1))
@@ -142,7 +142,7 @@ class _Shots:
         good = np.asarray(np.isfinite(q).all(axis=(0, 2, 3)))
         if np.mean(good) < LOST:
             raise IdentificationError(
-                f"{np.count_nonzero(~good)} of {segments} segments run away with these parameters: begin nearer to the truth"
+                f"{np.count_nonzero(~good)} of {segments} segments run away with these parameters: start closer to the true parameters"
             )
         e = np.where(good[:, None, None], self._measured - q[0], 0.0)
         slopes = np.where(good[:, None, None, None], np.moveaxis(q[1:] - q[0], 0, -1) / np.concatenate([h, steps]), 0.0)

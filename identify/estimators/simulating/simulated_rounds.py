@@ -123,7 +123,7 @@ class Rounds:
             self.fail(
                 run,
                 f"{self.problem.names[k]} still moves by {move[run][k]:.2g} sigma after {self.most} rounds: does the simulated "
-                "loop have the controller and the motion of the log? If it does, begin nearer to the truth",
+                "loop have the controller and the motion of the log? If it does, start closer to the true parameters",
             )
 
     def simulated(self, X: Array) -> Simulated:
