@@ -101,7 +101,7 @@ def _sum(*parts: Mapping[Any, Array]) -> dict[Any, Any]:
 
 
 def model_says_a_true_sentence(model: Any, example: Example) -> None:
-    """B tau is [c + s e] X at every instant of noise-free data at which no joint turns."""
+    """B tau is [c + s e] X at every instant of noise-free data at which no joint reverses."""
     signals = idbench_chain().signals(example.log)
     equations = model.equations(scara(), signals)
     rest = equations.y - equations.predicted(example.truth)

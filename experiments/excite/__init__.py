@@ -1,1 +1,1 @@
-"""Motions that tell parameters well, for any robot: `idbench excite`."""
+"""Exciting trajectories, for any robot: `idbench excite`."""

@@ -127,7 +127,7 @@ class Design:
 
     @cached_property
     def clearance(self) -> Clearance:
-        """Distances of shapes, from each other and from what stands around."""
+        """Distances of shapes, from each other and from obstacles."""
         found = Clearance(surroundings(self.robot, self.asked), self.limits.position, self.asked.clearance)
         wanted = [BOX.format(box.name) for box in self.asked.keep_out]
         wanted += [FLOOR] if isinstance(self.asked.floor, float) else []

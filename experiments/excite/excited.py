@@ -1,4 +1,4 @@
-"""A motion that was designed: what it tells, beside random motions and earlier logs."""
+"""A designed motion: its predicted standard errors, beside random motions and earlier logs."""
 
 import sys
 from dataclasses import dataclass, replace
@@ -26,7 +26,7 @@ BINDING = 0.9
 """Share of a limit from which on it counts as what holds the motion back."""
 
 STRETCHES = 20
-"""Parts of a motion whose share in each parameter is told."""
+"""Parts of a motion whose share in the information about each parameter is shown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ class Excited:
         if not np.isfinite(found.sigma).all():
             lost = [name for name, s in zip(design.robot_model.basis.names, found.sigma, strict=True) if not np.isfinite(s)]
             raise ExperimentError(
-                f"the motion tells nothing of {', '.join(lost)}: give a longer --duration, wider limits, or leave them out: "
+                f"the motion does not excite {', '.join(lost)}: give a longer --duration, wider limits, or leave them out: "
                 f"--without {' '.join(lost)}"
             )
         return found
@@ -111,7 +111,7 @@ class Excited:
 
     @cached_property
     def earlier(self) -> Array | None:
-        """Standard deviations from the earlier logs, shape (p,), infinite where they tell nothing; None without logs."""
+        """Standard deviations from the earlier logs, shape (p,), infinite where they have no information; None without logs."""
         return sigmas_of(self.design.known) if self.design.logs else None
 
     @property
@@ -150,7 +150,7 @@ class Excited:
 
     @cached_property
     def shares(self) -> Array:
-        """How much of what is told of each parameter each stretch of the motion tells, shape (stretch, p)."""
+        """Share of each stretch of the motion in the information about each parameter, shape (stretch, p)."""
         plan = self.design.plan
         motion = plan.motion(self.c)
         W = plan.information.weighted(motion)

@@ -59,7 +59,7 @@ def plan_for(design: "Design") -> Plan:
 
 
 def _information(design: "Design", rate: float, noise: bool) -> Information:
-    """Return what motions tell, with their noise, or as if all rows were alike."""
+    """Return the information of motions, with their noise, or as if all rows were alike."""
     basis, fs, n = design.robot_model.basis, design.scenario.fs, design.robot_model.robot.n
     levels = design.levels if noise else NoiseLevels(np.ones(n), np.zeros(n))
     return Information(basis, levels, _inertia(design), fs, rate, min(PASS, fs / 2))

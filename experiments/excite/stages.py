@@ -35,7 +35,7 @@ STAGES = Stage(24.0, 0.1, None, 50), Stage(24.0, 0.3, 3, 80), Stage(POWER, 10.0,
 
 HARDER = 100.0, 1000.0, 10000.0, 100000.0
 """What exceeding limits costs while some are still broken; they also become narrower, by as much as is exceeded: between the
-states that the search looks at torques may be larger, where a joint turns."""
+states that the search looks at torques may be larger, where a joint reverses."""
 
 FARTHEST = 1.5
 """Most by which limits become narrower at once: a motion that leads far beyond them says little of how near it may go."""

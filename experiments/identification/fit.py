@@ -70,7 +70,7 @@ def fit(request: Request, logs: Logs) -> "Fit":
 
 
 def _with_its_cause(found: "Fit", error: IdentificationError) -> IdentificationError:
-    """Return why nothing was estimated, with what least squares leaves over, if that hangs on the motion."""
+    """Return why nothing was estimated, with the residuals of least squares, if they depend on the motion."""
     if isinstance(error, ExcitationError) or found.solver.filtered:
         return error
     try:
@@ -152,7 +152,7 @@ class Fit:
 
     @cached_property
     def lack(self) -> tuple[Lack, ...]:
-        """What the torques hang on beside the parameters, the surest first; nothing where the rows cannot tell."""
+        """What the residual torques depend on, the most significant first; nothing where the rows do not allow the test."""
         try:
             return lack_of_fit(self.problem, self.estimates[self.leading].X)
         except IdentificationError:  # an estimate is not lost because its test is

@@ -11,7 +11,7 @@ from identify import estimate as identified_by
 from identify.judge.noise_in_rows import LEVEL
 
 FAR = 5.0
-"""Difference from least squares, in its sigma, that is none of chance."""
+"""Difference from least squares, in sigma, that is not chance."""
 
 
 def words_of_iterations(fit: Fit) -> Iterator[str]:

@@ -13,7 +13,7 @@ TRY: Mapping[str, str] = {
     "load": "--friction auto, or {joint}=standard+load",
     "time": "a log of a warm robot, a shorter one, or {joint}=standard+temperature with the temperature in the log",
 }
-"""What to try by what a torque hangs on."""
+"""What to try, by what the residual torque depends on."""
 
 
 def lacking(found: Sequence[Lack]) -> tuple[Lack, ...]:

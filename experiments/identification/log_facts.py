@@ -1,4 +1,4 @@
-"""What a log is like, before a robot comes into it: clock, ranges, noise, steps of encoders, how long joints stand."""
+"""What a log is like, before a robot comes into it: clock, ranges, noise, steps of encoders, how long joints rest."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from identify.data.velocities import white_noise
 from identify.judge.band import content_end
 
 STILL = 1e-3
-"""A joint stands while its velocity is below this share of its largest."""
+"""A joint is at rest while its velocity is below this share of its largest."""
 
 
 @final

@@ -21,7 +21,7 @@ MOST_JUMPS = 3
 """Jumps of a log that are named."""
 
 STILL = 1e-3
-"""A joint that travels less than this share of what the busiest does stands still, and trembles."""
+"""A joint that travels less than this share of what the busiest does is at rest, and trembles."""
 
 
 def warnings_of_log(log: MotionLog, tree: KinematicTree) -> list[str]:
@@ -86,7 +86,7 @@ def _reason(joint: Joint, ends: Array) -> str:
 
 
 def warnings_of_base(tree: KinematicTree) -> list[str]:
-    """Return whether a robot looks like one that does not stand fixed on the ground: legs and rotors start there."""
+    """Return whether a robot looks like one that is not fixed to the ground: legs and rotors start there."""
     first = [joint.name for joint in tree.joints if joint.parent == GROUND]
     if len(first) == 1:
         return []

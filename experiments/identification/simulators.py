@@ -24,7 +24,7 @@ from sim.scenario.ripple import Ripple
 from sim.scenario.scenario import Scenario
 from sim.trajectories import Reference
 
-IMPOSSIBLE = "; if the loop is right, the parameters are not physically consistent: start from a robot of --write-mjcf (--robot)"
+IMPOSSIBLE = "; if the loop is right, the parameters are not physically consistent: start from a file of --write-mjcf"
 """What else it may be."""
 
 SAME = 1e-6

@@ -33,7 +33,7 @@ WEAK = 0.5
 """Share of its value that the sigma of a parameter may have before it is marked as weak."""
 
 LINK_SIDE = 3.0
-"""A rotor's inertia this many sigma below zero is none: torques do not see it."""
+"""A rotor's inertia this many sigma below zero is impossible: the torques do not contain the rotor."""
 
 OPEN = 0.02
 """Share of a joint's torque on a brisk motion that one sigma of a parameter may make before it counts as left open."""

@@ -1,6 +1,6 @@
 """Which errors do the paper's steps make on motions like the paper's?
 
-The paper tells the class of its motion (fifth-order point-to-point moves, 40 s at 100 Hz, Cond(W) of 28 and 93), not the
+The paper specifies the class of its motion (fifth-order point-to-point moves, 40 s at 100 Hz, Cond(W) of 28 and 93), not the
 motion. So random motions of the class are drawn, those with the paper's condition numbers are kept, and the distribution of
 their errors is laid beside the paper's. No error decides which motion is kept.
 """

@@ -1,4 +1,4 @@
-"""The recording of a designed motion: the arm along it, limits in use, and which stretch tells which parameter."""
+"""The recording of a designed motion: the arm along it, limits in use, and which stretch excites which parameter."""
 
 from collections.abc import Iterator, Sequence
 
@@ -82,7 +82,7 @@ def _send_sigmas(stream: Stream, found: Excited) -> None:
 
 
 def _send_told(stream: Stream, found: Excited) -> None:
-    """Send which stretch of the motion tells how much of each parameter."""
+    """Send the share of each stretch of the motion in the information about each parameter."""
     names, shares, duration = found.design.robot_model.basis.names, found.shares, found.design.duration
     begin = len(found.ways[0].q) / FS + REST
     middles = begin + (np.arange(STRETCHES) + 0.5) * duration / STRETCHES

@@ -1,4 +1,4 @@
-"""The layer of an identification: what its models make of a recorded motion, and what they leave over."""
+"""The layer of an identification: what its models make of a recorded motion, and their residuals."""
 
 from collections.abc import Mapping, Sequence
 

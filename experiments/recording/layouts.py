@@ -63,7 +63,7 @@ def compare(shelf: Shelf) -> Part:
 
 
 def excited(shelf: Shelf) -> Part:
-    """Return a designed motion: the arm, limits in use, what is told, and when."""
+    """Return a designed motion: the arm, limits in use, predicted standard errors, and when they come about."""
     sigmas = charts(shelf, "predicted sigma", "excited/sigma/*", SQUARE)
     told = charts(shelf, "which stretch excites which parameter: bright is most", "excited/told/*")
     if not told:

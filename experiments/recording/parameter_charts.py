@@ -1,4 +1,4 @@
-"""Charts of estimates: every parameter with its interval beside the truth, and how well W tells them apart."""
+"""Charts of estimates: every parameter with its interval beside the truth, and how well W distinguishes them."""
 
 from collections.abc import Iterator, Sequence
 
@@ -76,7 +76,7 @@ def _scale(fit: Fit, farthest: Sequence[Array]) -> Signed:
 
 
 def _singular_values(stream: Stream, at: str, fit: Fit, number: int) -> None:
-    """Send the singular values of W, over the largest; beyond the conditions that they allow, parameters are not told apart."""
+    """Send the singular values of W, over the largest; beyond the allowed conditions, parameters cannot be distinguished."""
     values = {
         form: np.linalg.svd(estimate.problem.factors.together.R_W, compute_uv=False) for form, estimate in fit.estimates.items()
     }

@@ -1,4 +1,4 @@
-"""Charts of what an identification leaves over: over velocity and position, with the friction laws, and its spectrum."""
+"""Charts of the residuals of an identification: over velocity and position, with the friction laws, and its spectrum."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass

@@ -81,7 +81,7 @@ def _told(fit: Fit) -> Iterator[str]:
     if fit.raised:
         joints, speeds = fit.robot_model.robot.joints, fit.request.mask_speed
         each = ", ".join(f"{joints[j]} up to {speeds[j]:.2g} {fit.robot_model.units(j)[1]}/s" for j in fit.raised)
-        yield f"slow motion is masked, because its friction differs from that of faster motion: {each} (--mask-speed gives other speeds)"
+        yield f"slow motion is masked, because its friction differs from that of faster motion: {each} (--mask-speed)"
     yield _noise(fit)
     yield words_of_lack(fit.lack, fit.robot_model)
     yield from words_of_iterations(fit)
@@ -108,9 +108,7 @@ def _rotors(fit: Fit) -> Iterator[str]:
         words = "no armature is identified and reversals are not masked, as where torques are measured at the links"
         yield f"{words} (--armature none)" + ("" if filed else "; the robot's file has none either")
     elif asked == "file" and not filed:
-        yield (
-            "no armature is identified, because the file has none; behind gears rotors have more inertia than links: --armature all"
-        )
+        yield ("no armature is identified, because the file has none; behind gears rotors exceed links: --armature all")
 
 
 def _noise(fit: Fit) -> str:

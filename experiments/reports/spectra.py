@@ -29,13 +29,13 @@ class Spectrum:
 
 
 def left_over(fit: Fit) -> dict[str, Instants]:
-    """Return what each model leaves of its equations, at every sample of the first log."""
+    """Return the residuals of each model's equations, at every sample of the first log."""
     signals, basis, chain = fit.problem.signals[0], fit.basis, fit.processing
     return {form: instants(signals, basis, MODELS.create(form), chain, e.X) for form, e in fit.estimates.items()}
 
 
 def of_joints(fit: Fit, left: Mapping[str, Instants]) -> dict[str, Instants]:
-    """Return what models leave that have a row for each joint."""
+    """Return the residuals of models that have a row for each joint."""
     return {form: one for form, one in left.items() if form != "power" and len(one.residual) == fit.basis.n}
 
 

@@ -63,7 +63,7 @@ class AbstractJointLaw(AbstractBlock):
         return {(0, p): found[p.symbol][..., p.joint, :] for p in self.parameters(state.n)}
 
     def _checked(self, state: State) -> dict[str, Array]:
-        """Return the torques; raise SettingError if one is not finite, PluginError if it is not an array like the velocities."""
+        """Return the torques; raise SettingError if one is not finite, PluginError if it is no array like the velocities."""
         found = {x: expect(self, "force", torque, state.qd.shape) for x, torque in self.torques(state).items()}
         for torque in found.values():
             if not np.isfinite(torque).all():

@@ -46,9 +46,7 @@ class Shapes:
             If there are fewer than two harmonics: none alone rests.
         """
         if harmonics < 2:
-            raise SettingError(
-                f"{harmonics} harmonic of {period:g} s does not rest: use a longer period or a higher frequency"
-            )
+            raise SettingError(f"{harmonics} harmonic of {period:g} s does not rest: use a longer period or a higher frequency")
         w = np.asarray(2 * np.pi * np.arange(1, harmonics + 1) / period)
         phase = w * t[:, None]
         sines = np.stack([w ** (i - 1) * np.sin(phase + i * np.pi / 2) for i in range(ORDERS)])

@@ -189,7 +189,7 @@ class Problem:
 
     @cached_property
     def noise(self) -> NoiseLevels:
-        """The noise of torques and positions, as the spectrum of what the explicit model leaves over shows it."""
+        """The noise of torques and positions, from the spectrum of the residuals of the explicit model."""
         if self.explicit is not self:
             return self.explicit.noise
         rows, noisy = zip(*((part.rows, part.noisy) for part in self.parts), strict=True)

@@ -1,4 +1,4 @@
-"""Settling parameters that enter nonlinearly: the basis, made linear about its own estimate."""
+"""Estimating nonlinear parameters: the basis, linearized at its own estimate."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ ROUNDS = 30
 """At most; most laws take five."""
 
 COARSE, FINE = 6, 32
-"""Values of a shape that are looked at to begin with, and once it has settled."""
+"""Values of a shape that are looked at to begin with, and once it has converged."""
 
 FEWEST = 4
 """Values of each shape of a law with several."""
@@ -46,7 +46,7 @@ def settled(problem: Problem) -> Problem:
     Variable projection: for fixed shapes of friction the other parameters are linear. G. Golub and V. Pereyra, "The
     differentiation of pseudo-inverses and nonlinear least squares problems whose variables separate", SIAM J. Numerical
     Analysis 10 (1973) 413-432; with columns of the shapes as slopes about the estimate, a round is a step of Gauss and Newton.
-    Where it has settled, other shapes are looked at once more, joint by joint: the misfit has several minima.
+    After convergence, other shapes are tried once more, joint by joint: the misfit has several minima.
     Of logs too long for their rows to be kept, some pieces say what the shapes are.
     """
     if not problem.basis.is_nonlinear:

@@ -20,7 +20,7 @@ class AbstractSolution(ABC):
 
     @abstractmethod
     def weights(self, parts: Sequence[LogRows]) -> list[Array] | None:
-        """Return what rows were multiplied by, shape (..., r), if X is a least-squares solution whose residuals tell noise."""
+        """Return what rows were multiplied by, shape (..., r), if X is a least-squares solution whose residuals are noise."""
 
     @abstractmethod
     def independent(self, parts: Sequence[LogRows]) -> list[Array] | None:

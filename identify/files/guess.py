@@ -40,7 +40,7 @@ OTHERS = (
 """Words of columns that are not what was measured."""
 
 EPISODES = ("episode_index", "episode", "run", "trial")
-"""Columns that tell the runs of a file apart."""
+"""Columns that distinguish the runs of a file."""
 
 MOST_BLOCKS = (3, 4, 5, 6, 7, 8)
 """Quantities of each joint that a file without names may have: positions, velocities, accelerations, torques, set points."""

@@ -29,7 +29,7 @@ def cramer_rao(basis: Basis, X: Array, q: Array, qd: Array, fs: float, noise: No
     noise. A Kalman filter of the motion's small errors gives the innovations e_k, their covariances S_k, and how they move with
     the parameters, E_k = de_k / dX: the Fisher information is the sum of E_k' S_k^-1 E_k (L. Ljung, "System Identification:
     Theory for the User", 2nd ed., 1999, section 7.4). The motion's start is not known, nor is the friction of a joint that
-    stands or turns.
+    rests or reverses.
 
     Parameters
     ----------

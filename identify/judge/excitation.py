@@ -25,7 +25,7 @@ STATES = 200
 def showing_moves(tree: KinematicTree, grouping: BaseParameters, names: Sequence[str]) -> dict[str, tuple[int, ...]]:
     """Return for each base parameter the fewest joints that show it when they move, from 0; all where it takes many.
 
-    Some joints move at random, the others stand where they are. A parameter shows by what its column has that no combination of
+    Some joints move at random, the others rest. A parameter shows by what its column has that no combination of
     the others has.
 
     Parameters

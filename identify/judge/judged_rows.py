@@ -40,7 +40,7 @@ def shares(rows: RowMap) -> Array:
 @final
 @dataclass(frozen=True)
 class _WhereItMoves(AbstractMask):
-    """Leaves out where joints turn or stand, but for those that stand all the time."""
+    """Leaves out where joints reverse or rest, except those that rest all the time."""
 
     mask: ReversalMask = ReversalMask()  # noqa: RUF009  # frozen
 

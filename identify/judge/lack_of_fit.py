@@ -1,4 +1,4 @@
-"""Whether what a fit leaves over hangs on the motion: a test of lack of fit, joint by joint, and what it hangs on."""
+"""Whether the residuals of a fit depend on the motion: a test of lack of fit, joint by joint."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ DEPENDENT = 1e-6
 @final
 @dataclass(frozen=True)
 class Lack:
-    """What a joint's torque hangs on, beside the parameters.
+    """What a joint's residual torque depends on.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class Lack:
 
 
 def lack_of_fit(problem: Problem, X: Array) -> tuple[Lack, ...]:
-    """Return what the explicit model leaves over that hangs on velocity, position, load or time, the surest first.
+    """Return how the residuals of the explicit model depend on velocity, position, load and time, the most significant first.
 
     Rows of one run are made independent by the covariance that noise gives them; what they leave is regressed on functions of
     one variable of one joint, constant in each of `BINS` stretches. The reduction of the sum of squares is distributed as chi^2

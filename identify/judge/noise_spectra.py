@@ -1,4 +1,4 @@
-"""The spectra that the noise of a log should have in what the explicit model leaves over."""
+"""The spectra that the noise of a log should have in the residuals of the explicit model."""
 
 import numpy as np
 import scipy

@@ -26,14 +26,14 @@ FAINT = 1e-6
 def row_noise(left: Instants, signals: Signals, chain: Chain) -> Array:
     """Return the rms of the noise in the rows of the explicit model, joint by joint [N m], shape (joint,).
 
-    What the model leaves over above the band of the operator is noise, S(f) = a |A(f)|^2 + b |D(f)|^2: of the torque, white
+    The residual above the band of the operator is noise, S(f) = a |A(f)|^2 + b |D(f)|^2: of the torque, white
     before alignment and prefilter (A), and of the position, white before prefilter and two differentiations (D), a and b fitted
     with errors in proportion to S. The rows have what of S passes the operator.
 
     Parameters
     ----------
     left : Instants
-        What the explicit model leaves over of one run; what it does not explain of the motion lies inside the band.
+        Residuals of the explicit model for one run; what it does not explain of the motion lies inside the band.
     signals : Signals
         Of the same log.
     chain : Chain

@@ -40,7 +40,7 @@ def slow_motion(problem: Problem, X: Array) -> tuple[Array, Array]:
     Returns
     -------
     speed : Array, shape (joint,)
-        Up to which joints stand or turn [rad/s, m/s], on average over the logs.
+        Up to which joints rest or reverse [rad/s, m/s], on average over the logs.
     factor : Array, shape (joint,)
         1 where friction is the same down to that speed; else the end of the fastest band where it is not.
     """

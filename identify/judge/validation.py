@@ -55,7 +55,7 @@ class Validation:
     R2 : Array
         Share of the measured torque's variance that is predicted there.
     standing : Array
-        Rms of the error where the joint stands or turns [N m], where friction is not determined; NaN if it never does.
+        Rms of the error where the joint rests or reverses [N m], where friction is not determined; NaN if it never does.
     correlation : Array
         Largest correlation of the error with itself, by size, 2 to `LAGS` rows later. (Noise of differentiated positions
         alternates from row to row: what is one row later says nothing of the model.)
@@ -111,8 +111,8 @@ class Validation:
 def validate(held_out: Problem, X: Array, covariance: Array | None = None) -> Validation:
     """Return how well the parameters `X`, with their `covariance`, predict the torques of a log, by the explicit model.
 
-    Both sides go through the same chain. Where a joint turns or stands is judged apart, also where the mask of the chain leaves
-    nothing out: figures of fits with and without friction are comparable. A joint that never moves counts then, all the time.
+    Both sides go through the same chain. Where a joint reverses or rests is judged apart, also where the chain masks nothing:
+    figures of fits with and without friction are comparable. A joint that never moves counts then, all the time.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ SURE = 4.0
 """Standard deviations from which on a gain below zero is no chance."""
 
 VAGUE = 0.1
-"""Sigma above this share of a gain is none: the payload says nothing of it."""
+"""A gain with a sigma above this share of it is unidentifiable from the payload."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +75,7 @@ def identify_drive_gains(robot: LoadedRobot) -> GainEstimate:
     if not robot.known:
         raise SettingError("nothing is known of the payload: the gains need its mass at least")
     if not robot.without:
-        raise SettingError("there is no log without the payload: what the robot's own mass is cannot be told from the gains")
+        raise SettingError("there is no log without the payload: the robot's own mass cannot be distinguished from the gains")
     n, ratio = robot.tree.n, np.ones(robot.tree.n)
     basis = robot.basis
     for _ in range(ROUNDS):
@@ -94,8 +94,8 @@ def identify_drive_gains(robot: LoadedRobot) -> GainEstimate:
         ratio = ratio * np.clip(step, 1 / FACTOR, FACTOR)
     else:
         raise IdentificationError(
-            f"the gains of {', '.join(_names(robot, np.abs(step - 1) > sigma))} do not converge: move them more, with a heavier "
-            "payload"
+            f"the gains of {', '.join(_names(robot, np.abs(step - 1) > sigma))} do not converge: move them more, with a "
+            "heavier payload"
         )
     final = robot.estimator.fit(with_gains)
     gains = final.X[-n:] * ratio * np.broadcast_to(robot.loaded[0].torque.gain, (n,))

@@ -88,8 +88,8 @@ class LoadedRobot:
         basis = self.both.basis
         if missing := [name for name in self.known if name not in basis.names]:
             raise SettingError(
-                f"{', '.join(missing)} of a payload cannot be distinguished from its other parameters on robot {self.tree.name!r}: give "
-                f"values of {', '.join(self.names)}"
+                f"{', '.join(missing)} of a payload cannot be distinguished from its other parameters on robot "
+                f"{self.tree.name!r}: give values of {', '.join(self.names)}"
             )
         return basis.holding(**self.known) if self.known else basis
 

@@ -53,8 +53,8 @@ class Equations:
     def weighted_as(self, joints: Array) -> Array:
         """Return the weight of every row, shape (..., row, time), from weights of the joints, shape (..., joint, time).
 
-        A row that takes a torque as it is has the weight of its joint, since friction jumps where the joint turns. A row that
-        multiplies it by the velocity has weight 1: the product is continuous there.
+        A row that takes a torque as it is has the weight of its joint, since friction jumps where the joint reverses. A row
+        that multiplies it by the velocity has weight 1: the product is continuous there.
         """
         weight = np.ones((*joints.shape[:-2], self.kinds, joints.shape[-1]))
         for (row, joint), B in self.B.items():

@@ -1,4 +1,4 @@
-"""The noise of a log: of positions from their differences, of torques from what the explicit model leaves over."""
+"""The noise of a log: of positions from their differences, of torques from the residuals of the explicit model."""
 
 from collections.abc import Sequence
 from math import comb
@@ -38,9 +38,9 @@ def spectral_levels(
 
     How much of the squared residuals of a joint is noise of the torque, and how much that of positions, their spectrum says: it
     is explained, as well as may be, by a T(f) + b P(f), with T what white noise of the torques leaves in these rows, and P what
-    that of the positions does. (P lies at high frequencies, where a motion tells little: a small error of P would be a large
-    one of the rest.) White noise of variance sigma^2 gives row i the variance sigma^2 v_i, of which the fit takes the share
-    l_i, its leverage, so that sigma^2 = squares / sum of v_i (1 - l_i). What the model does not explain counts as noise, too.
+    that of the positions does. (P lies at high frequencies, where a motion has little information: a small error of P would be
+    a large one of the rest.) White noise of variance sigma^2 gives row i the variance sigma^2 v_i, of which the fit takes the
+    share l_i, its leverage, so that sigma^2 = squares / sum of v_i (1 - l_i). What the model does not explain counts as noise, too.
 
     Parameters
     ----------

@@ -88,8 +88,8 @@ def _thick(S: Array, number: int) -> Array:
     lowest, largest = np.linalg.eigvalsh(S)[[0, -1]]
     if lowest < -FLAT * largest or largest <= 0:
         raise IdentificationError(
-            f"link {number} of the given model is not physically consistent: its pseudo-inertia is not positive (is the centre of mass "
-            "outside of the body that the inertia describes?); correct the file first"
+            f"link {number} of the given model is not physically consistent: its pseudo-inertia is not positive (is the centre "
+            "of mass outside of the body that the inertia describes?); correct the file first"
         )
     return S + FLAT * largest * np.eye(4) if lowest < FLAT * largest else S
 

@@ -18,7 +18,7 @@ FAST = 10.0
 """Speed, as a multiple of the largest that the motion asks of a joint, that no loop at work reaches."""
 
 LEAST = 1.0
-"""Speed [rad/s, m/s] that counts as the motion's where it asks for less: joints that stand are pushed by others."""
+"""Speed [rad/s, m/s] that counts as the motion's where it asks for less: joints at rest are pushed by others."""
 
 ADVICE = (
     "the loop is unstable or too weak; lower controller.bandwidth or timing.delay, raise fs, ask less of the drive, or, if the "

@@ -101,7 +101,7 @@ def _print_layout(page: Page, layout: LogLayout, doubts: Sequence[str]) -> None:
 
 
 def _print_facts(page: Page, facts: LogFacts) -> None:
-    heads = ["from [rad]", "to", "qd max", "stands %", "noise of q", "step", "bits", "torque from", "to", "noise [N m]"]
+    heads = ["from [rad]", "to", "qd max", "at rest %", "noise of q", "step", "bits", "torque from", "to", "noise [N m]"]
     grid = new_table("", heads)
     for row in facts.rows:
         step = row["encoder_step"]

@@ -127,7 +127,7 @@ class JointFit:
                 break
             noises = now._noises()
         if moved > RESTLESS:
-            raise IdentificationError(f"motion and parameters together do not converge, they move by {moved:.2g} sigma: {CHECK}")
+            raise IdentificationError(f"motion and parameters together do not converge: steps of {moved:.2g} sigma: {CHECK}")
         same = np.allclose(now.levels.torque, before.torque, rtol=LIKE)
         return now if same else replace(now, covariance=now._reduced(now._noises())[2])
 

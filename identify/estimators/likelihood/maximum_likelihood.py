@@ -103,7 +103,7 @@ class MaximumLikelihood(AbstractEstimator):
         alone = tuple(log.run(run) for log in problem.logs)
         logs = tuple(map(Cells.of, alone))
         rms = np.sqrt(np.mean([np.mean(cells.torque[0] ** 2, axis=-1) for cells in logs], axis=0))
-        # A joint that stands says nothing of its torque.
+        # A joint at rest does not determine its torque.
         own = NoiseLevels(np.where(np.isfinite(levels.torque), levels.torque, rms), levels.position, levels.repeats)
         begin = JointFit.start(logs, problem.basis, start.X[run], own, find_delay=self.find_delay)
         found = _through_reversals(begin, EXACT * rms) if self.reversals else begin.solved(EXACT * rms)

@@ -142,7 +142,7 @@ class _Shots:
         good = np.asarray(np.isfinite(q).all(axis=(0, 2, 3)))
         if np.mean(good) < LOST:
             raise IdentificationError(
-                f"{np.count_nonzero(~good)} of {segments} segments run away with these parameters: start closer to the true parameters"
+                f"{np.count_nonzero(~good)} of {segments} segments run away with these parameters: start closer to the truth"
             )
         e = np.where(good[:, None, None], self._measured - q[0], 0.0)
         slopes = np.where(good[:, None, None, None], np.moveaxis(q[1:] - q[0], 0, -1) / np.concatenate([h, steps]), 0.0)

@@ -76,7 +76,7 @@ class Rounds:
         return X
 
     def until_settled(self, step: Callable[[Array], Solved], X: Array, steps: Steps | None = None) -> Solved:
-        """Return the solution of `step` that does not move any more; runs that have settled are left as they are.
+        """Return the solution of `step` that does not move any more; runs that have converged are left as they are.
 
         A round whose controller was made for the simulated robot is not the last: the real one was not.
 
@@ -117,7 +117,7 @@ class Rounds:
         return found
 
     def _require_settled(self, move: Array, left: Array) -> None:
-        """Let runs fail that have neither settled nor come near to it."""
+        """Let runs fail that have not converged."""
         for run in map(tuple, np.argwhere(self.active & ~(left < UNSETTLED)).tolist()):
             k = int(np.argmax(move[run]))
             self.fail(
@@ -135,7 +135,7 @@ class Rounds:
         found = loop_of(self.problem).repeat(np.nan_to_num(X), informed=self._informed, exact=self.exact)
         extra = X.ndim - 1 - self.simulations.ndim
         for place, why in found.failures.items():
-            if self.active[place[extra:]]:  # one that has settled stays
+            if self.active[place[extra:]]:  # one that has converged stays
                 self.fail(place[extra:], why)
         self.simulations += self.active * int(np.prod(X.shape[:extra], dtype=np.intp))
         self._last = tuple(replace(log, q=log.q[(0,) * extra], tau=log.tau[(0,) * extra], conditions={}) for log in found.logs)

@@ -24,11 +24,11 @@ THIRD = 3
 """Order of the differences of velocities in which motion vanishes beside noise."""
 
 QUIET = 0.8
-"""Quantile of the absolute third differences of velocities that tells their noise: most of any motion is smooth."""
+"""Quantile of the absolute third differences of velocities that measures their noise: most of any motion is smooth."""
 
 
 def slow_speed(qd: Array) -> Array:
-    """Return the speed up to which a joint stands or turns, from velocities of shape (..., time): of its own, above noise."""
+    """Return the speed up to which a joint rests or reverses, from velocities of shape (..., time): of its own, above noise."""
     rms = np.sqrt(np.mean(qd**2, axis=-1))
     if qd.shape[-1] <= THIRD:
         return np.maximum(SLOW * rms, LEAST)
@@ -41,7 +41,7 @@ def slow_speed(qd: Array) -> Array:
 @final
 @dataclass(frozen=True)
 class ReversalMask(AbstractMask):
-    """Leaves out the instants at which a joint stands or turns, where its friction is not Fs sign(qd) + Fv qd.
+    """Leaves out the instants at which a joint rests or reverses, where its friction is not Fs sign(qd) + Fv qd.
 
     The weights rise gradually: a weight that jumps would mix the noise of differentiated encoder counts, which lies at high
     frequencies, into the pass band of the operator.
@@ -49,15 +49,15 @@ class ReversalMask(AbstractMask):
     Parameters
     ----------
     threshold : float, tuple of float or Array, shape (..., joint), optional
-        A joint stands or turns while |qd| is at most this [rad/s, of slides m/s], of all joints or of each, and where the sign
-        of qd changes. By default it follows each joint's own speeds and their noise: `slow_speed`.
+        A joint rests or reverses while |qd| is at most this [rad/s, of slides m/s], of all joints or of each, and where the
+        sign of qd changes. By default it follows each joint's own speeds and their noise: `slow_speed`.
     width : float
         The instants this close [s] to such a one are left out as well: as far as differences look across the kink.
     taper : float
         Time [s] over which the weight then rises from 0 to 1, and falls.
     couplings : tuple of tuple of float
-        Of drives whose motor turns with several joints, what it turns for a turn of each: where it stands or turns these joints
-        are left out as well.
+        Of drives whose motor turns with several joints, what it turns for a turn of each: where it rests or reverses these
+        joints are left out as well.
     """
 
     threshold: float | tuple[float, ...] | Array | None = None
@@ -79,7 +79,7 @@ class ReversalMask(AbstractMask):
         return replace(self, threshold=slow_speed(qd)) if self.threshold is None else self
 
     def weight(self, qd: Array, fs: float) -> Array:
-        """Return 1 where the joint slides, 0 where it stands or turns, and what is between near there."""
+        """Return 1 where the joint moves, 0 where it rests or reverses, and what is between near there."""
         slow = self._slow(qd)
         weight = self._weight(qd, slow, fs)
         for coupling in self.couplings:
@@ -90,7 +90,7 @@ class ReversalMask(AbstractMask):
         return weight
 
     def _slow(self, qd: Array) -> Array:
-        """Return the speed up to which each joint stands or turns, shape (..., joint)."""
+        """Return the speed up to which each joint rests or reverses, shape (..., joint)."""
         threshold = np.asarray(self.suited(qd).threshold, dtype=np.float64)
         if threshold.size and threshold.shape[-1:] not in ((), (1,), (qd.shape[-2],)):
             raise SettingError(f"{len(threshold)} speeds of a mask for {qd.shape[-2]} joints: give one, or one each")
