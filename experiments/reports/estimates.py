@@ -3,13 +3,19 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import isfinite
+from math import isfinite, log10
 
 from experiments.identification.fit import Fit
 from experiments.identification.lack import lacking
 from experiments.identification.warnings import FLAGS, doubtful, used
 from experiments.text import WORTHLESS, number, percent, percentage
 from identify import Estimate
+
+LEAST_PERCENT = 0.01
+"""%sigma without a bar: such a parameter is known better than anybody needs."""
+
+TINY = 1e-300
+"""What a logarithm takes for zero."""
 
 ABOUT = "~"
 """Mark of a standard error that does not hold what the model is wrong by."""
@@ -48,6 +54,13 @@ class EstimatesTable:
         for i, name in enumerate(self.fit.basis.names):
             each = (self._cells(model, estimate, i) for model, estimate in self.estimates.items())
             yield [name, *self._true(i), *(cell for cells in each for cell in cells)]
+
+    def bars(self, cells: int) -> Iterator[str]:
+        """Yield a bar of the last model's %sigma for every parameter, on a logarithmic scale from 0.01 % to 100 %."""
+        estimate = list(self.estimates.values())[-1]
+        for x, sigma in zip(estimate.X, estimate.standard_errors, strict=True):
+            share = log10(max(100 * sigma / max(abs(x), TINY), TINY) / LEAST_PERCENT) / log10(100 / LEAST_PERCENT)
+            yield ("#" * round(cells * min(max(share, 0.0), 1.0))).ljust(cells)
 
     def short(self) -> Iterator[list[str]]:
         """Yield the truth and the estimates alone, with all marks."""

@@ -20,6 +20,9 @@ from experiments.reports.leading import in_lines, leading
 from experiments.text import WORTHLESS, new_table, percentage, print_titled
 from identify import AsLogged, Estimate
 
+BARS, BAR_HEAD = 8, "0.01..100"
+"""Cells of the bar of a standard error, and what is written above: a full bar is 100 % of the value, an empty one 0.01 %."""
+
 
 def print_fit(console: Console, fit: Fit, title: str, whole: tuple[str, ...]) -> None:
     """Print truth, if it is known, and of models estimate, error or sigma, %sigma, Cond(W) and what is explained.
@@ -42,7 +45,8 @@ def _grid(table: EstimatesTable) -> Table:
     """Return the table of the parameters, and of the fit as a whole."""
     heads, rows = [f"{first}\n{second}" for first, second in table.heads], list(table.rows())
     if len(table.estimates) < len(table.fit.estimates):
-        return _halved(heads, rows)
+        bars = [[*cells, bar] for cells, bar in zip(rows, table.bars(BARS), strict=True)]
+        return _halved([*heads, f"{table.heads[-1][0]}\n{BAR_HEAD}"], bars)
     grid = new_table("", heads)
     for cells in rows:
         grid.add_row(*cells)
@@ -60,6 +64,9 @@ def _halved(heads: list[str], rows: list[list[str]]) -> Table:
         grid.add_column(heading, justify="right", no_wrap=True)
     for left, right in zip_longest(rows[:half], rows[half:], fillvalue=()):
         grid.add_row(*left, *right)
+    for column in grid.columns:
+        if str(column.header).endswith(BAR_HEAD):
+            column.justify = "left"
     return grid
 
 

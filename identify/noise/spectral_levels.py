@@ -40,7 +40,7 @@ def spectral_levels(
     is explained, as well as may be, by a T(f) + b P(f), with T what white noise of the torques leaves in these rows, and P what
     that of the positions does. (P lies at high frequencies, where a motion has little information: a small error of P would be
     a large one of the rest.) White noise of variance sigma^2 gives row i the variance sigma^2 v_i, of which the fit takes the
-    share l_i, its leverage, so that sigma^2 = squares / sum of v_i (1 - l_i). What the model does not explain counts as noise, too.
+    share l_i, its leverage, so that sigma^2 = squares / sum of v_i (1 - l_i). What the model does not explain counts as noise.
 
     Parameters
     ----------

@@ -4,7 +4,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from experiments.cli.options.view import List
+from experiments.cli.options.authors import List
 from experiments.cli.page import new_page
 from experiments.plugin_tables import TABLES, plugin_conflicts
 from identify.plugins import PluginTable

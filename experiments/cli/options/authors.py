@@ -39,3 +39,13 @@ class Check(Command, action="authors:check"):
     """Its name in `idbench list`, with its table if ambiguous (drives/ideal); or MODULE:CLASS."""
     json: Json = False
     """Print the checks and their results as JSON; human-readable text goes to the error stream."""
+
+
+@command("list")
+@final
+@dataclass(frozen=True)
+class List(Command, action="list:list_plugins"):
+    """List all parts that can be combined, built-in and plug-ins."""
+
+    json: Json = False
+    """Print as JSON."""

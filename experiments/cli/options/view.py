@@ -8,17 +8,7 @@ import tyro
 
 from experiments.cli.app import command
 from experiments.cli.command import Command
-from experiments.option_types import File, Json
-
-
-@command("list")
-@final
-@dataclass(frozen=True)
-class List(Command, action="list:list_plugins"):
-    """List all parts that can be combined, built-in and plug-ins."""
-
-    json: Json = False
-    """Print as JSON."""
+from experiments.option_types import File
 
 
 @command("view")
