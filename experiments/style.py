@@ -15,6 +15,9 @@ JOINTS: tuple[Color, ...] = (
 )
 """Colours of the joints' curves, none of which is a model's; the first two are those of the SCARA's links."""
 
+SIGMAS = 2.0
+"""Half the width of intervals, in standard errors: 95 %."""
+
 GREY: Color = (150, 150, 150)
 """What was measured, the truth, and marks."""
 

@@ -7,25 +7,20 @@ suffers from it, from the prefilter and from the reversals, partly with opposite
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
+from experiments.paper.attribution import COMPARED
 from experiments.paper.table1 import Table1
 from identify import (
     CentralDifference,
     Chain,
     Estimate,
-    ExplicitModel,
     NoPrefilter,
     OrdinaryLeastSquares,
-    PowerModel,
     ReversalMask,
     identify_each,
     paper_chain,
     scara,
 )
-from identify.models import AbstractModel
 from identify.rows.chains import SCHOOL
-
-COMPARED: dict[str, AbstractModel] = {"explicit": ExplicitModel(), "power": PowerModel()}
-"""The implicit model's errors are the explicit one's to a few percent of themselves."""
 
 
 def _finer(chain: Chain) -> Chain:

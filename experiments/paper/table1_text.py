@@ -9,7 +9,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from experiments.paper.causes import COMPARED, causes
+from experiments.paper.attribution import COMPARED
+from experiments.paper.causes import causes
 from experiments.paper.table1 import PAPER, Table1
 from experiments.text import print_table
 from identify import Array, Estimate

@@ -29,7 +29,7 @@ DARK, BRIGHT = np.array([32.0, 32.0, 36.0]), np.array([90.0, 200.0, 120.0])
 LEVELS = 8
 """Colours that are told apart: an entity each, where one for each cell would make a large recording."""
 
-MOST = 13
+MAX_ROWS = 13
 """Parameters of a chart."""
 
 NOTABLE = 0.2
@@ -100,5 +100,5 @@ def _send_told(stream: Stream, found: Excited) -> None:
 
 def _parts(names: Sequence[str]) -> Iterator[tuple[str, npt.NDArray[np.intp]]]:
     """Yield the name of each chart and the parameters in it."""
-    for k, members in enumerate(np.array_split(np.arange(len(names)), -(-len(names) // MOST))):
+    for k, members in enumerate(np.array_split(np.arange(len(names)), -(-len(names) // MAX_ROWS))):
         yield f"{k}_{part(names[members[0]])}_to_{part(names[members[-1]])}", members

@@ -12,7 +12,7 @@ from experiments.recording.stream import Stream
 from experiments.style import JOINTS
 from identify import Estimate
 
-LEAST = 1e-3
+LINEAR_UP_TO = 1e-3
 """Difference [sigma] up to which the axis is linear."""
 
 
@@ -27,8 +27,8 @@ def _send(stream: Stream, at: str, estimate: Estimate) -> None:
     path = np.array(estimate.path)
     sigma = np.where(estimate.standard_errors > 0, estimate.standard_errors, 1.0)
     off, rounds = (path - estimate.X) / sigma, np.arange(float(len(path)))
-    high = max(float(np.nanmax(np.abs(off))), 10 * LEAST)
-    scale = Signed("away from the last [sigma]", -1.3 * high, 1.3 * high, LEAST)
+    high = max(float(np.nanmax(np.abs(off))), 10 * LINEAR_UP_TO)
+    scale = Signed("away from the last [sigma]", -1.3 * high, 1.3 * high, LINEAR_UP_TO)
     axis = Words("round", -0.5, len(path) - 0.5, tuple(map(str, range(len(path)))))
     names = np.array_split(np.arange(len(estimate.names)), ceil(len(estimate.names) / len(JOINTS)))  # a colour each
     for k, members in enumerate(names):

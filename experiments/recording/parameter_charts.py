@@ -10,15 +10,12 @@ from experiments.recording.chart import NARROW, SQUARE, SYMBOLS, Chart
 from experiments.recording.columns import part
 from experiments.recording.scales import Signed, decades, linear, listed
 from experiments.recording.stream import Stream
-from experiments.style import GREY, model_color
+from experiments.style import GREY, SIGMAS, model_color
 from experiments.text import percentage
 from identify import Array
 
-MOST = 13
+MAX_ROWS = 13
 """Parameters of a single chart; more have a chart for each joint."""
-
-SIGMAS = 2.0
-"""Half the length of an interval."""
 
 ASIDE = 0.22
 """How far the models of a parameter stand apart, of its room."""
@@ -53,7 +50,7 @@ def _label(name: str, relative: float) -> str:
 def _parts(fit: Fit, relative: Array) -> Iterator[tuple[str, npt.NDArray[np.intp]]]:
     """Yield title and parameters of each chart: all of few; of many those of each joint, the least certain first."""
     every = np.arange(len(fit.basis.names))
-    if len(every) <= MOST:
+    if len(every) <= MAX_ROWS:
         yield "all", every
         return
     joints = np.array([parameter.joint or 0 for parameter in fit.basis.parameters])

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from matplotlib.ticker import LogLocator, MaxNLocator
 
 from identify import Array
+from identify.arrays import TINY
 
 TICKS = 6
 """Values that have room beside an axis."""
@@ -22,9 +23,6 @@ ENOUGH = 2
 
 ROOM = 0.04
 """Share of an axis that stays free at either end."""
-
-SMALL = 1e-300
-"""What a logarithm takes for 0."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +83,7 @@ class Decades(AbstractScale):
     """A logarithmic axis."""
 
     def _bent(self, x: Array) -> Array:
-        return np.log10(np.maximum(x, SMALL))
+        return np.log10(np.maximum(x, TINY))
 
     def _values(self) -> Array:
         for steps in DECADE_STEPS:  # of a short axis, values between the powers of ten, too

@@ -17,7 +17,7 @@ from experiments.recording.scales import Words, decades, named
 from experiments.recording.stream import Stream
 from experiments.study.answer import short, value
 from experiments.study.axis import Axis
-from experiments.study.statistics import LEAST, Cell
+from experiments.study.statistics import MIN_ERROR, Cell
 from experiments.style import FORMS, GREY, JOINTS, Color, lighter
 from identify import Array
 
@@ -136,7 +136,7 @@ class AxisCharts:
 
     def _parameter(self, path: str, p: int, worst: Sequence[Worst]) -> None:
         """Send the rms error of a parameter, its runs as dots, and the worst of them."""
-        sizes = [np.maximum(PERCENT * np.abs(cell.error[:, p]), PERCENT * LEAST) for cell in self.cells]
+        sizes = [np.maximum(PERCENT * np.abs(cell.error[:, p]), PERCENT * MIN_ERROR) for cell in self.cells]
         low = np.concatenate([np.quantile(size, [0.02, 1.0]) for size in sizes])  # errors pass through 0
         words = [word if k % (1 + len(self._x.words) // MANY) == 0 else "" for k, word in enumerate(self._x.words)]
         chart = Chart(self.stream, path, named("", words), decades("error [%]", low), NARROW)

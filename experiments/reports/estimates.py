@@ -10,12 +10,10 @@ from experiments.identification.lack import lacking
 from experiments.identification.warnings import FLAGS, doubtful, used
 from experiments.text import WORTHLESS, number, percent, percentage
 from identify import Estimate
+from identify.arrays import TINY
 
 LEAST_PERCENT = 0.01
 """%sigma without a bar: such a parameter is known better than anybody needs."""
-
-TINY = 1e-300
-"""What a logarithm takes for zero."""
 
 ABOUT = "~"
 """Mark of a standard error that does not hold what the model is wrong by."""

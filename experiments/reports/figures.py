@@ -13,7 +13,7 @@ from experiments.identification.held_out import HeldOut
 from experiments.reports.friction_curves import FRICTIONS, WHOLE, FrictionCurves
 from experiments.reports.html import svg
 from experiments.reports.spectra import left_over, spectra
-from experiments.style import model_color
+from experiments.style import SIGMAS, model_color
 from experiments.text import percentage
 from identify import Array, cutoffs
 
@@ -22,9 +22,6 @@ NOISES: dict[str, dict[str, Any]] = {
     "position noise": {"color": "tab:brown", "lw": 1.0, "ls": ":"},
 }
 """How the noise that was found is drawn."""
-
-SIGMAS = 2.0
-"""Half the width of intervals, in sigma: 95 %."""
 
 WIDTH = 11.0
 """Of figures [inch]."""

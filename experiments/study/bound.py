@@ -8,7 +8,7 @@ from experiments.study.statistics import BOUNDS
 from identify import Array, Basis, NoiseLevels, cramer_rao
 from sim.engine.run import Run
 
-LEAST = 1e-9
+MIN_NOISE = 1e-9
 """Noise [rad, N m] that counts as none: the bound is then that of rounding."""
 
 
@@ -18,7 +18,7 @@ def bounds_of(basis: Basis, simulated: Run, truth: Mapping[str, float]) -> dict[
     What else is wrong in a scenario, such as cogging, is no part of them.
     """
     scenario, n = simulated.scenario, basis.n
-    noise = NoiseLevels(*(np.maximum(x, LEAST) for x in (scenario.torque.spread(n), scenario.encoder.spread(n))))
+    noise = NoiseLevels(*(np.maximum(x, MIN_NOISE) for x in (scenario.torque.spread(n), scenario.encoder.spread(n))))
     X = np.array(list(truth.values()))
     found = {
         name: cramer_rao(basis, X, simulated.q, simulated.qd, scenario.fs, noise, reversals=reversals)

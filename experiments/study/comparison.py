@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from experiments.study.statistics import LEAST, Cell
+from experiments.study.statistics import MIN_ERROR, Cell
 from identify import Array
 
 SURE = 0.01
@@ -92,4 +92,4 @@ def _probability(one: Array, other: Array, gap: float, draws: int) -> float:
 
 def _ln_typical(squares: Array) -> Array:
     """Return the logarithm of the typical error of mean squares, shape (..., p)."""
-    return np.asarray(np.mean(np.log(np.maximum(squares, LEAST**2)), axis=-1) / 2)
+    return np.asarray(np.mean(np.log(np.maximum(squares, MIN_ERROR**2)), axis=-1) / 2)

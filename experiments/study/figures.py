@@ -12,8 +12,8 @@ from experiments.reports.html import svg
 from experiments.study.answer import value
 from experiments.study.axis import Axis
 from experiments.study.requirement import in_words
-from experiments.study.statistics import RIGHT, SIGMAS, Cell
-from experiments.style import FORMS
+from experiments.study.statistics import RIGHT, Cell
+from experiments.style import FORMS, SIGMAS
 from identify import Array
 
 OTHER = [90, 90, 90]

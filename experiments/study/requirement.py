@@ -9,7 +9,7 @@ from experiments.study.statistics import Cell
 LEVELS = (0.1, 0.01, 0.001, 0.0001)
 """Typical errors that are asked for."""
 
-MOST = 2
+MAX_NAMED = 2
 """Errors that are named."""
 
 LINES = "encoder.lines"
@@ -31,7 +31,7 @@ def requirements(cells: Sequence[Cell], edges: int = 4) -> str:
     if len(varied) != 1 or not all(isinstance(cell.settings[varied[0]], float) for cell in cells):
         return ""
     found = list(_requirements(cells, varied[0], edges))
-    return f"a typical error of {', '.join(found[-MOST:])}" if found else ""
+    return f"a typical error of {', '.join(found[-MAX_NAMED:])}" if found else ""
 
 
 def _requirements(cells: Sequence[Cell], field: str, edges: int) -> Iterator[str]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import scipy
 
+from experiments.style import SIGMAS
 from identify import Array
 
 CONFIDENCE = 0.95
@@ -17,13 +18,10 @@ CONFIDENCE = 0.95
 DRAWS = 300
 """Of a bootstrap: its ends are then known to a tenth of its width."""
 
-SIGMAS = 2.0
-"""Coverage is the share of truths inside this many sigma of the estimate."""
-
 RIGHT = float(2 * scipy.stats.norm.cdf(SIGMAS) - 1)
 """Coverage if sigma is right and errors are normal."""
 
-LEAST = 1e-16
+MIN_ERROR = 1e-16
 """Relative error that counts as none: logarithms of 0 would say too much of rounding."""
 
 BOUNDS = (".bound", ".bound_through_reversals")
@@ -112,14 +110,14 @@ class Cell:
     @property
     def typical(self) -> float:
         """Geometric mean over the parameters of their rmse: one figure that no parameter's unit or size decides."""
-        return float(np.exp(np.mean(np.log(np.maximum(self.rmse[self.relative], LEAST)))))
+        return float(np.exp(np.mean(np.log(np.maximum(self.rmse[self.relative], MIN_ERROR)))))
 
     @cached_property
     def typical_interval(self) -> tuple[float, float]:
         """Confidence interval of `typical`, by the bootstrap over the runs; the same at every call."""
         squares = self.error[:, self.relative] ** 2
         draws = np.random.default_rng(0).integers(self.runs, size=(DRAWS, self.runs))
-        typical = [np.mean(np.log(np.maximum(np.mean(squares[drawn], axis=0), LEAST**2))) / 2 for drawn in draws]
+        typical = [np.mean(np.log(np.maximum(np.mean(squares[drawn], axis=0), MIN_ERROR**2))) / 2 for drawn in draws]
         low, high = np.exp(np.quantile(typical, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2]))
         return float(low), float(high)
 
@@ -136,7 +134,7 @@ class Cell:
 
     def typical_least(self, bound: str = BOUNDS[0]) -> float:
         """Return the geometric mean over the parameters of `least`."""
-        return float(np.exp(np.mean(np.log(np.maximum(self.least(bound)[self.relative], LEAST)))))
+        return float(np.exp(np.mean(np.log(np.maximum(self.least(bound)[self.relative], MIN_ERROR)))))
 
     @property
     def relative(self) -> np.typing.NDArray[np.bool_]:

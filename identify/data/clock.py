@@ -22,7 +22,7 @@ STEADY = 0.01
 ROUGHER = 0.95
 """Share of a clock's roughness that another must leave less than to be believed: stamps first, then a steady clock."""
 
-LEAST = 20
+MIN_ROWS = 20
 """Rows that it takes."""
 
 
@@ -71,7 +71,7 @@ class Clock:
         rows = np.flatnonzero(finite)
         broken, backward, t = len(finite) - len(rows), 0, columns.t
         forward = t[rows] > np.maximum.accumulate(np.concatenate([[-np.inf], t[rows][:-1]]))
-        if len(rows) >= LEAST and np.mean(~forward) > 0.5:
+        if len(rows) >= MIN_ROWS and np.mean(~forward) > 0.5:
             raise LogError("time hardly ever increases: is its column the right one?")
         backward, rows = int(np.count_nonzero(~forward)), rows[forward]
         _require_enough(rows, finite)
@@ -156,7 +156,7 @@ class Clock:
 
 
 def _require_enough(rows: npt.NDArray[np.intp], every: npt.NDArray[np.bool_]) -> None:
-    if len(rows) < LEAST:
+    if len(rows) < MIN_ROWS:
         raise LogError(f"{len(rows)} rows are left of {len(every)}, without those that repeat others or have no value: too few")
 
 
@@ -169,7 +169,7 @@ def torque_stretches(columns: LogColumns) -> tuple[LogColumns, list[tuple[float,
     t, tau = t[sound], tau[sound]
     forward = t > np.maximum.accumulate(np.concatenate([[-np.inf], t[:-1]]))
     t, tau = t[forward], tau[forward]
-    if len(t) < LEAST:
+    if len(t) < MIN_ROWS:
         raise LogError(f"{len(t)} torques have values and times that increase: too few")
     steps = np.diff(t)
     ends = [0, *(np.flatnonzero(steps > max(LONGEST, 3.5 * float(np.median(steps)))) + 1), len(t)]
@@ -215,7 +215,7 @@ def _numbered(t: Array, fs: float) -> Array:
     The frequency at which all stamps have the same phase, |sum of exp(2 pi i f t)| being largest, is looked for in a short
     beginning first, then in ever longer ones, each of which tells it more sharply.
     """
-    since, count, width = t - t[0], min(10 * LEAST, len(t)), 0.1 * fs
+    since, count, width = t - t[0], min(10 * MIN_ROWS, len(t)), 0.1 * fs
     while True:
         some = since[:count]
         tried = fs + np.linspace(-width, width, 161)

@@ -7,10 +7,10 @@ from identify.arrays import Array
 OFF = 0.05
 """Share of a step by which a difference of positions may miss a whole number of steps: files are rounded."""
 
-LEAST = 20
+MIN_DIFFERENCES = 20
 """Differences that it takes."""
 
-MOST = 1000
+MAX_STEPS = 1000
 """Steps of a difference up to which rounding of the step itself does not matter."""
 
 
@@ -30,7 +30,7 @@ def _step(moved: Array) -> float:
     """Return the largest number of which all differences are whole multiples."""
     rounding = 1e-9 * max(float(moved.max(initial=0.0)), 1e-9)
     found = np.sort(moved[moved > rounding])
-    if len(found) < LEAST:
+    if len(found) < MIN_DIFFERENCES:
         return np.nan
     step = float(found[0])
     for divisor in (1, 2, 3, 4, 5):
@@ -42,9 +42,9 @@ def _step(moved: Array) -> float:
 
 def _refined(found: Array, step: float) -> float:
     """Return the step that fits differences, the smallest first, from a first guess; NaN if few are its multiples."""
-    for most in (5, 50, MOST):
+    for most in (5, 50, MAX_STEPS):
         some = found[found < (most + 0.5) * step]
-        if most == MOST and len(some) < LEAST:
+        if most == MAX_STEPS and len(some) < MIN_DIFFERENCES:
             return np.nan
         count = np.round(some / step)
         if (np.abs(some / step - count) > OFF).any():

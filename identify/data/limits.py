@@ -7,7 +7,7 @@ import numpy as np
 from identify.arrays import Array, frozen
 from identify.errors import SettingError
 
-LEAST = 1e-6
+MIN_LIMIT = 1e-6
 """Limits below this are a slip."""
 
 
@@ -37,8 +37,8 @@ class Limits:
         n = len(self.position)
         for name in ("velocity", "acceleration", "jerk", "torque", "rms_torque"):
             values = frozen(np.broadcast_to(getattr(self, name), n))
-            if not (values >= LEAST).all():
-                raise SettingError(f"limits: {name} = {values.tolist()} must be at least {LEAST:g}")
+            if not (values >= MIN_LIMIT).all():
+                raise SettingError(f"limits: {name} = {values.tolist()} must be at least {MIN_LIMIT:g}")
             object.__setattr__(self, name, values)
         if self.position.shape != (n, 2) or not (self.position[:, 0] < self.position[:, 1]).all():
             raise SettingError(f"limits: position = {self.position.tolist()} must be pairs, the lowest first")

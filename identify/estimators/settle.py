@@ -8,7 +8,7 @@ from typing import Any, final
 
 import numpy as np
 
-from identify.arrays import Array
+from identify.arrays import TINY, Array
 from identify.basis.basis import Basis
 from identify.basis.friction.shape import ShapedFriction, with_settings
 from identify.basis.joint_law import AbstractFriction, AbstractJointLaw
@@ -36,8 +36,6 @@ SETTLED = 1e-3
 
 SHARES = (0.5, 0.25, 0.1, 0.0)
 """Of a step, in turn, until the rows are explained better."""
-
-TINY = 1e-300
 
 
 def settled(problem: Problem) -> Problem:

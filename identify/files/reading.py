@@ -19,7 +19,7 @@ from identify.files.units import needs_gain
 CLOCKS = 1e6
 """Times [s] beyond this are those of a calendar: logs count from their beginning."""
 
-LEAST, MOST = 1e-9, 1e9
+MIN_GAIN, MAX_GAIN = 1e-9, 1e9
 """Sizes of gains beyond which they are slips."""
 
 LAYOUT_FILE = ".toml"
@@ -165,10 +165,10 @@ class _Files:
             )
         if gain and len(gain) not in (1, n):
             raise LogError(f"{self.log}: {len(gain)} gains for {n} joints: give one, or one per joint")
-        if wrong := [x for x in gain if not LEAST <= abs(x) <= MOST]:
+        if wrong := [x for x in gain if not MIN_GAIN <= abs(x) <= MAX_GAIN]:
             raise LogError(
                 f"{self.log}: a gain of {wrong[0]:g} makes no torque: give N m a unit of tau for each joint (--gain, or "
-                f"gain in [torque] of its log.toml), {LEAST:g} to {MOST:g} in size, negative where the sign is the other way"
+                f"gain in [torque] of its log.toml), {MIN_GAIN:g} to {MAX_GAIN:g} in size, negative if the sign is reversed"
             )
         return np.array(gain or (1.0,))
 

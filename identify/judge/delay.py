@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from identify.arrays import Array
+from identify.arrays import TINY, Array
 from identify.basis.basis import Basis
 from identify.data.motion_log import MotionLog
 from identify.errors import LogError, RangeError, SettingError
@@ -23,9 +23,6 @@ RANGE = (-0.02, 0.05)
 
 BLOCKS = 16
 """Stretches of the log of which each is left out once, to see how much the delay depends on it."""
-
-TINY = 1e-300
-"""Squares below this count as this: of torques that are explained exactly."""
 
 _COARSE = 15
 """Delays of a first look, which brackets the smallest misfit."""

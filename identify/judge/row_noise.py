@@ -16,7 +16,7 @@ RESOLUTION = 0.5
 QUIET = 0.02
 """Gain of the operator, as a share of that at rest, below which a frequency is above its band."""
 
-LEAST = 8
+MIN_FREQUENCIES = 8
 """Frequencies above the band that it takes to distinguish two kinds of noise."""
 
 FAINT = 1e-6
@@ -52,7 +52,7 @@ def row_noise(left: Instants, signals: Signals, chain: Chain) -> Array:
     kinds = np.stack([_gain(impulse, f, fs) ** 2 for impulse in _impulses(log, chain)])
     above = (passed < QUIET * passed[0]) & (f > f[np.argmax(passed < QUIET * passed[0])]) & (f < 0.95 * fs / 2)
     above &= (kinds > FAINT * kinds.max(axis=1, keepdims=True)).any(axis=0)
-    if np.count_nonzero(above) < LEAST:
+    if np.count_nonzero(above) < MIN_FREQUENCIES:
         return np.full(len(S), np.nan)
     levels = np.stack(two_levels(kinds[0, above], kinds[1, above], S[:, above]), axis=-1)
     return np.sqrt(scipy.integrate.trapezoid(levels @ kinds * passed**2, f, axis=-1))

@@ -23,7 +23,7 @@ from identify.parameters.pseudo_inertia import inertial, pseudo_inertia
 REPEATED = 0.05
 """Rms distance of two motions [rad or m] up to which they count as one that was repeated."""
 
-LEAST = 1e-6
+MIN_EIGENVALUE = 1e-6
 """Least eigenvalue of a body's pseudo-inertia, as a share of the largest."""
 
 
@@ -204,7 +204,7 @@ def _outer(lower: Array) -> Array:
 def _root(S: Array, size: float) -> Array:
     """Return the lower triangle of the root of a pseudo-inertia, or of one that is near and can exist."""
     values, axes = np.linalg.eigh(S)
-    least = max(LEAST * values[-1], 1e-9 * size)
+    least = max(MIN_EIGENVALUE * values[-1], 1e-9 * size)
     lower = np.linalg.cholesky((axes * np.maximum(values, least)) @ axes.T)
     found: Array = lower[np.tril_indices(4)]
     return found

@@ -24,7 +24,7 @@ SMOOTHING = 0.15
 KNOTS = 25.0
 """Frequency [Hz] at which slopes are computed; between them cubics go through them, since motion has little beyond 5 Hz."""
 
-MOST = 2_000_000
+MAX_BLOCK = 2_000_000
 """Samples times columns of which slopes are computed at once: columns of many joints take much memory."""
 
 SLIDING = 2 * STEP_QD
@@ -81,7 +81,7 @@ class Linearization:
         # Beyond the last sample the motion stays as it is: a place to interpolate to.
         knots = np.minimum(np.arange(0, last + self._every, self._every), last)
         runs = np.prod(state.q.shape[:-2], dtype=int)
-        each = max(1, MOST // (self.basis.n**2 * len(self.basis.names) * max(runs, 1)))
+        each = max(1, MAX_BLOCK // (self.basis.n**2 * len(self.basis.names) * max(runs, 1)))
         pieces = []
         for part in np.split(knots, range(each, len(knots), each)):
             conditions = {name: x[..., part] for name, x in state.conditions.items()}

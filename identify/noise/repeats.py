@@ -11,7 +11,7 @@ from identify.data.motion_log import MotionLog
 OVERLAP = 0.1
 """Share of a log that must lie over itself for what it says of a lag to count."""
 
-MOST = 2**18
+MAX_SAMPLES = 2**18
 """Samples that a log is looked at."""
 
 PRECISE = 1e-12
@@ -44,8 +44,8 @@ def repeats(logs: Sequence[MotionLog], sigma: Array) -> Array:
 
 
 def _repeats_of(log: MotionLog, sigma: Array) -> Array:
-    if log.samples > MOST:
-        return 1 + (_repeats_of(log.part(0, MOST), sigma) - 1) * (log.samples / MOST)
+    if log.samples > MAX_SAMPLES:
+        return 1 + (_repeats_of(log.part(0, MAX_SAMPLES), sigma) - 1) * (log.samples / MAX_SAMPLES)
     q = np.swapaxes(log.q - np.mean(log.q, axis=-2, keepdims=True), -1, -2)
     N, square = q.shape[-1], np.mean(q**2, axis=-1)
     lags = np.arange(1, round((1 - OVERLAP) * N))

@@ -12,7 +12,7 @@ from identify.noise.linearization import Linearization, smoothed
 from identify.noise.two_levels import two_levels
 from identify.rows.row_map import RowMap
 
-LEAST, MOST = 0.01, 10.0
+MIN_RATIO, MAX_RATIO = 0.01, 10.0
 """Range of b/a: residuals of some hundred rows do not show less, and more is as good as equal weights."""
 
 
@@ -58,8 +58,8 @@ def floor_of(squares: Array, variance: Array, valid: npt.NDArray[np.bool_]) -> A
     mean = np.sum(variance * valid, axis=-1, keepdims=True) / count
     u = np.divide(variance, mean, out=np.ones_like(variance), where=mean > 0)
     a, b = two_levels(u * valid, np.where(valid, 1.0, 0.0), squares * valid)
-    share = np.divide(b, a, out=np.full(a.shape, MOST), where=a > 0)
-    return mean[..., 0] * np.clip(np.where(np.isfinite(share), share, 1.0), LEAST, MOST)
+    share = np.divide(b, a, out=np.full(a.shape, MAX_RATIO), where=a > 0)
+    return mean[..., 0] * np.clip(np.where(np.isfinite(share), share, 1.0), MIN_RATIO, MAX_RATIO)
 
 
 def reciprocal_root(variance: Array, floor: Array) -> Array:

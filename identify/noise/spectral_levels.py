@@ -6,6 +6,7 @@ from math import comb
 import numpy as np
 
 from identify.arrays import Array
+from identify.data.velocities import ORDER
 from identify.noise.covariance import BandedCovariance
 from identify.noise.noisy_rows import NoisyRows
 from identify.noise.propagation import NoiseLevels
@@ -15,13 +16,10 @@ from identify.rows.rows import Rows
 from identify.signals.signals import Signals
 from identify.signals.stencils import slide
 
-ORDER = 6
-"""Differences of the positions after which next to nothing of a motion is left, and of white noise much."""
-
 NEGLIGIBLE = 1e-4
 """Share of the squared residuals below which noise of the positions counts as none: it makes 0.005 % of sigma."""
 
-LEAST = 32
+MIN_SAMPLES = 32
 """Samples that it takes to estimate the noise of positions."""
 
 FREE = 0.01
@@ -115,5 +113,5 @@ def position_noise(logs: Sequence[Signals]) -> Array:
         counts = np.stack([moving, differences != 0])
         squares = squares + np.sum(differences**2 * counts, axis=-1)
         count = count + np.sum(counts, axis=-1)
-    used, changing = np.where(np.asarray(count) >= LEAST, np.sqrt(squares / np.maximum(count, 1)), 0.0)
-    return np.where(np.asarray(count)[0] >= LEAST, used, changing)
+    used, changing = np.where(np.asarray(count) >= MIN_SAMPLES, np.sqrt(squares / np.maximum(count, 1)), 0.0)
+    return np.where(np.asarray(count)[0] >= MIN_SAMPLES, used, changing)

@@ -9,7 +9,7 @@ from sim.drives.pwm import Modulator, Pieces, pieces
 from sim.drives.winding import Passage, Winding, pass_period, step_by_step, straight
 from sim.robot.motors import Array
 
-MOST = 20_000
+MAX_VALUES = 20_000
 """Values of the modulation index beyond which no table is made."""
 
 
@@ -124,6 +124,6 @@ class TabulatedPassages:
 
 def passages(winding: Winding, modulator: Modulator, least: float) -> ExactPassages | TabulatedPassages:
     """Return the passages of windings; `least` is the step of the modulation index, 0 if it has none."""
-    if least and 2 / least < MOST:
+    if least and 2 / least < MAX_VALUES:
         return TabulatedPassages(winding, modulator, least)
     return ExactPassages(winding, modulator)

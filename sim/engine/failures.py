@@ -17,7 +17,7 @@ FAR = 1.0
 FAST = 10.0
 """Speed, as a multiple of the largest that the motion asks of a joint, that no loop at work reaches."""
 
-LEAST = 1.0
+MIN_SPEED = 1.0
 """Speed [rad/s, m/s] that counts as the motion's where it asks for less: joints at rest are pushed by others."""
 
 ADVICE = (
@@ -50,7 +50,7 @@ class Bounds:
         )
         low, high = (np.broadcast_to(end, (nsim, robot.n)) for end in ends)
         self._middle, self._half = (low + high) / 2, (high - low) / 2
-        self._fastest = FAST * np.maximum(np.abs(planned.qd).max(axis=0), LEAST)
+        self._fastest = FAST * np.maximum(np.abs(planned.qd).max(axis=0), MIN_SPEED)
 
     def broken(self, q: Array, qd: Array) -> dict[int, str]:
         """Return the simulations whose state, shape (nsim, joint), is none of a loop at work, and what their joint does."""

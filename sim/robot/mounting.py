@@ -70,7 +70,7 @@ class Mounting:
             _couple(spec, name, weights)
 
 
-LEAST, MOST = 1e-6, 1e6
+MIN_FACTOR, MAX_FACTOR = 1e-6, 1e6
 """Sizes of a coupling's factors beyond which they are slips."""
 
 PLAIN = Mounting()
@@ -87,10 +87,10 @@ def _couple(spec: mujoco.MjSpec, name: str, weights: Sequence[tuple[str, float]]
     named = [joint for joint, _ in weights]
     if twice := sorted({joint for joint in named if named.count(joint) > 1}):
         raise RobotError(f"--coupling {name}: {', '.join(twice)} is given twice: add its factors up")
-    if wrong := [f"{weight:g}*{joint}" for joint, weight in weights if not LEAST <= abs(weight) <= MOST]:
+    if wrong := [f"{weight:g}*{joint}" for joint, weight in weights if not MIN_FACTOR <= abs(weight) <= MAX_FACTOR]:
         raise RobotError(
-            f"--coupling {name}: {', '.join(wrong)}: a factor must be from {LEAST:g} to {MOST:g} in size; leave joints out "
-            "with which the motor does not turn"
+            f"--coupling {name}: {', '.join(wrong)}: a factor must be from {MIN_FACTOR:g} to {MAX_FACTOR:g} in size; leave out "
+            "joints with which the motor does not turn"
         )
     if len(weights) < 2:
         raise RobotError(

@@ -164,7 +164,7 @@ def test_other_models_are_refused_and_leave_the_explicit_one(exact):
 
 
 def test_logs_too_long_for_their_motion_are_refused(exact, monkeypatch):
-    monkeypatch.setattr(maximum_likelihood, "MOST", 1e6)
+    monkeypatch.setattr(maximum_likelihood, "MAX_BYTES", 1e6)
     with pytest.raises(IdentificationError, match=r"together take .* GB: use GLS, or at most \d+ samples"):
         identify(MotionLog(exact.fs, exact.q[0], exact.tau[0], exact.torque), scara(), EXPLICIT, estimator=ML)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identify.noise.row_weights import LEAST, MOST, floor_of, reciprocal_root, rectified
+from identify.noise.row_weights import MAX_RATIO, MIN_RATIO, floor_of, reciprocal_root, rectified
 
 ALL = np.ones((200, 400), dtype=bool)
 
@@ -24,7 +24,7 @@ def test_pure_noise_has_next_to_none_and_equal_residuals_the_most(variance, rng)
     mean = variance.mean(axis=-1)
     noise = rng.standard_normal(variance.shape) ** 2
     assert np.median(floor_of(variance * noise, variance, ALL) / mean) < 0.05
-    np.testing.assert_allclose(floor_of(np.ones_like(variance), variance, ALL), MOST * mean)
+    np.testing.assert_allclose(floor_of(np.ones_like(variance), variance, ALL), MAX_RATIO * mean)
 
 
 def test_a_run_does_not_touch_the_others_and_bad_ones_have_a_value(variance):
@@ -33,7 +33,7 @@ def test_a_run_does_not_touch_the_others_and_bad_ones_have_a_value(variance):
     found = floor_of(squares, variance, ALL)
     np.testing.assert_array_equal(found[7], floor_of(squares[7], variance[7], ALL[7]))
     assert np.isfinite(found).all()
-    assert (found >= LEAST * variance.mean(axis=-1)).all()
+    assert (found >= MIN_RATIO * variance.mean(axis=-1)).all()
 
 
 def test_reciprocal_roots():

@@ -24,7 +24,7 @@ SIGMA = 1.4826
 ROUGH_Q, ROUGH_TAU = 1e-5, 1e-3
 """How rough positions and torques are at least, as a share of their standard deviation: torques bend, positions hardly."""
 
-LEAST = 0.1
+MIN_DEVIATION = 0.1
 """Standard deviation of a row at least, over the median of its kind: of the edge of a mask little is known."""
 
 SETTLED = 1e-3
@@ -129,7 +129,7 @@ class _Weights:
         root = np.linalg.inv(np.linalg.cholesky(C + floor))
         white = replace(self, root=root)._white(left[..., None])[..., 0] / self.relative
         spread = _spread(white, self._together[..., None] & self._seen)
-        root = root / np.maximum(spread, LEAST)[..., None]
+        root = root / np.maximum(spread, MIN_DEVIATION)[..., None]
         white = replace(self, root=root)._white(left[..., None])[..., 0] / self.relative
         weight = _tukey(white, self.tuning) * self._seen
         pick = active[..., None, None]
@@ -174,7 +174,7 @@ def _relative(problem: Problem, kinds: Kinds) -> Array:
     variance = np.concatenate([part.covariance.variance for part in problem.parts], axis=-1)
     size = kinds.by_kind(np.sqrt(np.nan_to_num(variance)) * kinds.own)
     typical = _spread(size, kinds.by_kind(kinds.own) > 0)[..., None, :] / SIGMA
-    return np.maximum(np.where(typical > 0, size / typical, 1.0), LEAST)
+    return np.maximum(np.where(typical > 0, size / typical, 1.0), MIN_DEVIATION)
 
 
 def _least(Y: Array, kinds: Kinds) -> Array:

@@ -28,7 +28,7 @@ nonlinear estimation", Proc. IEEE AS-SPCC 2000, 153-158)."""
 TUNINGS = 1.0, 3.0, 10.0
 """Process noise that is tried, over the torque noise of the log."""
 
-LEAST = 1e-7
+MIN_NOISE = 1e-7
 """Noise of positions [rad] and torques [N m] at least: of exact ones covariances would be those of rounding."""
 
 UNSURE = 10.0
@@ -87,7 +87,7 @@ class UnscentedKalmanFilter(AbstractEstimator):
         for run in np.ndindex(runs):
             if problem.factors.together.status[run] != Status.OK or not np.isfinite(start[run]).all():
                 continue
-            own = NoiseLevels(np.maximum(np.nan_to_num(levels.torque[run]), LEAST), problem.position_noise[run])
+            own = NoiseLevels(np.maximum(np.nan_to_num(levels.torque[run]), MIN_NOISE), problem.position_noise[run])
             found = [way for tuning in TUNINGS if (way := _tried(problem, run, (start[run], sigma[run]), own, tuning))]
             if not found:
                 failures[run] = "the filter diverges from this start: start closer to the true parameters, or with less spread"
@@ -122,7 +122,7 @@ def _filtered(
         weight = MASK.weight(signals.state.qd[run], log.fs)
         unknown = UNKNOWN * friction_jumps(problem.basis, X, log.q[0])
         variance = (level[:, None] + (1 - weight) * unknown[:, None]) ** 2
-        one = _Filter(problem.basis, _mean_torques(log), log.fs, variance, np.maximum(noise.position, LEAST))
+        one = _Filter(problem.basis, _mean_torques(log), log.fs, variance, np.maximum(noise.position, MIN_NOISE))
         more, state, P = one.run(log.q, state, P, sigma)
         likelihood += more
     return likelihood, state, P * np.outer(sigma, sigma), level

@@ -32,7 +32,7 @@ FINE = 0.02
 WORTH = 0.9
 """Typical sigma, over that of a fit without reversals, below which these are used."""
 
-MOST = 2e9
+MAX_BYTES = 2e9
 """Bytes that the equations of all motions may take."""
 
 
@@ -162,8 +162,8 @@ def _require_near(found: JointFit, X: Array, sigma: Array, names: tuple[str, ...
 def _require_short(problem: Problem) -> None:
     n, p = problem.basis.n, len(problem.names)
     samples = sum(log.samples for log in problem.logs)
-    if (size := samples * 2 * n * (3 * p + 20 * n) * 8) > MOST:
+    if (size := samples * 2 * n * (3 * p + 20 * n) * 8) > MAX_BYTES:
         raise IdentificationError(
             f"motion and parameters of {samples} samples of {n} joints together take {size / 1e9:.3g} GB: use GLS, or at most "
-            f"{int(samples * MOST / size)} samples"
+            f"{int(samples * MAX_BYTES / size)} samples"
         )

@@ -29,7 +29,7 @@ NOTHING = 1e-2
 UNSETTLED = 1.0
 """Remaining distance, in sigma, at which an estimate that has not converged is kept after the last step."""
 
-STRAYS, ELSEWHERE = 0.1, 0.3
+MAX_DEVIATION, MAX_FIRST_DEVIATION = 0.1, 0.3
 """Rms by which a simulated motion may differ from the logged one in the end, and in the first round, as a share of the rms of
 the logged motion about its mean."""
 
@@ -111,7 +111,7 @@ class Rounds:
             X = np.where(self.active[..., None], after, X)
             if not self.active.any():
                 break
-        self._require_same_motion(STRAYS)
+        self._require_same_motion(MAX_DEVIATION)
         self._require_settled(move, left)
         assert found is not None  # there is a round at least
         return found
@@ -140,7 +140,7 @@ class Rounds:
         self.simulations += self.active * int(np.prod(X.shape[:extra], dtype=np.intp))
         self._last = tuple(replace(log, q=log.q[(0,) * extra], tau=log.tau[(0,) * extra], conditions={}) for log in found.logs)
         if self._informed:
-            self._require_same_motion(ELSEWHERE)
+            self._require_same_motion(MAX_FIRST_DEVIATION)
         return found
 
     def _require_same_motion(self, most: float) -> None:

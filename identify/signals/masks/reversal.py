@@ -14,7 +14,7 @@ from identify.signals.masks.mask import AbstractMask
 SLOW = 0.05
 """Share of a joint's rms speed up to which it counts as turning: 0.1 rad/s of the SCARA's 2 rad/s."""
 
-LEAST = 1e-12
+MIN_SPEED = 1e-12
 """Speed below which there is none."""
 
 NOISY = 4.0
@@ -31,11 +31,11 @@ def slow_speed(qd: Array) -> Array:
     """Return the speed up to which a joint rests or reverses, from velocities of shape (..., time): of its own, above noise."""
     rms = np.sqrt(np.mean(qd**2, axis=-1))
     if qd.shape[-1] <= THIRD:
-        return np.maximum(SLOW * rms, LEAST)
+        return np.maximum(SLOW * rms, MIN_SPEED)
     kinks = np.abs(np.diff(qd, THIRD, axis=-1))
     size = scipy.special.ndtri((1 + QUIET) / 2) * np.sqrt(scipy.special.comb(2 * THIRD, THIRD))
     noise = np.quantile(kinks, QUIET, axis=-1) / size
-    return np.maximum(np.maximum(SLOW * rms, NOISY * noise), LEAST)
+    return np.maximum(np.maximum(SLOW * rms, NOISY * noise), MIN_SPEED)
 
 
 @final
