@@ -1,4 +1,8 @@
-"""The noise levels that make the rows of the explicit model most likely."""
+"""The noise levels that make the rows of the explicit model most likely.
+
+Restricted: the fit absorbs part of the noise, as many degrees of freedom as it has parameters. Plain maximum likelihood would
+find variances that are too small, by half in a joint with twice as many rows as parameters.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
