@@ -35,12 +35,13 @@ def filled(text: str) -> str:
 
 
 def _usual(study: str, name: str, label: Callable[[dict[str, Any]], str], columns: Sequence[Column]) -> Iterator[str]:
-    """Yield typical errors and coverages of chains and models, a row a setting."""
+    """Yield typical errors of chains and models, and coverages in chain idbench, a row a setting."""
     several = len({chain for chain, _ in columns}) > 1
     names = [f"{model}, {chain}" if several else model for chain, model in columns]
-    head = [name, *names, f"coverage: {names[0]}", *names[1:]]
+    own = [column for column in columns if column[0] == I]
+    head = [name, *names, f"coverage: {names[0]}", *names[1 : len(own)]]
     rows = (
-        [label(settings), *(typical(group[c]) for c in columns), *(coverage(group[c]) for c in columns)]
+        [label(settings), *(typical(group[c]) for c in columns), *(coverage(group[c]) for c in own)]
         for settings, group in by_settings(study)
     )
     yield from table(head, rows)
@@ -62,12 +63,13 @@ def _one(key: str, scale: float = 1.0) -> Callable[[dict[str, Any]], str]:
 
 def _sigma() -> Iterator[str]:
     def rows() -> Iterator[Sequence[str]]:
+        first = cells("sigma")[0]["settings"]  # the other noise, joints exchanged, gives the same; explicit and implicit, too
         for cell in cells("sigma"):
-            noise = ", ".join(f"{x:g}" for x in json.loads(str(cell["settings"]["torque.noise"])))
-            shares = (coverage(cell, key, 1) for key in ("coverage", "paper_coverage"))
-            yield [noise, cell["estimator"], cell["model"], *shares]
+            if cell["settings"] == first and cell["model"] != "implicit":
+                shares = (coverage(cell, key, 1) for key in ("coverage", "paper_coverage"))
+                yield [cell["estimator"], cell["model"], *shares]
 
-    yield from table(["torque noise [N m]", "estimator", "model", "corrected", "the paper's"], rows())
+    yield from table(["estimator", "model", "calibrated", "the paper's"], rows())
 
 
 def _cutoffs() -> Iterator[str]:
