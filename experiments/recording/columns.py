@@ -13,7 +13,7 @@ from identify import Array
 
 NANOSECONDS = 1_000_000_000
 
-SHOWN, POSES = 125.0, 62.5
+SHOWN, POSES = 62.5, 31.25
 """Frequencies [Hz] above which curves, and poses of the arms, are thinned out: a minute on a screen has no more points."""
 
 
