@@ -90,8 +90,8 @@ def percentage(x: float) -> str:
 
 
 def probability(p: float) -> str:
-    """Return a probability to two digits, down to what nobody believes."""
-    return f"{p:.2g}" if p >= UNBELIEVED else f"below {UNBELIEVED:g}"
+    """Return a probability to two digits with its sign, = or <."""
+    return f"= {p:.2g}" if p >= UNBELIEVED else f"< {UNBELIEVED:g}"
 
 
 def error_percentage(share: float) -> str:

@@ -32,6 +32,10 @@ PLACES = {
 __all__ = ["Robot", "Run", "Scenario", "kinematic_tree", "load_robot", "load_scenario", "run"]
 
 
+def __dir__() -> list[str]:
+    return __all__
+
+
 def __getattr__(name: str) -> Any:
     if name not in PLACES:
         raise AttributeError(f"module 'sim' has no {name!r}; it has {', '.join(PLACES)}")

@@ -52,7 +52,7 @@ print(f"{len(base.names)} base parameters; one of them: {base.names[3]} = {base.
 from identify import ExplicitModel, GeneralizedLeastSquares, identify
 
 estimate = identify(log, base.basis, ExplicitModel(), estimator=GeneralizedLeastSquares())
-weak = [name for name, share in zip(estimate.names, estimate.relative_sigma_percent) if share > 20]
+weak = [name for name, share in zip(estimate.names, estimate.paper_sigma_percent) if share > 20]
 print(f"Cond(W) = {estimate.condition_number:.0f}; {len(estimate.names) - len(weak)} parameters known to 20 %")
 print("torque noise found [N m]:", estimate.noise_levels.torque.round(4))
 

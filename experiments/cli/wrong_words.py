@@ -15,7 +15,7 @@ from experiments.errors import ExperimentError
 KINDS: Mapping[type, str] = {int: "a whole number", float: "a number"}
 """What options take, in words."""
 
-CLOSE = 0.6
+CLOSE = 0.7
 """Likeness of words from which on one is taken for a slip of the other."""
 
 COUNTS = ("", "", "two", "three", "four", "five", "six")

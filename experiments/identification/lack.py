@@ -30,10 +30,10 @@ def words_of_lack(found: Sequence[Lack], robot_model: RobotModel) -> str:
     if not found:
         return "lack of fit: not tested, the rows are too few or do not allow it"
     if not (wrong := lacking(found)):
-        return f"lack of fit: none over velocity, position, load and time (p = {probability(found[0].p)})"
+        return f"lack of fit: none over velocity, position, load and time (p {probability(found[0].p)})"
     joints = robot_model.robot.joints
     each = (
-        f"{joints[x.joint]} over its {x.over} ({x.size:.2g} {robot_model.units(x.joint)[0]} rms, p = {probability(x.p)})"
+        f"{joints[x.joint]} over its {x.over} ({x.size:.2g} {robot_model.units(x.joint)[0]} rms, p {probability(x.p)})"
         for x in wrong
     )
     return f"lack of fit: {'; '.join(each)}: sigma is too small"

@@ -73,7 +73,7 @@ class LogFacts:
     def notes(self) -> Iterator[str]:
         """Yield what is worth knowing of the whole log."""
         yield from self.repaired.words(self.joints)
-        yield f"torques stand out of their noise up to {content_end(self.log):.3g} Hz"
+        yield f"torques exceed their noise up to {content_end(self.log):.3g} Hz"
         dead = [row["joint"] for row in self.rows if row["tau"][0] == row["tau"][1]]
         if dead:
             yield f"the torque of {', '.join(dead)} never changes: is it logged?"

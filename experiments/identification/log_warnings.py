@@ -26,12 +26,13 @@ STILL = 1e-3
 
 def warnings_of_log(log: MotionLog, tree: KinematicTree) -> list[str]:
     """Return what is suspicious about a log: jumps, degrees, millimetres, places that a joint cannot reach, joints at rest."""
-    found, jumping = list(_of_jumps(log, tree)), {jump.joint for jump in _jumps(log)}
+    found, jumping, by_reason = list(_of_jumps(log, tree)), {jump.joint for jump in _jumps(log)}, dict[str, list[str]]()
     for j, (joint, q) in enumerate(zip(tree.joints, log.q.reshape(-1, log.n).T, strict=True)):
         ends = np.array([q.min(), q.max()])
         reason = "" if j in jumping else _reason(joint, ends)
         if reason:
-            found.append(f"{joint.name} goes from {ends[0]:.4g} to {ends[1]:.4g}{reason}")
+            by_reason.setdefault(reason, []).append(f"{joint.name} goes from {ends[0]:.4g} to {ends[1]:.4g}")
+    found += [f"{', '.join(each)}{reason}" for reason, each in by_reason.items()]  # all joints in degrees are one line
     dead = [joint.name for joint, tau in zip(tree.joints, log.tau.reshape(-1, log.n).T, strict=True) if not np.ptp(tau)]
     return found + ([f"the torque of {', '.join(dead)} never changes: is it logged?"] if dead else [])
 
@@ -70,10 +71,11 @@ def _reason(joint: Joint, ends: Array) -> str:
     low, high = joint.range
     slack = SLACK * (high - low) if np.isfinite(high - low) else SLACK
     span, room = float(np.ptp(ends)), min(high - low, MOST_TURNS * 2 * np.pi if joint.kind == "hinge" else np.inf)
-    unit, other, scale = ("rad", "degrees", np.pi / 180) if joint.kind == "hinge" else ("m", "millimetres", 1e-3)
+    hinge = joint.kind == "hinge"
+    unit, other, option, scale = ("rad", "degrees", "deg", np.pi / 180) if hinge else ("m", "millimetres", "mm", 1e-3)
     # In the other unit a joint moves farther than any does in its own.
     if span > 3 * room and scale * ends[0] >= low - slack and scale * ends[1] <= high + slack:
-        return f": are positions logged in {other}? They must be in {unit}"
+        return f": are positions logged in {other}? Then add --units q={option}"
     if ends[0] < low - slack or ends[1] > high + slack:
         order = "are joints in the order of the robot's file, and counted from its zero in its direction?"
         return f", out of its range, {low:.4g} to {high:.4g}: {order}"

@@ -219,8 +219,7 @@ def _require_seconds(path: Path, t: Array) -> None:
     step = float(np.median(np.diff(t))) if len(t) > 1 and np.isfinite(t).all() else 0.0
     if step >= SLOWEST:
         raise ExperimentError(
-            f"{path} has a sample every {step:.4g} s, if t is in s: is it in ms, microseconds or ns? Divide it by 1e3, 1e6 or "
-            "1e9"
+            f"{path} has a sample every {step:.4g} s, if t is in s: is it in ms, us or ns? Then add --units t=ms, t=us or t=ns"
         )
 
 

@@ -86,9 +86,7 @@ class Verdict:
 
     def _expected(self, j: int) -> str:
         noise, sigma = (self.validation.percent_of_level(x)[j] for x in (self.validation.noise, self.validation.open))
-        known = (
-            f"noise of this log makes {error_percentage(noise)}" if np.isfinite(noise) else "the noise of this log is not known"
-        )
+        known = f"noise accounts for up to {error_percentage(noise)}" if np.isfinite(noise) else "the noise is not known"
         return f"{known}, sigma of the parameters {error_percentage(sigma)}"
 
     def _left(self) -> Iterator[str]:

@@ -17,14 +17,14 @@ from identify import Array, Estimate
 
 WHY = (
     "Chain paper takes the paper's steps as they are printed, chain paper_masked leaves out what lies near reversals besides, "
-    "as the paper's school does; neither has the paper's trajectory, of which the paper gives the condition numbers alone. The "
+    "as the paper's school does. Neither uses the paper's trajectory: only its condition numbers are published. The "
     "explicit model's errors of friction are {paper:.2g} and {paper_masked:.2g} times the paper's (geometric means), those of "
     "ZZR1 {zzr1:.2g} times at most; single errors are up to {most:.0f} times the paper's. How errors scatter over motions: "
-    "--motions 3500. What makes those of chain paper, by taking it out (largest error in %):"
+    "--motions 3500. Causes of chain paper's errors, each removed in turn (largest error in %):"
 )
 
 EXACT = (
-    "Chain idbench has nothing left to err by here: the data are noise-free, and a 6th-order difference of a 5th-order move "
+    "Chain idbench is exact here: the data are noise-free, and a 6th-order difference of a 5th-order polynomial "
     "is exact. It shows that the models are right and the paper's limits were those of its filters, not how a real arm fares."
 )
 

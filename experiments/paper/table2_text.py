@@ -46,6 +46,6 @@ def _with_sigma(estimate: Estimate, i: int, truth: list[float]) -> tuple[str, st
     return (
         f"{estimate.X[i]:.4f}",
         f"{2 * estimate.own_sigma[i]:.2g}",
-        f"{estimate.relative_sigma_percent[i]:.2g}",
+        f"{estimate.paper_sigma_percent[i]:.2g}",
         percent(float(estimate.error_percent(truth)[i])),
     )

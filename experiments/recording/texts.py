@@ -15,14 +15,19 @@ def estimates_table(fit: Fit) -> str:
     """Return estimates, with error or sigma, as a markdown table."""
     table = EstimatesTable(fit)
     made = markdown(_title(fit), [" ".join(head) for head in table.heads], chain(table.rows(), table.whole()))
-    return f"{made}\n\n{table.legend}"
+    return f"{made}\n\n{_escaped(table.legend)}"
 
 
 def short_table(fit: Fit) -> str:
     """Return the estimates of the models alone, beside the truth if it is known, as a markdown table."""
     table, known = EstimatesTable(fit), ["true"] * (fit.truth is not None)
-    found = [f"{markdown(_title(fit), [*known, *fit.estimates], table.short())}", table.legend, *_pointers(fit)]
+    found = [f"{markdown(_title(fit), [*known, *fit.estimates], table.short())}", _escaped(table.legend), *_pointers(fit)]
     return "\n\n".join(filter(None, found))
+
+
+def _escaped(text: str) -> str:
+    """Return a text whose stars Markdown leaves alone."""
+    return text.replace("*", "\\*")
 
 
 def _pointers(fit: Fit) -> Iterator[str]:

@@ -61,7 +61,7 @@ class Shelf:
         if not known:
             return ""
         low, high = min(known, key=float), max(known, key=float)
-        return f", rms {high}" if low == high else f", rms ≤ {high}"
+        return f", rms {high}" if low == high else f", largest rms {high}"
 
     def parents(self, pattern: str) -> list[str]:
         """Return what the parts before the last of the matching entities are, each once."""

@@ -21,7 +21,9 @@ def _found(one: HeldOut | None) -> str:
         return "Result: not validated"
     model = leading({name: validation.rms for name, validation in one.torques.items()})
     worst = float(np.nanmax(np.nan_to_num(one.torques[model].percent, nan=0.0, posinf=np.inf)))
-    word = one.verdicts[model].word
+    word, wrong = one.verdicts[model].word, one.verdicts[model].wrong
+    if wrong:
+        return f"Result: {word} ({model} model): {wrong[0].partition(':')[0]}"
     return f"Result: {word} ({model} model), torque errors of at most {error_percentage(worst)} on {_short(one.title)}"
 
 

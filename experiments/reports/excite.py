@@ -10,6 +10,7 @@ from experiments.reports.excite_printed import lines
 from experiments.reports.html import rendered, svg
 from experiments.style import JOINTS
 from experiments.text import number, percentage
+from sim.limits.motion_limits import looser
 from sim.scenario.scenario_file import to_toml
 
 PLOTTED = 100.0
@@ -25,7 +26,7 @@ def report(found: Excited, command: str) -> str:
         title=f"A motion for {d.robot_model.robot.name}",
         design=d,
         headline=lines(found)[0],
-        notes=lines(found)[1:],
+        notes=[*lines(found)[1:], *looser(d.robot_model.robot, d.asked)],
         sigmas=_sigma_figure(found),
         motion=_motion_figure(found),
         told=_told_figure(found),
@@ -115,5 +116,5 @@ def _told_figure(found: Excited) -> str:
     panel.set_yticks(np.arange(len(names)), names, fontsize=6)
     panel.set_xlabel("time [s]")
     panel.grid(visible=False)
-    figure.colorbar(image, label="% of what is told")
+    figure.colorbar(image, label="% of the information")
     return svg(figure)

@@ -60,7 +60,7 @@ def torques_figure(one: HeldOut) -> str:
 def residuals_figure(one: HeldOut) -> str:
     """Return the residual torques of the first model on a held-out log over time, joint by joint, with the noise of the log."""
     rows, model = one.problem.rows, next(iter(one.torques))
-    figure, panels = _panels(rows.kinds, 1.1)
+    figure, panels = _panels(rows.kinds, 1.35)
     residual = rows.Y - rows.predicted(one.fit.estimates[model].X)
     for j, panel in enumerate(panels):
         own = rows.group == j

@@ -145,7 +145,7 @@ def print_held_out(console: Console, one: HeldOut | Unjudged, whole: Sequence[st
     joints = one.fit.robot_model.robot.joints
     simulated = any(one.position_error(model) is not None for model in torques)
     heads = [f"{model}\n{what}" for model in torques for what in ("rms", "%", "R2", "q rms")[: 3 + simulated]]
-    grid, first = new_table("", ["noise of\nthe log %", *heads]), next(iter(torques.values()))
+    grid, first = new_table("", ["noise,\nat most %", *heads]), next(iter(torques.values()))
     for j, joint in enumerate(joints):
         noise = percentage(first.percent_of_level(first.noise)[j])
         cells = (cell for model in torques for cell in _held_out_cells(one, model, j)[: 3 + simulated])

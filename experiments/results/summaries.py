@@ -22,7 +22,7 @@ def summarize(estimate: Estimate, truth: list[float] | None) -> dict[str, Any]:
         "relative_error_percent": None if truth is None else [finite(x) for x in estimate.relative_error_percent(truth)],
         "sigma": estimate.own_sigma.tolist(),
         "corrected_sigma": [finite(x) for x in estimate.calibrated_sigma],
-        "relative_sigma_percent": [finite(x) for x in estimate.relative_sigma_percent],
+        "relative_sigma_percent": [finite(x) for x in estimate.paper_sigma_percent],
         "condition_number": float(estimate.condition_number),
         "rows": int(estimate.row_count),
         "residual_rms": float(estimate.residual_rms),

@@ -117,8 +117,8 @@ def _sigmas(cells: Sequence[Cell]) -> str:
         whose = f" with chain {chain}" if len(chains) > 1 else ""
         shares.append(f"{np.nanmean(ours):.0f} %{whose} ({span}; the paper's sigma {np.nanmean(theirs):.0f} %)")
     if not shares:
-        return "There is no corrected sigma."
-    return f"Two corrected sigma hold the truth in {' and '.join(shares)} of cases, where 95 % is right."
+        return "Standard errors are not calibrated."
+    return f"The true value lies within two standard errors in {' and '.join(shares)} of cases; 95 % would be right."
 
 
 def failures(cells: Sequence[Cell]) -> str:

@@ -25,8 +25,8 @@ MANY = 16
 ACROSS = 3
 """Panels beside each other."""
 
-TICKS = 8
-"""Values of an axis that have room beside it."""
+TICKS, SMALL_TICKS = 8, 4
+"""Values of an axis that have room beside it, of a large panel and of a small one."""
 
 PANEL = 2.2
 """Height of a panel [inch]."""
@@ -48,7 +48,7 @@ def typical_figure(families: Mapping[str, Sequence[Cell]], axis: Axis, edges: in
         spare.set_visible(False)
     for panel, (title, cells) in zip(grid, families.items(), strict=False):
         for model, group in _models(cells).items():
-            x, y = _places(panel, group, axis, edges), np.array([100 * c.typical for c in group])
+            x, y = _places(panel, group, axis, edges, TICKS), np.array([100 * c.typical for c in group])
             ends = np.abs(100 * np.array([c.typical_interval for c in group]).T - y)
             panel.errorbar(x, y, ends, color=_color(model), label=model, lw=_width(cells, model), marker=".", capsize=2)
             if np.isfinite(least := np.array([100 * c.typical_least() for c in group])).any():
@@ -202,7 +202,7 @@ def _models(cells: Sequence[Cell]) -> dict[str, list[Cell]]:
     return groups
 
 
-def _places(panel: Panel, group: Sequence[Cell], axis: Axis, edges: int = 4) -> Array:
+def _places(panel: Panel, group: Sequence[Cell], axis: Axis, edges: int = 4, ticks: int = SMALL_TICKS) -> Array:
     """Return where the cells lie on an axis, logarithmic if its values are far apart, counted if they are words.
 
     What is written beside the axis are its own values.
@@ -219,7 +219,7 @@ def _places(panel: Panel, group: Sequence[Cell], axis: Axis, edges: int = 4) -> 
             panel.set_xscale("log")
         else:
             panel.set_xscale("symlog", linthresh=float(positive.min()))
-    some = numbers[:: 1 + len(numbers) // TICKS]
+    some = numbers[:: 1 + len(numbers) // ticks]
     written = [in_words(axis.field, x, edges).replace(" (", "\n(") for x in some.tolist()]
     panel.set_xticks(some.tolist(), labels=written, fontsize=7)
     panel.set_xticks([], minor=True)

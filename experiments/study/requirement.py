@@ -43,7 +43,7 @@ def _requirements(cells: Sequence[Cell], field: str, edges: int) -> Iterator[str
         enough = [k for k in range(len(weakest_first)) if all(cell.typical <= level for cell in weakest_first[k:])]
         if enough and enough[0] > 0:
             value = weakest_first[enough[0]].settings[field]
-            yield f"{100 * level:g} % takes {field} of at {'most' if rises else 'least'} {in_words(field, value, edges)}"
+            yield f"{100 * level:g} % requires {field} of at {'most' if rises else 'least'} {in_words(field, value, edges)}"
 
 
 def in_words(field: str, value: object, edges: int = 4) -> str:

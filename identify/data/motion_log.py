@@ -233,4 +233,4 @@ def _require_finite(name: str, values: Array) -> None:
         return
     *run, k, j = (int(i) for i in np.argwhere(~np.isfinite(values))[0])
     where = f"sample {k}" + (f" of joint {j + 1}" if values.shape[-1] > 1 else "") + (f" of run {tuple(run)}" if run else "")
-    raise LogError(f"{name} is {values[(*run, k, j)]} at {where}; remove or repair such samples first")
+    raise LogError(f"{name} is {values[(*run, k, j)]} at {where}; remove or repair such samples first (idbench: --resample)")

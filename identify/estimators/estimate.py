@@ -30,7 +30,7 @@ class Estimate:
     X : Array, shape (..., p)
         Estimated parameters; NaN where the rows cannot be solved.
     own_covariance : Array, shape (..., p, p)
-        Covariance of the error of X, as the estimator has it: of OLS and WLS as if rows were independent (section 7.3).
+        Covariance of the error of X as the estimator computes it; OLS and WLS assume independent rows (section 7.3).
     solution : AbstractSolution, optional
         How X follows from the rows; without it standard errors are the estimator's own.
     calibrated : Array, shape (..., p, p), optional
@@ -38,11 +38,11 @@ class Estimate:
     levels : NoiseLevels, optional
         The noise of the logs as the estimator found it; by default that of the problem.
     fits : mapping of tuple of int to JointFit
-        Of maximum likelihood, motion and parameters of every run that could be solved, () of a single one.
+        For `ML`: fitted motion and parameters of each solved run, by its index; key () if there is one run.
     failures : mapping of tuple of int to str
-        Why runs have no estimate, beside rows that do not determine it.
+        Reasons, other than rank deficiency, why a run has no estimate.
     path : tuple of Array, shape (..., p)
-        Of estimators that go on from one round to the next: where the first began, and what each found.
+        Iterates of iterative estimators, the start first.
     simulations : int array, shape (...), optional
         How often the robot was simulated.
     """
@@ -92,7 +92,7 @@ class Estimate:
 
     @classmethod
     def of_fit(cls, problem: Problem, fit: Fit, *, scaled: bool) -> Self:
-        """Return the estimate of a least-squares solution; `scaled` if its rows were divided by what their noise makes."""
+        """Return the estimate of a least-squares solution; `scaled` if its rows were divided by their noise."""
         inverse = fit.factor.inverse(problem.factors.together.status == Status.OK)
         covariance = _paper_covariance(fit.factor, fit.X, inverse)
         return cls(problem, frozen(fit.X), frozen(covariance), OfWeightedRows(fit.weight, inverse, scaled))
@@ -162,7 +162,7 @@ class Estimate:
         return _roots(self.covariance)
 
     @property
-    def relative_sigma_percent(self) -> Array:
+    def paper_sigma_percent(self) -> Array:
         """%sigma of section 7.3, 100 sigma / |X| with the estimator's own sigma, shape (..., p)."""
         zero = self.X == 0
         return np.where(zero, np.inf, 100 * self.own_sigma / np.where(zero, 1.0, np.abs(self.X)))

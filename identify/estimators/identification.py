@@ -47,7 +47,7 @@ def identify(
     simulation : Simulation, optional
         How the robot is simulated, for estimators that need it.
     throw : bool
-        Raise if a run cannot be solved; otherwise the estimate's `status` says it.
+        Raise if a run cannot be solved; otherwise `status` reports it.
 
     Returns
     -------
@@ -156,7 +156,7 @@ def estimate(problem: Problem, estimator: AbstractEstimator, *, throw: bool = Tr
     estimator : AbstractEstimator
         How it is solved.
     throw : bool
-        Raise if a run cannot be solved; otherwise the estimate's `status` says it.
+        Raise if a run cannot be solved; otherwise `status` reports it.
     """
     _require(estimator, AbstractEstimator, 'an estimator, such as ESTIMATORS.create("OLS")')
     with one_thread(), blamed():

@@ -237,7 +237,7 @@ class Problem:
             One for each log of this problem, of the same length.
         weights : {"measured", "own"}
             Whether instants are weighted as in the measured logs, or by the mask of the other log. A simulated motion reverses
-            at slightly other instants: with a mask of its own, its rows would be of other stretches (with DIDIM, errors of 1.2 %
+            at slightly other instants: with a mask of its own, its rows would be of other stretches (with DIDIM, errors of 1.2
             instead of 0.024 %).
 
         Raises

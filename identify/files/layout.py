@@ -169,8 +169,8 @@ class LogLayout:
             lines += [f'meaning = "{self.torque.meaning}"', f"delay = {self.torque.delay!r}"]
         else:
             lines += ['# meaning = "held"  # or "instantaneous", "averaged": see docs/torque.md', "# delay = 0.0  # [s]"]
-        if self.gain:
-            lines += [f"gain = {list(self.gain)}"]
+        unit = self.tau.unit or SI["tau"]
+        lines += [f"gain = {list(self.gain)}"] if self.gain else [f"# gain = [1.0]  # N m per {unit}, of all joints or of each"]
         if self.motors:
             lines += ["", "[motors]", f"matrix = {[list(row) for row in self.motors]}"]
         if self.rows:

@@ -43,10 +43,10 @@ SPEED, ACCELERATION = 5.0, 25.0
 class BaseParameters:
     """The grouping of a basis: X_base = K X_standard, from the columns of the explicit model at random states.
 
-    A parameter whose column depends on those before it is grouped with them; one without effect has no part. So parameters stay
-    that come first in the order of the basis (W. Khalil and E. Dombre, "Modeling, Identification and Control of Robots", 2002,
-    chapter 9; numerically M. Gautier, "Numerical calculation of the base inertial parameters of robots", J. Robotic Systems 8
-    (1991) 485-506).
+    A parameter whose column depends on those before it is grouped with them; one without effect is dropped. The first
+    parameters in the order of the basis are kept (W. Khalil and E. Dombre, "Modeling, Identification and Control of Robots",
+    2002, chapter 9; numerically M. Gautier, "Numerical calculation of the base inertial parameters of robots", J. Robotic
+    Systems 8 (1991) 485-506).
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ def as_csv(logs, tmp_path):
 def test_times_in_milliseconds(idbench, as_csv):
     code, _, err = idbench("identify", as_csv(t=lambda t: 1e3 * t), *NEEDED, "--torque", "held")
     assert code == 2
-    assert "has a sample every 4 s, if t is in s: is it in ms, microseconds or ns?" in err
+    assert "has a sample every 4 s, if t is in s: is it in ms, us or ns?" in err
 
 
 def test_wrapped_angles_are_refused_and_unwrapped_when_asked(idbench, as_csv):

@@ -29,7 +29,7 @@ def test_robots_that_do_not_fit(idbench, logs, robot, message):
 def test_a_log_in_degrees_is_pointed_out(idbench, changed):
     path = changed(q=np.rad2deg)
     _, out, err = idbench("identify", path, "--robot", "puma560", "--model", "explicit")
-    assert "are positions logged in degrees? They must be in rad" in out + err
+    assert "are positions logged in degrees? Then add --units q=deg" in out + err
 
 
 @pytest.mark.thorough
@@ -106,4 +106,4 @@ def test_a_slide_in_millimetres_is_pointed_out(idbench, tmp_path, arm):
     log = read_log(tmp_path / "run" / "log.parquet")
     write_log(MotionLog(log.fs, log.q * [1, 1000], log.tau, log.torque), tmp_path / "mm.parquet")
     _, out, err = idbench("identify", "mm.parquet", "--robot", "arm.xml", "--model", "explicit")
-    assert "are positions logged in millimetres? They must be in m" in out + err
+    assert "are positions logged in millimetres? Then add --units q=mm" in out + err

@@ -43,7 +43,7 @@ def test_estimate_and_covariance_are_the_textbooks(rng):
     X, squares, _, values = np.linalg.lstsq(W, Y, rcond=None)
     np.testing.assert_allclose(estimate.X, X, rtol=1e-12)
     np.testing.assert_allclose(estimate.own_covariance, squares[0] / 197 * np.linalg.inv(W.T @ W), rtol=1e-10)
-    np.testing.assert_allclose(estimate.relative_sigma_percent, 100 * estimate.own_sigma / np.abs(X), rtol=1e-12)
+    np.testing.assert_allclose(estimate.paper_sigma_percent, 100 * estimate.own_sigma / np.abs(X), rtol=1e-12)
     np.testing.assert_allclose(estimate.residual, Y - W @ X, atol=1e-12)
     assert estimate.condition_number == pytest.approx(values[0] / values[-1], rel=1e-12)
     assert estimate.residual_rms == pytest.approx(np.sqrt(np.mean((Y - W @ X) ** 2)), rel=1e-12)
@@ -145,7 +145,7 @@ def test_an_estimator_may_bring_its_own_covariance(rng):
     one = Given(rows(rng.normal(size=(50, 3)), rng.normal(size=50)))
     estimate = Estimate.judge(one, np.array([1.0, 2.0, -4.0]), np.diag([1.0, 4.0, 16.0]))
     np.testing.assert_array_equal(estimate.own_sigma, [1, 2, 4])
-    np.testing.assert_array_equal(estimate.relative_sigma_percent, [100, 100, 100])
+    np.testing.assert_array_equal(estimate.paper_sigma_percent, [100, 100, 100])
     np.testing.assert_array_equal(estimate.relative_error_percent([2.0, 2.0, -2.0]), [50, 0, 100])
 
 

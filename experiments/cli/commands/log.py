@@ -36,7 +36,8 @@ def show_log(options: ShowLog) -> None:
     layout, facts = found.layout, LogFacts(columns)
     with shown(page):
         _print_layout(page, layout, found.doubts)
-        _print_facts(page, facts)
+        raw = needs_gain(layout.tau.unit) and not layout.gain
+        _print_facts(page, facts, str(layout.tau.unit) if raw else "N m")
         for note in facts.notes():
             page.print(Text(note), soft_wrap=True)
         page.found |= {**facts.summary(), "layout": layout.text, "doubts": list(found.doubts)}
@@ -100,8 +101,8 @@ def _print_layout(page: Page, layout: LogLayout, doubts: Sequence[str]) -> None:
         page.print(Text(f"look: {doubt}"), soft_wrap=True)
 
 
-def _print_facts(page: Page, facts: LogFacts) -> None:
-    heads = ["from [rad]", "to", "qd max", "at rest %", "noise of q", "step", "bits", "torque from", "to", "noise [N m]"]
+def _print_facts(page: Page, facts: LogFacts, unit: str) -> None:
+    heads = ["from [rad]", "to", "qd max", "at rest %", "noise of q", "step", "bits", f"tau [{unit}]", "to", f"noise [{unit}]"]
     grid = new_table("", heads)
     for row in facts.rows:
         step = row["encoder_step"]

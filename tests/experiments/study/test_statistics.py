@@ -142,7 +142,7 @@ def test_the_answer_names_the_better_model_and_both_sigmas(rng):
     assert printed.count(". ") == 1  # two sentences
     few = [cell(error[:4], "explicit"), cell(3 * error[:4], "power")]
     assert answer(few).startswith("Least typical error in 1 of 1 settings: explicit (too few runs for a test)")
-    assert "Two corrected sigma hold the truth in" in printed
+    assert "The true value lies within two standard errors in" in printed
 
 
 def test_an_answer_without_estimates():
@@ -260,8 +260,8 @@ def test_the_interval_of_the_typical_error_holds_it(rng):
 def test_what_an_error_takes_is_said_with_the_bits_of_an_encoder(rng):
     errors = {256.0: 0.2, 1024.0: 0.03, 4096.0: 0.004, 16384.0: 0.0005}
     group = [cell(size * TRUTH * rng.normal(0, 1, (400, 2)), settings={"encoder.lines": x}) for x, size in errors.items()]
-    asked = "a typical error of 1 % takes encoder.lines of at least 4096 (14 bits), 0.1 % takes encoder.lines of at least 16384"
+    asked = "a typical error of 1 % requires encoder.lines of at least 4096 (14 bits), 0.1 % requires"
     assert requirements(group).startswith(asked)
     rising = [replace(c, settings={"torque.noise": 1 / c.settings["encoder.lines"]}) for c in group]
-    assert "0.1 % takes torque.noise of at most 6.10352e-05" in requirements(rising)
+    assert "0.1 % requires torque.noise of at most 6.10352e-05" in requirements(rising)
     assert requirements(group[:1]) == ""
