@@ -1,4 +1,4 @@
-"""Which errors are told in a line, and which are faults of idbench, whose traceback goes into a file."""
+"""Which errors are reported in a line, and which are faults of idbench, whose traceback goes into a file."""
 
 import sys
 import tempfile

@@ -13,7 +13,7 @@ _within: ContextVar[tuple[str, ...]] = ContextVar("within", default=())
 
 @contextmanager
 def listening(listener: Listener) -> Iterator[None]:
-    """Let `listener` hear what is told in the block, in this thread."""
+    """Let `listener` hear the progress of the block, in this thread."""
     token = _listener.set(listener)
     try:
         yield

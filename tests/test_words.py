@@ -21,6 +21,22 @@ IDIOMS = {
     r"that of the median": "relative to the median",
     r"hang together": "correlated",
     r"unseen motion|has not seen": "held-out",
+    r"delay denied": "assuming no delay",
+    r"law that was found": "estimated law",
+    r"stands beside what": "flags a value",
+    r"nothing tells why": "the residuals hide their cause",
+    r"sticks? out": "is above",
+    r"torque of an ampere": "torque constant",
+    r"chance would have": "significant",
+    r"floor counts": "floor assumed at",
+    r"twice what it is there": "doubling",
+    r"holds? the motion back": "active limit",
+    r"\bhangs on (the|its|what)\b": "depends on",
+    r"leaves? over\b": "residual",
+    r"(stands|turns) or (turns|stands)": "rests or reverses",
+    r"knows? better": "less noisy",
+    r"stands twice": "is given twice",
+    r"\b(is|are) told\b": "is reported",
 }
 """Each with what to say instead."""
 

@@ -20,7 +20,7 @@ WIDTH = 144
 
 @final
 class Page(Console):
-    """A console that keeps what is printed until it is shown; what cannot be shown is told at the end.
+    """A console that keeps what is printed until it is shown; what cannot be shown is reported at the end.
 
     Parameters
     ----------

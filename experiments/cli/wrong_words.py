@@ -69,7 +69,7 @@ def _said(event: parser.ParseErrorEvent, words: Sequence[str], commands: Mapping
             said = f"{_called(event.argument)} needs {_wanted(event.argument)}: {help_} tells more"
         case parser.MissingArgs():
             missing = ", ".join(_called(each.arg) for each in event.missing_arguments)
-            said = f"{name}: {missing} is missing; {help_} tells more"
+            said = f"{name} needs {missing}; {help_} tells more"
         case parser.UnrecognizedArgs():
             said = _unknown(event.tokens[0], name, commands) + help_ + " lists all"
         case _:

@@ -41,7 +41,7 @@ class AbstractExcitation(ABC):
         """Return the trajectory, of a scenario, of coefficients that are scaled, about the middle of the ranges [rad]."""
 
     def starts(self, rng: np.random.Generator, plan: Plan, duration: float, frequency: float, count: int) -> list[Array]:
-        """Return coefficients to begin the search with; random ones unless a kind knows better."""
+        """Return coefficients to begin the search with; random ones unless a kind has others."""
         return [self.random(rng, plan, duration, frequency) for _ in range(count)]
 
 

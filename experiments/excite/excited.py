@@ -23,7 +23,7 @@ from sim.scenario.scenario_file import to_dict
 from sim.trajectories.reference import Reference
 
 BINDING = 0.9
-"""Share of a limit from which on it counts as what holds the motion back."""
+"""Share of a limit from which on it counts as active."""
 
 STRETCHES = 20
 """Parts of a motion whose share in the information about each parameter is shown."""
@@ -160,7 +160,7 @@ class Excited:
 
     @property
     def binding(self) -> list[str]:
-        """Which limits hold the motion back, in words."""
+        """Active limits, in words."""
         joints = self.use.joints
         found = []
         for name, largest in self.use.largest.items():

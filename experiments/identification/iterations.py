@@ -26,7 +26,7 @@ def words_of_iterations(fit: Fit) -> Iterator[str]:
             yield (
                 f"{model}: does noise in W matter here? {'Yes' if test.matters else 'No'}: without instruments "
                 f"{fit.basis.names[k]} is off by {abs(test.off[k]):.2g} sigma"
-                + (" more than chance would have it" if test.probability < LEVEL else ", as chance has it")
+                + (" (significant)" if test.probability < LEVEL else " (not significant)")
                 + f" (Durbin-Wu-Hausman: chi2 = {test.statistic:.3g}, {int(test.freedom)} degrees of freedom, "
                 f"p = {test.probability:.2g})"
             )

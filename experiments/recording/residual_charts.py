@@ -119,7 +119,7 @@ class ResidualCharts:
             chart.line(name, v, torque, self._color(name), 2.5 if name == "explicit" else 1.2)
 
     def _spectrum(self, found: Spectrum) -> None:
-        """Send spectra of what models leave over in a row, what the noise found predicts, and the cut-offs of the chain."""
+        """Send spectra of the residuals of a row, the prediction from the estimated noise, and the cut-offs of the chain."""
         models = [density for name, density in found.lines.items() if name not in COLORS]
         shown = [np.maximum(density, FAINTEST * max(x.max() for x in models)) for density in found.lines.values()]
         y = decades(f"residual of {found.row} [{found.unit}/√Hz]", *shown)

@@ -20,6 +20,9 @@ from experiments.reports.leading import in_lines, leading
 from experiments.text import WORTHLESS, new_table, percentage, print_titled
 from identify import AsLogged, Estimate
 
+HIDDEN = 0.5
+"""Share of an encoder's rounding below which noise of the positions was not found."""
+
 BARS, BAR_HEAD = 8, "0.01..100"
 """Cells of the bar of a standard error, and what is written above: a full bar is 100 % of the value, an empty one 0.01 %."""
 
@@ -120,7 +123,8 @@ def _rotors(fit: Fit) -> Iterator[str]:
 
 def _noise(fit: Fit) -> str:
     """Return the noise of a log in words, joint by joint."""
-    torque, position = (" ".join("?" if x is None else f"{x:.2g}" for x in fit.noise[name]) for name in ("torque", "position"))
+    torque = " ".join("?" if x is None else f"{x:.2g}" for x in fit.noise["torque"])
+    position = " ".join(_position_noise(*each) for each in zip(fit.noise["position"], fit.noise["encoder_step"], strict=True))
     slides = [joint.kind == "slide" for joint in fit.robot_model.tree.joints]
     force, length = ("N m, N", "rad, m") if any(slides) else ("N m", "rad")
     words = f"noise found in the log: torque {torque} {force}, position {position} {length}"
@@ -130,6 +134,14 @@ def _noise(fit: Fit) -> str:
     each = zip(steps, slides, strict=True)
     bits = " ".join("-" if slide else f"{log2(2 * pi / step):.1f}" if step else "?" for step, slide in each)
     return f"{words}; encoder steps {' '.join(f'{x:.3g}' if x else '?' for x in steps)} {length} ({bits} bits)"
+
+
+def _position_noise(level: float | None, step: float | None) -> str:
+    """Return a level as text; one below the rounding of the encoder was hidden by the noise of the torque."""
+    if level is None:
+        return "?"
+    rounding = (step or 0.0) / 12**0.5
+    return f"<{rounding:.2g}" if level < HIDDEN * rounding else f"{level:.2g}"
 
 
 def print_held_out(console: Console, one: HeldOut | Unjudged, whole: Sequence[str]) -> None:

@@ -1,4 +1,4 @@
-"""Spectra of what models leave over, joint by joint, beside those of the noise that was found."""
+"""Spectra of the residuals, joint by joint, beside those of the estimated noise."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

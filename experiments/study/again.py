@@ -22,7 +22,7 @@ def compare_again(store: Store, run: int) -> tuple[list[dict[str, Any]], bool]:
         other = [f"{name} {there[name]!r}, now {here.get(name)!r}" for name in there if not _same(here, there, name)]
         if other:
             what = f"{there['chain']}, {there['estimator']}, {there['model']}"
-            raise StudyError(f"run {run} of {store.folder} does not come out again ({what}): {'; '.join(other[:3])}")
+            raise StudyError(f"run {run} of {store.folder} is not reproduced ({what}): {'; '.join(other[:3])}")
     return made, bool(known)
 
 

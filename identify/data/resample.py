@@ -170,7 +170,7 @@ def _parts(sound: LogColumns, clock: Clock, stretches: list[tuple[float, float]]
 
 
 def _uniform(part: LogColumns, torque: TorqueChannel, fs: float) -> tuple[MotionLog, Velocities | None]:
-    """Return a piece without gaps as a log, its positions improved by velocities that know better."""
+    """Return a piece without gaps as a log, its positions improved by velocities that are less noisy."""
     steps = np.diff(part.t)
     as_is = part.t_tau is None and np.abs(steps * fs - 1).max() < 1e-3
     log = MotionLog(fs, part.q, part.tau, torque) if as_is else resample(part.t, part.q, part.tau, torque, fs, part.t_tau)

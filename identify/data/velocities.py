@@ -1,4 +1,4 @@
-"""Logged velocities: compared with differences of the positions, and used where they know better."""
+"""Logged velocities: compared with differences of the positions, and used where they are less noisy."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ ORDER = 6
 """Differences of a signal after which next to nothing of a motion is left, and of white noise much."""
 
 HIGHEST = 10.0
-"""Frequency [Hz] above which velocities that know better do not matter: little of a motion is there."""
+"""Frequency [Hz] above which less noisy velocities do not matter: little of a motion is there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ class Velocities:
 
     @property
     def used(self) -> npt.NDArray[np.bool_]:
-        """Whether the velocities of each joint know better than differences do."""
+        """Whether the velocities of each joint are less noisy than differences."""
         return np.logical_and(self.consistent, self.crossover < min(HIGHEST, self.fs / 10))
 
     def words(self, joints: tuple[str, ...]) -> list[str]:

@@ -19,6 +19,9 @@ from identify.files.units import needs_gain
 CLOCKS = 1e6
 """Times [s] beyond this are those of a calendar: logs count from their beginning."""
 
+SHOWN = 20
+"""Columns of a file that a message names."""
+
 MIN_GAIN, MAX_GAIN = 1e-9, 1e9
 """Sizes of gains beyond which they are slips."""
 
@@ -87,11 +90,13 @@ def standard_layout(path: Path, table: LogTable) -> LogLayout:
     ends = [f"_{joint}" for joint in joints] or [str(j + 1) for j in range(max(n, 1))]
     needed = ["t", *(f"q{end}" for end in ends), *(f"tau{end}" for end in ends)]
     present = [name for name in names if re.fullmatch(r"t|(q|tau)_.+" if joints else r"t|(q|tau)\d+", name)]
-    if wrong := set(needed) ^ set(present):
+    missing, unexpected = [x for x in needed if x not in present], [x for x in present if x not in needed]
+    if missing or unexpected:
+        wrong = [f"{what} {', '.join(x)}" for what, x in (("missing:", missing), ("unexpected:", unexpected)) if x]
         raise LogError(
-            f"{path} must have a header with the columns {', '.join(needed)}; missing, left over or twice: "
-            f"{', '.join(sorted(wrong))}; or say what its columns are in a file log.toml beside it: uv run idbench log {path} "
-            "--write makes one to start from"
+            f"{path} must have a header with the columns {', '.join(needed)}; {'; '.join(wrong)}; its columns: "
+            f"{', '.join(names[:SHOWN])}; or say what they are in a file log.toml beside it: uv run idbench log {path} --write "
+            "makes one to start from"
         )
     qd = tuple(f"qd{end}" for end in ends)
     velocities = Source(qd) if set(qd) <= set(table.columns) else Source()
@@ -159,9 +164,10 @@ class _Files:
     def _gain(self, n: int) -> Array:
         gain = self.layout.gain
         if needs_gain(self.layout.tau.unit) and not gain:
+            unit = self.layout.tau.unit
             raise LogError(
-                f"{self.log}: efforts in {self.layout.tau.unit} are no torques: state gain = [...] in [torque] of its "
-                "log.toml, or --gain, N m a unit of each joint"
+                f"{self.log}: tau is in {unit}, no torque: give the gain of each joint in N m/{unit} with --gain, or as "
+                "gain = [...] in [torque] of its log.toml"
             )
         if gain and len(gain) not in (1, n):
             raise LogError(f"{self.log}: {len(gain)} gains for {n} joints: give one, or one per joint")

@@ -4,7 +4,7 @@
 
 Averaged drive, 14- and 16-bit encoders, PD loop at 100 Hz, every run with a motion of its own. Both take the same threads; half
 of the bare steps come before the study and half after, so that the ratio holds when the machine's speed drifts. Then 256 runs
-on two worker processes; their start is told apart. Peak memory is that of this process.
+on two worker processes; their start is given separately. Peak memory is that of this process.
 """
 
 import resource

@@ -1,4 +1,4 @@
-"""What authors begin with runs as it is; a plug-in that breaks its contract is told where."""
+"""What authors begin with runs as it is; a plug-in that breaks its contract is reported where."""
 
 import subprocess
 import sys

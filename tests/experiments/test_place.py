@@ -128,7 +128,7 @@ def test_errors_of_others_are_not_called_errors_of_the_folder(tmp_path):
 
 
 def test_two_runs_into_one_folder_at_once(tmp_path):
-    """The second is told before its work; the first loses nothing."""
+    """The second is refused before its work; the first loses nothing."""
     folder = ResultsFolder(tmp_path / "out", "run", "idbench run mine")
     with folder.held():
         with pytest.raises(ResultsError, match="another process is writing its results to"), folder.held():

@@ -133,7 +133,7 @@ def test_currents_ask_for_a_gain(tmp_path):
     text(path, ["t", *(f"q{j}" for j in (1, 2, 3)), *(f"current_{j}" for j in (1, 2, 3))], [T, Q, TAU / 5])
     layout = guess(path).layout
     assert layout.tau.unit == "A"
-    with pytest.raises(LogError, match=r"efforts in A are no torques: state gain"):
+    with pytest.raises(LogError, match=r"tau is in A, no torque: give the gain"):
         read_columns(path, layout)
     np.testing.assert_allclose(read_columns(path, replace(layout, gain=(5.0,))).tau, TAU)
     with pytest.raises(LogError, match="2 gains for 3 joints"):

@@ -1,4 +1,4 @@
-"""A test of lack of fit: rare where the model is right, sure where it is not, and it names what the torque hangs on."""
+"""A test of lack of fit: rare where the model is right, sure where it is not, and it names what the torque depends on."""
 
 from dataclasses import replace
 

@@ -45,7 +45,7 @@ def test_unusable_files_are_refused(tmp_path, rng):
     with pytest.raises(LogError, match="cannot read the log"):
         read_log(tmp_path / "text.parquet")
     parquet.write_table(pa.table({"t": [0.0, 0.1], "q1": [0.0, 1.0], "q2": [0.0, 1.0]}), tmp_path / "half.parquet")
-    with pytest.raises(LogError, match="missing, left over or twice: tau1, tau2"):
+    with pytest.raises(LogError, match="missing: tau1, tau2"):
         read_log(tmp_path / "half.parquet")
     runs = MotionLog(100, rng.normal(size=(2, 9, 1)), rng.normal(size=(2, 9, 1)), TorqueChannel("held"))
     with pytest.raises(LogError, match="a file holds one run"):
@@ -55,7 +55,7 @@ def test_unusable_files_are_refused(tmp_path, rng):
 @pytest.mark.parametrize("names", [("t", "q1", "q3", "tau1", "tau3"), ("t", "q1", "tau1", "tau2"), ("q1", "tau1")])
 def test_columns_that_do_not_pair_up_are_refused(tmp_path, names):
     parquet.write_table(pa.table({name: np.arange(9) / 10 for name in names}), tmp_path / "log.parquet")
-    with pytest.raises(LogError, match="missing, left over or twice"):
+    with pytest.raises(LogError, match="missing: |unexpected: "):
         read_log(tmp_path / "log.parquet", TorqueChannel("held"))
 
 

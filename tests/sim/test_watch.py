@@ -61,7 +61,7 @@ def test_it_is_heard_while_the_run_goes_on():
 
 @pytest.mark.parametrize("name", ["averaged", "late", "approach"])
 def test_the_mean_current_is_the_mean_torque_over_the_torque_constant(name):
-    """Without ripple: what the motor's torque was is told by the run, what its current was by the drive."""
+    """Without ripple: the motor's torque comes from the run, its current from the drive."""
     heard = []
     run = simulate(scenario(**DRIVES[name]), watch=Watch(heard.append))
     K = run.robots[0].motors.K

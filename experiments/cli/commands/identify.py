@@ -118,8 +118,9 @@ def _fitted(options: Identify, request: Request, stated: dict[str, Any]) -> Fit:
     try:
         return fit(loaded.request, logs)
     except IdentificationError as error:
-        doubts = [f"warning: {doubt}" for log in logs.fitted for doubt in warnings_of_log(log, request.robot_model.tree)]
-        raise ExperimentError("; ".join([str(error), *doubts])) from error
+        doubts = dict.fromkeys(doubt for log in logs.fitted for doubt in warnings_of_log(log, request.robot_model.tree))
+        why = f"; what is suspicious: {'; '.join(doubts)}" if doubts else ""
+        raise ExperimentError(f"{error}{why}") from error
 
 
 def _truth(stated: dict[str, Any], request: Request) -> dict[str, float] | None:

@@ -133,7 +133,7 @@ def _alone(scenario: str, study: Path | None, index: int | None) -> str:
 
 
 def _again(page: Page, folder: Path | None, index: int | None, method: int | None) -> tuple[Scenario, Method]:
-    """Return the scenario of a run of a study, whose rows come out again, and the method by which it is identified."""
+    """Return the scenario of a run of a study, which is reproduced, and the method by which it is identified."""
     from experiments.study.again import compare_again
     from experiments.study.store import Store
 

@@ -162,7 +162,7 @@ def test_the_table_and_the_chart_of_parameters_tell_the_errors(recorded):
 
 
 def test_friction_and_residuals_are_charted_for_each_joint(recorded, reading):
-    """The law that was found goes through the dots; the residual's mean is that of the dots' bins."""
+    """The estimated law goes through the dots; the residual's mean is that of the dots' bins."""
     there = reading.entities(recorded.folder / "recording.idbench-GLS.rrd")
     for joint in ("joint1", "joint2"):
         for kind, lines in (("friction", ("explicit", "implicit", "true")), ("over_velocity", ("mean_explicit",))):

@@ -51,7 +51,7 @@ def test_a_run_with_other_bits_is_told(small, tmp_path, run_study, monkeypatch):
     rows = store.rows_of(13)
     rows[2]["Fv1"] *= 1 + 1e-15
     monkeypatch.setattr(Store, "rows_of", lambda self, run: rows)
-    with pytest.raises(StudyError, match=r"run 13 of .* does not come out again \(idbench, GLS, explicit\): Fv1"):
+    with pytest.raises(StudyError, match=r"run 13 of .* is not reproduced \(idbench, GLS, explicit\): Fv1"):
         compare_again(store, 13)
 
 

@@ -95,7 +95,7 @@ def test_many_pairs_are_corrected(rng):
 
 
 def test_the_best_of_many_can_be_significant(rng):
-    """22 methods make 231 pairs: the best is told from all others, which are alike."""
+    """22 methods make 231 pairs: the best differs from all others, which are alike."""
     group = [cell(rng.normal(size=(25, 2)) * (0.01 if k == 0 else 1.0), f"model {k}") for k in range(22)]
     sure = [d for d in differences(group) if d.p < SURE]
     assert len(sure) == 21
