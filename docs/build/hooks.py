@@ -1,6 +1,7 @@
 """Pages of the site that are made of the code: commands, settings, the Python reference, notebooks."""
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -61,7 +62,8 @@ def commands() -> str:
 
 def _summary(text: str) -> str:
     """Return the first sentence of a help text, between the usage and the options."""
-    return " ".join(text.split("\n\n")[1].split()).split(". ")[0].rstrip(".").replace("|", "&#124;") + "."
+    whole = " ".join(text.split("\n\n")[1].split())
+    return re.split(r"(?<!\.)\. ", whole)[0].rstrip(".").replace("|", "&#124;") + "."
 
 
 def _help(name: str) -> str:
