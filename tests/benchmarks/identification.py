@@ -55,7 +55,7 @@ def main() -> None:
 
     for name in CHAINS:
         chain = CHAINS.create(name)
-        for estimator, sigma in (("WLS", "sigma"), ("WLS", "corrected_sigma"), ("GLS", "sigma")):
+        for estimator, sigma in (("WLS", "own_sigma"), ("WLS", "calibrated_sigma"), ("GLS", "own_sigma")):
             ours(chain, estimator, sigma)
             pairs = np.array(
                 [(seconds(lambda c=chain, e=estimator, s=sigma: ours(c, e, s)), seconds(peer)) for _ in range(RUNS)]

@@ -67,7 +67,7 @@ def compared(motion: str, bits: int, torque: float, logs: np.ndarray) -> dict[st
         start = time.perf_counter()
         fit = estimator.fit(problem, throw=False)
         took, known = time.perf_counter() - start, np.isfinite(fit.X).all(axis=-1)
-        z = (fit.X - exact.X)[known] / fit.sigma[known]
+        z = (fit.X - exact.X)[known] / fit.own_sigma[known]
         found[name] = {
             "typical": percent((fit.X[known] - exact.X) / exact.X),
             "coverage": float(100 * np.mean(np.abs(z) < 2)),

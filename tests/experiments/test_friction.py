@@ -96,7 +96,7 @@ def test_the_log_says_which_law(tmp_path, monkeypatch, capsys):
         == 0
     )
     out = capsys.readouterr().out
-    assert re.search(r"friction of joint1: viscous \+ coulomb \+ stribeck \(stribeck takes \d+ %", out)
+    assert re.search(r"friction of joint1: viscous \+ coulomb \+ stribeck \(stribeck explains \d+ %", out)
     compared = json.loads((tmp_path / "found" / "summary.json").read_text())["friction"]
     assert {(c["joint"], c["law"]) for c in compared if c["taken"]} >= {(1, "stribeck")}
     assert "beyond the speeds of the log" in (tmp_path / "found" / "report.html").read_text()

@@ -170,7 +170,7 @@ def test_headers(header, message, csv, complaint):
         ("identify x --cutof 3", "identify has no option --cutof (did you mean '--cutoff'?)"),
         ("search --seed abc", "--seed abc: give a whole number"),
         ("run a b", "run takes no further word 'b'"),
-        ("new", "new: what, name is missing"),
+        ("new", "new needs what, name"),
     ],
 )
 def test_words(words, message, complaint):

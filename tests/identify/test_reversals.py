@@ -135,7 +135,7 @@ def test_errors_are_near_the_bound_that_knows_friction_through_reversals(motion,
     used, masked = (fitted(q, tau, bits, 0.0, estimator) for estimator in (USED, MASKED))
     assert typical(used) < 2.2 * bound
     assert typical(used) < 0.8 * typical(masked)
-    assert np.mean(np.abs(used.X - exact.X) < 2 * used.sigma) > 0.9
+    assert np.mean(np.abs(used.X - exact.X) < 2 * used.own_sigma) > 0.9
 
 
 @pytest.mark.thorough
@@ -164,7 +164,7 @@ def test_where_torque_noise_rules_little_is_gained_and_nothing_lost():
     q, _, tau = logged("series", "coulomb")
     used, masked = (fitted(q, tau, 16, 0.01, estimator) for estimator in (USED, MASKED))
     assert typical(used) < 1.02 * typical(masked)
-    assert np.sqrt(np.mean(((used.X - exact.X) / used.sigma) ** 2)) == pytest.approx(1.0, abs=0.25)
+    assert np.sqrt(np.mean(((used.X - exact.X) / used.own_sigma) ** 2)) == pytest.approx(1.0, abs=0.25)
 
 
 @pytest.mark.thorough
