@@ -55,7 +55,7 @@ def test_unusable_files_are_refused(tmp_path, rng):
 @pytest.mark.parametrize("names", [("t", "q1", "q3", "tau1", "tau3"), ("t", "q1", "tau1", "tau2"), ("q1", "tau1")])
 def test_columns_that_do_not_pair_up_are_refused(tmp_path, names):
     parquet.write_table(pa.table({name: np.arange(9) / 10 for name in names}), tmp_path / "log.parquet")
-    with pytest.raises(LogError, match="missing: |unexpected: "):
+    with pytest.raises(LogError, match=r"missing: |unexpected: "):
         read_log(tmp_path / "log.parquet", TorqueChannel("held"))
 
 
