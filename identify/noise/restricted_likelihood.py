@@ -46,12 +46,12 @@ SMALLEST = 1e-9
 def likely_levels(parts: Sequence[Rows], noisy: Sequence[NoisyRows], start: NoiseLevels) -> NoiseLevels:
     """Return the levels of the noise of logs by restricted maximum likelihood (REML), from the rows of their explicit model.
 
-    The covariance of rows is C = sum of sigma_i^2 C_i over the torques and positions of all joints. The likelihood of what the
-    parameters do not explain is stationary where r' C^-1 C_i C^-1 r = trace of P C_i, with P = C^-1 - C^-1 W (W' C^-1 W)^-1 W'
-    C^-1 and r the residual (H. D. Patterson and R. Thompson, "Recovery of inter-block information when block sizes are
-    unequal", Biometrika 58 (1971) 545-554). In the first round every sigma_i^2 is multiplied by a power of the ratio of the two; then
-    come Newton's, by average information (A. R. Gilmour, R. Thompson and B. R. Cullis, "Average information REML: an efficient
-    algorithm for variance parameter estimation in linear mixed models", Biometrics 51 (1995) 1440-1450).
+    The covariance of rows is C = sum of sigma_i^2 C_i over the torques and positions of all joints. The likelihood of what
+    the parameters do not explain is stationary where r' C^-1 C_i C^-1 r = trace of P C_i, with P = C^-1 - C^-1 W (W' C^-1
+    W)^-1 W' C^-1 and r the residual (H. D. Patterson and R. Thompson, "Recovery of inter-block information when block sizes
+    are unequal", Biometrika 58 (1971) 545-554). In the first round every sigma_i^2 is multiplied by a power of the ratio of
+    the two; then come Newton's, by average information (A. R. Gilmour, R. Thompson and B. R. Cullis, "Average information
+    REML: an efficient algorithm for variance parameter estimation in linear mixed models", Biometrics 51 (1995) 1440-1450).
 
     Parameters
     ----------
