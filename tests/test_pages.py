@@ -75,6 +75,17 @@ def test_the_code_of_a_page_runs(root, logs, page):
         assert done.returncode == 0, done.stderr
 
 
+def test_diagrams_are_those_of_their_script(root):
+    sys.path.insert(0, str(root / "docs" / "build"))
+    try:
+        from diagrams import DIAGRAMS
+    finally:
+        sys.path.pop(0)
+    for name, diagram in DIAGRAMS.items():
+        assert (root / "docs" / f"{name}.svg").read_text() == diagram.svg(), "uv run python docs/build/diagrams.py"
+        assert all({start, end} <= set(diagram.boxes) for start, end, _ in diagram.arrows)
+
+
 def test_notebooks_are_those_of_their_scripts(root):
     """What the site runs are the scripts; the notebooks beside them hold the same cells, without outputs."""
     scripts = sorted((root / "docs" / "notebooks").glob("*.py"))

@@ -32,7 +32,7 @@ PAGE = 8
 
 
 def table2(shelf: Shelf) -> Part:
-    """Return Table 2: the twin's errors by both processings, and what each imperfection does alone."""
+    """Return Table 2: the virtual robot's errors by both processings, and what each imperfection does alone."""
     if (causes := text(shelf, "attribution/*")) is None:
         return None
     found = charts(shelf, "error [%], {1}'s steps", "processing/*", NARROW)

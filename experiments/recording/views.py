@@ -6,6 +6,7 @@ from collections.abc import Set as AbstractSet
 import rerun.blueprint as rrb
 
 from experiments.recording.chart import HEIGHT, WIDE
+from experiments.recording.stream import SIZES
 
 LEGEND, EDGE = 0.66, 0.1
 """Room to the right of a chart, with a legend and without one, in heights of its frame."""
@@ -30,7 +31,7 @@ class Shelf:
 
     def __init__(self, paths: AbstractSet[str]) -> None:
         named = [path.strip("/") for path in paths]
-        stripped = [path for path in named if not path.startswith("rms/")]
+        stripped = [path for path in named if not path.startswith(f"{SIZES}/")]
         self.sizes = {path: size.split("_") for _, size, path in (name.split("/", 2) for name in set(named) - set(stripped))}
         numbered = sorted(path.split("/")[1:] for path in stripped if path.startswith("joints/"))
         self.joints = [joint for _, joint in numbered]

@@ -118,7 +118,10 @@ def _rotors(fit: Fit) -> Iterator[str]:
         words = "no armature is identified and reversals are not masked, as where torques are measured at the links"
         yield f"{words} (--armature none)" + ("" if filed else "; the robot's file has none either")
     elif asked == "file" and not filed:
-        yield ("no armature is identified, because the file has none; behind gears rotors exceed links: --armature all")
+        yield (
+            "no armature is identified, because the file has none; behind gears rotors often have more inertia than links: "
+            "--armature all"
+        )
 
 
 def _noise(fit: Fit) -> str:

@@ -1,0 +1,34 @@
+"""The rms of curves in the titles of plots, and what is said of logs."""
+
+import numpy as np
+
+from experiments.recording.columns import seconds
+from experiments.recording.stream import Stream
+from experiments.recording.views import Shelf
+from experiments.reports.printed import _position_noise
+from experiments.text import of_each
+
+
+def test_titles_have_the_rms_of_what_was_sent_in_pieces():
+    """Of one curve sent in two pieces, and of two curves the largest."""
+    stream, t = Stream("sizes"), np.arange(4) / 100
+    for piece in (slice(0, 1), slice(1, 4)):
+        stream.curves("torque/log", [seconds(t[piece])], np.array([3.0, 3.0, -3.0, 3.0])[piece])
+    stream.curves("q/true", [seconds(t)], np.array([[1.0, 0.2]] * 4))
+    stream.keep_sizes()
+    shelf = Shelf(stream.paths)
+    assert shelf.rms(["torque/log"]) == ", rms 3"
+    assert shelf.rms(["q/true"]) == ", largest rms 1"
+    assert shelf.rms(["qd/true"]) == ""
+    assert shelf.paths == ["q/true", "torque/log"]
+
+
+def test_what_is_said_of_several_logs_is_one_line():
+    assert of_each([("a", "x"), ("b", "y"), ("c", "x")]) == ["a, c: x", "b: y"]
+
+
+def test_noise_below_the_rounding_of_an_encoder_is_named_as_hidden():
+    """Rounding to a step has the standard deviation step / sqrt(12)."""
+    assert _position_noise(1e-9, np.sqrt(12) * 1e-5) == "<1e-05"
+    assert _position_noise(0.9e-5, np.sqrt(12) * 1e-5) == "9e-06"
+    assert _position_noise(None, None) == "?"
