@@ -76,16 +76,21 @@ def worst_runs(cells: Sequence[Cell]) -> list[tuple[Cell, str, float, int]]:
 
     The worst run of each combination and model comes first, so that not all are of one kind; each run is there once.
     """
-    found = []
+    firsts, others = list[tuple[Cell, str, float, int]](), list[tuple[Cell, str, float, int]]()
     for cell in cells:
         p = np.nan_to_num(np.abs(cell.error)).argmax(axis=1)
-        found += [(cell, cell.parameters[j], float(cell.error[i, j]), int(cell.run[i])) for i, j in enumerate(p)]
-    found.sort(key=lambda entry: -abs(entry[2]))
-    firsts = {id(entry[0]): entry for entry in reversed(found)}
+        own = [(cell, cell.parameters[j], float(cell.error[i, j]), int(cell.run[i])) for i, j in enumerate(p)]
+        own.sort(key=_by_size)
+        firsts += own[:1]
+        others += own[1:]
     worst: dict[int, tuple[Cell, str, float, int]] = {}
-    for entry in [*sorted(firsts.values(), key=lambda entry: -abs(entry[2])), *found]:
+    for entry in [*sorted(firsts, key=_by_size), *sorted(others, key=_by_size)]:
         worst.setdefault(entry[3], entry)
     return list(worst.values())[:WORST]
+
+
+def _by_size(entry: tuple[Cell, str, float, int]) -> float:
+    return -abs(entry[2])
 
 
 def command(study: Study, folder: Path, cell: Cell, run: int) -> str:

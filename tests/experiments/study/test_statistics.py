@@ -11,6 +11,7 @@ from experiments.study.answer import answer
 from experiments.study.comparison import SURE, differences
 from experiments.study.requirement import requirements
 from experiments.study.statistics import Cell, cells
+from experiments.study.study_report import WORST, worst_runs
 
 TRUTH = np.array([2.0, -0.5])
 
@@ -255,6 +256,15 @@ def test_the_interval_of_the_typical_error_holds_it(rng):
         low, high = cell(rng.normal(0, 1, (60, 2)) * TRUTH).typical_interval
         inside += low <= 1 <= high
     assert 0.87 <= inside / 200 <= 0.985  # the bootstrap's ends are a little close; two sigma of 200 draws
+
+
+def test_the_worst_runs_are_of_several_combinations():
+    """Twenty bad runs of one combination do not hide the worst of a better one; no run is there twice."""
+    bad = cell(np.linspace(5, 1, 40).reshape(20, 2) * TRUTH, settings={"fs": 1.0})
+    good = cell(0.01 * np.ones((20, 2)) * TRUTH, settings={"fs": 2.0})
+    found = worst_runs([bad, replace(good, run=good.run + 20)])
+    assert [each[0].settings["fs"] for each in found[:2]] == [1.0, 2.0]
+    assert len({each[3] for each in found}) == len(found) == WORST
 
 
 def test_what_an_error_takes_is_said_with_the_bits_of_an_encoder(rng):
