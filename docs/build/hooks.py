@@ -16,8 +16,8 @@ from mkdocs.structure.files import File, Files
 ROOT = Path(__file__).parent.parent.parent
 
 COMMANDS = (
-    *("run", "view", "identify", "table1", "table2", "log", "robot", "excite", "payload", "gains", "study", "scenario", "new"),
-    *("check", "list", "resample", "export", "search"),
+    *("run", "view", "identify", "table1", "table2", "log", "robot", "excite", "payload", "gains", "servo", "study"),
+    *("scenario", "new", "check", "list", "resample", "export", "search"),
 )
 """In the order in which people meet them."""
 

@@ -32,6 +32,7 @@ FILES: Mapping[str, tuple[str, ...]] = {
     "excite": (*COMMON, "scenario.toml", "report.html", "motion*.csv"),
     "payload": ("summary.json", "fault.txt"),
     "gains": ("summary.json", "fault.txt"),
+    "servo": ("summary.json", "fault.txt"),
     "study": ("summary.json", "report.html", "recording.rrd", "fault.txt"),
 }
 """What an experiment may write: files of these names are looked for before the work."""

@@ -1,0 +1,49 @@
+"""Options of `idbench servo`."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, final
+
+import tyro
+
+from experiments.cli.app import command
+from experiments.cli.command import Command
+from experiments.cli.options.shared import Mounted, WrittenOptions
+from experiments.identification.read_options import MountingOptions
+from experiments.option_types import File, Files, Robot, Texts
+
+Law = Annotated[str, tyro.conf.arg(metavar="LAW")]
+Letters = Annotated[tuple[str, ...], tyro.conf.arg(metavar="LETTER")]
+
+
+@command("servo")
+@final
+@dataclass(frozen=True)
+class IdentifyServo(WrittenOptions, Command, action="servo:servo"):
+    """Identify position-controlled joints (Feetech, Dynamixel) from commands and positions alone; write them for MuJoCo."""
+
+    log: tyro.conf.Positional[tuple[Path, ...]] = ()
+    """Logs of commands and positions: columns t, q1, ..., command1, ... in SI units; on1, ..., voltage1, ... if logged."""
+    robot: Robot = None
+    """Name of a shipped robot, or its file: MJCF or URDF. Its links, a known mass included, set the scale of all torques."""
+    servo: File = None
+    """servo.toml: model = "STS3215" or gain = 0.166, then kp, supply, duty_limit, counts; [joints.NAME] and [logs."FILE"] for
+    what differs."""
+    friction: Law = "load"
+    """Friction law: coulomb, stribeck, load, load-stribeck, directional, quadratic, gear."""
+    find: Letters = ()
+    """Further parameters to be found: lead, dead_band."""
+    hold: Texts = ()
+    """Known parameters, for all joints: a=0.5 (N m/V), Ia=0.02."""
+    columns: Texts = ()
+    """Names of columns: q=position_* command=goal_* on=torque_enable (* stands for numbers or names of joints)."""
+    units: Texts = ()
+    """Units: t=ms q=deg command=deg."""
+    mounting: Mounted = MountingOptions()  # noqa: RUF009  # frozen
+    """How the robot is mounted."""
+    validate: Files = ()
+    """Held-out logs, simulated from their commands alone. Default: the last log, where there are several."""
+    write_mjcf: File = None
+    """Write the robot's MJCF file with these servos as `dcmotor` actuators, and measure it on a log in plain MuJoCo."""
+    position: bool = False
+    """Write `position` actuators instead, for older versions of MuJoCo."""

@@ -1,0 +1,122 @@
+"""The servos of a robot, identified joint by joint, and judged on logs that the fit has not seen."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+
+from experiments.errors import ExperimentError
+from experiments.servo.loads import loads
+from identify import Array, IdentificationError
+from identify.files.servo_file import ServoFile
+from identify.files.servo_log import ServoColumns
+from identify.servo import ServoFit, ServoRun, identify_servo
+from identify.servo.parameters import SERVO_PARAMETERS
+from sim.robot.mounting import Mounting
+from sim.robot.robot import Robot
+from sim.robot.servos import ServoValues, links, replay, with_servos
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Servos:
+    """Servos of a robot with their logs.
+
+    Parameters
+    ----------
+    robot : str
+        Name or file of the robot.
+    mounting : Mounting
+        How it is mounted.
+    known : ServoFile
+        What is known of the servos.
+    logs : mapping of Path to ServoColumns
+        What was logged.
+    """
+
+    robot: str
+    mounting: Mounting
+    known: ServoFile
+    logs: dict[Path, ServoColumns]
+
+    @cached_property
+    def links(self) -> Robot:
+        """The robot without its drives."""
+        return links(self.robot, self.mounting)
+
+    @cached_property
+    def runs(self) -> list[list[ServoRun]]:
+        """Runs of each joint."""
+        every = [[] for _ in self.links.joints]  # type: list[list[ServoRun]]
+        for path, columns in self.logs.items():
+            for j, load in enumerate(loads(self.links, columns)):
+                every[j].append(self._run(path, columns, j, load))
+        return every
+
+    def _run(self, path: Path, columns: ServoColumns, j: int, load: Any) -> ServoRun:
+        kp = self.known.servo(self.links.joints[j], path.name).kp
+        on = None if columns.on is None else columns.on[:, j] > 0.5
+        voltage = None if columns.voltage is None else columns.voltage[:, j]
+        name = f"{path.name}, {self.links.joints[j]}"
+        return ServoRun(columns.t, columns.q[:, j], columns.command[:, j], load, kp, on, voltage, name=name)
+
+    def fits(self, friction: str, find: Sequence[str], held: dict[str, float] | None = None) -> dict[str, ServoFit | str]:
+        """Return the fit of each joint, or why it has none."""
+        found = dict[str, ServoFit | str]()
+        for joint, runs in zip(self.links.joints, self.runs, strict=True):
+            try:
+                found[joint] = identify_servo(self.known.servo(joint, ""), runs, friction, find, held)
+            except IdentificationError as error:
+                found[joint] = str(error)
+        if not any(isinstance(fit, ServoFit) for fit in found.values()):
+            raise ExperimentError("; ".join(dict.fromkeys(str(why) for why in found.values())))
+        return found
+
+    def values(self, fit: ServoFit, joint: str) -> ServoValues:
+        """Return a servo as MuJoCo has it, with the firmware gain of the file."""
+        p, servo = fit.p, self.known.servo(joint, "")
+        rate = p.get("rate", np.inf)
+        return ServoValues(
+            p["a"], p["b"], servo.gain * servo.kp, servo.supply, servo.duty_limit, p["Ia"], p["Fv"], p["Fs"], rate, p["delay"]
+        )
+
+    def text(self, fits: dict[str, ServoFit], folder: Path, position: bool = False) -> str:
+        """Return the robot's MJCF with the servos that were found."""
+        place = {self.links.joints.index(joint): self.values(fit, joint) for joint, fit in fits.items()}
+        return with_servos(self.robot, place, folder, self.mounting, position)
+
+    def in_mujoco(self, text: str, folder: Path, fits: dict[str, ServoFit], path: Path) -> dict[str, float]:
+        """Return the mean absolute error [rad] of each joint, a log's commands given to the written file in plain MuJoCo."""
+        columns = self.logs[path]
+        places = [self.links.joints.index(joint) for joint in fits]
+        offset = np.zeros(self.links.n)
+        offset[places] = [fit.p["offset"] for fit in fits.values()]
+        if any(self.known.servo(joint, path.name).kp != self.known.servo(joint, "").kp for joint in fits):
+            raise ExperimentError(f"{path.name} has another kp than the file that was written")
+        commands = (columns.command + offset)[:, places]
+        q = replay(self.robot, text, folder, commands, columns.t, columns.q[0] + offset, places)
+        error = np.abs(q - columns.q - offset).mean(axis=0)
+        return {joint: float(error[j]) for joint, j in zip(fits, places, strict=True)}
+
+
+def held_out(servos: Servos, fits: dict[str, ServoFit]) -> dict[str, Array]:
+    """Return the mean absolute error [rad] of each run of other logs, by joint."""
+    runs = dict(zip(servos.links.joints, servos.runs, strict=True))
+    return {joint: fit.errors(runs[joint]) for joint, fit in fits.items()}
+
+
+def of_logs(servos: Servos, logs: dict[Path, ServoColumns]) -> Servos:
+    """Return the same servos with other logs."""
+    return replace(servos, logs=logs)
+
+
+def summary_of(fit: ServoFit) -> dict[str, Any]:
+    """Return what a summary says of a fit."""
+    sigma, bound = fit.standard_errors, fit.bound
+    return {
+        name: {"value": x, "sigma": sigma.get(name), "bound": bound.get(name), "unit": SERVO_PARAMETERS[name].unit}
+        for name, x in fit.p.items()
+    }

@@ -1,0 +1,50 @@
+"""Logs of servos as runs of each joint, with what the robot's links need of it."""
+
+import numpy as np
+
+from identify import Array
+from identify.files.servo_log import ServoColumns
+from identify.servo import JointLoad
+from identify.servo.smooth import smoothed
+from sim.robot.inverse_dynamics import InverseDynamics, inverse_dynamics
+from sim.robot.robot import Robot
+
+
+def loads(robot: Robot, columns: ServoColumns) -> list[JointLoad]:
+    """Return the load of each joint of a robot while the others move as they were measured.
+
+    Gravity follows the joint's own angle exactly; what accelerations and velocities of the others need is that of the measured
+    motion.
+    """
+    t, q, n = columns.t, columns.q, robot.n
+    if n == 1:
+        qd = qdd = np.zeros_like(q)
+    else:
+        q, qd, qdd = smoothed(t, q)
+    dynamics = InverseDynamics(robot, len(q))
+    still = np.zeros_like(q)
+    whole = dynamics(q, qd, qdd).copy()
+    inertia = dynamics.inertia().copy()
+    found = []
+    for j in range(n):
+        at = [inverse_dynamics(robot, _moved(q, j, angle), still, still)[:, j] for angle in (0.0, np.pi / 2, np.pi)]
+        constant = (at[0] + at[2]) / 2
+        cosine, sine = at[0] - constant, at[1] - constant
+        if robot.slides[j]:
+            constant, cosine, sine = at[0], 0 * constant, 0 * constant
+        gravity = sine * np.sin(q[:, j]) + cosine * np.cos(q[:, j]) + constant
+        rest = whole[:, j] - inertia[:, j] * qdd[:, j] - gravity + constant
+        found.append(JointLoad(*(_constant(x) for x in (inertia[:, j], sine, cosine, rest))))
+    return found
+
+
+def _moved(q: Array, j: int, angle: float) -> Array:
+    moved = q.copy()
+    moved[:, j] = angle
+    return moved
+
+
+def _constant(x: Array) -> Array:
+    """Return one number where all are the same but for rounding."""
+    size = float(np.abs(x).max())
+    return np.array(x[0] if size > 0 else 0.0) if np.ptp(x) <= 1e-9 * size or size == 0 else x

@@ -1,0 +1,108 @@
+"""What runs of a servo can show, and what they cannot."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self, final
+
+import numpy as np
+
+from identify.errors import ExcitationError, IdentificationError
+from identify.servo.run import ServoRun
+from identify.servo.servo import Servo
+
+TILTS = 0.01
+"""Share of gravity that turns with the joint, of its typical torque, from which on an offset of the position shows."""
+
+DEGREES = 20.0
+"""Times the range of the positions from which on commands are in another unit."""
+
+
+@final
+@dataclass(frozen=True)
+class Excitation:
+    """Sizes of the motion of some runs.
+
+    Parameters
+    ----------
+    range : float
+        Of positions [rad].
+    speed : float
+        Largest, but for 1 % of the samples [rad/s].
+    torque : float
+        Root mean square of the torque of the load [N m].
+    T : float
+        Sampling time [s].
+    step : float
+        Of the encoder [rad].
+    off : bool
+        Whether torque is off in some motion: friction then shows apart from back-EMF.
+    tilts : bool
+        Whether gravity depends on the position: only then does an offset show.
+    """
+
+    range: float
+    speed: float
+    torque: float
+    T: float
+    step: float
+    off: bool
+    tilts: bool
+
+    @classmethod
+    def of(cls, servo: Servo, runs: Sequence[ServoRun]) -> Self:
+        """Return what runs can show; raise IdentificationError if that is nothing."""
+        if not runs:
+            raise IdentificationError("there is no run of the servo")
+        ranges = [float(np.ptp(run.q)) for run in runs]
+        if max(ranges) < 20 * servo.step:
+            raise ExcitationError(
+                f"{runs[0].name}: the joint does not move (by {np.rad2deg(max(ranges)):.2g} deg): log motions of a good part "
+                "of its range, with steps and reversals"
+            )
+        if not any(run.enabled.any() for run in runs):
+            raise ExcitationError(
+                f"{runs[0].name}: torque is off all the time: friction and armature may swing, a and b need torque"
+            )
+        if wrong := [run for run in runs if np.ptp(run.command) > DEGREES * max(ranges)]:
+            run = wrong[0]
+            raise IdentificationError(
+                f"{run.name}: the command spans {np.ptp(run.command):.4g}, the position {np.ptp(run.q):.4g} rad: is the "
+                "command in degrees or counts? State its unit: --units command=deg"
+            )
+        if all(_saturated(servo, run) for run in runs):
+            raise ExcitationError(
+                f"{runs[0].name}: the duty is at its limit almost all the time, where the command has no effect: command "
+                "slower motions, or smaller steps"
+            )
+        speeds = np.concatenate([np.abs(np.gradient(run.q, run.t)) for run in runs])
+        # A load that moves with the joint sets the scale of torque; where there is none, what its inertia would need.
+        loads = [float(np.sqrt(np.mean(run.load.torque(run.q) ** 2))) for run in runs]
+        inertia = max(float(np.mean(run.load.inertia)) for run in runs)
+        T = float(np.median([run.T for run in runs]))
+        speed = float(np.quantile(speeds, 0.99))
+        torque = max(float(np.sqrt(np.mean(np.square(loads)))), inertia * speed / (50 * T))
+        if torque == 0:
+            raise ExcitationError(
+                f"{runs[0].name}: the joint carries no known load, so that only ratios of a, b, friction and armature show: "
+                "add a known mass to the robot's file, or move the joint through gravity"
+            )
+        off = any((~run.enabled).any() and np.ptp(run.q[~run.enabled]) > 20 * servo.step for run in runs)
+        swing = max(float(np.hypot(run.load.sine, run.load.cosine).max()) for run in runs)
+        return cls(max(ranges), speed, torque, T, servo.step, off, swing > TILTS * torque)
+
+    @property
+    def scales(self) -> dict[str, float]:
+        """Typical sizes, by what `ServoParameter.of` names."""
+        return {
+            "torque": self.torque,
+            "torque per speed": self.torque / self.speed,
+            "angle": self.step,
+            "time": self.T,
+            "1": 1.0,
+            "speed": self.speed,
+        }
+
+
+def _saturated(servo: Servo, run: ServoRun) -> bool:
+    duty = servo.gain * run.kp * np.abs(run.command - run.q)[run.enabled]
+    return bool(duty.size) and bool(np.mean(duty >= servo.duty_limit) > 0.98)

@@ -1,0 +1,52 @@
+"""Friction of servos: six published laws, and one of the gear, as one budget."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from identify.arrays import Array
+
+SERVO_FRICTIONS: dict[str, tuple[str, ...]] = {
+    "coulomb": (),
+    "stribeck": ("Fst", "vs"),
+    "load": ("Fl",),
+    "load-stribeck": ("Fl", "Fst", "vs", "Fls"),
+    "directional": ("Fle", "Flm", "Fst", "vs"),
+    "quadratic": ("Fle", "Flm", "Fst", "vs", "Flq"),
+    "gear": ("Fgd", "Fgb", "Fst", "vs"),
+}
+"""What each law has beside Fs and Fv: M1 to M6 of BAM (arXiv 2410.08650), and friction of the torque that the gear transmits,
+other when the motor drives (Fgd) than when it is driven (Fgb)."""
+
+
+def budget(p: Mapping[str, Array], qd: Array, motor: Array, external: Array, transmitted: Array) -> Array:
+    """Return the torque by which friction can resist at most [N m].
+
+    Parameters
+    ----------
+    p : mapping of str to Array
+        Parameters of the law; those that are missing are none of its own.
+    qd : Array
+        Speed [rad/s].
+    motor, external : Array
+        Torques of the motor and of the load, gravity included [N m].
+    transmitted : Array
+        Torque through the gear, positive where it drives the load on in the direction in which the joint moves [N m].
+    """
+    speed = np.abs(qd)
+    total = p["Fs"] + 0.0 * speed
+    near = np.exp(-speed / p["vs"]) if "vs" in p else None
+    if near is not None and "Fst" in p:
+        total = total + p["Fst"] * near
+    if "Fl" in p:
+        load = np.abs(external - motor)
+        total = total + p["Fl"] * load
+        if near is not None and "Fls" in p:
+            total = total + p["Fls"] * load * near
+    if "Fle" in p:
+        total = total + np.abs(p["Fle"] * external - p["Flm"] * motor)
+    if "Flq" in p:
+        total = total + p["Flq"] * np.minimum(external**2, motor**2) * (external * motor < 0)
+    if "Fgd" in p:
+        total = total + p["Fgd"] * np.maximum(transmitted, 0) + p["Fgb"] * np.maximum(-transmitted, 0)
+    return total

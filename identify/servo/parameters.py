@@ -1,0 +1,69 @@
+"""The parameters of a servo: letters, units, limits, and how far a search steps."""
+
+from collections.abc import Sequence
+from typing import NamedTuple, final
+
+
+@final
+class ServoParameter(NamedTuple):
+    """One parameter.
+
+    Parameters
+    ----------
+    unit : str
+        Unit.
+    meaning : str
+        What it is.
+    relative : float
+        Step of differences, as a share of its value; 0 for parameters that may be zero.
+    of : str
+        Scale of the step where it is absolute: torque, angle, time, speed, or 1.
+    share : float
+        Step as a share of that scale.
+    low : float
+        Smallest value.
+    """
+
+    unit: str
+    meaning: str
+    relative: float = 0.0
+    of: str = "1"
+    share: float = 0.01
+    low: float = 0.0
+
+
+NEGATIVE = float("-inf")
+
+SERVO_PARAMETERS: dict[str, ServoParameter] = {
+    "a": ServoParameter("N m/V", "torque per volt, kt/R", 0.03),
+    "b": ServoParameter("N m s/rad", "damping by back-EMF, kt^2/R", 0.03),
+    "Ia": ServoParameter("kg m^2", "armature: inertia of the rotor behind the gear", 0.04),
+    "Fs": ServoParameter("N m", "Coulomb friction", of="torque", share=0.01),
+    "Fv": ServoParameter("N m s/rad", "viscous friction", of="torque per speed", share=0.01),
+    "offset": ServoParameter("rad", "angle of the file minus angle of the log", of="angle", share=2.0, low=NEGATIVE),
+    "delay": ServoParameter("s", "delay of the command", of="time", share=0.15),
+    "rate": ServoParameter("rad/s", "rate limit of the target", 0.02),
+    "lead": ServoParameter("s", "by how much the loop sees its position early", of="time", share=0.15, low=NEGATIVE),
+    "dead_band": ServoParameter("rad", "error below which there is no duty", of="angle", share=1.0),
+    "Fst": ServoParameter("N m", "Stribeck friction: what friction near standstill has above that of sliding", of="torque"),
+    "vs": ServoParameter("rad/s", "Stribeck velocity", 0.1, low=1e-4),
+    "Fl": ServoParameter("1", "friction per load", share=0.006),
+    "Fls": ServoParameter("1", "friction per load near standstill", share=0.006),
+    "Fle": ServoParameter("1", "friction per external torque", share=0.009),
+    "Flm": ServoParameter("1", "friction per motor torque", share=0.009),
+    "Flq": ServoParameter("1/(N m)", "friction per square of the smaller torque", share=0.009),
+    "Fgd": ServoParameter("1", "friction per torque of a gear that drives", share=0.009),
+    "Fgb": ServoParameter("1", "friction per torque of a gear that is driven", share=0.009),
+}
+"""All parameters that a servo may have."""
+
+
+def step_of(name: str, value: float, scales: dict[str, float]) -> float:
+    """Return by how much differences change a parameter."""
+    parameter = SERVO_PARAMETERS[name]
+    return parameter.relative * abs(value) if parameter.relative else parameter.share * scales[parameter.of]
+
+
+def lows(names: Sequence[str]) -> list[float]:
+    """Return the smallest values of parameters."""
+    return [SERVO_PARAMETERS[name].low for name in names]

@@ -1,0 +1,88 @@
+"""What was logged of one servo: commands and positions."""
+
+from dataclasses import dataclass, field
+from typing import final
+
+import numpy as np
+import numpy.typing as npt
+
+from identify.arrays import Array, frozen
+from identify.errors import LogError, require_positive
+from identify.servo.load import JointLoad
+
+MIN_SAMPLES = 20
+"""Samples that a run must have."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ServoRun:
+    """Commands and positions of one joint, with their times as logged.
+
+    Parameters
+    ----------
+    t : array_like, shape (time,)
+        Times [s], increasing; steps may differ.
+    q : array_like, shape (time,)
+        Position that the servo reports [rad].
+    command : array_like, shape (time,)
+        Commanded position from each sample on [rad].
+    load : JointLoad
+        What hangs on the joint.
+    kp : float
+        Gain of the firmware, in its own unit.
+    on : array_like of bool, shape (time,), optional
+        Whether torque is enabled; by default always.
+    voltage : array_like, shape (time,), optional
+        Supply [V], where it was logged.
+    name : str
+        What messages call the run.
+
+    Raises
+    ------
+    LogError
+        If shapes differ, values are missing, time does not increase, or there are too few samples.
+    """
+
+    t: Array
+    q: Array
+    command: Array
+    load: JointLoad
+    kp: float
+    on: npt.NDArray[np.bool_] | None = None
+    voltage: Array | None = None
+    name: str = field(default="the log", kw_only=True)
+
+    def __post_init__(self) -> None:
+        require_positive(kp=self.kp)
+        for name in ("t", "q", "command", "voltage"):
+            if (values := getattr(self, name)) is not None:
+                object.__setattr__(self, name, self._checked(name, frozen(values)))
+        on = np.ones(len(self.t), dtype=bool) if self.on is None else np.array(self.on, dtype=bool)
+        if on.shape != self.t.shape:
+            raise LogError(f"{self.name}: torque on has shape {on.shape}, t {self.t.shape}")
+        object.__setattr__(self, "on", on)
+        if len(self.t) < MIN_SAMPLES:
+            raise LogError(f"{self.name} has {len(self.t)} samples; at least {MIN_SAMPLES} are needed")
+        if (np.diff(self.t) <= 0).any():
+            k = int(np.argmax(np.diff(self.t) <= 0))
+            raise LogError(f"{self.name}: time does not increase after t = {self.t[k]:.6g} s; remove repeated rows")
+
+    def _checked(self, name: str, values: Array) -> Array:
+        if values.ndim != 1 or np.shape(values) != np.shape(self.t):
+            raise LogError(f"{self.name}: {name} has shape {values.shape}, t {np.shape(self.t)}: one value per sample")
+        if not np.isfinite(values).all():
+            k = int(np.argmax(~np.isfinite(values)))
+            raise LogError(f"{self.name}: {name} is {values[k]} at sample {k}; remove or repair such samples first")
+        return values
+
+    @property
+    def enabled(self) -> npt.NDArray[np.bool_]:
+        """Whether torque is enabled, shape (time,)."""
+        assert self.on is not None
+        return self.on
+
+    @property
+    def T(self) -> float:
+        """Typical time between samples [s]."""
+        return float(np.median(np.diff(self.t)))

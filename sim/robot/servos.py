@@ -1,0 +1,183 @@
+"""A robot's file with servos at its joints, and what plain MuJoCo makes of it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import final
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+
+from sim.errors import RobotError
+from sim.robot.motors import Array
+from sim.robot.mounting import PLAIN, Mounting
+from sim.robot.rewrite import compiled, rewritten
+from sim.robot.robot import Robot
+
+STEP = 5e-4
+"""Physics step of a written file [s]. Implicit damping makes inertias b STEP larger: 3 % of the armature of a small servo."""
+
+EARLY = 1.3
+"""Steps by which a command acts early: force acts from half a step before, the rate limit moves on before that. Measured."""
+
+
+@final
+@dataclass(frozen=True)
+class ServoValues:
+    """A servo as MuJoCo has it.
+
+    Parameters
+    ----------
+    a, b : float
+        kt/R [N m/V] and kt^2/R [N m s/rad].
+    gain : float
+        Duty per rad, firmware gain included.
+    supply, duty_limit : float
+        V [V], and the largest duty.
+    armature, damping, frictionloss : float
+        Of the joint: Ia, Fv, Fs.
+    rate : float
+        Rate limit of the target [rad/s]; infinite if there is none.
+    delay : float
+        Of the command [s].
+    """
+
+    a: float
+    b: float
+    gain: float
+    supply: float
+    duty_limit: float
+    armature: float
+    damping: float
+    frictionloss: float
+    rate: float
+    delay: float
+
+
+def links(name: str, mounting: Mounting) -> Robot:
+    """Return a robot without what belongs to its drives: armature, damping and friction of the file."""
+    return Robot.load(name, mounting.edit, _without_drives)
+
+
+def _without_drives(spec: mujoco.MjSpec) -> None:
+    for joint in spec.joints:
+        joint.armature = joint.frictionloss = 0.0
+        joint.damping = [0.0] * len(joint.damping)
+
+
+def with_servos(
+    name: str, servos: Mapping[int, ServoValues], folder: Path | None = None, mounting: Mounting = PLAIN, position: bool = False
+) -> str:
+    """Return the file of a robot as MJCF, with servos in the place of the actuators of some joints.
+
+    MuJoCo's `dcmotor` with input="pos" drives V = clip((R/K) kp (u - q), Vmax): the servo's law, with kp = g kp V a,
+    kd = K^2/R, which cancels its compensation of the back-EMF, slewmax the rate limit, and a delayed command. `position` writes
+    `<position>` instead, for older versions: stiffness, damping and a force range, without rate limit and delay, and without
+    the fall of the torque with speed at full duty.
+
+    Parameters
+    ----------
+    name, folder, mounting
+        As for `rewritten`.
+    servos : mapping of int to ServoValues
+        By the number of the joint.
+    position : bool
+        Write `<position>`.
+
+    Raises
+    ------
+    RobotError
+        If the file does not compile.
+    """
+    robot = Robot.load(name, mounting.edit)
+    letters = {f"{x}{j + 1}": y for j, s in servos.items() for x, y in _passive(s).items()}
+    root = ElementTree.fromstring(rewritten(name, letters, folder, mounting))
+    for actuators in root.findall("actuator"):
+        for old in [old for old in actuators if old.get("joint") in [robot.joints[j] for j in servos]]:
+            actuators.remove(old)
+    option = root.find("option")
+    option = ElementTree.SubElement(root, "option") if option is None else option
+    option.set("timestep", repr(STEP))
+    option.set("integrator", "implicitfast")  # RK4 holds the state of a dcmotor over its whole step
+    block = ElementTree.SubElement(root, "actuator")
+    for j, servo in servos.items():
+        tag, attributes = ("position", _position(servo)) if position else ("dcmotor", _dcmotor(servo))
+        ElementTree.SubElement(block, tag, {"name": f"{robot.joints[j]}_servo", "joint": robot.joints[j], **attributes})
+    ElementTree.indent(root)
+    text = ElementTree.tostring(root, encoding="unicode") + "\n"
+    compiled(name, text, folder)
+    return text
+
+
+def _passive(servo: ServoValues) -> dict[str, float]:
+    return {"Ia": servo.armature, "Fv": servo.damping, "Fs": servo.frictionloss}
+
+
+def _dcmotor(servo: ServoValues) -> dict[str, str]:
+    K = servo.b / servo.a
+    rate = servo.rate if np.isfinite(servo.rate) else 0.0
+    kp, most = servo.gain * servo.supply * servo.a, servo.duty_limit * servo.supply
+    samples = round(servo.delay / STEP + EARLY)
+    late = {"nsample": str(samples), "delay": repr(samples * STEP)}
+    return {
+        "motorconst": repr(K),
+        "resistance": repr(K / servo.a),
+        "input": "pos",
+        "controller": " ".join(repr(float(x)) for x in (kp, 0.0, servo.b, rate, 0.0, most)),
+        **late,
+    }
+
+
+def _position(servo: ServoValues) -> dict[str, str]:
+    most = servo.a * servo.supply * servo.duty_limit
+    kp = servo.gain * servo.supply * servo.a
+    return {"kp": repr(kp), "kv": repr(servo.b), "forcerange": f"{-most!r} {most!r}"}
+
+
+def replay(name: str, text: str, folder: Path, commands: Array, t: Array, q0: Array, joints: Sequence[int]) -> Array:
+    """Return the positions that plain MuJoCo gives for commands that are held from each sample on.
+
+    Parameters
+    ----------
+    name, text, folder
+        A robot, its file with servos, and where that finds its meshes.
+    commands : Array, shape (time, servo)
+        Angles of the file [rad].
+    t : Array, shape (time,)
+        [s].
+    q0 : Array, shape (joint,)
+        Positions at the beginning.
+    joints : sequence of int
+        Joint of each servo.
+
+    Raises
+    ------
+    RobotError
+        If MuJoCo cannot go on.
+    """
+    model = compiled(name, text, folder).model
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    data = mujoco.MjData(model)
+    data.qpos[:] = q0
+    place = [model.actuator(f"{model.joint(j).name}_servo").id for j in joints]
+    _begin(model, data, place, commands[0])
+    q = np.empty((len(t), model.nq))
+    for k, instant in enumerate(t - t[0]):
+        while data.time < instant - model.opt.timestep / 2:
+            mujoco.mj_step(model, data)
+        q[k] = data.qpos
+        data.ctrl[place] = commands[k]
+        if not np.isfinite(q[k]).all():
+            raise RobotError(f"the servos written for {name!r} make MuJoCo diverge at {instant:.3g} s")
+    return q
+
+
+def _begin(model: mujoco.MjModel, data: mujoco.MjData, place: Sequence[int], command: Array) -> None:
+    """Let servos have held a command before the beginning: their rate limits and delays know no other."""
+    data.ctrl[place] = command
+    for actuator, value in zip(place, command, strict=True):
+        if model.actuator_actnum[actuator]:
+            data.act[model.actuator_actadr[actuator]] = value
+        if (kept := int(model.actuator_history[actuator, 0])) > 0:
+            mujoco.mj_initCtrlHistory(model, data, actuator, None, np.full((kept, 1), value))

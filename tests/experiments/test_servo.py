@@ -1,0 +1,167 @@
+"""`idbench servo`: from logs of commands and positions to servos of MuJoCo, of arms whose servos MuJoCo simulates."""
+
+import json
+from importlib.metadata import files
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from experiments.cli import main
+from sim.robot.robot import Robot
+from sim.robot.servos import STEP, ServoValues, replay, with_servos
+
+KP, GAIN, SUPPLY, LIMIT, COUNT = 16.0, 0.166, 12.0, 0.97, 2 * np.pi / 4096
+
+PENDULUM = """
+<mujoco model="pendulum"><worldbody><body name="arm"><joint name="axis" axis="0 -1 0" armature="0.5" damping="3"/>
+<inertial pos="0 0 -0.12" mass="0.6" diaginertia="1e-5 1e-5 1e-5"/></body></worldbody></mujoco>
+"""
+TRUTH = ServoValues(0.55, 1.2, GAIN * KP, SUPPLY, LIMIT, 0.02, 0.0, 0.1, 4.5, 0.02)
+
+
+def commands(seconds: float, n: int, seed: int, size: float = 1.1) -> tuple[np.ndarray, np.ndarray]:
+    """Return times and steps with waves of each joint."""
+    rng, t = np.random.default_rng(seed), np.arange(0, seconds, 0.01)
+    joints = []
+    for j in range(n):
+        steps = rng.uniform(-size, size, 60)[np.minimum((t / (0.55 + 0.07 * j)).astype(int), 59)]
+        joints.append(steps + 0.3 * np.sin(2 * np.pi * rng.uniform(0.5, 1.5) * t))
+    return t, np.stack(joints, axis=1)
+
+
+def write(path: Path, t: np.ndarray, q: np.ndarray, command: np.ndarray, names: list[str]) -> None:
+    counted = np.round(q / COUNT) * COUNT
+    header = ",".join(["t", *(f"q_{name}" for name in names), *(f"command_{name}" for name in names)])
+    np.savetxt(path, np.c_[t, counted, command], delimiter=",", header=header, comments="")
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    """Return a folder with a pendulum, what is known of its servo, and two logs."""
+    folder = tmp_path_factory.mktemp("servo")
+    robot = folder / "pendulum.xml"
+    robot.write_text(PENDULUM)
+    (folder / "servo.toml").write_text(f'model = "STS3215"\nkp = {KP}\nsupply = {SUPPLY}\n')
+    text = with_servos(str(robot), {0: TRUTH}, folder)
+    for seed, name in enumerate(("fit", "new")):
+        t, u = commands(6.0, 1, seed)
+        write(folder / f"{name}.csv", t, replay(str(robot), text, folder, u, t, u[0], [0]), u, ["axis"])
+    return folder
+
+
+def words(bench, *more):
+    return ["servo", bench / "fit.csv", "--robot", bench / "pendulum.xml", "--servo", bench / "servo.toml", *more]
+
+
+def test_servo_of_a_bench_is_found_and_written(bench, idbench):
+    more = ("--friction", "coulomb", "--validate", bench / "new.csv", "--write-mjcf", "out.xml", "--out", "results")
+    code, out, err = idbench(*words(bench, *more))
+    assert code == 0, err
+    assert "torque is never off" in out
+    summary = json.loads(Path("results/summary.json").read_text())
+    found = {name: entry["value"] for name, entry in summary["joints"]["axis"].items()}
+    # MuJoCo's friction holds softly near rest, and its implicit damping makes the inertia b STEP larger
+    inertia = 0.02 + TRUTH.b * STEP
+    for name, true, share in (
+        ("a", 0.55, 0.02),
+        ("b", 1.2, 0.02),
+        ("Ia", inertia, 0.04),
+        ("rate", 4.5, 0.01),
+        ("Fs", 0.1, 0.2),
+    ):
+        assert abs(found[name] - true) < share * true, (name, found[name])
+    assert abs(found["delay"] - TRUTH.delay) < STEP
+    # plain MuJoCo follows the held-out log to a count or two
+    assert summary["mujoco_error"]["new.csv"]["axis"] < 2 * COUNT
+    model = mujoco.MjModel.from_xml_path("out.xml")
+    assert model.dof_armature[0] == found["Ia"]
+    assert model.nu == 1
+
+
+def test_position_actuators_compile(bench, tmp_path):
+    text = with_servos(str(bench / "pendulum.xml"), {0: TRUTH}, tmp_path, position=True)
+    model = mujoco.MjModel.from_xml_string(text)
+    assert model.actuator_forcerange[0, 1] == pytest.approx(TRUTH.a * SUPPLY * LIMIT)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ('gain = 0.166\ngain_unit = "1/grad"', "gain_unit"),
+        ('model = "STS3251"', "STS3215"),
+        ("kpp = 4", "did you mean 'kp'"),
+        ("kp = 4", "gain is missing"),
+        ("gain = -1", "above 0"),
+        ('gain = "much"', "must be a number"),
+        ("gain = ", "servo.toml"),
+    ],
+)
+def test_wrong_servo_files_are_refused(bench, tmp_path, complaint, text, expected):
+    path = tmp_path / "servo.toml"
+    path.write_text(text)
+    args = ["servo", str(bench / "fit.csv"), "--robot", str(bench / "pendulum.xml"), "--servo", str(path)]
+    assert expected in complaint(*args)
+
+
+@pytest.mark.parametrize(
+    ("more", "expected"),
+    [
+        (["--friction", "sticky"], "directional"),
+        (["--find", "gap"], "no parameter"),
+        (["--hold", "a"], "NAME=VALUE"),
+        (["--hold", "a=much"], "letters and numbers"),
+        (["--units", "command=grad"], "unit 'grad'"),
+        (["--units", "q=deg"], "is the command in degrees"),
+        (["--columns", "command=goal"], "--columns command=NAME"),
+        (["--columns", "torque=goal"], "no quantity"),
+        (["--write-mjcf", "out.txt"], "must end with .xml"),
+    ],
+)
+def test_wrong_options_are_refused(bench, complaint, more, expected):
+    assert expected in complaint(*[str(word) for word in words(bench, *more)])
+
+
+def test_missing_files_are_named(bench, complaint):
+    assert "--servo is missing" in complaint("servo", str(bench / "fit.csv"), "--robot", str(bench / "pendulum.xml"))
+    assert "nowhere.csv" in complaint(*[str(word) for word in words(bench)], str(bench / "nowhere.csv"))
+
+
+def test_missing_values_are_named(bench, tmp_path, complaint):
+    lines = (bench / "fit.csv").read_text().splitlines()
+    lines[40] = lines[40].split(",")[0] + ",nan,0.1"
+    path = tmp_path / "holes.csv"
+    path.write_text("\n".join(lines))
+    said = complaint("servo", str(path), *[str(word) for word in words(bench)[2:]])
+    assert "q is missing at sample 39" in said
+
+
+def so101() -> str:
+    (path,) = [f.locate() for f in files("example-robot-data") or () if str(f).endswith("so101.urdf")]
+    return str(path)
+
+
+@pytest.mark.thorough
+def test_servos_of_an_arm_are_found_in_place(tmp_path, monkeypatch):
+    """The SO-101: joints that carry a load are found, those that do not are refused."""
+    urdf = so101()
+    robot = Robot.load(urdf)
+    servos = {
+        j: ServoValues(0.5 + 0.05 * j, 1.1 + 0.05 * j, GAIN * KP, SUPPLY, LIMIT, 0.02, 0.0, 0.06, 4.8, 0.015)
+        for j in range(robot.n)
+    }
+    t, u = commands(12.0, robot.n, 5, 0.7)
+    u += robot.ranges.mean(axis=1)
+    text = with_servos(urdf, servos, tmp_path)
+    write(tmp_path / "log.csv", t, replay(urdf, text, tmp_path, u, t, u[0], range(robot.n)), u, list(robot.joints))
+    (tmp_path / "servo.toml").write_text(f'model = "STS3215"\nkp = {KP}\nsupply = {SUPPLY}\n')
+    monkeypatch.chdir(tmp_path)
+    args = ["servo", "log.csv", "--robot", urdf, "--servo", "servo.toml", "--friction", "coulomb", "--out", "results"]
+    assert main(args) == 0
+    summary = json.loads(Path("results/summary.json").read_text())
+    assert "wrist_roll" not in summary["joints"]  # its axis carries no load, and its link nothing worth weighing
+    for joint in ("shoulder_lift", "elbow_flex"):
+        found, true = summary["joints"][joint], servos[robot.joints.index(joint)]
+        for name, value in (("a", true.a), ("b", true.b), ("Ia", true.armature), ("rate", true.rate)):
+            assert abs(found[name]["value"] - value) < 0.05 * value, (joint, name)

@@ -1,0 +1,121 @@
+"""Servos, against MuJoCo's own: `dcmotor` with input="pos" closes the same loop."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from identify import ExcitationError, IdentificationError, LogError, SettingError
+from identify.servo import JointLoad, Servo, ServoRun, identify_servo
+
+SERVO = Servo(0.166, supply=12.0, duty_limit=0.97)
+MASS, LENGTH, H, DELAY = 0.6, 0.12, 5e-4, 0.02
+TRUTH = {"a": 0.55, "b": 1.2, "Ia": 0.02, "Fs": 0.1, "rate": 4.5, "delay": DELAY}
+
+MJCF = """
+<mujoco>
+  <option timestep="{h}" integrator="implicitfast"/>
+  <worldbody><body><joint name="j" axis="0 -1 0" armature="{Ia}" frictionloss="{Fs}" damping="0"/>
+    <inertial pos="0 0 -{length}" mass="{mass}" diaginertia="1e-9 1e-9 1e-9"/></body></worldbody>
+  <actuator>
+    <dcmotor joint="j" motorconst="{K}" resistance="{R}" input="pos" controller="{kp} 0 {b} {rate} 0 {Vmax}"/>
+  </actuator>
+</mujoco>
+"""
+
+
+def command_at(t: np.ndarray, seed: int) -> np.ndarray:
+    """Return steps and sines as they are typed at a bench, held at 100 Hz."""
+    rng = np.random.default_rng(seed)
+    grid = np.floor(t * 100 + 1e-9) / 100
+    steps = rng.uniform(-1.2, 1.2, 12)[np.minimum((grid / 0.7).astype(int), 11)]
+    waves = 0.3 * np.sin(2 * np.pi * rng.uniform(0.5, 2.0) * grid) + 0.1 * np.sin(2 * np.pi * 3 * grid)
+    return steps + waves
+
+
+def simulated(kp: float, seed: int, seconds: float = 8.0) -> ServoRun:
+    """Return a run of MuJoCo's servo, its positions in counts."""
+    K = TRUTH["b"] / TRUTH["a"]
+    text = MJCF.format(
+        h=H, length=LENGTH, mass=MASS, Ia=TRUTH["Ia"], Fs=TRUTH["Fs"], K=K, R=K / TRUTH["a"], b=TRUTH["b"],
+        kp=SERVO.gain * kp * SERVO.supply * TRUTH["a"], rate=TRUTH["rate"], Vmax=SERVO.duty_limit * SERVO.supply,
+    )  # fmt: skip
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    t = np.arange(0, seconds, H)
+    ctrl = command_at(np.maximum(t - DELAY, 0.0), seed)
+    data.qpos[0] = 0.0
+    q = np.empty(len(t))
+    for k, u in enumerate(ctrl):
+        q[k] = data.qpos[0]
+        data.ctrl[0] = u
+        mujoco.mj_step(model, data)
+    every = round(0.01 / H)
+    counted = np.round(q[::every] / SERVO.step) * SERVO.step
+    return ServoRun(t[::every], counted, command_at(t[::every], seed), JointLoad.pendulum(MASS, LENGTH), kp)
+
+
+@pytest.fixture(scope="module")
+def runs() -> list[ServoRun]:
+    return [simulated(kp, seed) for seed, kp in enumerate((8.0, 16.0, 32.0))]
+
+
+def test_parameters_of_mujocos_servo_are_found(runs: list[ServoRun]) -> None:
+    fit = identify_servo(SERVO, runs, "coulomb")
+    # The truth is of first order in H: commands act up to 1.5 steps early, and implicit damping adds b H to the inertia.
+    effective = {**TRUTH, "Ia": TRUTH["Ia"] + TRUTH["b"] * H, "delay": DELAY - 1.3 * H}
+    for name, true in effective.items():
+        assert abs(fit.p[name] - true) < 4 * fit.standard_errors[name] + 0.005 * true, name
+    assert fit.scale < 0.35 * SERVO.step  # rounding alone leaves 0.25
+    assert fit.errors([simulated(24.0, 7)])[0] < 3 * SERVO.step
+
+
+def test_command_in_degrees_is_refused(runs: list[ServoRun]) -> None:
+    run = runs[0]
+    wrong = ServoRun(run.t, run.q, np.rad2deg(run.command), run.load, run.kp)
+    with pytest.raises(IdentificationError, match="in degrees"):
+        identify_servo(SERVO, [wrong])
+
+
+def test_standing_joint_is_refused(runs: list[ServoRun]) -> None:
+    run = runs[0]
+    with pytest.raises(ExcitationError, match="does not move"):
+        identify_servo(SERVO, [ServoRun(run.t, 0 * run.q, run.command, run.load, run.kp)])
+
+
+def test_torque_off_all_the_time_is_refused(runs: list[ServoRun]) -> None:
+    run = runs[0]
+    with pytest.raises(ExcitationError, match="off all the time"):
+        identify_servo(SERVO, [ServoRun(run.t, run.q, run.command, run.load, run.kp, np.zeros(len(run.t), bool))])
+
+
+def test_saturated_duty_is_refused(runs: list[ServoRun]) -> None:
+    run = runs[0]
+    with pytest.raises(ExcitationError, match="at its limit"):
+        identify_servo(SERVO, [ServoRun(run.t, run.q, run.q + 3.0 * np.sign(run.command), run.load, 200.0)])
+
+
+def test_joint_without_a_load_is_refused(runs: list[ServoRun]) -> None:
+    run, none = runs[0], np.array(0.0)
+    with pytest.raises(ExcitationError, match="known mass"):
+        identify_servo(SERVO, [ServoRun(run.t, run.q, run.command, JointLoad(none, none, none, none), run.kp)])
+
+
+def test_command_with_the_wrong_sign_is_refused(runs: list[ServoRun]) -> None:
+    run = runs[0]
+    with pytest.raises(IdentificationError, match="sign"):
+        identify_servo(SERVO, [ServoRun(run.t, run.q, -run.command, run.load, run.kp)])
+
+
+def test_unknown_names_are_refused(runs: list[ServoRun]) -> None:
+    with pytest.raises(SettingError, match="coulomb"):
+        identify_servo(SERVO, runs, "sticky")
+    with pytest.raises(SettingError, match="no parameter"):
+        identify_servo(SERVO, runs, "load", ("gap",))
+
+
+def test_time_that_stands_is_refused(runs: list[ServoRun]) -> None:
+    run = runs[0]
+    t = run.t.copy()
+    t[5] = t[4]
+    with pytest.raises(LogError, match="does not increase"):
+        ServoRun(t, run.q, run.command, run.load, run.kp)
