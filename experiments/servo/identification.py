@@ -1,4 +1,4 @@
-"""The servos of a robot, identified joint by joint, and judged on logs that the fit has not seen."""
+"""The servos of a robot, identified joint by joint, and judged on held-out logs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

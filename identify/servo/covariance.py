@@ -10,13 +10,13 @@ MIN_CLUSTERS = 3
 """Runs per parameter from which on they are the clusters; of fewer, stretches of time are."""
 
 LONGEST = 0.1
-"""Longest lag over which residuals may hang together, as a share of a run."""
+"""Longest lag over which residuals may be correlated, as a share of a run."""
 
 
 def covariance(found: Found, loop: ServoLoop, c: float) -> Array:
     """Return H^-1 S H^-1: H the curvature of the objective, S the covariance of its gradient (P. J. Huber, 1967).
 
-    S adds up over runs where there are enough of them; otherwise products of scores over lags that residuals hang together
+    S adds up over runs where there are enough of them; otherwise products of scores over lags within their correlation time
     (W. K. Newey and K. D. West, Econometrica 55 (1987) 703-708).
     """
     J, r = found.sensitivity, found.residual
@@ -48,7 +48,7 @@ def _of_lags(scores: Array, lag: int) -> Array:
 
 
 def _lag(r: Array, loop: ServoLoop) -> int:
-    """Return over how many samples residuals hang together: twice their correlation time, Bartlett's weights half it."""
+    """Return over how many samples residuals are correlated: thrice their correlation time, Bartlett's weights half it."""
     most = int(LONGEST * loop.samples)
     power = np.abs(np.fft.rfft(r, 2 * r.shape[1], axis=1)) ** 2
     correlation = np.fft.irfft(power.mean(axis=0))[: most + 1]

@@ -1,4 +1,4 @@
-"""What hangs on a servo: the torque that the links need of one joint."""
+"""What a servo carries: the torque that the links need of one joint."""
 
 from dataclasses import dataclass
 from typing import Self, final

@@ -28,7 +28,7 @@ class ServoRun:
     command : array_like, shape (time,)
         Commanded position from each sample on [rad].
     load : JointLoad
-        What hangs on the joint.
+        What the joint carries.
     kp : float
         Gain of the firmware, in its own unit.
     on : array_like of bool, shape (time,), optional
