@@ -24,7 +24,7 @@ SETTLED = 3e-4
 """Share by which the best of a round must improve the objective."""
 
 WILD = 4.0
-"""Times its typical size from which on the sensitivity of a sample counts less: motions that hang on a hair tell nothing."""
+"""Times its typical size from which on the sensitivity of a sample counts less: of motions that depend on a hair."""
 
 
 @final

@@ -3,8 +3,8 @@
     uv run python tests/benchmarks/servo.py shared.npz [LAW[+lead] ...]
 
 The file has data (run, sample, column), columns (t, goal, q, ..., torque_enable), mass [kg], length [m], kp and trajectory, as
-the logs of GitHub kscalelabs/sysid can be put together. Each run is judged by a fit that has seen neither its mass nor, a second
-time, its gain: mean absolute error of the position, simulated from the commands alone. Laws are compared by Wilcoxon's
+the logs of GitHub kscalelabs/sysid can be put together. Each run is judged by a fit without its mass, and a second time by one
+without its gain: mean absolute error of the position, simulated from the commands alone. Laws are compared by Wilcoxon's
 signed-rank test over settings (mass, length, gain, trajectory), p values times the number of tests.
 """
 
@@ -32,7 +32,7 @@ def read(path):
 
 
 def fold(task):
-    """Return the errors of the runs that a fit has not seen, and its seconds."""
+    """Return the errors of the held-out runs of a fold, and the seconds of its fit."""
     path, law, key, value = task
     runs, about = read(path)
     out = about[key] == value
