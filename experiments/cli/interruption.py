@@ -2,12 +2,19 @@
 
 import os
 import signal
+import sys
+from _thread import interrupt_main
 from collections.abc import Iterator
 from contextlib import contextmanager
+from threading import Timer, main_thread
 from types import FrameType
+from typing import Any
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C: 128 + SIGINT."""
+
+AGAIN = 0.01
+"""Time [s] after which an interruption that was lost is repeated."""
 
 
 @contextmanager
@@ -51,11 +58,29 @@ def noticing() -> Iterator[Notice]:
         notice.pressed = True
         signal.default_int_handler(number, frame)
 
-    before = signal.signal(signal.SIGINT, interrupt)
+    before, hook = signal.signal(signal.SIGINT, interrupt), sys.unraisablehook
+
+    def lost(error: Any) -> None:
+        # Python ignores what is raised while an object goes, as locks of imports do: the interruption comes again after that.
+        if notice.pressed and error.exc_type is KeyboardInterrupt:
+            Timer(AGAIN, _interrupt).start()
+        else:
+            hook(error)
+
+    sys.unraisablehook = lost
     try:
         yield notice
     finally:
+        sys.unraisablehook = hook
         signal.signal(signal.SIGINT, before)
+
+
+def _interrupt() -> None:
+    """Interrupt the main thread, which may be waiting."""
+    if hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(main_thread().ident or 0, signal.SIGINT)
+    else:  # on Windows
+        interrupt_main()
 
 
 def _leave(number: int, frame: FrameType | None) -> None:

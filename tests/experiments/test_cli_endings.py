@@ -10,6 +10,7 @@ import pytest
 
 import experiments.recording.table1_recording
 from experiments.cli import main
+from experiments.cli.interruption import noticing
 from experiments.results.manifest import NAME as MANIFEST
 
 KEPT = ["log.parquet", "summary.json"]
@@ -55,6 +56,28 @@ def test_a_real_interrupt_ends_the_process_without_a_traceback(tmp_path, start):
     assert process.returncode == 130, err
     assert err.strip() == "idbench: interrupted"
     assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupt_that_python_ignores_comes_again(capfd):
+    """As one that comes while an object goes: what its callback raises is printed, and forgotten."""
+
+    class Lock:
+        def __del__(self):
+            signal.raise_signal(signal.SIGINT)
+
+    def interrupted():
+        with noticing():
+            lock = Lock()
+            del lock
+            time.sleep(30)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            interrupted()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert capfd.readouterr().err == ""
 
 
 def test_an_interrupt_that_comes_out_as_another_error_is_one(tmp_path, start):
