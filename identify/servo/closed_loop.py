@@ -18,7 +18,7 @@ LARGEST = 2**24
 FRICTION = ("Fs", "Fst", "vs", "Fl", "Fls", "Fle", "Flm", "Flq", "Fgd", "Fgb")
 
 WAY = 6
-"""Steps by which a joint may be thrown in a sample, as a number of its range of motion, before it counts as lost."""
+"""Ranges of its motion that a joint may cross in a step: beyond, it is lost, and numbers would overflow."""
 
 
 @final

@@ -32,6 +32,9 @@ FEW = 20
 REFINED = 15
 """Rounds with all runs, at most."""
 
+ALWAYS = ("a", "b", "Ia", "Fs", "Fv", "offset", "delay", "rate", "lead", "dead_band")
+"""Parameters that a servo may have whatever its friction."""
+
 TORQUES = ("a", "b", "Ia", "Fs", "Fv", "Fst")
 """Parameters that scale together where no known load sets the scale."""
 
@@ -154,6 +157,7 @@ def identify_servo(
     """
     held = held or {}
     _require_known(friction, (*more, *held))
+    _require_possible(held)
     excitation = Excitation.of(servo, runs)
     chosen = _evenly(runs)
     with one_thread():
@@ -238,5 +242,15 @@ def _require_scale(fit: ServoFit, search: Search) -> None:
 def _require_known(friction: str, names: Sequence[str]) -> None:
     if friction not in SERVO_FRICTIONS:
         raise SettingError(f"friction {friction!r} is unknown; known: {', '.join(SERVO_FRICTIONS)}")
-    if wrong := [name for name in names if name not in SERVO_PARAMETERS]:
-        raise SettingError(f"a servo has no parameter {wrong[0]!r}; known: {', '.join(SERVO_PARAMETERS)}")
+    known = [*ALWAYS, *SERVO_FRICTIONS[friction]]
+    if wrong := [name for name in names if name not in known]:
+        raise SettingError(f"a servo with friction {friction} has no parameter {wrong[0]!r}; known: {', '.join(known)}")
+
+
+def _require_possible(held: dict[str, float]) -> None:
+    for name, x in held.items():
+        parameter = SERVO_PARAMETERS[name]
+        if not np.isfinite(x) or x < parameter.low or (parameter.relative and x <= 0):
+            raise SettingError(
+                f"{name} = {x:g} {parameter.unit} is impossible: {parameter.meaning} must be finite and not negative"
+            )

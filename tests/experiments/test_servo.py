@@ -110,6 +110,10 @@ def test_wrong_servo_files_are_refused(bench, tmp_path, complaint, text, expecte
     [
         (["--friction", "sticky"], "directional"),
         (["--find", "gap"], "no parameter"),
+        (["--find", "Fle"], "friction load has no parameter"),
+        (["--hold", "Fgd=0.1"], "friction load has no parameter"),
+        (["--hold", "a=0"], "impossible"),
+        (["--hold", "rate=nan"], "impossible"),
         (["--hold", "a"], "NAME=VALUE"),
         (["--hold", "a=much"], "letters and numbers"),
         (["--units", "command=grad"], "unit 'grad'"),
