@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 LOGGED = {"q/measured", "torque/log"}
 """What a robot would log: numbered by samples, too, which takes room."""
 
-ELECTRIC = ("reference", "current", "voltage", "duty")
+ELECTRIC = ("reference", "current", "voltage", "duty", "emf")
 """Signals of a drive."""
 
 
@@ -187,6 +187,8 @@ class Base:
 def _signals(stretch: Stretch) -> dict[str, Array]:
     """Return the curves of a stretch, by path."""
     planned = stretch.reference
+    gap = {} if stretch.gap is None else {"gear/gap": stretch.gap}
+    asked = {"torque/command": stretch.command, "torque/disturbance": stretch.tau - stretch.command}
     return {
         "q/planned": planned.q,
         "q/true": stretch.q,
@@ -196,8 +198,8 @@ def _signals(stretch: Stretch) -> dict[str, Array]:
         "qdd/planned": planned.qdd,
         "error/tracking": planned.q - stretch.q,
         "error/encoder": stretch.measured - stretch.q,
-        "torque/command": stretch.command,
         "torque/true": stretch.tau,
-        "torque/disturbance": stretch.tau - stretch.command,
         "torque/log": stretch.logged,
+        **({} if stretch.by_position else asked),
+        **gap,
     }

@@ -99,8 +99,10 @@ def drive(shelf: Shelf) -> Part:
         return None
     samples = column(
         plot(shelf, "current [A], asked for and true", "drive/reference", "drive/current"),
-        plot(shelf, "voltage [V]", "drive/voltage"),
+        plot(shelf, "voltage and back-EMF [V]", "drive/voltage", "drive/emf"),
         plot(shelf, "duty, share of the bus voltage", "drive/duty"),
+        None if shelf.of("torque/command") else plot(shelf, "position, commanded and true [rad]", "q/planned", "q/true"),
+        plot(shelf, "rotor - link [rad], within the backlash", "gear/gap"),
         plot(shelf, "torque, true - commanded [N m]", "torque/disturbance"),
         lanes(shelf, JOINT_STATES, "state/*"),
     )

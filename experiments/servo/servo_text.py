@@ -76,7 +76,7 @@ def warnings_of(fits: Mapping[str, ServoFit | str]) -> list[str]:
 def inexpressible(fits: Mapping[str, ServoFit]) -> list[str]:
     """Return what MuJoCo's servos do not have of what was found."""
     lost = {"Fst": "Stribeck friction", "Fl": "friction with load", "Fle": "friction with load", "Fgd": "friction of the gear"}
-    lost |= {"lead": "lead", "dead_band": "dead band"}
+    lost |= {"lead": "lead", "dead_band": "dead band", "backlash": "backlash", "Fo": "friction while torque is off"}
     kinds = dict.fromkeys(word for fit in fits.values() for name, word in lost.items() if name in fit.free)
     found = [f"MuJoCo's dcmotor cannot express {', '.join(kinds)}: the errors above include that"] if kinds else []
     offsets = {joint: fit.p["offset"] for joint, fit in fits.items()}

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
+from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.study.axis import FRICTION, Axis, Setting
 from identify import CHAINS, ESTIMATORS, AbstractEstimator, Chain
 
@@ -40,6 +41,14 @@ def methods_of(chains: Sequence[str], estimators: Sequence[str], friction: str, 
             chain, estimator = setting.chain(chain), setting.estimator(estimator)
         laws = next((str(setting.value) for setting in combination if setting.axis.field == FRICTION), friction)
         yield Method(name, way, chain, estimator, laws, combination)
+
+
+def servo_methods(friction: str, axes: Sequence[Axis]) -> Iterator[Method]:
+    """Yield what the closed loop of servos is fitted with: every law of friction."""
+    chain, estimator = CHAINS.create(CHAIN), ESTIMATORS.create(ESTIMATOR)  # which see no servo
+    for combination in combinations(axes):
+        laws = next((str(setting.value) for setting in combination if setting.axis.field == FRICTION), friction)
+        yield Method("commands", "closed loop", chain, estimator, laws, combination)
 
 
 def combinations(axes: Sequence[Axis]) -> Iterator[tuple[Setting, ...]]:

@@ -12,6 +12,7 @@ from experiments.identification.robot_model import RobotModel
 from experiments.identification.simulators import RobotPlant, ScenarioLoop
 from experiments.study.bound import bounds_of
 from experiments.study.method import Method
+from experiments.study.servo_rows import SERVO, rows_of
 from experiments.study.statistics import BOUNDS
 from experiments.study.study import Study
 from identify import Array, Estimate, ExplicitModel, IdentificationError, Problem, Simulation, Status, attempt_each
@@ -65,7 +66,7 @@ def run_shard(study: Study, runs: range, *, threads: int = 1, progress: Progress
         start, tell = time.perf_counter(), _part(progress, done, len(together), steps * len(runs))
         try:
             simulated = _simulate(scenarios, together, threads, tell)
-            known = {laws: _known(study, robot_model, simulated) for laws, robot_model in study.subjects.items()}
+            known = {} if study.of_servos else {x: _known(study, model, simulated) for x, model in study.subjects.items()}
         except BenchError as error:
             _fail(shard, study, scenarios, list(together), str(error))
             continue
@@ -73,9 +74,13 @@ def run_shard(study: Study, runs: range, *, threads: int = 1, progress: Progress
         done += len(together) * steps
         for k, method in enumerate(study.methods):
             start = time.perf_counter()
-            truth, bounds = known[method.friction]
-            simulation = _simulation(study, method, simulated, together, truth)
-            shard.rows += _identify(study, method, simulated, list(together), truth, bounds, simulation)
+            if study.of_servos:
+                common = [_common(study, method, run, SERVO, seed) for run, seed in zip(together, simulated.seeds, strict=True)]
+                shard.rows += rows_of(study.parameters, parts_of(study), method.friction, simulated, common)
+            else:
+                truth, bounds = known[method.friction]
+                simulation = _simulation(study, method, simulated, together, truth)
+                shard.rows += _identify(study, method, simulated, list(together), truth, bounds, simulation)
             shard.seconds[f"{method.chain_name} {method.estimator_name}"] += time.perf_counter() - start
             tell(2.0 + k)
     shard.rows.sort(key=lambda row: row["run"])

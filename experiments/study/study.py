@@ -16,12 +16,14 @@ from experiments.identification.defaults import CHAIN, ESTIMATOR
 from experiments.identification.parameters import Parameters
 from experiments.identification.robot_model import RobotModel
 from experiments.study.axis import FRICTION, Axis, Setting
-from experiments.study.method import Method, combinations, methods_of, whole_first
+from experiments.study.method import Method, combinations, methods_of, servo_methods, whole_first
+from experiments.study.servo_rows import SERVO, names_of
 from identify import MODELS, AbstractModel
+from sim.drives import ServoDrive
 from sim.scenario.scenario import Scenario
 from sim.scenario.scenario_file import from_dict
 from sim.settings import NotNegative, Seed, Truth, Whole, settings
-from sim.trajectories import RandomMoves
+from sim.trajectories import RandomMoves, RandomSteps
 
 MOST_POINTS = 1_000_000
 """Combinations of settings of simulation, above which axes are taken for a slip: each is looked at before the first is run."""
@@ -91,7 +93,11 @@ class Study:
         points = prod(len(axis.points) for axis in self.axes if not axis.identification)
         if points > MOST_POINTS:
             raise StudyError(f"the grid has {points:,} combinations, more than {MOST_POINTS:,}: give its axes fewer values")
-        _ = self.methods, self.created_models, self.subjects
+        _ = self.methods, self.parameters
+        if self.of_servos != (self.models == (SERVO,)):
+            raise StudyError(f'models = {list(self.models)}: a study of servos has models = ["{SERVO}"], any other has not')
+        if not self.of_servos:
+            _ = self.created_models, self.subjects
         self._require(next(self._points()))  # the whole grid is looked at when it is known not to be endless
 
     @property
@@ -131,7 +137,14 @@ class Study:
     def methods(self) -> tuple[Method, ...]:
         """The grid of identifications."""
         axes = [axis for axis in self.every_axis if axis.identification]
+        if self.of_servos:
+            return tuple(servo_methods(self.friction[0], axes))
         return tuple(methods_of(self.chains, self.estimators, self.friction[0], axes))
+
+    @cached_property
+    def of_servos(self) -> bool:
+        """Whether servos are identified, from commands and positions."""
+        return isinstance(self._first.drive, ServoDrive)
 
     @property
     def every_axis(self) -> tuple[Axis, ...]:
@@ -153,6 +166,8 @@ class Study:
     @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the parameters that are identified, with any of the laws of friction."""
+        if self.of_servos:
+            return names_of(self._first, self.friction)
         return tuple(dict.fromkeys(name for robot_model in self.subjects.values() for name in robot_model.basis.names))
 
     @cached_property
@@ -212,8 +227,8 @@ class Study:
         return {**plain, **lists, "axes": axes, "scenario": self.scenario}
 
 
-def _random(scenario: Scenario) -> RandomMoves:
+def _random(scenario: Scenario) -> RandomMoves | RandomSteps:
     """Return the trajectory of a scenario whose motion can be drawn."""
-    if not isinstance(scenario.trajectory, RandomMoves):
-        raise StudyError("motion = 'drawn' needs a trajectory of kind random: write one, or motion = 'shared'")
+    if not isinstance(scenario.trajectory, (RandomMoves, RandomSteps)):
+        raise StudyError("motion = 'drawn' needs a trajectory of kind random or steps: write one, or motion = 'shared'")
     return scenario.trajectory

@@ -79,7 +79,8 @@ class MotionLog:
     torque : TorqueChannel
         What a sample of `tau` means.
     conditions : mapping of str to array_like, shape (..., time, joint or 1)
-        What else was logged that laws may need: ``temperature`` [deg C]; ``payload``, the share of the payload that is held.
+        What else was logged that laws may need: ``temperature`` [deg C]; ``payload``, the share of the payload that is held;
+        ``command`` of servos [rad], and ``on``, 1 where their torque is.
 
     Raises
     ------

@@ -18,6 +18,10 @@ WRITTEN = (CSV, ".parquet")
 """What names of files end with that idbench writes."""
 
 
+COLUMNS = ("temperature", "command", "on")
+"""Conditions that have columns."""
+
+
 def write_log(log: MotionLog, path: Path | str, joints: Sequence[str] = ()) -> None:
     """Write one run to a CSV or Parquet file; the torque channel goes into the metadata of Parquet.
 
@@ -44,8 +48,9 @@ def write_log(log: MotionLog, path: Path | str, joints: Sequence[str] = ()) -> N
     in_newton_metres = path.suffix.lower() == CSV
     tau = log.tau * np.asarray(log.torque.gain) if in_newton_metres else log.tau
     columns |= {f"tau{end}": x for end, x in zip(ends, tau.T, strict=True)}
-    if (warm := log.conditions.get("temperature")) is not None:
-        columns |= {f"temperature{end}": x for end, x in zip(ends, np.broadcast_to(warm, log.q.shape).T, strict=True)}
+    for name in COLUMNS:
+        if (values := log.conditions.get(name)) is not None:
+            columns |= {f"{name}{end}": x for end, x in zip(ends, np.broadcast_to(values, log.q.shape).T, strict=True)}
     table = pa.table({name: pa.array(values) for name, values in columns.items()})
     if in_newton_metres:
         with path.open("wb") as file:  # not by its name, which pyarrow takes in UTF-8 alone

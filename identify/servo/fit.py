@@ -14,7 +14,8 @@ from identify.servo.closed_loop import ServoLoop
 from identify.servo.covariance import covariance
 from identify.servo.excitation import Excitation
 from identify.servo.friction import SERVO_FRICTIONS
-from identify.servo.parameters import SERVO_PARAMETERS
+from identify.servo.parameters import SERVO_PARAMETERS, parameters_of
+from identify.servo.pieces import pieces
 from identify.servo.rows import ServoRows
 from identify.servo.run import ServoRun
 from identify.servo.search import Found, Search
@@ -32,9 +33,6 @@ FEW = 20
 REFINED = 15
 """Rounds with all runs, at most."""
 
-ALWAYS = ("a", "b", "Ia", "Fs", "Fv", "offset", "delay", "rate", "lead", "dead_band")
-"""Parameters that a servo may have whatever its friction."""
-
 TORQUES = ("a", "b", "Ia", "Fs", "Fv", "Fst")
 """Parameters that scale together where no known load sets the scale."""
 
@@ -46,6 +44,9 @@ CONTRAST = 0.05
 
 UNEXPLAINED = 0.2
 """Typical residual, as a share of the range of the motion, from which on a fit explains nothing."""
+
+PLAYS = np.array([0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
+"""Backlash that is tried first [counts]."""
 
 MOST_RUNS = 120
 """Runs that a search looks at; of more, as many evenly spread ones."""
@@ -156,17 +157,21 @@ def identify_servo(
         If a name is unknown.
     """
     held = held or {}
-    _require_known(friction, (*more, *held))
+    parameters_of(friction, (*more, *held))
     _require_possible(held)
     excitation = Excitation.of(servo, runs)
-    chosen = _evenly(runs)
+    whole = _evenly(runs)
+    # Few runs are simulated in pieces, side by side; many are whole, as they are judged.
+    chosen = whole if len(whole) > FEW else [piece for run in whole for piece in pieces(run, servo.step)]
     with one_thread():
         loop = ServoLoop(servo, chosen)
-        begin = {**(start or _start(servo, chosen, loop, excitation)), **held}
+        begin = {**(start or _start(servo, whole, loop, excitation)), **held}
         begin["offset"] *= excitation.tilts
         begin = {**_first(friction, more, begin, excitation), **begin, **held}
+        if "backlash" in more and "backlash" not in held:
+            begin["backlash"] = _play(servo, loop, begin)
         free = tuple(x for x in _names(friction, more, begin, excitation) if x not in held)
-        some = ServoLoop(servo, chosen[::2]) if len(chosen) > FEW else loop
+        some = ServoLoop(servo, chosen[::2]) if len(whole) > FEW else loop
         rough = Search(some, free, excitation.scales, _scale(servo, some, begin)).best(begin).p
         found = Search(loop, free, excitation.scales, _scale(servo, loop, rough)).best(rough, REFINED)
         fit = ServoFit(servo, friction, free, found, loop, excitation)
@@ -209,6 +214,13 @@ def _first(friction: str, more: Sequence[str], begin: dict[str, float], excitati
     return {**first, **dict.fromkeys(more, 0.0)}
 
 
+def _play(servo: Servo, loop: ServoLoop, begin: dict[str, float]) -> float:
+    """Return the backlash of some that fits best: where there is none to begin with, its sensitivity is none."""
+    tried = servo.step * PLAYS
+    r = np.abs(loop.q - loop.simulate({name: np.full(len(tried), x) for name, x in begin.items()} | {"backlash": tried}))
+    return float(tried[int((r * loop.kept).mean(axis=(1, 2)).argmin())])
+
+
 def _scale(servo: Servo, loop: ServoLoop, begin: dict[str, float]) -> float:
     r = np.abs(loop.q - loop.simulate(begin)[0])[loop.kept]
     return 3 * max(float(np.median(r)), servo.step / 4)
@@ -237,14 +249,6 @@ def _require_scale(fit: ServoFit, search: Search) -> None:
             f"{fit.loop.runs[0].name}: torque constant, friction and armature scale together, because the known load is small "
             "beside them: add a known mass to the robot's file, or give one of them (--hold a=0.5)"
         )
-
-
-def _require_known(friction: str, names: Sequence[str]) -> None:
-    if friction not in SERVO_FRICTIONS:
-        raise SettingError(f"friction {friction!r} is unknown; known: {', '.join(SERVO_FRICTIONS)}")
-    known = [*ALWAYS, *SERVO_FRICTIONS[friction]]
-    if wrong := [name for name in names if name not in known]:
-        raise SettingError(f"a servo with friction {friction} has no parameter {wrong[0]!r}; known: {', '.join(known)}")
 
 
 def _require_possible(held: dict[str, float]) -> None:

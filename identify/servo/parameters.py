@@ -3,6 +3,9 @@
 from collections.abc import Sequence
 from typing import NamedTuple, final
 
+from identify.errors import SettingError
+from identify.servo.friction import SERVO_FRICTIONS
+
 
 @final
 class ServoParameter(NamedTuple):
@@ -45,6 +48,9 @@ SERVO_PARAMETERS: dict[str, ServoParameter] = {
     "rate": ServoParameter("rad/s", "rate limit of the target", 0.02),
     "lead": ServoParameter("s", "by how much the loop sees its position early", of="time", share=0.15, low=NEGATIVE),
     "dead_band": ServoParameter("rad", "error below which there is no duty", of="angle", share=1.0),
+    "backlash": ServoParameter("rad", "free play between rotor and link", of="angle", share=1.0),
+    "Mg": ServoParameter("N m", "gravity of the link beyond the file's, along the sine", of="torque", low=NEGATIVE),
+    "Fo": ServoParameter("N m", "further Coulomb friction while torque is off", of="torque", low=NEGATIVE),
     "Fst": ServoParameter("N m", "Stribeck friction: what friction near standstill has above that of sliding", of="torque"),
     "vs": ServoParameter("rad/s", "Stribeck velocity", 0.1, low=1e-4),
     "Fl": ServoParameter("1", "friction per load", share=0.006),
@@ -56,6 +62,26 @@ SERVO_PARAMETERS: dict[str, ServoParameter] = {
     "Fgb": ServoParameter("1", "friction per torque of a gear that is driven", share=0.009),
 }
 """All parameters that a servo may have."""
+
+FURTHER = ("lead", "dead_band", "backlash", "Mg", "Fo")
+"""Parameters that are found where that is asked for."""
+
+
+def parameters_of(friction: str, more: Sequence[str] = ()) -> tuple[str, ...]:
+    """Return the parameters that may be found of a servo with a law of friction, in their order.
+
+    Raises
+    ------
+    SettingError
+        If a name is unknown.
+    """
+    if friction not in SERVO_FRICTIONS:
+        raise SettingError(f"friction {friction!r} is unknown; known: {', '.join(SERVO_FRICTIONS)}")
+    known = {"a", "b", "Ia", "Fs", "Fv", "offset", "delay", "rate", *SERVO_FRICTIONS[friction]}
+    if wrong := [name for name in more if name not in (*known, *FURTHER)]:
+        named = [name for name in SERVO_PARAMETERS if name in (*known, *FURTHER)]
+        raise SettingError(f"a servo with friction {friction} has no parameter {wrong[0]!r}; known: {', '.join(named)}")
+    return tuple(name for name in SERVO_PARAMETERS if name in (*known, *more))
 
 
 def step_of(name: str, value: float, scales: dict[str, float]) -> float:

@@ -1,7 +1,6 @@
 """Where a search begins: rows of the servo's law, linear in all but delay and rate limit (variable projection)."""
 
 from collections.abc import Sequence
-from itertools import product
 from typing import final
 
 import numpy as np
@@ -16,6 +15,8 @@ DELAYS = np.arange(0.0, 6.1, 0.5)
 
 RATES = 10
 """Rate limits that are tried, between half and 1.3 times the largest speed of a joint, beside none."""
+
+DECIMATION = max(1, int(0.25 / CUTOFF))
 
 COLUMNS = ("a", "b", "Ia", "Fs", "offset")
 
@@ -38,13 +39,14 @@ class ServoRows:
 
     def starts(self) -> list[dict[str, float]]:
         """Return parameters for each delay and rate limit that is tried, those whose rows fit best first."""
-        rates = [np.inf, *(self.fast * np.geomspace(0.5, 1.3, RATES))] if self.fast else [np.inf]
-        found = [self.solved(samples, rate) for rate, samples in product(rates, DELAYS)]
+        rates = np.array([np.inf, *(self.fast * np.geomspace(0.5, 1.3, RATES))] if self.fast else [np.inf])
+        targets = [run.targets(rates) for run in self._runs]
+        found = [self.solved(samples, rate, [t[:, k] for t in targets]) for k, rate in enumerate(rates) for samples in DELAYS]
         return [p for _, p in sorted((pair for pair in found if pair), key=lambda pair: pair[0])]
 
-    def solved(self, samples: float, rate: float) -> tuple[float, dict[str, float]] | None:
-        """Return residual and linear parameters for a delay [samples] and a rate limit [rad/s]; None if they make no servo."""
-        parts = [run.rows(self.servo, samples, rate) for run in self._runs]
+    def solved(self, samples: float, rate: float, targets: Sequence[Array]) -> tuple[float, dict[str, float]] | None:
+        """Return residual and linear parameters for a delay [samples] and targets within a rate; None if they make no servo."""
+        parts = [run.rows(self.servo, samples, target) for run, target in zip(self._runs, targets, strict=True)]
         W, Y = np.concatenate([w for w, _ in parts]), np.concatenate([y for _, y in parts])
         size = np.sqrt((W**2).sum(axis=0))
         used = size > 0
@@ -53,7 +55,7 @@ class ServoRows:
         if X[0] <= 0:
             return None
         p = dict(zip(COLUMNS, X.tolist(), strict=True))
-        p |= {"offset": p["offset"] / p["a"], "delay": samples * self._runs[0].T, "rate": rate}
+        p |= {"offset": p["offset"] / p["a"], "delay": samples * self._runs[0].T, "rate": float(rate)}
         p["b"] = max(p["b"], 0.02 * p["a"])
         p["Ia"] = max(p["Ia"], 0.02 * self._runs[0].inertia)
         p["Fs"] = max(p["Fs"], 0.0)
@@ -68,39 +70,46 @@ class _Uniform:
         self.run, self.T = run, run.T
         self._t = np.arange(run.t[0], run.t[-1], self.T)
         q = np.interp(self._t, run.t, run.q)
-        self.q = low_passed(q)
-        self.qd, self.qdd = np.gradient(self.q, self.T), np.gradient(np.gradient(self.q, self.T), self.T)
+        self.q, self._measured = low_passed(q), q
+        qd = np.gradient(self.q, self.T)
+        qdd = np.gradient(qd, self.T)
         self._on = np.interp(self._t, run.t, run.enabled.astype(float))
-        driven = np.abs(self.qd[self._on > 0])
+        driven = np.abs(qd[self._on > 0])
         self.fast = float(np.quantile(driven, 0.995)) if driven.size else 0.0
         inertia, sine, cosine, rest = (
             np.interp(self._t, run.t, np.broadcast_to(getattr(run.load, x), run.t.shape))
             for x in ("inertia", "sine", "cosine", "rest")
         )
         self.inertia = float(inertia.mean())
-        self._needed = inertia * self.qdd + sine * np.sin(self.q) + cosine * np.cos(self.q) + rest
+        needed = inertia * qdd + sine * np.sin(self.q) + cosine * np.cos(self.q) + rest
+        columns = np.stack([-self._on * qd, -qdd, -np.sign(qd), needed], axis=1)
+        *motion, self._needed = low_passed(columns)[::DECIMATION].T
+        self._motion = np.stack(motion, axis=1)
 
-    def rows(self, servo: Servo, samples: float, rate: float) -> tuple[Array, Array]:
-        """Return W and Y."""
+    def targets(self, rates: Array) -> Array:
+        """Return the command within rates [rad/s], not yet late, shape (time, rate)."""
         run = self.run
-        command = np.interp(self._t - samples * self.T, run.t, run.command)
-        target = _limited(command, rate * self.T)
-        error = target - np.interp(self._t, run.t, run.q)
+        return _limited(np.interp(self._t, run.t, run.command), rates * self.T)
+
+    def rows(self, servo: Servo, samples: float, target: Array) -> tuple[Array, Array]:
+        """Return W and Y for a target that is late by some samples."""
+        run = self.run
+        late = np.interp(self._t - samples * self.T, self._t, target)
+        error = late - self._measured
         g = servo.gain * run.kp
         duty = np.clip(g * error, -servo.duty_limit, servo.duty_limit)
         V = self._on * servo.supply
         inside = np.abs(g * error) < servo.duty_limit
-        columns = (V * duty, -self._on * self.qd, -self.qdd, -np.sign(self.qd), V * g * inside)
-        W = np.stack([low_passed(column) for column in columns], axis=1)
-        decimation = max(1, int(0.25 / CUTOFF))
-        return W[::decimation], low_passed(self._needed)[::decimation]
+        driven = low_passed(np.stack([V * duty, V * g * inside], axis=1))[::DECIMATION]
+        return np.concatenate([driven[:, :1], self._motion, driven[:, 1:]], axis=1), self._needed
 
 
-def _limited(command: Array, most: float) -> Array:
-    """Return a target that follows a command by at most `most` a sample."""
-    if not np.isfinite(most) or np.abs(np.diff(command)).max(initial=0.0) <= most:
-        return command
-    target = command.copy()
-    for i in range(1, len(target)):
-        target[i] = target[i - 1] + min(max(command[i] - target[i - 1], -most), most)
+def _limited(command: Array, most: Array) -> Array:
+    """Return targets that follow a command by at most `most` a sample, shape (time, most)."""
+    if len(command) < 2:
+        return np.repeat(command[:, None], len(most), axis=1)
+    target = np.empty((len(command), len(most)))
+    now = target[0] = command[0]
+    for i, wanted in enumerate(command[1:].tolist(), start=1):
+        now = target[i] = now + np.minimum(np.maximum(wanted - now, -most), most)
     return target

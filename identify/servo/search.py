@@ -23,6 +23,9 @@ SAMPLES = 12
 SETTLED = 3e-4
 """Share by which the best of a round must improve the objective."""
 
+IDLE = 2
+"""Rounds without such an improvement after which a search ends."""
+
 WILD = 4.0
 """Times its typical size from which on the sensitivity of a sample counts less: of motions that depend on a hair."""
 
@@ -85,7 +88,10 @@ class Search:
         for _ in range(rounds):
             tried, cost, J, r = self._differences(start, x, width)
             A, gradient, size = self._normal(J, r)
-            steps = self._steps(A, gradient, size, damping)
+            steps, promised = (
+                self._steps(A, gradient, size, damping),
+                float(gradient @ np.linalg.pinv(A, 1e-6, hermitian=True) @ gradient),
+            )
             scattered = self._scattered(rng, A, size, spread * np.sqrt(0.02 * cost[0] / len(x)))
             more = self._within(x, np.concatenate([steps, scattered]))
             further = self.cost(self._simulated(start, more))
@@ -102,7 +108,7 @@ class Search:
             if best == 0:
                 width, spread = 0.6 * width, 0.6 * spread
             x = every[best]
-            if idle >= 3:
+            if idle >= IDLE or (promised < SETTLED * cost[0] and width < 1):
                 break
         _, cost, J, r = self._differences(start, x, min(width, 0.5))
         return Found({**start, **dict(zip(self.free, x.tolist(), strict=True))}, float(cost[0]), r, J)

@@ -8,10 +8,12 @@ from identify.arrays import Array
 CUTOFF = 1 / 12
 """Cut-off of the low-pass, as a share of the sampling frequency: motion lies below, differentiated counts above."""
 
+SECTIONS = butter(2, 2 * CUTOFF, output="sos")
+
 
 def low_passed(x: Array) -> Array:
     """Return signals of a uniform clock, shape (time, ...), without what lies above the cut-off; none is late."""
-    return np.asarray(sosfiltfilt(butter(2, 2 * CUTOFF, output="sos"), x, axis=0))
+    return np.asarray(sosfiltfilt(SECTIONS, x, axis=0))
 
 
 def smoothed(t: Array, q: Array) -> tuple[Array, Array, Array]:

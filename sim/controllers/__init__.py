@@ -7,6 +7,7 @@ from sim.controllers.controller import AbstractLaw as AbstractLaw
 from sim.controllers.controller import Task as Task
 from sim.controllers.pd import PDFeedforward as PDFeedforward
 from sim.controllers.pid import PID as PID
+from sim.controllers.position import PositionCommand as PositionCommand
 
 CONTROLLERS: PluginTable[AbstractController] = PluginTable(
     "controllers",
@@ -15,5 +16,6 @@ CONTROLLERS: PluginTable[AbstractController] = PluginTable(
         "pd": PDFeedforward,
         "pid": PID,
         "computed_torque": ComputedTorque,
+        "position": PositionCommand,
     },
 )

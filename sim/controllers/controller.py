@@ -3,10 +3,12 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
+from sim.drives.drive import Commanded
 from sim.robot.inverse_dynamics import InverseDynamics, inverse_dynamics
 from sim.robot.motors import Array
 from sim.robot.robot import Robot
@@ -68,11 +70,17 @@ class AbstractLaw(ABC):
 
     @abstractmethod
     def command(self, k: int, q: Array) -> Array:
-        """Return the torques [N m], shape (nsim, joint), for the positions `q` [rad] of sample `k`; asked once a sample."""
+        """Return the command, shape (nsim, joint), for the positions `q` [rad] of sample `k`; asked once a sample.
+
+        Torques [N m], or positions [rad] of a controller that commands positions.
+        """
 
 
 class AbstractController(ABC):
     """The settings of a control law."""
+
+    commanded: ClassVar[Commanded] = "torque"
+    """What it commands."""
 
     @abstractmethod
     def start(self, task: Task) -> AbstractLaw:

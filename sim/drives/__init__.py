@@ -5,6 +5,7 @@ from sim.drives.averaged_drive import AveragedDrive as AveragedDrive
 from sim.drives.drive import AbstractAmplifier as AbstractAmplifier
 from sim.drives.drive import AbstractDrive as AbstractDrive
 from sim.drives.ideal_drive import IdealDrive as IdealDrive
+from sim.drives.servo_drive import ServoDrive as ServoDrive
 from sim.drives.switched_drive import SwitchedDrive as SwitchedDrive
 
 DRIVES: PluginTable[AbstractDrive] = PluginTable(
@@ -14,5 +15,6 @@ DRIVES: PluginTable[AbstractDrive] = PluginTable(
         "ideal": IdealDrive,
         "averaged": AveragedDrive,
         "switched": SwitchedDrive,
+        "servo": ServoDrive,
     },
 )

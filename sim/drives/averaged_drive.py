@@ -92,7 +92,7 @@ class _Amplifier(AbstractAmplifier):
         voltage = R * current + L * (i1 - i0) / dt + e
         limited = np.maximum(saturated, np.abs(demand) > most * K)
         duty = np.where(np.isfinite(V), voltage / V, np.nan)  # a share of a bus that has no end is none
-        return Electric(reference, current, voltage, duty, limited)
+        return Electric(reference, current, voltage, duty, limited, e)
 
     def _release(self, v: Array, target: Array, e: Array) -> Array:
         """Return how long [s] the loop asks for more than the voltage `v`, which is all there is."""

@@ -1,7 +1,9 @@
 """What a drive is: what stands between a commanded torque and the torque at the joint."""
 
 from abc import ABC, abstractmethod
+from typing import ClassVar, Literal
 
+import mujoco
 import numpy as np
 
 from sim.drives.electric import BetweenEdges, Electric
@@ -10,12 +12,19 @@ from sim.robot.robot import Robot
 
 Trace = tuple[Array, ...]
 
+Commanded = Literal["torque", "position"]
+"""What a controller commands, and a drive obeys."""
+
 
 class AbstractAmplifier(ABC):
     """A drive at work; what it remembers is of shape (nsim, joint)."""
 
     trace: Trace = ()
     """What the last call of `step` did, raw, (steps or 1, nsim, joint) or (nsim, joint) each; empty without currents."""
+
+    def sees(self, q: Array) -> None:
+        """Receive the positions in the middle of the steps to come, shape (steps or 1, nsim, joint), before `step`."""
+        del q
 
     @abstractmethod
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
@@ -24,7 +33,7 @@ class AbstractAmplifier(ABC):
         Parameters
         ----------
         demand : Array, shape (nsim, joint)
-            Torque asked for, its mean over the steps [N m].
+            What is commanded, its mean over the steps [N m, or rad for drives that take positions].
         speed : Array, shape (steps or 1, nsim, joint)
             Speed in the middle of every step, times the torque constant over its nominal value [rad/s]; that in the middle of
             all of them for a steady drive.
@@ -58,6 +67,9 @@ class AbstractAmplifier(ABC):
 class AbstractDrive(ABC):
     """The settings of a drive."""
 
+    commands: ClassVar[Commanded] = "torque"
+    """What it takes."""
+
     @abstractmethod
     def start(self, robot: Robot, nsim: int, h: float) -> AbstractAmplifier:
         """Return the drive at rest, to be advanced by physics steps of `h` [s].
@@ -69,6 +81,32 @@ class AbstractDrive(ABC):
         ScenarioError
             If a setting does not fit the motors.
         """
+
+    def edit(self, spec: mujoco.MjSpec) -> None:
+        """Write what belongs to the drive into the joints of a robot."""
+        del spec
+
+    def play(self, robot: Robot) -> Array:
+        """Return the backlash of every joint [rad], shape (joint,)."""
+        return np.zeros(robot.n)
+
+    @property
+    def before_gear(self) -> bool:
+        """Whether encoders see the rotor rather than the link: with backlash, these differ."""
+        return False
+
+    def conditions(self, t: Array, command: Array) -> dict[str, Array]:
+        """Return what the log says beside motion and torque at its instants t [s], shape (nsim, time, joint) or less.
+
+        Parameters
+        ----------
+        t : Array, shape (time,)
+            [s].
+        command : Array, shape (nsim, time, joint)
+            What was commanded.
+        """
+        del t, command
+        return {}
 
     @abstractmethod
     def lag(self, robot: Robot) -> Array:

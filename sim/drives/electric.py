@@ -38,3 +38,6 @@ class Electric(NamedTuple):
 
     limited: Array
     """1 where current or voltage was at its limit, otherwise 0."""
+
+    emf: Array
+    """Back-EMF [V]."""

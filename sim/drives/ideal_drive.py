@@ -38,4 +38,4 @@ class _Amplifier(AbstractAmplifier):
 
     def electric(self, trace: Trace, dt: Array) -> Electric:
         del trace
-        return Electric(*np.zeros((5, *dt.shape)))
+        return Electric(*np.zeros((6, *dt.shape)))

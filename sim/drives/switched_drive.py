@@ -155,7 +155,7 @@ class SwitchedAmplifier(AbstractAmplifier):
         voltage = (R * charge + L * (after - before)) / dt + e
         most = self._most[0] / V * (1 - 1e-9)  # as an index is rounded
         limited = (np.abs(reference) >= self._I[0]) | (np.abs(index) >= most)
-        return Electric(reference, charge / dt, voltage, index, limited.astype(np.float64))
+        return Electric(reference, charge / dt, voltage, index, limited.astype(np.float64), e)
 
     def between_edges(self, trace: Trace) -> BetweenEdges:
         """Return current and voltage at the edges of PWM periods, and in the middle between them."""

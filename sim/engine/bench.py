@@ -15,8 +15,8 @@ from sim.drives.drive import AbstractAmplifier, every
 from sim.encoders.encoder import AbstractReader
 from sim.engine.clock import Clock
 from sim.engine.failures import Failures
+from sim.engine.geared_plant import plant_of
 from sim.engine.history import History
-from sim.engine.plant import Plant
 from sim.engine.run import Run
 from sim.engine.watch import Step, Watcher
 from sim.errors import ScenarioError
@@ -57,14 +57,14 @@ class Bench:
         self._scenario, self._planned, self._seeds, self._watcher = scenario, planned, seeds, watcher
         self._h = scenario.drive.step_length(fs, scenario.physics.step)
         self._clock = clock = Clock(round(1 / fs / self._h), self._h, scenario.timing.delay)
-        self._plant = Plant(robot, nsim, scenario.physics, self._h, vary, threads)
-        self._plant.q[:] = planned.q[0]
+        self._plant = plant_of(scenario, robot, nsim, self._h, vary, threads)
+        self._plant.put(planned.q[0])
         task = Task(scenario.nominal_robot, planned, nsim, vary if informed else {})
         self._law = _started(scenario.controller, scenario.controller.start(task), AbstractLaw)
         self._drive = _started(scenario.drive, scenario.drive.start(robot, nsim, self._h), AbstractAmplifier)
         self._ripple = scenario.ripple.start(robot)
         friction, encoder = scenario.friction, scenario.encoder
-        self._friction = _started(friction, friction.start(self._plant.batch, self._plant.Fs, self._h), AbstractContact)
+        self._friction = _started(friction, friction.start(self._plant.joints, self._plant.Fs, self._h), AbstractContact)
         self._encoder = _started(encoder, encoder.start(n, samples, fs, generators(seeds, 0)), AbstractReader)
         self._each = nsim, n
         self._sensor = CurrentSensor(scenario.torque, nsim, n)
@@ -74,13 +74,16 @@ class Bench:
         self._going: npt.NDArray[np.intp] | None = None
         at_rest = every(planned.q[0], nsim) if planned.q.ndim == 2 else planned.q[0]
         self._at_rest, still = at_rest, np.zeros((nsim, n))
-        self._before = self._command = self._demand = InverseDynamics(robot, nsim, vary)(at_rest, still, still)
+        by_position = scenario.controller.commanded == "position"
+        held = every(np.zeros(n), nsim) + at_rest if by_position else InverseDynamics(robot, nsim, vary)(at_rest, still, still)
+        self._before = self._command = self._demand = held
         self._qd, self._steps, self._instants = np.zeros((nsim, n)), 1, dict[int, Array]()
         self._steady = scenario.drive.steady and scenario.ripple.steady
         watched = scenario.timing.jitter or scenario.torque.source == "current"
         one_by_one = watched or not scenario.friction.steady
         self._most = 1 if one_by_one else clock.per_sample if self._steady else max(1, round(BLOCK / self._h))
         self._measured, self._commands, self._currents, self._q, self._speeds, self._tau = np.zeros((6, samples, nsim, n))
+        self._gaps = np.zeros((samples, nsim, n)) if self._plant.has_play else np.zeros(0)
         self.steps = samples * clock.per_sample + clock.late
 
     def _drawn_jitter(self, samples: int) -> Array:
@@ -105,15 +108,20 @@ class Bench:
             self._stop_failed(step)
         if sample is not None and sample < len(self._q):
             self._q[sample], self._speeds[sample], self._currents[sample] = q, qd, self._sensor.value
+            if self._plant.has_play:
+                self._gaps[sample] = self._plant.rotors[0] - q
             if self._watcher and self._watcher.due(self._final(step)):
                 self.tell(step)
-        self._history.put(step, q, qd)
+        rotor_q, rotor_qd = self._plant.rotors
+        before_gear = self._scenario.drive.before_gear
+        self._history.put(step, *((rotor_q, rotor_qd) if before_gear else (q, qd)))
         steps = self._listen(step)
         t = self._middles(steps)
-        rate = (qd - self._qd) / (self._steps * self._h)  # accelerating as in the steps before
-        mid_qd, mid_q = qd + rate * t, q + qd * t + rate * (t**2 / 2)
-        self._qd, self._steps = qd.copy(), steps
+        rate = (rotor_qd - self._qd) / (self._steps * self._h)  # accelerating as in the steps before
+        mid_qd, mid_q = rotor_qd + rate * t, rotor_q + rotor_qd * t + rate * (t**2 / 2)
+        self._qd, self._steps = rotor_qd.copy(), steps
         constant = 1 + self._ripple.commutation.at(mid_q)
+        self._drive.sees(mid_q if before_gear else mid_q + (q - rotor_q) + (qd - rotor_qd) * t)
         electric = self._drive.step(self._demand, mid_qd * constant, steps)
         expect(self._drive, "step", electric, (1, *self._each), (steps, *self._each))
         self._sensor.take(electric, steps * self._h)
@@ -150,6 +158,8 @@ class Bench:
                 "command": self._commands,
                 "logged": self._currents if self._scenario.torque.source == "current" else self._commands,
             }
+            if self._plant.has_play:
+                channels["gap"] = self._gaps
             self._watcher.tell(self._final(step), self._planned, channels, self._drive)
 
     def _middles(self, steps: int) -> Array:
@@ -192,7 +202,8 @@ class Bench:
             current if scenario.torque.source == "current" else command, n, generators(self._seeds, NOISE)
         )
         planned = replace(self._planned, **{x: getattr(self._planned, x)[skipped:] for x in ("q", "qd", "qdd")})
-        conditions = scenario.friction.conditions((skipped + np.arange(q.shape[1])) / scenario.fs, n)
+        t = (skipped + np.arange(q.shape[1])) / scenario.fs
+        conditions = scenario.friction.conditions(t, n) | scenario.drive.conditions(t, command)
         log = MotionLog(scenario.fs, measured, logged, scenario.channel, conditions)
         return Run(scenario, self._seeds, self._plant.robots, planned, log, q, qd, tau, command, self._failures.reasons)
 
@@ -204,7 +215,7 @@ class Bench:
             failures.add(sim, f"MuJoCo cannot go on: {complaint}")
         if failures.reasons:
             failed = list(failures.reasons)
-            plant.q[failed], plant.qd[failed] = self._at_rest[failed], 0.0
+            plant.put(self._at_rest[failed], np.array(failed))
             self._going = np.setdiff1d(np.arange(len(self._seeds)), failed)
 
 

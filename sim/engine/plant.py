@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from copy import copy
+from typing import ClassVar
 
 import mujoco
 import numpy as np
@@ -12,6 +13,8 @@ from sim.robot.motors import Array
 from sim.robot.robot import Robot
 from sim.robot.varied import VariedRobots, vary_fields
 from sim.scenario.scenario import Physics
+
+ALL = slice(None)
 
 SWITCHED_OFF = (
     mujoco.mjtDisableBit.mjDSBL_ACTUATION,
@@ -42,21 +45,41 @@ class Plant:
         Native threads; 0 for all processors.
     """
 
+    has_play: ClassVar[bool] = False
+
     def __init__(
         self, robot: Robot, nsim: int, physics: Physics, h: float, vary: Mapping[str, npt.ArrayLike], threads: int
     ) -> None:
-        model = copy(robot.model)
-        model.opt.timestep = h
-        model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{physics.integrator.upper()}")
-        for flag in SWITCHED_OFF:
-            model.opt.disableflags |= int(flag)
-        self.robot, self.batch = robot, Batch(model, nsim, threads)
-        self._errors: dict[int, str] = {}
+        self._begin(robot.model, physics, h, nsim, threads)
         vary_fields(self.batch, vary)
         self.robots = VariedRobots(robot, nsim, vary) if vary else (robot,) * nsim
         self.q, self.qd, self._applied = (self.batch.bind(name) for name in ("qpos", "qvel", "qfrc_applied"))
         expanded = self.batch.expanded("dof_frictionloss")
+        model = robot.model
         self.Fs: Array = np.array(np.broadcast_to(model.dof_frictionloss, (nsim, robot.n)) if expanded is None else expanded)
+
+    def _begin(self, described: mujoco.MjModel, physics: Physics, h: float, nsim: int, threads: int) -> None:
+        model = copy(described)
+        model.opt.timestep = h
+        model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{physics.integrator.upper()}")
+        for flag in SWITCHED_OFF:
+            model.opt.disableflags |= int(flag)
+        self.batch = Batch(model, nsim, threads)
+        self._errors: dict[int, str] = {}
+
+    @property
+    def joints(self) -> Batch:
+        """The simulations as frictions see them: fields of a value a joint."""
+        return self.batch
+
+    @property
+    def rotors(self) -> tuple[Array, Array]:
+        """Positions [rad] and velocities [rad/s] of the rotors behind the gear, shape (nsim, joint)."""
+        return self.q, self.qd
+
+    def put(self, q: Array, some: npt.NDArray[np.intp] | slice = ALL) -> None:
+        """Put simulations where they are at rest: q [rad], shape (joint,) or (nsim, joint)."""
+        self.q[some], self.qd[some] = q, 0.0
 
     def step(self, torques: Array, steps: int, going: npt.NDArray[np.intp] | None = None) -> None:
         """Advance simulations by `steps` physics steps.

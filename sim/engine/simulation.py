@@ -74,7 +74,7 @@ def simulate(  # noqa: PLR0913  # all but two by their names
     planned, skipped = _joined([_planned(scenario, robot, motion) for motion in motions or (None,)])
     h = scenario.drive.step_length(scenario.fs, scenario.physics.step)
     logged = partial(scenario.torque.logged, n=robot.n, rngs=generators(seeds[:1], NOISE))
-    watcher = Watcher(watch, scenario.fs, h, skipped, logged) if watch else None
+    watcher = Watcher(watch, scenario, h, skipped, logged) if watch else None
     with blamed():
         bench = Bench(scenario, robot, planned, seeds, vary or {}, threads, watcher, informed=informed)
     step, reported, bearable = 0, -1, 0 if throw else len(seeds) - 1
@@ -85,7 +85,7 @@ def simulate(  # noqa: PLR0913  # all but two by their names
             if progress and 100 * step // bench.steps > reported:
                 reported = 100 * step // bench.steps
                 progress(step / bench.steps)
-    bench.tell(bench.steps)
+    bench.tell(step)
     run = bench.run(skipped)
     if throw and run.failures:
         raise ScenarioError(next(iter(run.failures.values())))

@@ -3,7 +3,7 @@
 from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,7 @@ import numpy.typing as npt
 from sim.drives.drive import AbstractAmplifier, Trace
 from sim.drives.electric import BetweenEdges, Electric
 from sim.robot.motors import Array
+from sim.scenario.scenario import Scenario
 from sim.trajectories.reference import Reference
 
 
@@ -51,13 +52,17 @@ class Stretch:
     q, qd : Array
         True positions [rad] and velocities [rad/s].
     tau, command : Array
-        True mean torque of the motors until the next sample, and the torque asked for [N m].
+        True mean torque of the motors until the next sample, and what was commanded: torque [N m] or position [rad].
     logged : Array
         The torque that comes into the log [N m].
     electric : Electric, optional
         Means until the next sample; none for a drive without currents.
     inner : Inner, optional
         What is in the window, if anything is.
+    by_position : bool
+        Whether positions are commanded.
+    gap : Array, optional
+        Position of the rotor minus that of the link [rad], of a robot with backlash.
     """
 
     first: int
@@ -70,6 +75,8 @@ class Stretch:
     logged: Array
     electric: Electric | None
     inner: Inner | None
+    by_position: bool = False
+    gap: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -114,15 +121,18 @@ class Watcher:
     ----------
     watch : Watch
         Who receives it.
-    fs, h : float
-        Sampling frequency [Hz] and physics step [s].
+    scenario : Scenario
+        What is run.
+    h : float
+        Physics step [s].
     skipped : int
         Samples before the log begins.
     logged : callable
         Gives what the log says of the torques of one stretch after the other, shape (1, time, joint).
     """
 
-    def __init__(self, watch: Watch, fs: float, h: float, skipped: int, logged: Callable[[Array], Array]) -> None:
+    def __init__(self, watch: Watch, scenario: Scenario, h: float, skipped: int, logged: Callable[[Array], Array]) -> None:
+        fs, self._by_position = scenario.fs, scenario.controller.commanded == "position"
         self._watch, self._fs, self._h, self._skipped, self._logged = watch, fs, h, skipped, logged
         self._samples = max(1, round(watch.every * fs)) if np.isfinite(watch.every) else np.inf
         self._told, self._taken = skipped, list[Step]()
@@ -140,7 +150,7 @@ class Watcher:
         if final <= self._told:
             return
         now, per_sample = slice(self._told, final), round(1 / (self._fs * self._h))
-        parts = {name: x[now, 0].copy() for name, x in channels.items()}
+        parts: dict[str, Any] = {name: x[now, 0].copy() for name, x in channels.items()}
         parts["tau"] /= per_sample
         parts["logged"] = self._logged(parts["logged"][None])[0]
         reference = Reference(self._fs, *(_alone(getattr(planned, x)[now]) for x in ("q", "qd", "qdd")))
@@ -151,7 +161,8 @@ class Watcher:
             rows = _Rows.of(taken, drive, self._h)
             electric = rows.means(self._told, final, per_sample)
             inner = rows.inside(self._watch.window, self._h, self._skipped / self._fs, drive) if self._watch.window else None
-        self._watch.receive(Stretch(self._told - self._skipped, reference, electric=electric, inner=inner, **parts))
+        parts |= {"electric": electric, "inner": inner}
+        self._watch.receive(Stretch(self._told - self._skipped, reference, by_position=self._by_position, **parts))
         self._told = final
 
 

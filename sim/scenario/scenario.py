@@ -87,10 +87,19 @@ class Scenario:
     physics: Physics = Physics()
     """How the plant is integrated."""
 
+    def __post_init__(self) -> None:
+        if self.drive.commands != self.controller.commanded:
+            raise ScenarioError(
+                f"this controller commands a {self.controller.commanded}, this drive takes a {self.drive.commands}: a drive of "
+                "kind servo needs a controller of kind position, and the other way round"
+            )
+        if self.drive.commands == "position" and self.torque.source == "reference":
+            raise ScenarioError("the torque of a servo is commanded by nobody: torque.source must be 'current'")
+
     @property
     def real_robot(self) -> Robot:
         """The robot that is simulated: with its payload, and the friction of the scenario."""
-        return Robot.load(self.robot, self.payload.edit, self.friction.edit)
+        return Robot.load(self.robot, self.payload.edit, self.friction.edit, self.drive.edit)
 
     @property
     def nominal_robot(self) -> Robot:

@@ -7,6 +7,7 @@ from sim.trajectories.quintic import Quintic as Quintic
 from sim.trajectories.random_moves import RandomMoves as RandomMoves
 from sim.trajectories.recorded import Recorded as Recorded
 from sim.trajectories.reference import Reference as Reference
+from sim.trajectories.steps import RandomSteps as RandomSteps
 from sim.trajectories.time_optimal import TimeOptimal as TimeOptimal
 from sim.trajectories.trajectory import AbstractTrajectory as AbstractTrajectory
 
@@ -18,6 +19,7 @@ TRAJECTORIES: PluginTable[AbstractTrajectory] = PluginTable(
         "quintic": Quintic,
         "random": RandomMoves,
         "recorded": Recorded,
+        "steps": RandomSteps,
         "time_optimal": TimeOptimal,
     },
 )

@@ -41,7 +41,7 @@ class RandomMoves(AbstractTrajectory):
     def plan(self, robot: Robot) -> PointToPoint:
         """Draw waypoints and times; every joint moves in every move."""
         rng, points = np.random.default_rng(self.seed), np.zeros((self.moves + 1, robot.n))
-        ranges = _room(robot)
+        ranges = room(robot)
         width = np.diff(ranges, axis=1)[:, 0]
         clearance = np.minimum(0.2, width / 10) if self.clearance is None else self.clearance
         smallest = np.minimum(0.4, width / 4) if self.smallest_move is None else self.smallest_move
@@ -54,7 +54,7 @@ class RandomMoves(AbstractTrajectory):
         return at_rest(points, times, self.rest)
 
 
-def _room(robot: Robot) -> Array:
+def room(robot: Robot) -> Array:
     """Return where joints move at random, shape (joint, 2): their ranges, or half a turn or metre to either side."""
     free = np.where(robot.slides, 0.5, np.pi)
     around = robot.model.qpos0[:, None] + free[:, None] * [-1.0, 1.0]

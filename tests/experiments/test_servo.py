@@ -1,6 +1,7 @@
 """`idbench servo`: from logs of commands and positions to servos of MuJoCo, of arms whose servos MuJoCo simulates."""
 
 import json
+from dataclasses import replace
 from importlib.metadata import files
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 from experiments.cli import main
 from sim.robot.robot import Robot
 from sim.robot.servos import STEP, ServoValues, replay, with_servos
+from sim.scenario.scenario_file import load, to_toml
 
 KP, GAIN, SUPPLY, LIMIT, COUNT = 16.0, 0.166, 12.0, 0.97, 2 * np.pi / 4096
 
@@ -169,3 +171,21 @@ def test_servos_of_an_arm_are_found_in_place(tmp_path, monkeypatch):
         found, true = summary["joints"][joint], servos[robot.joints.index(joint)]
         for name, value in (("a", true.a), ("b", true.b), ("Ia", true.armature), ("rate", true.rate)):
             assert abs(found[name]["value"] - value) < 0.05 * value, (joint, name)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("degrees", "seed"), [(0.5, 1), (1.0, 2)])
+def test_backlash_of_a_simulated_servo_is_found(idbench, tmp_path, degrees, seed):
+    """From a simulated log, with sampling jitter and torque that is off once, to the free play: within 10 %."""
+    scenario = load("servo-backlash")
+    play, trajectory = np.deg2rad(degrees), replace(scenario.trajectory, seed=seed)
+    changed = replace(scenario, seed=seed, trajectory=trajectory, drive=replace(scenario.drive, backlash=(play,)))
+    (tmp_path / "servo.toml").write_text(to_toml(changed))
+    assert main(["run", str(tmp_path / "servo.toml"), "--out", str(tmp_path / "run"), "--no-rerun"]) == 0
+    log, known = tmp_path / "run" / "log.parquet", tmp_path / "run" / "servo.toml"
+    find = ["--friction", "coulomb", "--find", "backlash", "--out", str(tmp_path / "found")]
+    assert main(["servo", str(log), "--robot", "pendulum", "--servo", str(known), *find]) == 0
+    joint = json.loads((tmp_path / "found" / "summary.json").read_text())["joints"]["swing"]
+    assert joint["backlash"]["value"] == pytest.approx(play, rel=0.1)
+    assert joint["a"]["value"] == pytest.approx(2.05 / 3.33, rel=0.01)
+    assert joint["Ia"]["value"] == pytest.approx(0.02, rel=0.02)

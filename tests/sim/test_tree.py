@@ -137,7 +137,8 @@ def test_a_floating_base_is_held_and_joints_without_names_get_some(written):
 
 
 @pytest.mark.parametrize(
-    ("name", "message"), [("kuka", "no robot 'kuka'; known: panda, puma560, scara"), ("no.xml", "cannot read")]
+    ("name", "message"),
+    [("kuka", "no robot 'kuka'; known: panda, pendulum, puma560, scara, servo_arm"), ("no.xml", "cannot read")],
 )
 def test_robots_that_are_not_there(name, message):
     with pytest.raises(RobotError, match=message):

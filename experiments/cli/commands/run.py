@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from shlex import quote
 
 from rich.text import Text
 
@@ -11,7 +12,7 @@ from experiments.cli.commands.inner import doubt_window, recording_of, require_w
 from experiments.cli.options.run import Run
 from experiments.cli.page import Page, new_page, shown
 from experiments.cli.progress import stages_of
-from experiments.cli.saving import saved, write_scenario
+from experiments.cli.saving import Files, saved, write_scenario
 from experiments.errors import ExperimentError
 from experiments.identification.log_warnings import warnings_of_log
 from experiments.identification.parameters import Parameters
@@ -23,10 +24,11 @@ from experiments.plugin_tables import plugin_conflicts
 from experiments.reports.leading import shown_whole
 from experiments.reports.printed import print_fit
 from experiments.results.folder import ResultsFolder
+from experiments.servo.known import servo_toml
 from experiments.study.method import Method
 from identify import CHAINS
 from identify.files.log_file import write_log
-from sim.drives import IdealDrive
+from sim.drives import IdealDrive, ServoDrive
 from sim.errors import RobotError
 from sim.robot.robot import Robot
 from sim.scenario.ripple import Ripple
@@ -56,13 +58,27 @@ def run(options: Run) -> None:
             ran = replace(made, progress=lambda share: told(f"simulating, {share:.0%}", share), watch=watch)
             _ = ran.fit
         _print_run(page, ran)
-        files = {"log.parquet": partial(write_log, ran.run.alone()), "scenario.toml": partial(write_scenario, ran.scenario)}
-        with saved(page, folder, ran.summary(), files, watching.hint(folder.out)) as attempts:
+        if isinstance(ran.scenario.drive, ServoDrive):
+            page.print(Text(_as_servos(ran.scenario, folder.out)), soft_wrap=True)
+        with saved(page, folder, ran.summary(), _files(ran), watching.hint(folder.out)) as attempts:
             if recording:
                 attempts.recording(lambda: recording.finish(ran))
                 doubt_window(page, options.inner, recording)
                 if ran.fit.logs.long:
                     page.print("the identification is not recorded: the rows of such a long log are not kept")
+
+
+def _files(ran: ScenarioRun) -> Files:
+    """Return what writes the log and the scenario, and what is known of servos, if there are any."""
+    drive, robot = ran.scenario.drive, ran.run.robots[0]
+    known = {"servo.toml": lambda path: path.write_text(servo_toml(drive, robot))} if isinstance(drive, ServoDrive) else {}
+    return {"log.parquet": partial(write_log, ran.run.alone()), "scenario.toml": partial(write_scenario, ran.scenario), **known}
+
+
+def _as_servos(scenario: Scenario, out: Path) -> str:
+    """Return the command that identifies the servos of a run."""
+    words = f"{quote(str(out / 'log.parquet'))} --robot {quote(scenario.robot)} --servo {quote(str(out / 'servo.toml'))}"
+    return f"the torque above is that of the motors' currents; from commands and positions alone: uv run idbench servo {words}"
 
 
 def _read(options: Run) -> tuple[Path, ...]:
@@ -113,7 +129,7 @@ def _with_robot(page: Page, scenario: Scenario, robot: str | None) -> Scenario:
     if isinstance(scenario.trajectory, Quintic) and Robot.load(robot).n != Robot.load(scenario.robot).n:
         page.print(f"the trajectory of {scenario.name} does not fit robot {robot}: the random moves of scenario arm are used")
         other = replace(other, trajectory=load("arm").trajectory, start=())
-    if not isinstance(other.drive, IdealDrive) and not _has_motors(robot):
+    if not isinstance(other.drive, (IdealDrive, ServoDrive)) and not _has_motors(robot):
         page.print(f"robot {robot} has no motors (dcmotor elements of MJCF): its drives are ideal, without ripple")
         other = replace(other, drive=IdealDrive(), ripple=Ripple())
     return other

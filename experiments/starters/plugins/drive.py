@@ -47,4 +47,4 @@ class _Amplifier(AbstractAmplifier):
 
     def electric(self, trace: Trace, dt: Array) -> Electric:
         del trace  # it has no currents
-        return Electric(*np.zeros((5, *dt.shape)))
+        return Electric(*np.zeros((6, *dt.shape)))

@@ -6,6 +6,7 @@ import pytest
 
 from identify import ExcitationError, IdentificationError, LogError, SettingError
 from identify.servo import JointLoad, Servo, ServoRun, identify_servo
+from identify.servo.pieces import pieces
 
 SERVO = Servo(0.166, supply=12.0, duty_limit=0.97)
 MASS, LENGTH, H, DELAY = 0.6, 0.12, 5e-4, 0.02
@@ -119,3 +120,20 @@ def test_time_that_stands_is_refused(runs: list[ServoRun]) -> None:
     t[5] = t[4]
     with pytest.raises(LogError, match="does not increase"):
         ServoRun(t, run.q, run.command, run.load, run.kp)
+
+
+def test_pieces_begin_at_rest_and_leave_nothing_out_that_moves():
+    t = np.arange(0, 6, 0.01)
+    command = np.repeat([0.0, 0.5, -0.3], 200)
+    q = np.interp(t, [0, 2, 2.5, 4, 4.5, 6], [0.0, 0.0, 0.5, 0.5, -0.3, -0.3])
+    run = ServoRun(t, q, command, JointLoad.pendulum(0.5, 0.1), 16.0)
+    parts = pieces(run, 2 * np.pi / 4096)
+    assert all(part.q[0] == part.q[1] and part.command[0] == part.command[1] for part in parts)
+    assert sum(np.abs(np.diff(part.q)).sum() for part in parts) == pytest.approx(1.3)
+    assert max(part.t[-1] - part.t[0] for part in parts) < 2.5
+
+
+def test_a_run_that_never_rests_is_one_piece():
+    t = np.arange(0, 6, 0.01)
+    run = ServoRun(t, np.sin(t), np.sin(t), JointLoad.pendulum(0.5, 0.1), 16.0)
+    assert len(pieces(run, 2 * np.pi / 4096)) == 1

@@ -1,0 +1,118 @@
+"""What a study of servos finds: parameters of every joint, from commands and positions alone."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from experiments.servo.loads import loads
+from experiments.study.statistics import BOUNDS
+from identify import IdentificationError, MotionLog
+from identify.files.servo_log import ServoColumns
+from identify.servo import Servo, ServoRun, identify_servo, parameters_of
+from sim.drives import ServoDrive
+from sim.engine.run import Run
+from sim.robot.mounting import PLAIN
+from sim.robot.robot import Robot
+from sim.robot.servos import links
+from sim.scenario.scenario import Scenario
+from sim.settings import per_joint
+
+SERVO = "servo"
+"""Name of the model in results."""
+
+
+class Law(NamedTuple):
+    """A law of friction, and what else is found, as `load+lead` states it."""
+
+    friction: str
+    more: tuple[str, ...]
+
+    @property
+    def letters(self) -> tuple[str, ...]:
+        """Parameters of a joint."""
+        return parameters_of(self.friction, self.more)
+
+
+def law_of(text: str) -> Law:
+    """Return the law that a text states."""
+    friction, *more = text.split("+")
+    return Law(friction, tuple(more))
+
+
+def names_of(scenario: Scenario, laws: Sequence[str]) -> tuple[str, ...]:
+    """Return the parameters of all joints with any of the laws."""
+    letters = dict.fromkeys(x for text in laws for x in law_of(text).letters)
+    return tuple(f"{x}{j + 1}" for j in range(scenario.real_robot.n) for x in letters)
+
+
+def truth_of(scenario: Scenario) -> dict[str, float]:
+    """Return the parameters of the servos of a scenario."""
+    robot, drive = scenario.real_robot, scenario.drive
+    assert isinstance(drive, ServoDrive)
+    K, R, play = (per_joint(x, robot.n, "drive") for x in (drive.torque_constant, drive.resistance, drive.backlash))
+    model, found = robot.model, dict[str, float]()
+    for j in range(robot.n):
+        of_joint = {"a": K[j] / R[j], "b": K[j] ** 2 / R[j], "Ia": model.dof_armature[j], "Fs": model.dof_frictionloss[j]}
+        of_joint |= {"Fv": model.dof_damping[j, 0] if model.dof_damping.ndim > 1 else model.dof_damping[j], "backlash": play[j]}
+        of_joint |= {"offset": 0.0, "delay": scenario.timing.delay, "rate": drive.rate or np.inf}
+        of_joint |= {"lead": drive.lead, "dead_band": drive.dead_band}
+        if not drive.off:  # then damping shows as one
+            of_joint |= {"b": of_joint["b"] + of_joint["Fv"], "Fv": 0.0}
+        found |= {f"{name}{j + 1}": float(x) for name, x in of_joint.items()}
+    return found | scenario.friction.truth(robot)
+
+
+def servo_columns(law: str, simulated: Run, i: int) -> dict[str, float] | str:
+    """Return the parts of every parameter that one run gives, by their names, or why it gives none.
+
+    Joints that are refused have none.
+    """
+    scenario, truth = simulated.scenario, truth_of(simulated.scenario)
+    found, why = dict[str, float](), list[str]()
+    for j, run in enumerate(_runs(scenario, simulated.log.run((i,)))):
+        try:
+            fit = identify_servo(_known(scenario.drive, j), [run], *law_of(law))
+        except IdentificationError as error:
+            why.append(str(error))
+            continue
+        for name, sigma in fit.standard_errors.items():
+            at, bound = f"{name}{j + 1}", fit.bound[name]
+            found |= {at: fit.p[name], f"{at}.sigma": sigma, f"{at}.paper_sigma": bound, f"{at}.truth": truth.get(at, np.nan)}
+            found |= dict.fromkeys((at + part for part in BOUNDS), bound)
+    return found or "; ".join(why)
+
+
+def rows_of(
+    names: Sequence[str], parts: Sequence[str], law: str, simulated: Run, common: Sequence[Mapping[str, Any]]
+) -> Iterator[dict[str, Any]]:
+    """Yield a row for each run, `common` being what the row says of it beside what is found."""
+    for i, said in enumerate(common):
+        columns = simulated.failures.get(i) or servo_columns(law, simulated, i)
+        if isinstance(columns, str):
+            yield {**said, "failure": columns}
+        else:
+            every = {name + part: columns.get(name + part, np.nan) for name in names for part in parts}
+            yield {**said, "condition_number": np.nan, "rows": 0, "residual_rms": np.nan, "simulations": 0, **every}
+
+
+def _runs(scenario: Scenario, log: MotionLog) -> list[ServoRun]:
+    on = log.conditions.get("on")
+    columns = ServoColumns(log.t, log.q, log.conditions["command"], on, None, ())
+    kp = per_joint(scenario.drive.kp, log.n, "drive.kp")  # type: ignore[attr-defined]  # a servo's
+    enabled = None if on is None else on[:, 0] > 0.5
+    return [
+        ServoRun(log.t, log.q[:, j], columns.command[:, j], load, float(kp[j]), enabled, name=f"joint {j + 1}")
+        for j, load in enumerate(loads(_links(scenario.robot), columns))
+    ]
+
+
+@cache
+def _links(robot: str) -> Robot:
+    return links(robot, PLAIN)
+
+
+def _known(drive: Any, j: int) -> Servo:
+    kp = drive.kp[j] if len(drive.kp) > 1 else drive.kp[0]
+    return Servo(drive.gain, kp, drive.supply, drive.duty_limit, drive.counts or 2**24)

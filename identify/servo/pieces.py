@@ -1,0 +1,57 @@
+"""Runs cut where the joint rests: short pieces are simulated together, and nothing is thrown far from what was measured."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from identify.arrays import Array
+from identify.servo.load import JointLoad
+from identify.servo.run import MIN_SAMPLES, ServoRun
+
+REST = 0.12
+"""How long joint and command have stood still where a run is cut [s]: longer than commands are late."""
+
+SHORTEST = 0.8
+"""Length of a piece [s]."""
+
+
+MOVES = 4
+"""Counts by which a joint moves in a piece that says anything."""
+
+
+def pieces(run: ServoRun, step: float) -> list[ServoRun]:
+    """Return a run in pieces that begin at rest, the target of the firmware where the command is.
+
+    Parameters
+    ----------
+    run : ServoRun
+        What was logged.
+    step : float
+        Of the encoder [rad]; a position that flickers by one still rests.
+    """
+    t, first = run.t, np.searchsorted(run.t, run.t - REST)
+    still = np.array(
+        [np.ptp(run.q[i : k + 1]) <= 1.5 * step and np.ptp(run.command[i : k + 1]) == 0 for k, i in enumerate(first)]
+    )
+    still &= t >= t[0] + REST
+    cuts = [0]
+    for k in np.flatnonzero(still):
+        if t[k] - t[cuts[-1]] >= SHORTEST and k - cuts[-1] >= MIN_SAMPLES:
+            cuts.append(int(k))
+    if len(cuts) > 1 and (t[-1] - t[cuts[-1]] < SHORTEST or len(t) - cuts[-1] < MIN_SAMPLES):
+        cuts.pop()
+    parts = [_part(run, slice(a, b)) for a, b in zip(cuts, [*cuts[1:], len(t)], strict=True)]
+    moving = [part for part in parts if np.ptp(part.q) > MOVES * step]
+    return moving or parts[:1]
+
+
+def _part(run: ServoRun, some: slice) -> ServoRun:
+    load = JointLoad(*(_of(x, some) for x in (run.load.inertia, run.load.sine, run.load.cosine, run.load.rest)))
+    voltage = None if run.voltage is None else run.voltage[some]
+    return replace(
+        run, t=run.t[some], q=run.q[some], command=run.command[some], on=run.enabled[some], voltage=voltage, load=load
+    )
+
+
+def _of(x: Array, some: slice) -> Array:
+    return x[some] if x.ndim else x

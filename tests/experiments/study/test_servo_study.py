@@ -1,0 +1,57 @@
+"""Studies of servos."""
+
+import numpy as np
+import pytest
+
+from experiments.errors import StudyError
+from experiments.study.shard import run_shard
+from experiments.study.study_file import load_study, study_from
+
+SHORT = {
+    "name": "short",
+    "question": "?",
+    "scenario": "servo",
+    "settings": {"trajectory": {"steps": 8}, "drive": {"off": []}},
+    "seeds": 2,
+    "models": ["servo"],
+    "friction": ["coulomb"],
+    "axes": [{"field": "fs", "values": [100.0]}],
+}
+
+
+def test_studies_of_servos_ship():
+    study = load_study("servo")
+    assert study.of_servos
+    assert "backlash1" in study.parameters
+    assert len(load_study("servo-arm").parameters) == 6 * len(study.parameters) - 6
+
+
+def test_rows_have_every_parameter_beside_its_truth():
+    rows = run_shard(study_from(SHORT, "study"), range(2)).rows
+    assert [row["failure"] for row in rows] == [None, None]
+    for row in rows:
+        assert row["a1"] == pytest.approx(row["a1.truth"], rel=0.02)
+        assert row["delay1"] == pytest.approx(0.018, abs=0.001)
+        assert 0 < row["a1.sigma"] < 0.02
+        assert np.isnan(row["Fv1"])  # torque is never off: it shows as part of b
+
+
+def test_a_joint_that_does_not_move_has_a_reason():
+    still = SHORT | {"settings": {"trajectory": {"kind": "steps", "steps": 4, "reach": 0.001}}}
+    rows = run_shard(study_from(still, "study"), range(2)).rows
+    assert all("does not move" in row["failure"] for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"models": ["explicit"]}, "a study of servos has models"),
+        ({"scenario": "arm", "settings": {}}, "a study of servos has models"),
+        ({"friction": ["stiction"]}, "friction 'stiction' is unknown"),
+        ({"friction": ["load+leed"]}, "no parameter 'leed'"),
+    ],
+    ids=str,
+)
+def test_studies_that_make_no_sense(changes, message):
+    with pytest.raises(StudyError, match=message):
+        study_from(SHORT | changes, "study")
