@@ -108,6 +108,7 @@ def test_force_replaces_what_is_written_and_removes_nothing_of_others(tmp_path, 
     assert read_log(out / "log_of_monday.parquet").samples
 
 
+@pytest.mark.thorough
 def test_a_command_can_be_repeated(tmp_path, idbench, logs):
     """Its own folder may be called like a scenario, and files that it wrote beside the results are its own."""
     for _ in range(2):

@@ -63,6 +63,7 @@ def compared(*args):
     return [typical(one, runs) for one in both]
 
 
+@pytest.mark.thorough
 def test_slopes_of_the_cost_are_those_of_differences():
     """Of the parameters to 1e-5, of nodes beside reversals to what slopes at a cell's middle leave."""
     q, v, tau = logged("series", "coulomb", 1)

@@ -26,6 +26,7 @@ def test_studies_of_servos_ship():
     assert len(load_study("servo-arm").parameters) == 6 * len(study.parameters) - 6
 
 
+@pytest.mark.thorough
 def test_rows_have_every_parameter_beside_its_truth():
     rows = run_shard(study_from(SHORT, "study"), range(2)).rows
     assert [row["failure"] for row in rows] == [None, None]
