@@ -39,7 +39,9 @@ class ServoLoop:
         self.samples = max(len(run.t) for run in self.runs)
         self.steps = int(np.ceil(max(run.t[-1] - run.t[0] for run in self.runs) / h)) + 2
         needed = np.array([np.ceil((run.t[-1] - run.t[0]) / h) + 2 for run in self.runs])
-        order = np.argsort(-needed, kind="stable")  # longest first: at any step those that go on are the first ones
+        self._order = order = np.argsort(
+            -needed, kind="stable"
+        )  # longest first: at any step those that go on are the first ones
         self._place = np.argsort(order, kind="stable")
         self._going = (needed > np.arange(self.steps)[:, None]).sum(axis=1)
         ordered = [self.runs[k] for k in order]
@@ -66,17 +68,22 @@ class ServoLoop:
         loads = (_of_load(runs, name, t) for name in ("inertia", "sine", "cosine", "rest"))
         return Inputs(command, _short(_centred(drive)), _short(_centred(on)), *loads)
 
-    def simulate(self, p: Mapping[str, npt.ArrayLike]) -> Array:
-        """Return positions at the samples of the log [rad], shape (lane, run, sample), for a value of each parameter a lane."""
+    def simulate(self, p: Mapping[str, npt.ArrayLike], ahead: npt.ArrayLike = 0.0) -> Array:
+        """Return positions at the samples of the log [rad], shape (lane, run, sample), for a value of each parameter a lane.
+
+        `ahead`, shape (lane, run) or less, is where runs begin, beyond the position that was measured [rad].
+        """
         lanes = max(np.size(x) for x in p.values())
         every = {name: np.broadcast_to(np.asarray(x, dtype=np.float64), (lanes,)) for name, x in p.items()}
         size = max(1, LARGEST // (self.steps * len(self.runs)))
-        pieces = [{name: x[i : i + size, None] for name, x in every.items()} for i in range(0, lanes, size)]
-        return np.concatenate([self._at_samples(self._piece(piece)) for piece in pieces])
+        begin = np.broadcast_to(np.asarray(ahead, dtype=np.float64), (lanes, len(self.runs)))[:, self._order]
+        pieces = [slice(i, i + size) for i in range(0, lanes, size)]
+        parts = (self._piece({name: x[now, None] for name, x in every.items()}, begin[now]) for now in pieces)
+        return np.concatenate([self._at_samples(q) for q in parts])
 
-    def _motion(self, p: Mapping[str, Array]) -> Motion:
+    def _motion(self, p: Mapping[str, Array], ahead: Array) -> Motion:
         kind = GearedMotion if np.any(p.get("backlash", 0.0)) else Motion
-        return kind(self.servo, self._given, p, self.h, self._start)
+        return kind(self.servo, self._given, p, self.h, self._start._replace(q=self._start.q + ahead))
 
     def _at_samples(self, q: Array) -> Array:
         """Return positions between steps, linearly, shape (lane, run, sample)."""
@@ -84,14 +91,14 @@ class ServoLoop:
         lower, upper = q[self._before, :, run], q[self._before + 1, :, run]
         return np.moveaxis(lower + (upper - lower) * self._share[..., None], -1, 0)
 
-    def _piece(self, p: Mapping[str, Array]) -> Array:
+    def _piece(self, p: Mapping[str, Array], ahead: Array) -> Array:
         """Return positions at all steps as they are logged, shape (step, lane, run)."""
         h, grid, n = self.h, self._given, len(self.runs)
         lanes = len(p["a"])
         late, share = np.divmod(p["delay"][:, 0] / h + 0.5, 1.0)
         late, share = late.astype(np.int64), share[:, None]
         rate, offset = p.get("rate", np.full((lanes, 1), np.inf)) * h, p["offset"]
-        motion = self._motion(p)
+        motion = self._motion(p, ahead)
         # A force acts for the step about its instant: means of the target over steps can be delayed by parts of them.
         kept, lane = int(late.max()) + 2, np.arange(lanes)
         means = np.repeat(np.repeat(grid.command[:1], lanes, axis=0)[None], kept, axis=0)

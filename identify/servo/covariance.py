@@ -16,6 +16,8 @@ LONGEST = 0.1
 def covariance(found: Found, loop: ServoLoop, c: float) -> Array:
     """Return H^-1 S H^-1: H the curvature of the objective, S the covariance of its gradient (P. J. Huber, 1967).
 
+    Both are those that are left when every change of the parameters comes with the best beginnings of the runs.
+
     S adds up over runs where there are enough of them; otherwise products of scores over lags within their correlation time
     (W. K. Newey and K. D. West, Econometrica 55 (1987) 703-708).
     """
@@ -25,8 +27,9 @@ def covariance(found: Found, loop: ServoLoop, c: float) -> Array:
     J = J / size
     w = 1 / (1 + np.abs(r) / c)
     flat = J.reshape(-1, J.shape[-1])
-    H = flat.T @ (flat * (w**2).reshape(-1, 1))  # of Fair's function: the derivative of r w
-    scores = J * (w * r)[..., None]
+    free = found.beginning.free_of(J, w**2)
+    H = free.reshape(flat.shape).T @ (flat * (w**2).reshape(-1, 1))  # of Fair's function: the derivative of r w
+    scores = free * (w * r)[..., None]
     p, runs = J.shape[-1], len(r)
     S = _of_runs(scores) * runs / (runs - p) if runs >= MIN_CLUSTERS * p else _of_lags(scores, _lag(r, loop))
     inverse = np.linalg.pinv(H, hermitian=True)

@@ -1,7 +1,7 @@
 """The identification of a servo."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import final
 
@@ -98,9 +98,12 @@ class ServoFit:
     @cached_property
     def bound(self) -> dict[str, float]:
         """Standard errors that the rounding of the encoder alone leaves (Cramer-Rao)."""
-        J = self.found.sensitivity.reshape(-1, len(self.free))
+        J, n = self.found.sensitivity, len(self.free)
+        rounded = replace(self.found.beginning, certainty=1.0)
+        free = rounded.free_of(J, np.ones(J.shape[:2])).reshape(-1, n)
+        J = J.reshape(-1, n)
         size = np.sqrt((J**2).sum(axis=0))
-        inverse = np.linalg.pinv((J / size).T @ (J / size))
+        inverse = np.linalg.pinv((free / size).T @ (J / size))
         return dict(
             zip(self.free, (self.servo.step / np.sqrt(12) * np.sqrt(np.diagonal(inverse)) / size).tolist(), strict=True)
         )

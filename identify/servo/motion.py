@@ -39,7 +39,7 @@ class Start(NamedTuple):
     Parameters
     ----------
     q, qd : Array
-        Angle of the log [rad] and speed [rad/s].
+        Angle of the log [rad], or (lane, run), and speed [rad/s].
     kp : Array
         Firmware gains.
     range : float
@@ -81,7 +81,7 @@ class Motion:
 
     def __init__(self, servo: Servo, inputs: Inputs, p: Mapping[str, Array], h: float, start: Start) -> None:
         self._p, self._inputs, self._h = p, inputs, h
-        self.q = start.q + p["offset"] + np.zeros((len(p["a"]), len(start.q)))
+        self.q = start.q + p["offset"] + np.zeros((len(p["a"]), len(start.qd)))
         self._qd = start.qd + np.zeros_like(self.q)
         self._friction = {name: p[name] for name in FRICTION if name in p}
         self._step = servo.step

@@ -23,11 +23,40 @@ SAMPLES = 12
 SETTLED = 3e-4
 """Share by which the best of a round must improve the objective."""
 
+MEDIAN = 0.6745
+"""Median of the size of a normal number, in standard deviations."""
+
 IDLE = 2
 """Rounds without such an improvement after which a search ends."""
 
 WILD = 4.0
 """Times its typical size from which on the sensitivity of a sample counts less: of motions that depend on a hair."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Beginning:
+    """Where runs begin: the encoder says that to a count, and where torque is off nothing makes a run forget it.
+
+    Parameters
+    ----------
+    ahead : Array, shape (run,)
+        Beyond the position that was measured [rad].
+    sensitivity : Array, shape (run, sample)
+        Of the simulated positions to it.
+    certainty : float
+        Variance of residuals over that of a position that was rounded.
+    """
+
+    ahead: Array
+    sensitivity: Array
+    certainty: float
+
+    def free_of(self, J: Array, w: Array) -> Array:
+        """Return sensitivities, shape (run, sample, parameter), without what other beginnings would do, weighted by w."""
+        whole = (w * self.sensitivity**2).sum(axis=1) + self.certainty
+        share = np.einsum("rt,rtp->rp", w * self.sensitivity, J) / whole[:, None]
+        return np.asarray(J - self.sensitivity[..., None] * share[:, None])
 
 
 @final
@@ -45,12 +74,15 @@ class Found:
         Measured minus simulated positions [rad].
     sensitivity : Array, shape (run, sample, parameter)
         Of the simulated positions to the free parameters.
+    beginning : Beginning
+        Where runs begin.
     """
 
     p: dict[str, float]
     cost: float
     residual: Array
     sensitivity: Array
+    beginning: Beginning
 
 
 @final
@@ -71,30 +103,31 @@ class Search:
 
     def __init__(self, loop: ServoLoop, free: Sequence[str], scales: Mapping[str, float], c: float) -> None:
         self._loop, self.free, self._scales, self.c = loop, tuple(free), dict(scales), c
+        self._count = loop.servo.step
+        # Residuals are a third of c in the median; a rounded position is off by its twelfth.
+        self._certainty = float((c / 3 / MEDIAN) ** 2 / (self._count**2 / 12))
         self._low = np.array(lows(self.free))
         self._relative = np.array([SERVO_PARAMETERS[name].relative > 0 for name in self.free], dtype=bool)
 
-    def cost(self, q: Array) -> Array:
-        """Return the objective of simulated positions, shape (lane,)."""
+    def cost(self, q: Array, ahead: Array | float = 0.0) -> Array:
+        """Return the objective of simulated positions, shape (lane,), of runs that begin ahead, shape (lane, run)."""
         r = np.abs(self._loop.q - q) * self._loop.kept / self.c
-        total = 2 * self.c**2 * (r - np.log1p(r)).sum(axis=(1, 2))
+        total = 2 * self.c**2 * (r - np.log1p(r)).sum(axis=(1, 2)) + self._certainty * np.square(ahead).sum(axis=-1)
         return np.nan_to_num(total, nan=np.inf, posinf=np.inf)
 
     def best(self, start: Mapping[str, float], rounds: int = 30) -> Found:
         """Return the best parameters that are found from a start."""
-        x = np.array([start[name] for name in self.free])
+        x, ahead = np.array([start[name] for name in self.free]), np.zeros(len(self._loop.runs))
         width, damping, idle, spread = 1.0, 1e-2, 0, 1.0
         rng = np.random.default_rng(0)  # the same samples for everybody
         for _ in range(rounds):
-            tried, cost, J, r = self._differences(start, x, width)
-            A, gradient, size = self._normal(J, r)
-            steps, promised = (
-                self._steps(A, gradient, size, damping),
-                float(gradient @ np.linalg.pinv(A, 1e-6, hermitian=True) @ gradient),
-            )
-            scattered = self._scattered(rng, A, size, spread * np.sqrt(0.02 * cost[0] / len(x)))
+            tried, cost, J, r, beginning = self._differences(start, x, ahead, width)
+            normal = self._normal(J, r, beginning)
+            steps, promised = self._steps(normal, damping), float(normal.gradient @ normal.inverse @ normal.gradient)
+            scattered = self._scattered(rng, normal, spread * np.sqrt(0.02 * cost[0] / len(x)))
             more = self._within(x, np.concatenate([steps, scattered]))
-            further = self.cost(self._simulated(start, more))
+            begins = np.clip(ahead + normal.begin(more - x), -self._count, self._count)
+            further = self.cost(self._simulated(start, more, begins), begins)
             every, costs = np.concatenate([tried, more]), np.concatenate([cost, further])
             best = int(costs.argmin())
             place = best - len(tried)
@@ -107,47 +140,74 @@ class Search:
             idle = idle + 1 if costs[best] > cost[0] * (1 - SETTLED) else 0
             if best == 0:
                 width, spread = 0.6 * width, 0.6 * spread
-            x = every[best]
+            x, ahead = every[best], begins[place] if place >= 0 else ahead
             if idle >= IDLE or (promised < SETTLED * cost[0] and width < 1):
                 break
-        _, cost, J, r = self._differences(start, x, min(width, 0.5))
-        return Found({**start, **dict(zip(self.free, x.tolist(), strict=True))}, float(cost[0]), r, J)
+        _, cost, J, r, beginning = self._differences(start, x, ahead, min(width, 0.5))
+        p = {**start, **dict(zip(self.free, x.tolist(), strict=True))}
+        return Found(p, float(cost[0]), r, J, beginning)
 
     def _within(self, x: Array, steps: Array) -> Array:
         """Return x with steps, which change no parameter whose size is known by more than a third."""
         most = np.where(self._relative, np.abs(x) / 3, np.inf)
         return np.maximum(x + np.clip(steps, -most, most), self._low)
 
-    def _simulated(self, start: Mapping[str, float], X: Array) -> Array:
+    def _simulated(self, start: Mapping[str, float], X: Array, ahead: Array) -> Array:
         lanes: dict[str, Array | float] = {**start, **dict(zip(self.free, X.T, strict=True))}
-        return self._loop.simulate(lanes)
+        return self._loop.simulate(lanes | {"a": np.broadcast_to(lanes["a"], (len(X),))}, ahead)
 
-    def _differences(self, start: Mapping[str, float], x: Array, width: float) -> tuple[Array, Array, Array, Array]:
-        """Return points about x, their costs, and sensitivity and residual at x."""
+    def _differences(
+        self, start: Mapping[str, float], x: Array, ahead: Array, width: float
+    ) -> tuple[Array, Array, Array, Array, Beginning]:
+        """Return points about x, their costs, sensitivity and residual at x, and what other beginnings do."""
         h = width * np.array([step_of(name, value, self._scales) for name, value in zip(self.free, x, strict=True)])
-        upper, lower = x + np.diag(h), np.maximum(x - np.diag(h), self._low)
-        tried = np.concatenate([x[None], upper, lower])
-        q, n = self._simulated(start, tried), len(x)
-        wide = np.diagonal(upper - lower)
-        J = np.moveaxis(q[1 : n + 1] - q[n + 1 :], 0, -1) / wide * self._loop.kept[..., None]
-        return tried, self.cost(q), J, (self._loop.q - q[0]) * self._loop.kept
+        upper, lower, n = x + np.diag(h), np.maximum(x - np.diag(h), self._low), len(x)
+        tried, half = np.concatenate([x[None], upper, lower]), self._count / 2
+        begins = np.concatenate([np.repeat(ahead[None], len(tried), axis=0), [ahead + half, ahead - half]])
+        q = self._simulated(start, np.concatenate([tried, [x, x]]), begins)
+        wide, kept = np.diagonal(upper - lower), self._loop.kept
+        J = np.moveaxis(q[1 : n + 1] - q[n + 1 : 2 * n + 1], 0, -1) / wide * kept[..., None]
+        beginning = Beginning(ahead, (q[-2] - q[-1]) / self._count * kept, self._certainty)
+        return tried, self.cost(q[:-2], ahead), J, (self._loop.q - q[0]) * kept, beginning
 
-    def _normal(self, J: Array, r: Array) -> tuple[Array, Array, Array]:
-        """Return the normal matrix, scaled to ones on its diagonal, the gradient, and the scales."""
+    def _normal(self, J: Array, r: Array, beginning: Beginning) -> "_Normal":
         w = 1 / (1 + np.abs(r) / self.c)
         typical = np.sqrt(np.median((J**2).mean(axis=1), axis=0))
         typical = np.where(typical > 0, typical, np.sqrt((J**2).mean(axis=(0, 1))) + 1e-12)
         w = w / (1 + ((J / typical) ** 2).mean(axis=-1) / WILD**2)
-        flat = J.reshape(-1, J.shape[-1])
-        A = flat.T @ (flat * w.reshape(-1, 1))
-        size = np.sqrt(np.maximum(np.diagonal(A), 1e-24))
-        return A / np.outer(size, size), (flat.T @ (w * r).ravel()) / size, size
+        return _Normal(J, r, w, beginning)
 
-    def _steps(self, A: Array, gradient: Array, size: Array, damping: float) -> Array:
-        every = [np.linalg.solve(A + damping * d * np.eye(len(size)), gradient) / size for d in DAMPINGS]
+    def _steps(self, normal: "_Normal", damping: float) -> Array:
+        eye = np.eye(len(normal.size))
+        every = [np.linalg.solve(normal.A + damping * d * eye, normal.gradient) / normal.size for d in DAMPINGS]
         return np.array(every)
 
-    def _scattered(self, rng: np.random.Generator, A: Array, size: Array, spread: float) -> Array:
-        root = np.linalg.cholesky(np.linalg.inv(A + 1e-3 * np.eye(len(size))))
+    def _scattered(self, rng: np.random.Generator, normal: "_Normal", spread: float) -> Array:
+        size = normal.size
+        root = np.linalg.cholesky(np.linalg.inv(normal.A + 1e-3 * np.eye(len(size))))
         z = spread * (rng.standard_normal((SAMPLES // 2, len(size))) @ root.T) / size
         return np.concatenate([z, -z])
+
+
+@final
+class _Normal:
+    """Weighted normal equations, in which every change of the parameters comes with the best beginnings of the runs.
+
+    `A` is scaled to ones on its diagonal but for what beginnings take, `gradient` likewise, by `size`.
+    """
+
+    def __init__(self, J: Array, r: Array, w: Array, beginning: Beginning) -> None:
+        J0, flat = beginning.sensitivity, J.reshape(-1, J.shape[-1])
+        self._whole = (w * J0**2).sum(axis=1) + beginning.certainty
+        self._mixed = np.einsum("rt,rtp->rp", w * J0, J)
+        self._pull = (w * J0 * r).sum(axis=1) - beginning.certainty * beginning.ahead
+        share = self._mixed / self._whole[:, None]
+        A = flat.T @ (flat * w.reshape(-1, 1)) - self._mixed.T @ share
+        self.size = np.sqrt(np.maximum(np.diagonal(A), 1e-24))
+        self.A = A / np.outer(self.size, self.size)
+        self.gradient = (flat.T @ (w * r).ravel() - share.T @ self._pull) / self.size
+        self.inverse = np.linalg.pinv(self.A, 1e-6, hermitian=True)
+
+    def begin(self, steps: Array) -> Array:
+        """Return how far beginnings move with steps of the parameters, shape (lane, parameter), as (lane, run)."""
+        return np.asarray((self._pull - steps @ self._mixed.T) / self._whole)
