@@ -114,7 +114,8 @@ def _overview(cell: Cell) -> list[str]:
     shares = []
     for sigma in (cell.sigma, cell.paper_sigma):
         share = 100 * cell.coverage(sigma)
-        shares.append(f"{share.mean():.0f} % ({share.min():.0f} to {share.max():.0f})" if np.isfinite(share).all() else "")
+        share = share[np.isfinite(share)]  # of what was identified
+        shares.append(f"{share.mean():.0f} % ({share.min():.0f} to {share.max():.0f})" if share.size else "")
     least = [percent(x) if np.isfinite(x := cell.typical_least(bound)) else "" for bound in BOUNDS]
     often = f"{cell.mean_simulations:.3g}" if cell.mean_simulations else ""
     return [*head, percent(cell.typical), *least, f"{percent(cell.rmse[worst])} {cell.parameters[worst]}", *shares, often]

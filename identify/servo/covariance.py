@@ -6,8 +6,8 @@ from identify.arrays import Array
 from identify.servo.closed_loop import ServoLoop
 from identify.servo.search import Found
 
-MIN_CLUSTERS = 3
-"""Runs per parameter from which on they are the clusters; of fewer, stretches of time are."""
+MIN_CLUSTERS = 1.5
+"""Runs, or pieces of them, per parameter from which on they are the clusters; of fewer, stretches of time are."""
 
 LONGEST = 0.1
 """Longest lag over which residuals may be correlated, as a share of a run."""
