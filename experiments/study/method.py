@@ -1,7 +1,7 @@
 """How the runs of a study are identified: chain, estimator, and their settings."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -49,6 +49,11 @@ def servo_methods(friction: str, axes: Sequence[Axis]) -> Iterator[Method]:
     for combination in combinations(axes):
         laws = next((str(setting.value) for setting in combination if setting.axis.field == FRICTION), friction)
         yield Method("commands", "closed loop", chain, estimator, laws, combination)
+
+
+def of_currents(method: Method) -> Method:
+    """Return what identifies the torque of servos' currents, in the place of what their closed loop is fitted with."""
+    return replace(method, chain_name=CHAIN, estimator_name=ESTIMATOR, friction="standard", settings=())
 
 
 def combinations(axes: Sequence[Axis]) -> Iterator[tuple[Setting, ...]]:

@@ -25,7 +25,7 @@ from experiments.reports.leading import shown_whole
 from experiments.reports.printed import print_fit
 from experiments.results.folder import ResultsFolder
 from experiments.servo.known import servo_toml
-from experiments.study.method import Method
+from experiments.study.method import Method, of_currents
 from identify import CHAINS
 from identify.files.log_file import write_log
 from sim.drives import IdealDrive, ServoDrive
@@ -159,7 +159,7 @@ def _again(page: Page, folder: Path | None, index: int | None, method: int | Non
     number, methods = method or 0, store.study.methods
     if not 0 <= number < len(methods):
         raise ExperimentError(f"--method {number} does not exist: the study has methods 0 to {len(methods) - 1}")
-    chosen = methods[number]
+    chosen = of_currents(methods[number]) if store.study.of_servos else methods[number]
     rows, known = compare_again(store, index)
     page.print(
         f"run {index} of {folder}: all {len(rows)} rows are the same again, bit for bit"
