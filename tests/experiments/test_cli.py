@@ -36,6 +36,7 @@ def test_table1_prints_and_writes_everything(out, capsys):
     assert list(out.parent.iterdir()) == [out]
 
 
+@pytest.mark.thorough
 def test_table1_repeats_itself(tmp_path, capsys):
     for name in ("a", "b"):
         main(["table1", "--out", str(tmp_path / name), "--seed", "5"])

@@ -95,6 +95,7 @@ def closed_loop(run, **others):
     return ServoLoop(servo, [log], 5e-4).simulate(LAW | others)[0, 0]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("settings", "rms"),
     [({}, 5e-5), ({"backlash": (0.0175,)}, 5e-5), ({"off": ((2.0, 2.6),)}, 3e-4)],
@@ -110,6 +111,7 @@ def test_two_simulators_agree(settings, rms):
     assert np.abs(error).max() < 10 * rms
 
 
+@pytest.mark.thorough
 def test_without_play_the_geared_plant_is_the_plain_one():
     plain, geared = (simulate(bench(3, backlash=(x,))) for x in (0.0, 1e-6))
     np.testing.assert_allclose(geared.q, plain.q, atol=1e-5)

@@ -78,6 +78,7 @@ def run(start, client, out, *options):
     return start("-c", code.replace("URL", client.url).replace("OUT", str(out)))
 
 
+@pytest.mark.thorough
 def test_the_arm_moves_in_the_viewer_before_the_run_has_ended(viewer, tmp_path, start):
     client, out = viewer[0], tmp_path / "run"
     process = run(start, client, out, "--connect", "URL", "--out", "OUT", "--pace", f"{PACE}")
