@@ -36,12 +36,16 @@ def test_every_scenario_that_ships_runs(name, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["run", str(shortened(name, tmp_path)), "--out", str(out)]) == 0
     printed = capsys.readouterr().out
-    assert all(word in printed for word in ("ZZR1", "Cond(W)", "expla", "torque: held"))
+    of_servos = load(name).controller.commanded == "position"
+    first = "YYR1" if load(name).robot == "pendulum" else "ZZR1"
+    assert all(word in printed for word in (first, "Cond(W)", "expla", "torque: held"))
+    assert ("uv run idbench servo" in printed) == of_servos
     assert sorted({x.name for x in out.iterdir()} - {MANIFEST}) == [
         "log.parquet",
         "recording.idbench-GLS.rrd",
         "recording.rrd",
         "scenario.toml",
+        *(["servo.toml"] if of_servos else []),
         "summary.json",
     ]
     summary = json.loads((out / "summary.json").read_text())

@@ -8,7 +8,7 @@ import pytest
 from identify import scara
 from identify.judge.delay import estimate_delay
 from sim.controllers import CONTROLLERS, ComputedTorque, PDFeedforward
-from sim.drives import AveragedDrive, SwitchedDrive
+from sim.drives import AveragedDrive, ServoDrive, SwitchedDrive
 from sim.encoders import IncrementalEncoder
 from sim.engine.simulation import simulate
 from sim.errors import ScenarioError
@@ -267,6 +267,8 @@ def test_every_simulation_may_have_a_motion_of_its_own(short, robot, controller)
     """With the bits that it has as the trajectory of a scenario."""
     kinds = [RandomMoves(moves=1, durations=(1.3, 1.3), rest=0.05, seed=seed) for seed in (4, 5, 6)]
     calm = {"controller": CONTROLLERS.create(controller), "timing": Timing(), "encoder": IncrementalEncoder()}
+    if calm["controller"].commanded == "position":
+        calm |= {"drive": ServoDrive()}
     busy = replace(short, **BUSY | calm)
     run = simulate(busy, (1, 2, 3), motions=[kind.sample(robot, busy.fs) for kind in kinds])
     for i, kind in enumerate(kinds):
