@@ -164,17 +164,17 @@ def identify_servo(
     _require_possible(held)
     excitation = Excitation.of(servo, runs)
     whole = _evenly(runs)
-    # Few runs are simulated in pieces, side by side; many are whole, as they are judged.
-    chosen = whole if len(whole) > FEW else [piece for run in whole for piece in pieces(run, servo.step)]
     with one_thread():
-        loop = ServoLoop(servo, chosen)
+        loop = ServoLoop(servo, whole)
         begin = {**(start or _start(servo, whole, loop, excitation)), **held}
+        if len(whole) <= FEW:  # few runs are simulated in pieces, side by side; many are whole, as they are judged
+            loop = ServoLoop(servo, [piece for run in whole for piece in pieces(run, servo.step, 1.5 * begin["delay"])])
         begin["offset"] *= excitation.tilts
         begin = {**_first(friction, more, begin, excitation), **begin, **held}
         if "backlash" in more and "backlash" not in held:
             begin["backlash"] = _play(servo, loop, begin)
         free = tuple(x for x in _names(friction, more, begin, excitation) if x not in held)
-        some = ServoLoop(servo, chosen[::2]) if len(whole) > FEW else loop
+        some = ServoLoop(servo, whole[::2]) if len(whole) > FEW else loop
         rough = Search(some, free, excitation.scales, _scale(servo, some, begin)).best(begin).p
         found = Search(loop, free, excitation.scales, _scale(servo, loop, rough)).best(rough, REFINED)
         fit = ServoFit(servo, friction, free, found, loop, excitation)

@@ -8,18 +8,17 @@ from identify.arrays import Array
 from identify.servo.load import JointLoad
 from identify.servo.run import MIN_SAMPLES, ServoRun
 
-REST = 0.12
-"""How long joint and command have stood still where a run is cut [s]: longer than commands are late."""
+REST = 0.1
+"""How long joint and command have stood still where a run is cut [s], beside the delay of the command."""
 
 SHORTEST = 0.8
 """Length of a piece [s]."""
-
 
 MOVES = 4
 """Counts by which a joint moves in a piece that says anything."""
 
 
-def pieces(run: ServoRun, step: float) -> list[ServoRun]:
+def pieces(run: ServoRun, step: float, delay: float) -> list[ServoRun]:
     """Return a run in pieces that begin at rest, the target of the firmware where the command is.
 
     Parameters
@@ -28,12 +27,15 @@ def pieces(run: ServoRun, step: float) -> list[ServoRun]:
         What was logged.
     step : float
         Of the encoder [rad]; a position that flickers by one still rests.
+    delay : float
+        By which commands may be late [s].
     """
-    t, first = run.t, np.searchsorted(run.t, run.t - REST)
+    rest = REST + delay
+    t, first = run.t, np.searchsorted(run.t, run.t - rest)
     still = np.array(
         [np.ptp(run.q[i : k + 1]) <= 1.5 * step and np.ptp(run.command[i : k + 1]) == 0 for k, i in enumerate(first)]
     )
-    still &= t >= t[0] + REST
+    still &= t >= t[0] + rest
     cuts = [0]
     for k in np.flatnonzero(still):
         if t[k] - t[cuts[-1]] >= SHORTEST and k - cuts[-1] >= MIN_SAMPLES:

@@ -10,8 +10,8 @@ from identify.servo.run import ServoRun
 from identify.servo.servo import Servo
 from identify.servo.smooth import CUTOFF, low_passed
 
-DELAYS = np.arange(0.0, 6.1, 0.5)
-"""Delays of the command that are tried [samples]."""
+DELAYS = np.array([*np.arange(0.0, 0.0601, 0.005), 0.08, 0.1, 0.13, 0.16, 0.2, 0.25])
+"""Delays of the command that are tried [s]."""
 
 RATES = 10
 """Rate limits that are tried, between half and 1.3 times the largest speed of a joint, beside none."""
@@ -41,12 +41,14 @@ class ServoRows:
         """Return parameters for each delay and rate limit that is tried, those whose rows fit best first."""
         rates = np.array([np.inf, *(self.fast * np.geomspace(0.5, 1.3, RATES))] if self.fast else [np.inf])
         targets = [run.targets(rates) for run in self._runs]
-        found = [self.solved(samples, rate, [t[:, k] for t in targets]) for k, rate in enumerate(rates) for samples in DELAYS]
+        found = [
+            self.solved(float(delay), rate, [t[:, k] for t in targets]) for k, rate in enumerate(rates) for delay in DELAYS
+        ]
         return [p for _, p in sorted((pair for pair in found if pair), key=lambda pair: pair[0])]
 
-    def solved(self, samples: float, rate: float, targets: Sequence[Array]) -> tuple[float, dict[str, float]] | None:
-        """Return residual and linear parameters for a delay [samples] and targets within a rate; None if they make no servo."""
-        parts = [run.rows(self.servo, samples, target) for run, target in zip(self._runs, targets, strict=True)]
+    def solved(self, delay: float, rate: float, targets: Sequence[Array]) -> tuple[float, dict[str, float]] | None:
+        """Return residual and linear parameters for a delay [s] and targets within a rate; None if they make no servo."""
+        parts = [run.rows(self.servo, delay, target) for run, target in zip(self._runs, targets, strict=True)]
         W, Y = np.concatenate([w for w, _ in parts]), np.concatenate([y for _, y in parts])
         size = np.sqrt((W**2).sum(axis=0))
         used = size > 0
@@ -55,7 +57,7 @@ class ServoRows:
         if X[0] <= 0:
             return None
         p = dict(zip(COLUMNS, X.tolist(), strict=True))
-        p |= {"offset": p["offset"] / p["a"], "delay": samples * self._runs[0].T, "rate": float(rate)}
+        p |= {"offset": p["offset"] / p["a"], "delay": delay, "rate": float(rate)}
         p["b"] = max(p["b"], 0.02 * p["a"])
         p["Ia"] = max(p["Ia"], 0.02 * self._runs[0].inertia)
         p["Fs"] = max(p["Fs"], 0.0)
@@ -91,10 +93,10 @@ class _Uniform:
         run = self.run
         return _limited(np.interp(self._t, run.t, run.command), rates * self.T)
 
-    def rows(self, servo: Servo, samples: float, target: Array) -> tuple[Array, Array]:
-        """Return W and Y for a target that is late by some samples."""
+    def rows(self, servo: Servo, delay: float, target: Array) -> tuple[Array, Array]:
+        """Return W and Y for a target that is late [s]."""
         run = self.run
-        late = np.interp(self._t - samples * self.T, self._t, target)
+        late = np.interp(self._t - delay, self._t, target)
         error = late - self._measured
         g = servo.gain * run.kp
         duty = np.clip(g * error, -servo.duty_limit, servo.duty_limit)

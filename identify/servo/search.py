@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import final
 
 import numpy as np
+from scipy.special import ndtri
 
 from identify.arrays import Array
 from identify.servo.closed_loop import ServoLoop
@@ -23,7 +24,7 @@ SAMPLES = 12
 SETTLED = 3e-4
 """Share by which the best of a round must improve the objective."""
 
-MEDIAN = 0.6745
+MEDIAN = float(ndtri(0.75))
 """Median of the size of a normal number, in standard deviations."""
 
 IDLE = 2

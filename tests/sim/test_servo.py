@@ -14,7 +14,7 @@ from sim.drives.profile import Profile
 from sim.encoders import ExactEncoder
 from sim.engine.simulation import simulate
 from sim.engine.watch import Watch
-from sim.errors import ScenarioError
+from sim.errors import RobotError, ScenarioError
 from sim.robot.robot import Robot
 from sim.scenario.scenario_file import from_dict, load, to_dict
 
@@ -166,7 +166,7 @@ def test_joints_of_one_body_have_no_play(tmp_path):
         '<joint name="x" axis="1 0 0"/><joint name="y" axis="0 1 0"/></body></worldbody></mujoco>'
     )
     scenario = from_dict(to_dict(load("servo-backlash")) | {"robot": str(file)})
-    with pytest.raises(Exception, match="needs a body for each joint"):
+    with pytest.raises(RobotError, match="needs a body for each joint"):
         simulate(scenario)
 
 

@@ -127,7 +127,7 @@ def test_pieces_begin_at_rest_and_leave_nothing_out_that_moves():
     command = np.repeat([0.0, 0.5, -0.3], 200)
     q = np.interp(t, [0, 2, 2.5, 4, 4.5, 6], [0.0, 0.0, 0.5, 0.5, -0.3, -0.3])
     run = ServoRun(t, q, command, JointLoad.pendulum(0.5, 0.1), 16.0)
-    parts = pieces(run, 2 * np.pi / 4096)
+    parts = pieces(run, 2 * np.pi / 4096, 0.03)
     assert all(part.q[0] == part.q[1] and part.command[0] == part.command[1] for part in parts)
     assert sum(np.abs(np.diff(part.q)).sum() for part in parts) == pytest.approx(1.3)
     assert max(part.t[-1] - part.t[0] for part in parts) < 2.5
@@ -136,4 +136,16 @@ def test_pieces_begin_at_rest_and_leave_nothing_out_that_moves():
 def test_a_run_that_never_rests_is_one_piece():
     t = np.arange(0, 6, 0.01)
     run = ServoRun(t, np.sin(t), np.sin(t), JointLoad.pendulum(0.5, 0.1), 16.0)
-    assert len(pieces(run, 2 * np.pi / 4096)) == 1
+    assert len(pieces(run, 2 * np.pi / 4096, 0.03)) == 1
+
+
+def test_pieces_begin_when_a_late_command_has_arrived():
+    """A joint that rests because its command is late has a target that is still on its way."""
+    t = np.arange(0, 6, 0.01)
+    command = np.repeat([0.0, 0.5, -0.3], 200)
+    q = np.interp(t, [0, 2.3, 2.8, 4.3, 4.8, 6], [0.0, 0.0, 0.5, 0.5, -0.3, -0.3])
+    run = ServoRun(t, q, command, JointLoad.pendulum(0.5, 0.1), 16.0)
+    starts = [part.t[0] for part in pieces(run, 2 * np.pi / 4096, 0.3)][1:]
+    assert len(starts) > 0
+    changed = np.array([2.0, 4.0])
+    assert all(not ((changed < s) & (changed > s - 0.4)).any() for s in starts)
