@@ -1,16 +1,24 @@
-"""What the firmware of a scenario's servos is known to do, as servo.toml."""
+"""What the owner of a scenario's servos knows of them."""
 
 import tomli_w
 
+from identify.servo import Servo
 from sim.drives import ServoDrive
 from sim.robot.robot import Robot
 from sim.settings import per_joint
 
+EXACT = 2**24
+"""Counts a turn that stand for a firmware without rounding."""
+
+
+def known_servos(drive: ServoDrive, n: int) -> list[Servo]:
+    """Return gain, supply, largest duty and counts of the servos of n joints."""
+    kp = per_joint(drive.kp, n, "drive.kp").tolist()
+    return [Servo(drive.gain, x, drive.supply, drive.duty_limit, drive.counts or EXACT) for x in kp]
+
 
 def servo_toml(drive: ServoDrive, robot: Robot) -> str:
-    """Return what an owner knows of the servos of a scenario: gains, supply, largest duty, counts."""
-    counts = {"counts": drive.counts} if drive.counts else {}
-    kp = per_joint(drive.kp, robot.n, "drive.kp").tolist()
-    stated = {"gain": drive.gain, "supply": drive.supply, "duty_limit": drive.duty_limit, "kp": kp[0], **counts}
-    others = {joint: {"kp": x} for joint, x in zip(robot.joints, kp, strict=True) if x != kp[0]}
-    return tomli_w.dumps({**stated, **({"joints": others} if others else {})})
+    """Return what is known of the servos of a robot as servo.toml."""
+    first, *others = known_servos(drive, robot.n)
+    differing = {joint: {"kp": servo.kp} for joint, servo in zip(robot.joints[1:], others, strict=True) if servo.kp != first.kp}
+    return tomli_w.dumps({**vars(first), **({"joints": differing} if differing else {})})

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from experiments.servo.known import known_servos
 from experiments.servo.loads import loads
 from experiments.study.statistics import BOUNDS
 from identify import IdentificationError, MotionLog
@@ -55,7 +56,7 @@ def truth_of(scenario: Scenario) -> dict[str, float]:
     model, found = robot.model, dict[str, float]()
     for j in range(robot.n):
         of_joint = {"a": K[j] / R[j], "b": K[j] ** 2 / R[j], "Ia": model.dof_armature[j], "Fs": model.dof_frictionloss[j]}
-        of_joint |= {"Fv": model.dof_damping[j, 0] if model.dof_damping.ndim > 1 else model.dof_damping[j], "backlash": play[j]}
+        of_joint |= {"Fv": model.dof_damping[j], "backlash": play[j]}
         of_joint |= {"offset": 0.0, "delay": scenario.timing.delay, "rate": drive.rate or np.inf}
         of_joint |= {"lead": drive.lead, "dead_band": drive.dead_band}
         if not drive.off:  # then damping shows as one
@@ -71,9 +72,9 @@ def servo_columns(law: str, simulated: Run, i: int) -> dict[str, float] | str:
     """
     scenario, truth = simulated.scenario, truth_of(simulated.scenario)
     found, why = dict[str, float](), list[str]()
-    for j, run in enumerate(_runs(scenario, simulated.log.run((i,)))):
+    for j, (servo, run) in enumerate(_runs(scenario, simulated.log.run((i,)))):
         try:
-            fit = identify_servo(_known(scenario.drive, j), [run], *law_of(law))
+            fit = identify_servo(servo, [run], *law_of(law))
         except IdentificationError as error:
             why.append(str(error))
             continue
@@ -97,22 +98,19 @@ def rows_of(
             yield {**said, "condition_number": np.nan, "rows": 0, "residual_rms": np.nan, "simulations": 0, **every}
 
 
-def _runs(scenario: Scenario, log: MotionLog) -> list[ServoRun]:
+def _runs(scenario: Scenario, log: MotionLog) -> list[tuple[Servo, ServoRun]]:
+    """Return what is known of each servo, and its log."""
+    assert isinstance(scenario.drive, ServoDrive)
     on = log.conditions.get("on")
     columns = ServoColumns(log.t, log.q, log.conditions["command"], on, None, ())
-    kp = per_joint(scenario.drive.kp, log.n, "drive.kp")  # type: ignore[attr-defined]  # a servo's
+    servos = known_servos(scenario.drive, log.n)
     enabled = None if on is None else on[:, 0] > 0.5
     return [
-        ServoRun(log.t, log.q[:, j], columns.command[:, j], load, float(kp[j]), enabled, name=f"joint {j + 1}")
-        for j, load in enumerate(loads(_links(scenario.robot), columns))
+        (servo, ServoRun(log.t, log.q[:, j], columns.command[:, j], load, servo.kp, enabled, name=f"joint {j + 1}"))
+        for j, (servo, load) in enumerate(zip(servos, loads(_links(scenario.robot), columns), strict=True))
     ]
 
 
 @cache
 def _links(robot: str) -> Robot:
     return links(robot, PLAIN)
-
-
-def _known(drive: Any, j: int) -> Servo:
-    kp = drive.kp[j] if len(drive.kp) > 1 else drive.kp[0]
-    return Servo(drive.gain, kp, drive.supply, drive.duty_limit, drive.counts or 2**24)

@@ -12,7 +12,7 @@ REST = 0.1
 """How long joint and command have stood still where a run is cut [s], beside the delay of the command."""
 
 SHORTEST = 0.8
-"""Length of a piece [s]."""
+"""Least length of a piece [s]."""
 
 MOVES = 4
 """Counts by which a joint moves in a piece that says anything."""
