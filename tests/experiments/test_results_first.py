@@ -44,7 +44,8 @@ VIEWS = {
 """What is broken; what is named; which views are there all the same."""
 
 
-@pytest.mark.parametrize("error", [broken, pytest.param(refused, marks=pytest.mark.thorough)], ids=["fault", "refusal"])
+@pytest.mark.thorough
+@pytest.mark.parametrize("error", [broken, refused], ids=["fault", "refusal"])
 @pytest.mark.parametrize("view", VIEWS)
 def test_a_view_that_fails_leaves_everything_else(view, error, idbench, logs, tmp_path, monkeypatch):
     name, others = VIEWS[view]
@@ -66,7 +67,8 @@ def test_a_view_that_fails_leaves_everything_else(view, error, idbench, logs, tm
         assert "it cannot be drawn" in err
 
 
-@pytest.mark.parametrize("error", [broken, pytest.param(refused, marks=pytest.mark.thorough)], ids=["fault", "refusal"])
+@pytest.mark.thorough
+@pytest.mark.parametrize("error", [broken, refused], ids=["fault", "refusal"])
 def test_a_held_out_log_that_cannot_be_judged_leaves_the_others(error, idbench, logs, tmp_path, monkeypatch):
     """The second of three; the table was printed, the summary is there, one line names what is missing."""
     from experiments.identification import held_out
@@ -127,6 +129,7 @@ def test_results_are_saved_before_the_judgement(idbench, logs, tmp_path, monkeyp
     assert (tmp_path / "found" / "log.parquet").is_file()
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
 def test_a_screen_that_is_full_costs_no_view(logs, tmp_path):
     words = ["identify", str(logs / "first.parquet"), *WORDS, "--no-rerun", "--out", "found"]

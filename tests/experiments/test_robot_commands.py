@@ -24,6 +24,7 @@ def test_robot_tells_what_can_be_identified(idbench):
     assert "97.6" in out
 
 
+@pytest.mark.thorough
 def test_identify_validates_and_writes_the_file(idbench, logs, tmp_path):
     words = "--robot", "puma560", "--validate", logs / "second.parquet", "--write-mjcf", "out.xml", "--out", "results"
     code, out, err = idbench("identify", logs / "first.parquet", *words, "--no-rerun")

@@ -95,6 +95,7 @@ def test_slopes_of_the_cost_are_those_of_differences():
             assert mine == pytest.approx(slope, rel=0.05), one
 
 
+@pytest.mark.thorough
 def test_the_true_motion_leaves_nothing_in_the_cells_of_reversals():
     """Torques of the cells in which friction jumps: to 1e-3 of the jump, 0.2 of which a sign at the middle would leave."""
     q, v, tau = logged("series", "coulomb", 1)

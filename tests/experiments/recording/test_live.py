@@ -106,6 +106,7 @@ def picture(client):
     return pytest.fail("the arm is not drawn")
 
 
+@pytest.mark.thorough
 def test_a_viewer_closed_while_the_run_goes_on_is_told_once(viewer, tmp_path, reading, start):
     (client, window), out = viewer, tmp_path / "run"
     process = run(start, client, out, "--connect", "URL", "--out", "OUT", "--pace", f"{PACE}")

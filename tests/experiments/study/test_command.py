@@ -24,6 +24,7 @@ def test_the_folder_has_all_that_is_promised(done, undisturbed):
     assert Store.open(done).table().equals(undisturbed)
 
 
+@pytest.mark.thorough
 def test_the_summary_says_what_the_rows_say(done, undisturbed):
     summary = json.loads((done / "summary.json").read_text())
     assert len(summary["cells"]) == 8
@@ -50,6 +51,7 @@ class Page(HTMLParser):
         self.loads += [value for name, value in attrs if name in {"src", "href", "xlink:href"} and not value.startswith("#")]
 
 
+@pytest.mark.thorough
 def test_the_report_is_one_file_with_everything_in_it(done):
     text = (done / "report.html").read_text()
     page = Page()
@@ -63,6 +65,7 @@ def test_the_report_is_one_file_with_everything_in_it(done):
     assert summary["answer"].split(";")[0].split("(p")[0] in text
 
 
+@pytest.mark.thorough
 def test_the_recording_holds_every_error(done, undisturbed):
     """Dots of a parameter, back through the logarithmic axis: as many as runs, each at its size."""
     path = done / "recording.rrd"
@@ -84,6 +87,7 @@ def test_the_recording_holds_every_error(done, undisturbed):
     np.testing.assert_allclose(up, slope * expected + offset, atol=1e-5)
 
 
+@pytest.mark.thorough
 def test_a_run_is_made_again_bit_for_bit(done, tmp_path, capfd):
     assert main(["run", "--from", str(done), "--index", "13", "--method", "1", "--out", str(tmp_path / "again")]) == 0
     assert "run 13 of" in capfd.readouterr().out.splitlines()[0]
@@ -137,6 +141,7 @@ def test_a_thousand_million_runs_are_asked_for_twice(file, complaint, tmp_path, 
     assert main(["study", str(file), "--yes", *out]) == 0
 
 
+@pytest.mark.thorough
 def test_wrong_calls(done, file, tmp_path, complaint):
     out = ("--out", str(tmp_path / "out"))
     assert "no study 'encodr' (did you mean 'encoder'?)" in complaint("study", "encodr")
