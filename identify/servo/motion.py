@@ -128,9 +128,18 @@ class Motion:
         return self._slowed(of, free, speed, (motor, of.external, sent), whole * (1 + half)), whole
 
     def _slowed(self, of: Torques, free: Array, speed: Array, loads: tuple[Array, Array, Array], inertia: Array) -> Array:
-        """Return speeds after friction, which takes away at most all."""
+        """Return speeds after friction.
+
+        It resists the motion that there was until that ends, within the step or not, and takes of what drives it on from there
+        at most all.
+        """
         most = self._h / inertia * (budget(self._friction, speed, *loads) + self._when_off * (1 - of.on))
-        return free - np.minimum(np.maximum(free, -most), most)
+        change = free - speed
+        slower = change - np.copysign(most, speed)
+        onward = speed + slower
+        driven = change - np.minimum(np.maximum(change, -most), most)
+        left = 1 - speed / np.where(onward * speed < 0, -slower, np.inf)
+        return np.where(onward * speed > 0, onward, left * driven)
 
     def _limited(self, speed: Array) -> Array:
         return np.minimum(np.maximum(speed, -self._most), self._most)

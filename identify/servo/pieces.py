@@ -11,6 +11,9 @@ from identify.servo.run import MIN_SAMPLES, ServoRun
 REST = 0.1
 """How long joint and command have stood still where a run is cut [s], beside the delay of the command."""
 
+AFTER = 0.05
+"""How long they go on to do so [s]: a piece that begins with a motion needs its speed, and the instant when it began."""
+
 SHORTEST = 0.8
 """Least length of a piece [s]."""
 
@@ -32,10 +35,9 @@ def pieces(run: ServoRun, step: float, delay: float) -> list[ServoRun]:
     """
     rest = REST + delay
     t, first = run.t, np.searchsorted(run.t, run.t - rest)
-    still = np.array(
-        [np.ptp(run.q[i : k + 1]) <= 1.5 * step and np.ptp(run.command[i : k + 1]) == 0 for k, i in enumerate(first)]
-    )
-    still &= t >= t[0] + rest
+    last = np.searchsorted(run.t, run.t + AFTER, side="right")
+    still = np.array([_rests(run, slice(i, k), step) for i, k in zip(first, last, strict=True)])
+    still &= (t >= t[0] + rest) & (t <= t[-1] - AFTER)
     cuts = [0]
     for k in np.flatnonzero(still):
         if t[k] - t[cuts[-1]] >= SHORTEST and k - cuts[-1] >= MIN_SAMPLES:
@@ -45,6 +47,10 @@ def pieces(run: ServoRun, step: float, delay: float) -> list[ServoRun]:
     parts = [_part(run, slice(a, b)) for a, b in zip(cuts, [*cuts[1:], len(t)], strict=True)]
     moving = [part for part in parts if np.ptp(part.q) > MOVES * step]
     return moving or parts[:1]
+
+
+def _rests(run: ServoRun, some: slice, step: float) -> bool:
+    return bool(np.ptp(run.q[some]) <= 1.5 * step and np.ptp(run.command[some]) == 0 and np.ptp(1.0 * run.enabled[some]) == 0)
 
 
 def _part(run: ServoRun, some: slice) -> ServoRun:

@@ -12,6 +12,7 @@ from sim.drives.profile import Profile
 from sim.errors import ScenarioError
 from sim.robot.motors import Array
 from sim.robot.robot import Robot
+from sim.robot.servos import SHARP_FRICTION
 from sim.settings import (
     EachNotNegative,
     EachNotNegativeOrNone,
@@ -83,7 +84,9 @@ class ServoDrive(AbstractDrive):
         return _Amplifier(self, robot.n, nsim, h)
 
     def edit(self, spec: mujoco.MjSpec) -> None:
-        """Write the armature into the joints."""
+        """Write the armature into the joints, and make their friction as sharp as the step allows."""
+        for joint in spec.joints:
+            joint.solref_friction, joint.solimp_friction = list(SHARP_FRICTION[0]), list(SHARP_FRICTION[1])
         if self.armature is not None:
             for joint, Ia in zip(spec.joints, per_joint(self.armature, len(spec.joints), "drive.armature"), strict=True):
                 joint.armature = Ia

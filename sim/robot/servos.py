@@ -22,6 +22,10 @@ EARLY = 1.3
 """Steps by which a command acts early: force acts from half a step before, the rate limit moves on before that. Measured."""
 
 
+SHARP_FRICTION = (1e-4, 1.0), (0.9999, 0.9999, 0.001, 0.5, 2.0)
+"""MuJoCo's solref and solimp of dry friction that is as sharp as any step allows: its own lets a joint creep under its load."""
+
+
 @final
 @dataclass(frozen=True)
 class ServoValues:
@@ -93,6 +97,10 @@ def with_servos(
     robot = Robot.load(name, mounting.edit)
     letters = {f"{x}{j + 1}": y for j, s in servos.items() for x, y in _passive(s).items()}
     root = ElementTree.fromstring(rewritten(name, letters, folder, mounting))
+    for joint in root.iter("joint"):
+        if joint.get("name") in [robot.joints[j] for j in servos]:
+            for attribute, values in zip(("solreffriction", "solimpfriction"), SHARP_FRICTION, strict=True):
+                joint.set(attribute, " ".join(f"{x:g}" for x in values))
     for actuators in root.findall("actuator"):
         for old in [old for old in actuators if old.get("joint") in [robot.joints[j] for j in servos]]:
             actuators.remove(old)

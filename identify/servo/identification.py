@@ -1,0 +1,159 @@
+"""The identification of a servo: rows, then the closed loop, law by law and finer from stage to stage."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identify.errors import IdentificationError
+from identify.one_thread import one_thread
+from identify.servo.closed_loop import ServoLoop
+from identify.servo.excitation import Excitation
+from identify.servo.fit import ServoFit
+from identify.servo.friction import SERVO_FRICTIONS, first_of, simpler
+from identify.servo.parameters import SERVO_PARAMETERS, parameters_of
+from identify.servo.pieces import pieces
+from identify.servo.refusals import TORQUES, require_explained, require_possible, require_scale
+from identify.servo.rows import ServoRows
+from identify.servo.run import ServoRun
+from identify.servo.search import Search
+from identify.servo.servo import Servo
+
+TRIED = 48
+"""Starts of the rows that are simulated."""
+
+FEW = 20
+"""Runs of which all are looked at from the beginning, in pieces that are simulated side by side; many are whole."""
+
+MOST_RUNS = 120
+"""Runs that a search looks at; of more, as many evenly spread ones."""
+
+COARSE, MEDIUM, FINE = 0.4, 0.2, 0.1
+"""Longest steps, as shares of the sampling time: of first stages, of the last with whole runs, and with pieces."""
+
+REFINED = 15
+"""Rounds of the last stage, at most."""
+
+PLAYS = np.array([0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
+"""Backlash that is tried first [counts]."""
+
+
+def identify_servo(
+    servo: Servo,
+    runs: Sequence[ServoRun],
+    friction: str = "load",
+    more: Sequence[str] = (),
+    held: dict[str, float] | None = None,
+) -> ServoFit:
+    """Return the parameters of a servo, from commands and positions alone.
+
+    Rows that are linear in all but delay and rate limit make the start (`ServoRows`); the closed loop, simulated from the
+    commands, is then fitted to the positions (`Search`): with the simpler laws of friction first, each the start of the next.
+
+    Parameters
+    ----------
+    servo : Servo
+        What is known.
+    runs : sequence of ServoRun
+        What was logged, with known loads.
+    friction : str
+        A law of `SERVO_FRICTIONS`.
+    more : sequence of str
+        Further parameters to be found, of `FURTHER`.
+    held : dict of str to float, optional
+        Parameters that are known, by their letters.
+
+    Raises
+    ------
+    IdentificationError
+        If nothing moves, torque is never on, duty always at its limit, or commands cannot explain the motion.
+    SettingError
+        If a name is unknown.
+    """
+    stages = _Stages(servo, runs, held or {}, (*more, *(held or {})), friction)
+    with one_thread():
+        for law in simpler(friction):
+            stages.go(law, ())
+        stages.go(friction, more)
+        fit = stages.fit(friction, more)
+        require_explained(fit)
+        if not any(name in stages.held for name in TORQUES):
+            require_scale(fit)
+    return fit
+
+
+class _Stages:
+    """Runs at work, and the parameters that were found of them last."""
+
+    def __init__(
+        self, servo: Servo, runs: Sequence[ServoRun], held: dict[str, float], names: Sequence[str], friction: str
+    ) -> None:
+        parameters_of(friction, names)
+        require_possible(held)
+        self.held, self._servo, self._excitation = held, servo, Excitation.of(servo, runs)
+        whole = _evenly(runs)
+        self._few = len(whole) <= FEW
+        with one_thread():
+            self.p = self._started(whole)
+        some = whole[::2]
+        if self._few:
+            whole = some = [piece for run in whole for piece in pieces(run, servo.step, 1.5 * self.p["delay"])]
+        self._whole, self._coarse = whole, ServoLoop(servo, some, COARSE * self._excitation.T)
+
+    def _started(self, runs: Sequence[ServoRun]) -> dict[str, float]:
+        """Return the start of the rows whose simulation fits best."""
+        starts = ServoRows(self._servo, runs).starts()[:TRIED]
+        if not starts:
+            raise IdentificationError(
+                f"{runs[0].name}: more duty does not make more torque in the direction of the command; has the command the "
+                "sign and the unit of the position, and is it the one that the servo received?"
+            )
+        loop = ServoLoop(self._servo, runs, COARSE * self._excitation.T)
+        lanes = {name: np.array([p[name] for p in starts]) for name in starts[0]} | {"Fv": np.zeros(len(starts))}
+        cost = Search(loop, (), self._excitation.scales, self._excitation.range / 10).cost(loop.simulate(lanes))
+        best = {**starts[int(cost.argmin())], "Fv": 0.0}
+        if not np.isfinite(best["rate"]):
+            del best["rate"]
+        return {**best, "offset": best["offset"] * self._excitation.tilts, **self.held}
+
+    def go(self, friction: str, more: Sequence[str]) -> None:
+        """Go on with a law of friction and further parameters."""
+        first = first_of(friction, self.p, self._excitation.speed) | dict.fromkeys(more, 0.0)
+        begin = {**first, **self.p, **self.held}
+        if "backlash" in more and "backlash" not in {**self.p, **self.held}:
+            begin["backlash"] = _play(self._servo, self._coarse, begin)
+        known = parameters_of(friction, (*more, *self.held))
+        begin = {name: x for name, x in begin.items() if name in known}
+        self.p = self._search(self._coarse, begin, self._free(friction, more, begin)).best(begin).p
+
+    def fit(self, friction: str, more: Sequence[str]) -> ServoFit:
+        """Return the parameters with all runs, in fine steps."""
+        step = (FINE if self._few else MEDIUM) * self._excitation.T
+        loop, free = ServoLoop(self._servo, self._whole, step), self._free(friction, more, self.p)
+        found = self._search(loop, self.p, free).best(self.p, REFINED)
+        return ServoFit(self._servo, friction, free, found, loop, self._excitation)
+
+    def _search(self, loop: ServoLoop, begin: dict[str, float], free: Sequence[str]) -> Search:
+        r = np.abs(loop.q - loop.simulate(begin)[0])[loop.kept]
+        c = 3 * max(float(np.median(r)), self._servo.step / 4)
+        return Search(loop, free, self._excitation.scales, c)
+
+    def _free(self, friction: str, more: Sequence[str], begin: dict[str, float]) -> tuple[str, ...]:
+        """Return the parameters that are searched for, in the order of `SERVO_PARAMETERS`."""
+        names = {"a", "b", "Ia", "Fs", "offset", "delay", *SERVO_FRICTIONS[friction], *more}
+        names |= {"Fv"} if self._excitation.off else set()
+        names -= set() if self._excitation.tilts else {"offset"}
+        names |= {"rate"} if "rate" in begin else set()
+        return tuple(name for name in SERVO_PARAMETERS if name in names - set(self.held))
+
+
+def _play(servo: Servo, loop: ServoLoop, begin: dict[str, float]) -> float:
+    """Return the backlash of some that fits best: where there is none to begin with, its sensitivity is none."""
+    tried = servo.step * PLAYS
+    r = np.abs(loop.q - loop.simulate({name: np.full(len(tried), x) for name, x in begin.items()} | {"backlash": tried}))
+    return float(tried[int((r * loop.kept).mean(axis=(1, 2)).argmin())])
+
+
+def _evenly(runs: Sequence[ServoRun]) -> list[ServoRun]:
+    stride = -(-len(runs) // MOST_RUNS)
+    # a shift a block, so that no factor of a table of runs falls together with the stride
+    return [runs[i] for i in (k * stride + k % stride for k in range(len(runs) // stride))]

@@ -1,0 +1,53 @@
+"""What refuses a servo's parameters: values that cannot be, motions that commands do not explain, torques without a scale."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from identify.errors import ExcitationError, IdentificationError, SettingError
+from identify.servo.fit import ServoFit
+from identify.servo.parameters import SERVO_PARAMETERS
+from identify.servo.search import Search
+
+TORQUES = ("a", "b", "Ia", "Fs", "Fv", "Fst")
+"""Parameters that scale together where no known load sets the scale."""
+
+SCALED = 1.5
+"""Factor on all of them."""
+
+CONTRAST = 0.05
+"""Share by which that must make the objective larger: a model is never exact, and below this its errors set the scale."""
+
+UNEXPLAINED = 0.2
+"""Typical residual, as a share of the range of the motion, from which on a fit explains nothing."""
+
+
+def require_explained(fit: ServoFit) -> None:
+    """Raise IdentificationError if commands do not explain the motion."""
+    if fit.scale > UNEXPLAINED * fit.excitation.range:
+        raise IdentificationError(
+            f"{fit.loop.runs[0].name}: commands explain the motion to {fit.scale:.2g} rad only, of {fit.excitation.range:.2g} "
+            "rad: check kp, gain and counts of the servo, and that the joint moves freely"
+        )
+
+
+def require_scale(fit: ServoFit) -> None:
+    """Raise ExcitationError if other torques explain the motion as well."""
+    search = Search(fit.loop, fit.free, fit.excitation.scales, 3 * fit.scale)
+    scaled = {name: x * SCALED if name in TORQUES else x for name, x in fit.p.items()}
+    cost = search.cost(fit.loop.simulate({name: np.array([x, scaled[name]]) for name, x in fit.p.items()}))
+    if cost[1] < (1 + CONTRAST) * cost[0]:
+        raise ExcitationError(
+            f"{fit.loop.runs[0].name}: torque constant, friction and armature scale together, because the known load is small "
+            "beside them: add a known mass to the robot's file, or give one of them (--hold a=0.5)"
+        )
+
+
+def require_possible(held: Mapping[str, float]) -> None:
+    """Raise SettingError if a value cannot be."""
+    for name, x in held.items():
+        parameter = SERVO_PARAMETERS[name]
+        if not np.isfinite(x) or x < parameter.low or (parameter.relative and x <= 0):
+            raise SettingError(
+                f"{name} = {x:g} {parameter.unit} is impossible: {parameter.meaning} must be finite and not negative"
+            )
