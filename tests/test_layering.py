@@ -29,6 +29,7 @@ ALLOWED_IN = {
     "identify/files/log_file.py": {"pyarrow"},
     "identify/files/ros_bag.py": {"rosbags"},
     "identify/one_thread.py": {"threadpoolctl"},
+    "identify/servo/step.py": {"numba"},
     "identify/parameters/consistent.py": {"clarabel"},
     "sim/scenario/scenario_file.py": {"tomli_w"},
     "sim/trajectories/recorded.py": {"scipy"},

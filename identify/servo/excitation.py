@@ -53,7 +53,7 @@ class Excitation:
         """Return what runs can show; raise IdentificationError if that is nothing."""
         if not runs:
             raise IdentificationError("there is no run of the servo")
-        ranges = [float(np.ptp(run.q)) for run in runs]
+        ranges = [float(np.ptp(run.clean)) for run in runs]
         if max(ranges) < 20 * servo.step:
             raise ExcitationError(
                 f"{runs[0].name}: the joint does not move (by {np.rad2deg(max(ranges)):.2g} deg): log motions of a good part "
@@ -66,7 +66,7 @@ class Excitation:
         if wrong := [run for run in runs if np.ptp(run.command) > DEGREES * max(ranges)]:
             run = wrong[0]
             raise IdentificationError(
-                f"{run.name}: the command spans {np.ptp(run.command):.4g}, the position {np.ptp(run.q):.4g} rad: is the "
+                f"{run.name}: the command spans {np.ptp(run.command):.4g}, the position {np.ptp(run.clean):.4g} rad: is the "
                 "command in degrees or counts? State its unit: --units command=deg"
             )
         if all(_saturated(servo, run) for run in runs):
@@ -74,9 +74,9 @@ class Excitation:
                 f"{runs[0].name}: the duty is at its limit almost all the time, where the command has no effect: command "
                 "slower motions, or smaller steps"
             )
-        speeds = np.concatenate([np.abs(np.gradient(run.q, run.t)) for run in runs])
+        speeds = np.concatenate([np.abs(np.gradient(run.clean, run.t)) for run in runs])
         # A load that moves with the joint sets the scale of torque; where there is none, what its inertia would need.
-        loads = [float(np.sqrt(np.mean(run.load.torque(run.q) ** 2))) for run in runs]
+        loads = [float(np.sqrt(np.mean(run.load.torque(run.clean) ** 2))) for run in runs]
         inertia = max(float(np.mean(run.load.inertia)) for run in runs)
         T = float(np.median([run.T for run in runs]))
         speed = float(np.quantile(speeds, 0.99))
@@ -86,7 +86,7 @@ class Excitation:
                 f"{runs[0].name}: the joint carries no known load, so that only ratios of a, b, friction and armature show: "
                 "add a known mass to the robot's file, or move the joint through gravity"
             )
-        off = any((~run.enabled).any() and np.ptp(run.q[~run.enabled]) > 20 * servo.step for run in runs)
+        off = any((~run.enabled).any() and np.ptp(run.clean[~run.enabled]) > 20 * servo.step for run in runs)
         swing = max(float(np.hypot(run.load.sine, run.load.cosine).max()) for run in runs)
         return cls(max(ranges), speed, torque, T, servo.step, off, swing > TILTS * torque)
 
@@ -104,5 +104,5 @@ class Excitation:
 
 
 def _saturated(servo: Servo, run: ServoRun) -> bool:
-    duty = servo.gain * run.kp * np.abs(run.command - run.q)[run.enabled]
+    duty = servo.gain * run.kp * np.abs(run.command - run.clean)[run.enabled]
     return bool(duty.size) and bool(np.mean(duty >= servo.duty_limit) > 0.98)

@@ -84,5 +84,6 @@ class ServoFit:
         return [x[: len(run.t)] for x, run in zip(q, runs, strict=True)]
 
     def errors(self, runs: Sequence[ServoRun]) -> Array:
-        """Return the mean absolute error of the position of each run, simulated from its commands alone [rad]."""
-        return np.array([np.abs(run.q - q).mean() for run, q in zip(runs, self.simulate(runs), strict=True)])
+        """Return the mean absolute error of each run's position, simulated from its commands alone [rad], without spikes."""
+        every = zip(runs, self.simulate(runs), strict=True)
+        return np.array([np.abs(run.q - q)[run.read_well].mean() for run, q in every])

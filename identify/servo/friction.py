@@ -1,10 +1,6 @@
-"""Friction of servos: six published laws, and one of the gear, as one budget."""
+"""Friction of servos: six published laws, and one of the gear (`identify.servo.step` has their formulas)."""
 
 from collections.abc import Mapping
-
-import numpy as np
-
-from identify.arrays import Array
 
 SERVO_FRICTIONS: dict[str, tuple[str, ...]] = {
     "coulomb": (),
@@ -42,36 +38,3 @@ def first_of(law: str, p: Mapping[str, float], speed: float) -> dict[str, float]
     first = {"Fst": 0.3 * p["Fs"], "vs": 0.1 * speed, "Fl": 0.05, "Fls": 0.3 * load, "Fle": load, "Flm": load, "Flq": 0.0}
     first |= {"Fgd": 0.1, "Fgb": 0.05}
     return {name: first[name] for name in SERVO_FRICTIONS[law]}
-
-
-def budget(p: Mapping[str, Array], qd: Array, motor: Array, external: Array, transmitted: Array) -> Array:
-    """Return the torque by which friction can resist at most [N m].
-
-    Parameters
-    ----------
-    p : mapping of str to Array
-        Parameters of the law; those that are missing are none of its own.
-    qd : Array
-        Speed [rad/s].
-    motor, external : Array
-        Torques of the motor and of the load, gravity included [N m].
-    transmitted : Array
-        Torque through the gear, positive where it drives the load on in the direction in which the joint moves [N m].
-    """
-    speed = np.abs(qd)
-    total = p["Fs"] + 0.0 * speed
-    near = np.exp(-speed / p["vs"]) if "vs" in p else None
-    if near is not None and "Fst" in p:
-        total = total + p["Fst"] * near
-    if "Fl" in p:
-        load = np.abs(external - motor)
-        total = total + p["Fl"] * load
-        if near is not None and "Fls" in p:
-            total = total + p["Fls"] * load * near
-    if "Fle" in p:
-        total = total + np.abs(p["Fle"] * external - p["Flm"] * motor)
-    if "Flq" in p:
-        total = total + p["Flq"] * np.minimum(external**2, motor**2) * (external * motor < 0)
-    if "Fgd" in p:
-        total = total + p["Fgd"] * np.maximum(transmitted, 0) + p["Fgb"] * np.maximum(-transmitted, 0)
-    return total

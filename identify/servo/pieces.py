@@ -45,12 +45,14 @@ def pieces(run: ServoRun, step: float, delay: float) -> list[ServoRun]:
     if len(cuts) > 1 and (t[-1] - t[cuts[-1]] < SHORTEST or len(t) - cuts[-1] < MIN_SAMPLES):
         cuts.pop()
     parts = [_part(run, slice(a, b)) for a, b in zip(cuts, [*cuts[1:], len(t)], strict=True)]
-    moving = [part for part in parts if np.ptp(part.q) > MOVES * step]
+    moving = [part for part in parts if np.ptp(part.clean) > MOVES * step]
     return moving or parts[:1]
 
 
 def _rests(run: ServoRun, some: slice, step: float) -> bool:
-    return bool(np.ptp(run.q[some]) <= 1.5 * step and np.ptp(run.command[some]) == 0 and np.ptp(1.0 * run.enabled[some]) == 0)
+    on = run.enabled[some]
+    steady = np.ptp(run.command[some]) == 0 and on.all() == on.any()
+    return bool(steady and np.ptp(run.clean[some]) <= 1.5 * step)
 
 
 def _part(run: ServoRun, some: slice) -> ServoRun:

@@ -39,17 +39,22 @@ class ServoRows:
 
     def starts(self) -> list[dict[str, float]]:
         """Return parameters for each delay and rate limit that is tried, those whose rows fit best first."""
-        rates = np.array([np.inf, *(self.fast * np.geomspace(0.5, 1.3, RATES))] if self.fast else [np.inf])
-        targets = [run.targets(rates) for run in self._runs]
-        found = [
-            self.solved(float(delay), rate, [t[:, k] for t in targets]) for k, rate in enumerate(rates) for delay in DELAYS
-        ]
-        return [p for _, p in sorted((pair for pair in found if pair), key=lambda pair: pair[0])]
+        rates = [np.inf, *(self.fast * np.geomspace(0.5, 1.3, RATES)).tolist()] if self.fast else [np.inf]
+        found = [pair for rate in rates for pair in self._of_rate(rate)]
+        return [p for _, p in sorted(found, key=lambda pair: pair[0])]
 
-    def solved(self, delay: float, rate: float, targets: Sequence[Array]) -> tuple[float, dict[str, float]] | None:
-        """Return residual and linear parameters for a delay [s] and targets within a rate; None if they make no servo."""
-        parts = [run.rows(self.servo, delay, target) for run, target in zip(self._runs, targets, strict=True)]
-        W, Y = np.concatenate([w for w, _ in parts]), np.concatenate([y for _, y in parts])
+    def _of_rate(self, rate: float) -> list[tuple[float, dict[str, float]]]:
+        """Return residual and parameters for each delay, targets keeping within a rate [rad/s]."""
+        driven = np.concatenate([run.driven(self.servo, rate) for run in self._runs])
+        motion, Y = (np.concatenate(x) for x in zip(*[run.motion for run in self._runs], strict=True))
+        found = []
+        for k, delay in enumerate(DELAYS.tolist()):
+            W = np.concatenate([driven[:, k, :1], motion, driven[:, k, 1:]], axis=1)
+            found.append(self._solved(W, Y, delay, rate))
+        return [pair for pair in found if pair]
+
+    def _solved(self, W: Array, Y: Array, delay: float, rate: float) -> tuple[float, dict[str, float]] | None:
+        """Return residual and linear parameters; None if they make no servo."""
         size = np.sqrt((W**2).sum(axis=0))
         used = size > 0
         X = np.zeros(len(COLUMNS))
@@ -71,7 +76,7 @@ class _Uniform:
     def __init__(self, run: ServoRun) -> None:
         self.run, self.T = run, run.T
         self._t = np.arange(run.t[0], run.t[-1], self.T)
-        q = np.interp(self._t, run.t, run.q)
+        q = np.interp(self._t, run.t, run.clean)
         self.q, self._measured = low_passed(q), q
         qd = np.gradient(self.q, self.T)
         qdd = np.gradient(qd, self.T)
@@ -85,33 +90,18 @@ class _Uniform:
         self.inertia = float(inertia.mean())
         needed = inertia * qdd + sine * np.sin(self.q) + cosine * np.cos(self.q) + rest
         columns = np.stack([-self._on * qd, -qdd, -np.sign(qd), needed], axis=1)
-        *motion, self._needed = low_passed(columns)[::DECIMATION].T
-        self._motion = np.stack(motion, axis=1)
+        filtered = low_passed(columns)[::DECIMATION]
+        self.motion = filtered[:, :-1], filtered[:, -1]
 
-    def targets(self, rates: Array) -> Array:
-        """Return the command within rates [rad/s], not yet late, shape (time, rate)."""
+    def driven(self, servo: Servo, rate: float) -> Array:
+        """Return the columns of a and of the offset for each delay, shape (time, delay, 2)."""
+        from identify.servo.step import targets
+
         run = self.run
-        return _limited(np.interp(self._t, run.t, run.command), rates * self.T)
-
-    def rows(self, servo: Servo, delay: float, target: Array) -> tuple[Array, Array]:
-        """Return W and Y for a target that is late [s]."""
-        run = self.run
-        late = np.interp(self._t - delay, self._t, target)
-        error = late - self._measured
-        g = servo.gain * run.kp
-        duty = np.clip(g * error, -servo.duty_limit, servo.duty_limit)
-        V = self._on * servo.supply
-        inside = np.abs(g * error) < servo.duty_limit
-        driven = low_passed(np.stack([V * duty, V * g * inside], axis=1))[::DECIMATION]
-        return np.concatenate([driven[:, :1], self._motion, driven[:, 1:]], axis=1), self._needed
-
-
-def _limited(command: Array, most: Array) -> Array:
-    """Return targets that follow a command by at most `most` a sample, shape (time, most)."""
-    if len(command) < 2:
-        return np.repeat(command[:, None], len(most), axis=1)
-    target = np.empty((len(command), len(most)))
-    now = target[0] = command[0]
-    for i, wanted in enumerate(command[1:].tolist(), start=1):
-        now = target[i] = now + np.minimum(np.maximum(wanted - now, -most), most)
-    return target
+        target = targets(np.interp(self._t, run.t, run.command), rate, self.T)
+        late = np.interp(self._t[:, None] - DELAYS, self._t, target)
+        duty = servo.gain * run.kp * (late - self._measured[:, None])
+        inside = np.abs(duty) < servo.duty_limit
+        V = (self._on * servo.supply)[:, None]
+        limited = np.clip(duty, -servo.duty_limit, servo.duty_limit)
+        return low_passed(np.stack([V * limited, V * servo.gain * run.kp * inside], axis=2))[::DECIMATION]

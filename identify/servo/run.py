@@ -1,10 +1,12 @@
 """What was logged of one servo: commands and positions."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import final
 
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import median_filter
 
 from identify.arrays import Array, frozen
 from identify.errors import LogError, require_positive
@@ -12,6 +14,12 @@ from identify.servo.load import JointLoad
 
 MIN_SAMPLES = 20
 """Samples that a run must have."""
+
+SPIKE = 5.0
+"""Times the longest way of the joint in a sample: a position that is further from those about it was not read well."""
+
+BESIDE = 5
+"""Samples whose median a position is compared with."""
 
 
 @final
@@ -86,3 +94,16 @@ class ServoRun:
     def T(self) -> float:
         """Typical time between samples [s]."""
         return float(np.median(np.diff(self.t)))
+
+    @cached_property
+    def read_well(self) -> npt.NDArray[np.bool_]:
+        """Whether each position can be one, shape (time,): spikes of the bus come back at once, joints do not."""
+        typical = median_filter(self.q, BESIDE, mode="nearest")
+        moves = np.abs(np.diff(self.q))
+        longest = max(np.abs(np.diff(typical)).max(), moves[moves > 0].min(initial=np.inf) if moves.any() else 0.0)
+        return np.abs(self.q - typical) <= SPIKE * longest
+
+    @cached_property
+    def clean(self) -> Array:
+        """Positions without spikes, which are interpolated [rad], shape (time,)."""
+        return np.interp(self.t, self.t[self.read_well], self.q[self.read_well])
