@@ -77,6 +77,23 @@ def excited(shelf: Shelf) -> Part:
     return side_by_side("excited", left, middle, tabbed(each) if len(each) > 1 else each[0], shares=[5, 5, 6])
 
 
+def servos(shelf: Shelf) -> Part:
+    """Return servos: commands, positions as measured and as they follow from commands alone, and what is left."""
+    joints = shelf.parents("servo/*/left")
+    if not joints:
+        return None
+    each = [
+        column(
+            plot(shelf, f"{joint} [rad]: commanded, measured, simulated", f"servo/{joint}/q/*", legend=True),
+            plot(shelf, f"{joint}, measured - simulated [rad]", f"servo/{joint}/left"),
+            shares=[3, 2],
+        )
+        for joint in joints
+    ]
+    shown = grid("servos", each, 1 if len(each) <= FEW else 2)
+    return side_by_side("servos", column(arm(shelf), text(shelf, "about"), shares=[4, 1]), shown, shares=[1, 2])
+
+
 def _limit(path: str) -> str:
     """Return the title of a plot of limits/2_acceleration."""
     return f"{path.partition('_')[2].replace('_', ' ')} [% of its limit]"
@@ -107,6 +124,7 @@ LAYOUTS: dict[str, Callable[[Shelf], Part]] = {
     "table2": table2,
     "compare": compare,
     "excited": excited,
+    "servos": servos,
     "overview": overview,
     "torques": torques,
     "friction": friction,

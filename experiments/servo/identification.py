@@ -1,6 +1,6 @@
 """The servos of a robot, identified joint by joint, and judged on held-out logs."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,10 +14,18 @@ from identify import Array, IdentificationError
 from identify.files.servo_file import ServoFile
 from identify.files.servo_log import ServoColumns
 from identify.servo import ServoFit, ServoRun, identify_servo
+from identify.servo.choice import FrictionChoice, choose_friction
+from identify.servo.lack import lacks_of
 from identify.servo.parameters import SERVO_PARAMETERS
 from sim.robot.mounting import Mounting
 from sim.robot.robot import Robot
-from sim.robot.servos import ServoValues, links, replay, with_servos
+from sim.robot.servos import Commands, ServoValues, links, replay, with_servos
+
+Result = ServoFit | FrictionChoice | str
+"""What becomes of a joint: its fit, those with all laws of friction, or why there is none."""
+
+AUTO = "auto"
+"""In the place of a law of friction: that which the log needs."""
 
 
 @final
@@ -63,25 +71,32 @@ class Servos:
         name = f"{path.name}, {self.links.joints[j]}"
         return ServoRun(columns.t, columns.q[:, j], columns.command[:, j], load, kp, on, voltage, name=name)
 
-    def fits(self, friction: str, find: Sequence[str], held: dict[str, float] | None = None) -> dict[str, ServoFit | str]:
-        """Return the fit of each joint, or why it has none."""
-        found = dict[str, ServoFit | str]()
+    def fits(
+        self, friction: str, find: Sequence[str], held: dict[str, float]
+    ) -> Iterator[tuple[str, "ServoFit | str | FrictionChoice"]]:
+        """Yield the fit of each joint, all laws of friction compared (`auto`), or why there is none."""
         for joint, runs in zip(self.links.joints, self.runs, strict=True):
+            servo = self.known.servo(joint, "")
             try:
-                found[joint] = identify_servo(self.known.servo(joint, ""), runs, friction, find, held)
+                if friction == AUTO:
+                    yield joint, choose_friction(servo, runs, find, held)
+                else:
+                    yield joint, identify_servo(servo, runs, friction, find, held)
             except IdentificationError as error:
-                found[joint] = str(error)
-        if not any(isinstance(fit, ServoFit) for fit in found.values()):
-            raise ExperimentError("; ".join(dict.fromkeys(str(why) for why in found.values())))
-        return found
+                yield joint, str(error)
+
+    def simulated(self, fits: dict[str, ServoFit], path: Path) -> dict[str, Array]:
+        """Return the positions of joints from the commands of a log alone [rad], as the log has them, by joint."""
+        k = list(self.logs).index(path)
+        runs = dict(zip(self.links.joints, self.runs, strict=True))
+        return {joint: fit.simulate([runs[joint][k]])[0] for joint, fit in fits.items()}
 
     def values(self, fit: ServoFit, joint: str) -> ServoValues:
         """Return a servo as MuJoCo has it, with the firmware gain of the file."""
         p, servo = fit.p, self.known.servo(joint, "")
-        rate = p.get("rate", np.inf)
-        return ServoValues(
-            p["a"], p["b"], servo.gain * servo.kp, servo.supply, servo.duty_limit, p["Ia"], p["Fv"], p["Fs"], rate, p["delay"]
-        )
+        known = servo.gain * servo.kp, servo.supply, servo.duty_limit
+        rate, play = p.get("rate", np.inf), p.get("backlash", 0.0)
+        return ServoValues(p["a"], p["b"], *known, p["Ia"], p["Fv"], p["Fs"], rate, p["delay"], play)
 
     def text(self, fits: dict[str, ServoFit], folder: Path, position: bool = False) -> str:
         """Return the robot's MJCF with the servos that were found."""
@@ -96,8 +111,9 @@ class Servos:
         offset[places] = [fit.p["offset"] for fit in fits.values()]
         if any(self.known.servo(joint, path.name).kp != self.known.servo(joint, "").kp for joint in fits):
             raise ExperimentError(f"{path.name} has another kp than the file that was written")
-        commands = (columns.command + offset)[:, places]
-        q = replay(self.robot, text, folder, commands, columns.t, columns.q[0] + offset, places)
+        on = None if columns.on is None else columns.on[:, places] > 0.5
+        sent = Commands(columns.t, (columns.command + offset)[:, places], places, on)
+        q = replay(self.robot, text, folder, sent, columns.q[0] + offset)
         error = np.abs(q - columns.q - offset).mean(axis=0)
         return {joint: float(error[j]) for joint, j in zip(fits, places, strict=True)}
 
@@ -116,7 +132,8 @@ def of_logs(servos: Servos, logs: dict[Path, ServoColumns]) -> Servos:
 def summary_of(fit: ServoFit) -> dict[str, Any]:
     """Return what a summary says of a fit."""
     sigma, bound = fit.standard_errors, fit.bound
-    return {
+    values = {
         name: {"value": x, "sigma": sigma.get(name), "bound": bound.get(name), "unit": SERVO_PARAMETERS[name].unit}
         for name, x in fit.p.items()
     }
+    return {**values, "friction": fit.friction, "lack_of_fit": [lack._asdict() for lack in lacks_of(fit)]}

@@ -9,10 +9,21 @@ from experiments.cli.page import Page
 from experiments.text import new_table, number, print_titled
 from identify import Array
 from identify.servo import ServoFit
+from identify.servo.choice import FrictionChoice
+from identify.servo.lack import lacks_of
 from identify.servo.parameters import SERVO_PARAMETERS
 
 VAGUE = 0.5
 """Standard error, as a share of the value, from which on a parameter is reported as unidentified."""
+
+ALIKE = 1.5
+"""Error on held-out logs, over that on the fitted ones, up to which a model holds."""
+
+EXPLAINED = 3.0
+"""Residual over what rounding leaves, up to which there is nothing to explain: clocks of cheap servos jitter."""
+
+EXPRESSIBLE = ("a", "b", "Ia", "Fs", "Fv", "offset", "delay", "rate", "backlash")
+"""Parameters that a file of MuJoCo has, or that its user adds to commands."""
 
 RATIOS = ("a", "b", "Ia", "Fs", "Fst")
 """Parameters that only a known load tells apart."""
@@ -54,6 +65,9 @@ def warnings_of(fits: Mapping[str, ServoFit | str]) -> list[str]:
     for joint, fit in fits.items():
         if isinstance(fit, str):
             continue
+        spikes = sum(int((~run.read_well).sum()) for run in fit.loop.runs)
+        if spikes:
+            found.append(f"{joint}: {spikes} positions are spikes, from which the joint came back at once: they are left out")
         sigma = fit.standard_errors
         vague = [name for name in RATIOS if name in sigma and sigma[name] > VAGUE * abs(fit.p[name])]
         if vague:
@@ -75,10 +89,43 @@ def warnings_of(fits: Mapping[str, ServoFit | str]) -> list[str]:
 
 def inexpressible(fits: Mapping[str, ServoFit]) -> list[str]:
     """Return what MuJoCo's servos do not have of what was found."""
-    lost = {"Fst": "Stribeck friction", "Fl": "friction with load", "Fle": "friction with load", "Fgd": "friction of the gear"}
-    lost |= {"lead": "lead", "dead_band": "dead band", "backlash": "backlash", "Fo": "friction while torque is off"}
-    kinds = dict.fromkeys(word for fit in fits.values() for name, word in lost.items() if name in fit.free)
-    found = [f"MuJoCo's dcmotor cannot express {', '.join(kinds)}: the errors above include that"] if kinds else []
+    lost = dict.fromkeys(x for fit in fits.values() for x in fit.free if x not in EXPRESSIBLE)
+    meanings = ", ".join(f"{x} ({SERVO_PARAMETERS[x].meaning})" for x in lost)
+    found = [f"MuJoCo's dcmotor cannot express {meanings}: the errors above include that"] if lost else []
+    if any("backlash" in fit.free for fit in fits.values()):
+        found.append("backlash is written as a second joint; the loop of the dcmotor sees the rotor, before the play")
     offsets = {joint: fit.p["offset"] for joint, fit in fits.items()}
     words = ", ".join(f"{joint} {x:+.4g}" for joint, x in offsets.items())
     return [*found, f"the file's angles are the log's plus an offset [rad]: {words}; add it to commands"]
+
+
+def verdicts(fits: Mapping[str, ServoFit], fitted: Mapping[str, Array], held_out: Mapping[str, Array]) -> list[str]:
+    """Return a line for each joint: whether its model holds on logs that it did not see, and what it lacks most."""
+    return [f"{joint}: {_holds(fit, fitted[joint], held_out.get(joint))}; {_lacks(fit)}" for joint, fit in fits.items()]
+
+
+def _holds(fit: ServoFit, fitted: Array, held_out: Array | None) -> str:
+    if held_out is None:
+        return "no held-out log says whether the model holds elsewhere (name a second log)"
+    floor, ratio = fit.servo.step / 4, float(np.mean(held_out) / np.mean(fitted))
+    if ratio <= ALIKE or np.mean(held_out) <= 2 * floor:
+        return "the model holds on other logs"
+    return f"the model does not hold on other logs: its error there is {ratio:.2g} times that on the fitted ones"
+
+
+def _lacks(fit: ServoFit) -> str:
+    lacks, floor = lacks_of(fit), fit.servo.step / 4  # what rounding leaves, on average
+    if lacks[0].error <= EXPLAINED * floor:
+        return "its residuals are little more than the rounding of the encoder"
+    parts = ", ".join(f"{lack.error / fit.servo.step:.2g} counts while {lack.when} ({lack.share:.0%})" for lack in lacks[:2])
+    return f"residuals are largest by what the joint does: {parts}"
+
+
+def print_choice(page: Page, joint: str, choice: FrictionChoice) -> None:
+    """Print laws of friction compared by parts of the log that their fits did not see."""
+    first = next(iter(choice.errors))
+    grid = new_table("law", ["counts", f"p, against {first}"])
+    for law, error in choice.errors.items():
+        p = f"{choice.p[law]:.2g}" if law in choice.p else ""
+        grid.add_row(f"{law}{' (chosen)' if law == choice.chosen else ''}", number(error / choice.fits[law].servo.step), p)
+    print_titled(page, f"{joint}: laws of friction, by the error of parts of the log that their fits did not see", grid)

@@ -9,11 +9,14 @@ import numpy as np
 
 from identify.arrays import Array
 from identify.servo.closed_loop import ServoLoop
-from identify.servo.covariance import covariance
 from identify.servo.excitation import Excitation
+from identify.servo.left_out import LeftOut, left_out
 from identify.servo.run import ServoRun
 from identify.servo.search import Found
 from identify.servo.servo import Servo
+
+CLUSTERS = 2
+"""Clusters per parameter: where there are fewer runs, or pieces of them, these are cut into stretches of time."""
 
 
 @final
@@ -50,9 +53,14 @@ class ServoFit:
         return self.found.p
 
     @cached_property
+    def left_out(self) -> LeftOut:
+        """The fit without each run, or piece of a run."""
+        return left_out(self.found, self.loop, 3 * self.scale, CLUSTERS * len(self.free))
+
+    @property
     def covariance(self) -> Array:
         """Of the free parameters, from the scatter of the residuals, shape (p, p)."""
-        return covariance(self.found, self.loop, 3 * self.scale)
+        return self.left_out.covariance
 
     @property
     def standard_errors(self) -> dict[str, float]:

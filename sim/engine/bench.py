@@ -69,7 +69,9 @@ class Bench:
         self._each = nsim, n
         self._sensor = CurrentSensor(scenario.torque, nsim, n)
         self._jitter = self._drawn_jitter(samples)
-        self._history = History(clock.late + clock.per_sample, nsim, n, self._h)
+        self._history = History(
+            clock.late + clock.per_sample + int(np.ceil(scenario.timing.refresh / self._h)), nsim, n, self._h
+        )
         self._failures = Failures(robot, planned, seeds)
         self._going: npt.NDArray[np.intp] | None = None
         at_rest = every(planned.q[0], nsim) if planned.q.ndim == 2 else planned.q[0]
@@ -79,7 +81,7 @@ class Bench:
         self._before = self._command = self._demand = held
         self._qd, self._steps, self._instants = np.zeros((nsim, n)), 1, dict[int, Array]()
         self._steady = scenario.drive.steady and scenario.ripple.steady
-        watched = scenario.timing.jitter or scenario.torque.source == "current"
+        watched = scenario.timing.jitter or scenario.timing.refresh or scenario.torque.source == "current"
         one_by_one = watched or not scenario.friction.steady
         self._most = 1 if one_by_one else clock.per_sample if self._steady else max(1, round(BLOCK / self._h))
         self._measured, self._commands, self._currents, self._q, self._speeds, self._tau = np.zeros((6, samples, nsim, n))
@@ -87,7 +89,7 @@ class Bench:
         self.steps = samples * clock.per_sample + clock.late
 
     def _drawn_jitter(self, samples: int) -> Array:
-        """Return by how many steps each sample is off its claimed instant, shape (sample, nsim)."""
+        """Return by how many steps each sample is off its claimed instant, or older, shape (sample, nsim)."""
         width = self._scenario.timing.jitter / self._h
         if width >= self._clock.per_sample:
             raise ScenarioError(
@@ -98,7 +100,12 @@ class Bench:
                 f"timing.jitter = {self._scenario.timing.jitter:g} s needs a timing.delay of at least its half in whole "
                 f"physics steps of {self._h:g} s: a command cannot act before its sample is taken"
             )
-        return np.stack([width * (rng.random(samples) - 0.5) for rng in generators(self._seeds, 1)], axis=1)
+        sources = generators(self._seeds, 1)
+        off = np.stack([width * (rng.random(samples) - 0.5) for rng in sources], axis=1)
+        if (period := self._scenario.timing.refresh / self._h) == 0:
+            return off
+        instants = np.arange(samples)[:, None] * self._clock.per_sample + off
+        return off - (instants - period * np.array([rng.random() for rng in sources])) % period
 
     def advance(self, step: int) -> int:
         """Advance from physics step `step` to where something may change; return how many steps that were."""

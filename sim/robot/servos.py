@@ -1,6 +1,6 @@
 """A robot's file with servos at its joints, and what plain MuJoCo makes of it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import final
@@ -8,10 +8,12 @@ from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 
 from sim.errors import RobotError
 from sim.robot.motors import Array
 from sim.robot.mounting import PLAIN, Mounting
+from sim.robot.play import HARD
 from sim.robot.rewrite import compiled, rewritten
 from sim.robot.robot import Robot
 
@@ -21,6 +23,15 @@ STEP = 5e-4
 EARLY = 1.3
 """Steps by which a command acts early: force acts from half a step before, the rate limit moves on before that. Measured."""
 
+
+NO_DRIVE = ("armature", "damping", "frictionloss", "stiffness", "margin")
+"""What a joint that is free play has none of, whatever the defaults of the file are."""
+
+GROUPS = 31
+"""Groups of actuators that MuJoCo can disable."""
+
+PLAY = "_play"
+"""What the name of a joint's free play ends with."""
 
 SHARP_FRICTION = (1e-4, 1.0), (0.9999, 0.9999, 0.001, 0.5, 2.0)
 """MuJoCo's solref and solimp of dry friction that is as sharp as any step allows: its own lets a joint creep under its load."""
@@ -45,6 +56,8 @@ class ServoValues:
         Rate limit of the target [rad/s]; infinite if there is none.
     delay : float
         Of the command [s].
+    backlash : float
+        Free play between rotor and link [rad].
     """
 
     a: float
@@ -57,6 +70,7 @@ class ServoValues:
     frictionloss: float
     rate: float
     delay: float
+    backlash: float = 0.0
 
 
 def links(name: str, mounting: Mounting) -> Robot:
@@ -100,7 +114,8 @@ def with_servos(
     for joint in root.iter("joint"):
         if joint.get("name") in [robot.joints[j] for j in servos]:
             for attribute, values in zip(("solreffriction", "solimpfriction"), SHARP_FRICTION, strict=True):
-                joint.set(attribute, " ".join(f"{x:g}" for x in values))
+                joint.set(attribute, _words(values))
+    _set_play(root, {robot.joints[j]: servo.backlash for j, servo in servos.items() if servo.backlash > 0})
     for actuators in root.findall("actuator"):
         for old in [old for old in actuators if old.get("joint") in [robot.joints[j] for j in servos]]:
             actuators.remove(old)
@@ -116,6 +131,24 @@ def with_servos(
     text = ElementTree.tostring(root, encoding="unicode") + "\n"
     compiled(name, text, folder)
     return text
+
+
+def _set_play(root: ElementTree.Element, plays: Mapping[str, float]) -> None:
+    """Give joints free play [rad]: a second joint behind each, which moves within it."""
+    for body in root.iter("body"):
+        joints = body.findall("joint")
+        for joint in [joint for joint in joints if joint.get("name") in plays]:
+            if len(joints) > 1:
+                raise RobotError(f"backlash of {joint.get('name')} needs a body of its own; its body moves in several joints")
+            half, limits = plays[str(joint.get("name"))] / 2, {"solreflimit": f"{2 * STEP:g} 1", "solimplimit": _words(HARD)}
+            alike = {key: str(joint.get(key)) for key in ("type", "axis", "pos") if joint.get(key) is not None}
+            own = {"range": f"{-half!r} {half!r}", "limited": "true", **dict.fromkeys(NO_DRIVE, "0")}
+            gap = ElementTree.Element("joint", {"name": f"{joint.get('name')}{PLAY}", **alike, **own, **limits})
+            body.insert(list(body).index(joint) + 1, gap)
+
+
+def _words(numbers: Iterable[float]) -> str:
+    return " ".join(f"{x:g}" for x in numbers)
 
 
 def _passive(servo: ServoValues) -> dict[str, float]:
@@ -143,21 +176,40 @@ def _position(servo: ServoValues) -> dict[str, str]:
     return {"kp": repr(kp), "kv": repr(servo.b), "forcerange": f"{-most!r} {most!r}"}
 
 
-def replay(name: str, text: str, folder: Path, commands: Array, t: Array, q0: Array, joints: Sequence[int]) -> Array:
-    """Return the positions that plain MuJoCo gives for commands that are held from each sample on.
+@final
+@dataclass(frozen=True, eq=False)
+class Commands:
+    """What servos are sent.
+
+    Parameters
+    ----------
+    t : Array, shape (time,)
+        [s].
+    command : Array, shape (time, servo)
+        Angles of the file, held from each sample on [rad].
+    on : Array, shape (time, servo), optional
+        Whether torque is enabled; by default always.
+    joints : sequence of int
+        Joint of each servo.
+    """
+
+    t: Array
+    command: Array
+    joints: Sequence[int]
+    on: npt.NDArray[np.bool_] | None = None
+
+
+def replay(name: str, text: str, folder: Path, sent: Commands, q0: Array) -> Array:
+    """Return the positions that plain MuJoCo gives for commands, shape (time, joint).
 
     Parameters
     ----------
     name, text, folder
         A robot, its file with servos, and where that finds its meshes.
-    commands : Array, shape (time, servo)
-        Angles of the file [rad].
-    t : Array, shape (time,)
-        [s].
+    sent : Commands
+        What the servos are sent.
     q0 : Array, shape (joint,)
         Positions at the beginning.
-    joints : sequence of int
-        Joint of each servo.
 
     Raises
     ------
@@ -167,15 +219,24 @@ def replay(name: str, text: str, folder: Path, commands: Array, t: Array, q0: Ar
     model = compiled(name, text, folder).model
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     data = mujoco.MjData(model)
-    data.qpos[:] = q0
-    place = [model.actuator(f"{model.joint(j).name}_servo").id for j in joints]
-    _begin(model, data, place, commands[0])
-    q = np.empty((len(t), model.nq))
-    for k, instant in enumerate(t - t[0]):
+    own = [j for j in range(model.njnt) if not model.joint(j).name.endswith(PLAY)]
+    at = model.jnt_qposadr[own]
+    gaps = {k: model.jnt_qposadr[j + 1] for k, j in enumerate(own) if j + 1 < model.njnt and j + 1 not in own}
+    data.qpos[at] = q0
+    place = [model.actuator(f"{model.joint(own[j]).name}_servo").id for j in sent.joints]
+    model.actuator_group[place] = groups = np.arange(len(place)) % GROUPS
+    _begin(model, data, place, sent.command[0])
+    q = np.empty((len(sent.t), len(own)))
+    for k, instant in enumerate(sent.t - sent.t[0]):
         while data.time < instant - model.opt.timestep / 2:
             mujoco.mj_step(model, data)
-        q[k] = data.qpos
-        data.ctrl[place] = commands[k]
+        q[k] = data.qpos[at]
+        for joint, gap in gaps.items():
+            q[k, joint] += data.qpos[gap]
+        data.ctrl[place] = sent.command[k]
+        if sent.on is not None:  # a group that is disabled gives no torque, as an open winding, and its target stands still
+            model.opt.disableactuator = sum({1 << int(g) for g in groups[~sent.on[k]]})
+            _aim(model, data, [a for a, on in zip(place, sent.on[k], strict=True) if not on])
         if not np.isfinite(q[k]).all():
             raise RobotError(f"the servos written for {name!r} make MuJoCo diverge at {instant:.3g} s")
     return q
@@ -184,8 +245,14 @@ def replay(name: str, text: str, folder: Path, commands: Array, t: Array, q0: Ar
 def _begin(model: mujoco.MjModel, data: mujoco.MjData, place: Sequence[int], command: Array) -> None:
     """Let servos have held a command before the beginning: their rate limits and delays know no other."""
     data.ctrl[place] = command
+    _aim(model, data, place)
     for actuator, value in zip(place, command, strict=True):
-        if model.actuator_actnum[actuator]:
-            data.act[model.actuator_actadr[actuator]] = value
         if (kept := int(model.actuator_history[actuator, 0])) > 0:
             mujoco.mj_initCtrlHistory(model, data, actuator, None, np.full((kept, 1), value))
+
+
+def _aim(model: mujoco.MjModel, data: mujoco.MjData, place: Sequence[int]) -> None:
+    """Let the targets of servos have arrived at their commands."""
+    for actuator in place:
+        if model.actuator_actnum[actuator]:
+            data.act[model.actuator_actadr[actuator]] = data.ctrl[actuator]

@@ -27,6 +27,8 @@ class Timing:
     """Computing delay: from a sample to the instant its command acts [s]; below 1 s."""
     jitter: NotNegative = 0.0
     """Sample instants scatter evenly over this width around the instant that the log claims [s]."""
+    refresh: NotNegative = 0.0
+    """Period at which the position that is read is renewed [s]: samples are up to that old, and those between repeat."""
 
     def __post_init__(self) -> None:
         if self.delay >= 1:

@@ -11,7 +11,7 @@ import pytest
 
 from experiments.cli import main
 from sim.robot.robot import Robot
-from sim.robot.servos import STEP, ServoValues, replay, with_servos
+from sim.robot.servos import STEP, Commands, ServoValues, replay, with_servos
 from sim.scenario.scenario_file import load, to_toml
 
 KP, GAIN, SUPPLY, LIMIT, COUNT = 16.0, 0.166, 12.0, 0.97, 2 * np.pi / 4096
@@ -49,7 +49,7 @@ def bench(tmp_path_factory):
     text = with_servos(str(robot), {0: TRUTH}, folder)
     for seed, name in enumerate(("fit", "new")):
         t, u = commands(6.0, 1, seed)
-        write(folder / f"{name}.csv", t, replay(str(robot), text, folder, u, t, u[0], [0]), u, ["axis"])
+        write(folder / f"{name}.csv", t, replay(str(robot), text, folder, Commands(t, u, [0]), u[0]), u, ["axis"])
     return folder
 
 
@@ -160,7 +160,7 @@ def test_servos_of_an_arm_are_found_in_place(tmp_path, monkeypatch):
     t, u = commands(12.0, robot.n, 5, 0.7)
     u += robot.ranges.mean(axis=1)
     text = with_servos(urdf, servos, tmp_path)
-    write(tmp_path / "log.csv", t, replay(urdf, text, tmp_path, u, t, u[0], range(robot.n)), u, list(robot.joints))
+    write(tmp_path / "log.csv", t, replay(urdf, text, tmp_path, Commands(t, u, range(robot.n)), u[0]), u, list(robot.joints))
     (tmp_path / "servo.toml").write_text(f'model = "STS3215"\nkp = {KP}\nsupply = {SUPPLY}\n')
     monkeypatch.chdir(tmp_path)
     args = ["servo", "log.csv", "--robot", urdf, "--servo", "servo.toml", "--friction", "coulomb", "--out", "results"]

@@ -188,3 +188,15 @@ def test_a_watched_run_that_fails_says_why():
     scenario = bench(2, kp=(16.0,), armature=(0.0,), torque_constant=(60.0,))
     with pytest.raises(ScenarioError, match="swing"):
         simulate(scenario, watch=Watch(lambda stretch: None))
+
+
+def test_positions_are_renewed_once_a_period():
+    """A log of twice the frequency sees every position twice, and none that is older than a period."""
+    plain = replace(load("servo"), fs=200.0, encoder=ExactEncoder(), timing=replace(load("servo").timing, jitter=0.0))
+    plain = replace(plain, trajectory=replace(plain.trajectory, steps=4))
+    slow = replace(plain, timing=replace(plain.timing, refresh=0.01))
+    q, exact = (simulate(scenario).log.q[0, :, 0] for scenario in (slow, plain))
+    moving = np.abs(np.diff(exact)) > 1e-6
+    repeated = np.diff(q)[moving] == 0
+    assert 0.4 < repeated.mean() < 0.6
+    assert np.abs(q - exact).max() <= np.abs(exact[2:] - exact[:-2]).max() * (1 + 1e-9)

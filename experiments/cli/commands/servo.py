@@ -1,107 +1,99 @@
 """The command that identifies servos."""
 
-from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.text import Text
 
 from experiments.cli.command_text import command_of
+from experiments.cli.commands.servo_inputs import files_read, held_of, servos_of
 from experiments.cli.options.servo import IdentifyServo
 from experiments.cli.page import Page, new_page, shown
 from experiments.cli.progress import stages_of
 from experiments.errors import ExperimentError
-from experiments.identification.robot_model import absolute
+from experiments.recording.audience import Audience
 from experiments.results.attempts import Attempts
 from experiments.results.folder import ResultsFolder
 from experiments.results.summaries import write_summary
 from experiments.results.writing import require_free, write_text
 from experiments.servo.identification import Servos, held_out, of_logs, summary_of
-from experiments.servo.servo_text import inexpressible, print_errors, print_servos, warnings_of
-from identify.files.servo_file import ServoFile
-from identify.files.servo_log import ServoColumns, order, read_servo_log
-from identify.servo import SERVO_FRICTIONS, ServoFit
-from sim.robot.robot import Robot
+from experiments.servo.servo_function import servo_function
+from experiments.servo.servo_text import inexpressible, print_choice, print_errors, print_servos, verdicts, warnings_of
+from identify.servo import ServoFit
+from identify.servo.choice import FrictionChoice
+
+if TYPE_CHECKING:
+    from experiments.results.streams import Streams
 
 
 def servo(options: IdentifyServo) -> None:
     """Identify servos."""
     page, folder = new_page(machine=options.json), _folder(options)
-    if options.write_mjcf is not None:
-        if options.write_mjcf.suffix != ".xml":
-            raise ExperimentError(f"--write-mjcf {options.write_mjcf}: its name must end with .xml")
-        require_free(options.write_mjcf, "--write-mjcf", force=options.force, read=_read(options))
-    with shown(page), folder.held() if folder else nullcontext():
-        servos, others = _servos(options)
-        with stages_of(f"identifying {', '.join(servos.links.joints)}"):
-            fits = servos.fits(options.friction, options.find, _held(options))
-        found = {joint: fit for joint, fit in fits.items() if isinstance(fit, ServoFit)}
-        print_servos(page, fits)
-        page.found |= {"experiment": "servo", "robot": servos.robot, "friction": options.friction}
-        page.found |= {"joints": {joint: summary_of(fit) for joint, fit in found.items()}}
-        _print_errors(page, servos, others, found)
-        page.warn({"the servos": warnings_of(fits)})
+    for option, path, ending in (("--write-mjcf", options.write_mjcf, ".xml"), ("--write", options.write, ".py")):
+        if path is not None:
+            if path.suffix != ending:
+                raise ExperimentError(f"{option} {path}: its name must end with {ending}")
+            require_free(path, option, force=options.force, read=files_read(options))
+    with options.watching.audience() as audience, shown(page), folder.held() if folder else nullcontext():
+        servos, others = servos_of(options)
+        page.found |= {"experiment": "servo", "robot": servos.robot, "friction": options.friction, "joints": {}}
+        found = _identified(page, folder, options, servos)
+        _judge(page, servos, others, found)
         page.show()
         _save(page, folder)
         with Attempts("the results are printed" + (f", and in {folder.out}" if folder else ""), folder) as attempts:
             if options.write_mjcf is not None:
                 attempts.attempt("--write-mjcf", lambda: _write(page, options, servos, others, found))
                 attempts.attempt("summary.json", lambda: _save(page, folder))
+            if options.write is not None:
+                attempts.attempt("--write", lambda: _write_function(page, options, servos, found))
+            if options.watching.rerun and (folder is not None or audience is not None):
+                attempts.recording(lambda: _recorded(others or servos, found, audience))
         if folder is not None:
-            page.print(f"written to {folder.out}", soft_wrap=True)
+            page.print(f"written to {folder.out}{options.watching.hint(folder.out)}", soft_wrap=True)
 
 
-def _print_errors(page: Page, servos: Servos, others: Servos | None, found: dict[str, ServoFit]) -> None:
-    """Print errors of positions from commands alone, on the logs of the fit and on others."""
-    errors = {"fitted": held_out(servos, found)} | ({"held out": held_out(others, found)} if others else {})
-    for what, each in errors.items():
-        print_errors(page, f"{what} logs", each)
-    page.found["position_error"] = {
-        what: {joint: [float(x) for x in e] for joint, e in each.items()} for what, each in errors.items()
-    }
-
-
-def _servos(options: IdentifyServo) -> tuple[Servos, Servos | None]:
-    """Return the servos with the logs of the fit, and with those that it does not see."""
-    for name, given in (("--robot", options.robot), ("--servo", options.servo)):
-        if given is None:
-            raise ExperimentError(f"{name} is missing; see idbench servo --help")
-    if not options.log:
-        raise ExperimentError("name the logs of commands and positions")
-    if options.friction not in SERVO_FRICTIONS:
-        raise ExperimentError(f"--friction {options.friction} is unknown; known: {', '.join(SERVO_FRICTIONS)}")
-    assert options.robot is not None
-    assert options.servo is not None
-    known, mounting = ServoFile.read(options.servo), options.mounting.mounting
-    logs, held = options.log, options.validate
-    if not held and len(logs) > 1:
-        logs, held = logs[:-1], logs[-1:]
-    servos = Servos(absolute(options.robot), mounting, known, {})
-    made = of_logs(servos, {path: _ordered(path, options, servos.links.joints) for path in logs})
-    others = {path: _ordered(path, options, servos.links.joints) for path in held}
-    return made, of_logs(servos, others) if others else None
-
-
-def _held(options: IdentifyServo) -> dict[str, float]:
+def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo, servos: Servos) -> dict[str, ServoFit]:
+    """Return the fits that there are; print and save those of joints that are done if the others are not waited for."""
+    every = dict[str, ServoFit | str]()
     try:
-        return {name: float(value) for name, value in _stated("--hold", options.hold).items()}
-    except ValueError:
-        raise ExperimentError(f"--hold {' '.join(options.hold)}: give letters and numbers, such as a=0.5") from None
+        with stages_of(f"identifying {', '.join(servos.links.joints)}"):
+            for joint, result in servos.fits(options.friction, options.find, held_of(options)):
+                if isinstance(result, FrictionChoice):
+                    print_choice(page, joint, result)
+                    page.found.setdefault("laws", {})[joint] = {"errors": result.errors, "p": result.p}
+                every[joint] = result.fits[result.chosen] if isinstance(result, FrictionChoice) else result
+                _take(page, folder, every)
+    finally:
+        found = {joint: fit for joint, fit in every.items() if isinstance(fit, ServoFit)}
+        if found:
+            print_servos(page, every)
+    if not found:
+        raise ExperimentError("; ".join(dict.fromkeys(str(why) for why in every.values())))
+    page.warn({"the servos": warnings_of(every)})
+    return found
 
 
-def _ordered(path: Path, options: IdentifyServo, joints: Sequence[str]) -> ServoColumns:
-    columns = read_servo_log(path, _stated("--columns", options.columns), _stated("--units", options.units))
-    place = order(columns, joints, path)
-    on, voltage = (None if x is None else x[:, place] for x in (columns.on, columns.voltage))
-    return ServoColumns(columns.t, columns.q[:, place], columns.command[:, place], on, voltage, tuple(joints))
+def _take(page: Page, folder: ResultsFolder | None, every: dict[str, ServoFit | str]) -> None:
+    page.found["joints"] = {joint: summary_of(fit) for joint, fit in every.items() if isinstance(fit, ServoFit)}
+    if page.found["joints"]:
+        _save(page, folder)
 
 
-def _stated(option: str, texts: Sequence[str]) -> dict[str, str]:
-    stated = [text.partition("=") for text in texts]
-    if wrong := [name for name, mark, value in stated if not mark or not value]:
-        raise ExperimentError(f"{option} {wrong[0]}: give NAME=VALUE, such as q=position_*")
-    return {name: value for name, _, value in stated}
+def _judge(page: Page, servos: Servos, others: Servos | None, found: dict[str, ServoFit]) -> None:
+    """Print errors of positions from commands alone, on the logs of the fit and on others, and what they mean."""
+    fitted, elsewhere = held_out(servos, found), held_out(others, found) if others else {}
+    for what, each in (("fitted", fitted), ("held out", elsewhere)):
+        print_errors(page, f"{what} logs", each)
+    every = {"fitted": fitted} | ({"held out": elsewhere} if others else {})
+    page.found["position_error"] = {
+        what: {joint: [float(x) for x in e] for joint, e in each.items()} for what, each in every.items()
+    }
+    page.found["verdict"] = verdicts(found, fitted, elsewhere)
+    for line in page.found["verdict"]:
+        page.print(Text(line), soft_wrap=True)
 
 
 def _write(page: Page, options: IdentifyServo, servos: Servos, others: Servos | None, found: dict[str, ServoFit]) -> None:
@@ -110,7 +102,7 @@ def _write(page: Page, options: IdentifyServo, servos: Servos, others: Servos | 
     assert path is not None
     place = path.absolute().parent
     text = servos.text(found, place, options.position)
-    write_text(path, text, "--write-mjcf", force=options.force, read=_read(options))
+    write_text(path, text, "--write-mjcf", force=options.force, read=files_read(options))
     page.print(Text(f"written to {path}: the robot with its servos, to be commanded with angles of the file"), soft_wrap=True)
     for each in (of_logs(servos, {log: logs.logs[log]}) for logs in (others or servos,) for log in logs.logs):
         log = next(iter(each.logs))
@@ -120,16 +112,27 @@ def _write(page: Page, options: IdentifyServo, servos: Servos, others: Servos | 
     page.warn({"the written file": inexpressible(found)})
 
 
-def _read(options: IdentifyServo) -> tuple[Path, ...]:
-    robot = [] if options.robot is None else [Robot.path(options.robot)]
-    return (*robot, *([options.servo] if options.servo else []), *options.log, *options.validate)
+def _write_function(page: Page, options: IdentifyServo, servos: Servos, found: dict[str, ServoFit]) -> None:
+    path = options.write
+    assert path is not None
+    known = {joint: (servos.known.servo(joint, ""), fit) for joint, fit in found.items()}
+    text = servo_function(Path(servos.robot).name, known, [log.name for log in servos.logs])
+    write_text(path, text, "--write", force=options.force, read=files_read(options))
+    page.print(Text(f"written to {path}: the servos as Python functions"), soft_wrap=True)
+
+
+def _recorded(servos: Servos, found: dict[str, ServoFit], audience: Audience | None) -> "Streams":
+    from experiments.recording.servo_recording import record_servos
+
+    path, log = next(iter(servos.logs.items()))
+    return record_servos(servos.links, path.stem, log, servos.simulated(found, path), audience)
 
 
 def _folder(options: IdentifyServo) -> ResultsFolder | None:
     if options.out is None:
         return None
-    command = command_of("servo", options, "log", ("out", "force", "json", "write_mjcf"), absolute=True)
-    folder = ResultsFolder(options.out, "servo", command, options.force, _read(options))
+    command = command_of("servo", options, "log", ("out", "force", "json", "write_mjcf", "write", "watching"), absolute=True)
+    folder = ResultsFolder(options.out, "servo", command, options.force, files_read(options))
     folder.check()
     return folder
 

@@ -8,7 +8,7 @@ import tyro
 
 from experiments.cli.app import command
 from experiments.cli.command import Command
-from experiments.cli.options.shared import Mounted, WrittenOptions
+from experiments.cli.options.shared import Mounted, RecordedOptions
 from experiments.identification.read_options import MountingOptions
 from experiments.option_types import File, Files, Robot, Texts
 
@@ -19,7 +19,7 @@ Letters = Annotated[tuple[str, ...], tyro.conf.arg(metavar="LETTER")]
 @command("servo")
 @final
 @dataclass(frozen=True)
-class IdentifyServo(WrittenOptions, Command, action="servo:servo"):
+class IdentifyServo(RecordedOptions, Command, action="servo:servo"):
     """Identify position-controlled joints (Feetech, Dynamixel) from commands and positions alone; write them for MuJoCo."""
 
     log: tyro.conf.Positional[tuple[Path, ...]] = ()
@@ -30,9 +30,10 @@ class IdentifyServo(WrittenOptions, Command, action="servo:servo"):
     """servo.toml: model = "STS3215" or gain = 0.166, then kp, supply, duty_limit, counts; [joints.NAME] and [logs."FILE"] for
     what differs."""
     friction: Law = "load"
-    """Friction law: coulomb, stribeck, load, load-stribeck, directional, quadratic, gear."""
+    """Friction law: coulomb, stribeck, load, load-stribeck, directional, quadratic, gear; auto compares them, and takes the
+    simplest that no other predicts significantly better."""
     find: Letters = ()
-    """Further parameters to be found: lead, dead_band."""
+    """Further parameters to be found: lead, dead_band, backlash, Mg, Fo."""
     hold: Texts = ()
     """Known parameters, for all joints: a=0.5 (N m/V), Ia=0.02."""
     columns: Texts = ()
@@ -45,5 +46,7 @@ class IdentifyServo(WrittenOptions, Command, action="servo:servo"):
     """Held-out logs, simulated from their commands alone. Default: the last log, where there are several."""
     write_mjcf: File = None
     """Write the robot's MJCF file with these servos as `dcmotor` actuators, and measure it on a log in plain MuJoCo."""
+    write: File = None
+    """Write the servos as Python functions, for those who step themselves: a file .py."""
     position: bool = False
     """Write `position` actuators instead, for older versions of MuJoCo."""

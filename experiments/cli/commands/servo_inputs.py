@@ -1,0 +1,62 @@
+"""What the command that identifies servos reads."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from experiments.cli.options.servo import IdentifyServo
+from experiments.errors import ExperimentError
+from experiments.identification.robot_model import absolute
+from experiments.servo.identification import AUTO, Servos, of_logs
+from identify.files.servo_file import ServoFile
+from identify.files.servo_log import ServoColumns, order, read_servo_log
+from identify.servo import SERVO_FRICTIONS
+from sim.robot.robot import Robot
+
+
+def servos_of(options: IdentifyServo) -> tuple[Servos, Servos | None]:
+    """Return the servos with the logs of the fit, and with those that it does not see."""
+    for name, given in (("--robot", options.robot), ("--servo", options.servo)):
+        if given is None:
+            raise ExperimentError(f"{name} is missing; see idbench servo --help")
+    if not options.log:
+        raise ExperimentError("name the logs of commands and positions")
+    if options.friction not in (*SERVO_FRICTIONS, AUTO):
+        raise ExperimentError(f"--friction {options.friction} is unknown; known: {', '.join(SERVO_FRICTIONS)}, {AUTO}")
+    assert options.robot is not None
+    assert options.servo is not None
+    known, mounting = ServoFile.read(options.servo), options.mounting.mounting
+    logs, held = options.log, options.validate
+    if not held and len(logs) > 1:
+        logs, held = logs[:-1], logs[-1:]
+    servos = Servos(absolute(options.robot), mounting, known, {})
+    made = of_logs(servos, {path: _ordered(path, options, servos.links.joints) for path in logs})
+    others = {path: _ordered(path, options, servos.links.joints) for path in held}
+    return made, of_logs(servos, others) if others else None
+
+
+def held_of(options: IdentifyServo) -> dict[str, float]:
+    """Return the parameters that are known."""
+    try:
+        return {name: float(value) for name, value in _stated("--hold", options.hold).items()}
+    except ValueError:
+        raise ExperimentError(f"--hold {' '.join(options.hold)}: give letters and numbers, such as a=0.5") from None
+
+
+def files_read(options: IdentifyServo) -> tuple[Path, ...]:
+    """Return the files that are read, which nothing may be written over."""
+    robot = [] if options.robot is None else [Robot.path(options.robot)]
+    return (*robot, *([options.servo] if options.servo else []), *options.log, *options.validate)
+
+
+def _ordered(path: Path, options: IdentifyServo, joints: Sequence[str]) -> ServoColumns:
+    columns = read_servo_log(path, _stated("--columns", options.columns), _stated("--units", options.units))
+    place = order(columns, joints, path)
+    on, voltage = (None if x is None else x[:, place] for x in (columns.on, columns.voltage))
+    return ServoColumns(columns.t, columns.q[:, place], columns.command[:, place], on, voltage, tuple(joints))
+
+
+def _stated(option: str, texts: Sequence[str]) -> dict[str, str]:
+    stated = [text.partition("=") for text in texts]
+    if wrong := [name for name, mark, value in stated if not mark or not value]:
+        raise ExperimentError(f"{option} {wrong[0]}: give NAME=VALUE, such as q=position_*")
+    return {name: value for name, _, value in stated}

@@ -1,0 +1,54 @@
+"""The recording of servos: commands, positions as measured and as they follow from commands, and what is left."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from experiments.recording.audience import Audience
+from experiments.recording.columns import part, seconds
+from experiments.recording.folder import BASE
+from experiments.recording.identification_recording import recording_id
+from experiments.recording.motion_layer import Base
+from experiments.recording.stream import Stream
+from experiments.style import FORMS, GREY
+from identify import Array
+from identify.files.servo_log import ServoColumns
+from identify.servo.smooth import smoothed
+from sim.robot.robot import Robot
+
+COMMANDED = [200, 160, 60]
+"""Colour of commands."""
+
+
+def record_servos(
+    robot: Robot, name: str, log: ServoColumns, simulated: Mapping[str, Array], audience: Audience | None = None
+) -> list[tuple[str, Stream]]:
+    """Return the stream of the recording, by the name of its file.
+
+    Parameters
+    ----------
+    robot : Robot
+        What moves.
+    name : str
+        Of the log.
+    log : ServoColumns
+        Commands and positions.
+    simulated : mapping of str to Array, shape (time,)
+        Positions of the joints with an estimate, from commands alone [rad], by joint.
+    audience : Audience, optional
+        Who watches.
+    """
+    _, qd, _ = smoothed(log.t, log.q)
+    fs = 1 / float(np.median(np.diff(log.t)))
+    base = Base(recording_id(name, np.ascontiguousarray(log.q).tobytes()), robot, fs, ("measured",), qd, audience)
+    base.add(0, {"q/measured": log.q}, {"measured": log.q}, qd)
+    times = [seconds(log.t - log.t[0])]
+    for joint, q in simulated.items():
+        j, path = robot.joints.index(joint), f"servo/{part(joint)}"
+        curves = (("command", log.command[:, j], COMMANDED, 1.0), ("measured", log.q[:, j], GREY, 2.0),
+                  ("simulated", q, FORMS["explicit"], 1.5))  # fmt: skip
+        for kind, values, color, width in curves:
+            base.stream.curve(f"{path}/q/{kind}", times, values, f"{kind} {joint}", color, width)
+        base.stream.curve(f"{path}/left", times, log.q[:, j] - q, f"measured - simulated {joint}", GREY, 1.5)
+    base.finish(f"## Servos, simulated from the commands of {name} alone\n\nGrey: measured. The other curve: simulated.")
+    return [(BASE, base.stream)]

@@ -1,0 +1,84 @@
+"""Which law of friction a log needs: the simplest that no other predicts significantly better."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from scipy.stats import wilcoxon
+
+from identify.errors import IdentificationError
+from identify.servo.fit import ServoFit
+from identify.servo.friction import SERVO_FRICTIONS
+from identify.servo.identification import identify_servo
+from identify.servo.left_out import left_out
+from identify.servo.run import ServoRun
+from identify.servo.servo import Servo
+
+LEVEL = 0.05
+"""p value, of all comparisons together, below which a law is better."""
+
+PER_PARAMETER = 2
+"""Parts of the log per parameter of the largest law, each predicted without it."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class FrictionChoice:
+    """Laws of friction compared.
+
+    Parameters
+    ----------
+    fits : mapping of str to ServoFit
+        By the law, those that can be fitted.
+    chosen : str
+        The law to use.
+    errors : mapping of str to float
+        Root mean square of the residuals of parts of the log that were left out, large ones counting less [rad].
+    p : mapping of str to float
+        p value of each law against the simplest, two-sided, times the number of tests.
+    """
+
+    fits: dict[str, ServoFit]
+    chosen: str
+    errors: dict[str, float]
+    p: dict[str, float]
+
+
+def choose_friction(
+    servo: Servo, runs: Sequence[ServoRun], more: Sequence[str] = (), held: dict[str, float] | None = None
+) -> FrictionChoice:
+    """Return the laws of friction compared, each by parts of the log that its fit did not see (see `identify.servo.left_out`).
+
+    Laws are taken from the simplest on; a further one replaces the one before if it predicts the parts better and Wilcoxon's
+    signed-rank test over them says that this is no chance, at a level of 5 % over all tests (Bonferroni).
+
+    Raises
+    ------
+    IdentificationError
+        If no law can be fitted.
+    """
+    fits, why = dict[str, ServoFit](), ""
+    for law in SERVO_FRICTIONS:
+        try:
+            fits[law] = identify_servo(servo, runs, law, more, held)
+        except IdentificationError as error:
+            why = why or str(error)
+    if not fits:
+        raise IdentificationError(why)
+    c = 3 * float(np.median([fit.scale for fit in fits.values()]))  # one measure for all
+    parts = PER_PARAMETER * max(len(fit.free) for fit in fits.values())
+    costs = {law: left_out(fit.found, fit.loop, c, parts).costs for law, fit in fits.items()}
+    tests = len(fits) - 1
+    first = next(iter(fits))
+    chosen, p = first, dict[str, float]()
+    for law in [law for law in fits if law != first]:
+        p[law] = _p(costs[law], costs[first], tests)
+        if costs[law].mean() < costs[chosen].mean() and _p(costs[law], costs[chosen], tests) < LEVEL:
+            chosen = law
+    return FrictionChoice(fits, chosen, {law: float(np.sqrt(x.mean())) for law, x in costs.items()}, p)
+
+
+def _p(one: "np.typing.NDArray[np.float64]", other: "np.typing.NDArray[np.float64]", tests: int) -> float:
+    n = min(len(one), len(other))
+    return min(1.0, tests * float(wilcoxon(one[:n], other[:n]).pvalue))
