@@ -1,6 +1,6 @@
 """Servos as text."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 from rich.text import Text
@@ -21,6 +21,9 @@ ALIKE = 1.5
 
 EXPLAINED = 3.0
 """Residual over what rounding leaves, up to which there is nothing to explain: clocks of cheap servos jitter."""
+
+UNEXPLAINED = 20
+"""Counts of a typical residual from which on something is missing."""
 
 EXPRESSIBLE = ("a", "b", "Ia", "Fs", "Fv", "offset", "delay", "rate", "backlash")
 """Parameters that a file of MuJoCo has, or that its user adds to commands."""
@@ -60,31 +63,35 @@ def print_errors(page: Page, what: str, errors: Mapping[str, Array]) -> None:
 
 
 def warnings_of(fits: Mapping[str, ServoFit | str]) -> list[str]:
-    """Return what to check."""
-    found = list[str]()
-    for joint, fit in fits.items():
-        if isinstance(fit, str):
-            continue
-        spikes = sum(int((~run.read_well).sum()) for run in fit.loop.runs)
-        if spikes:
-            found.append(f"{joint}: {spikes} positions are spikes, from which the joint came back at once: they are left out")
-        sigma = fit.standard_errors
-        vague = [name for name in RATIOS if name in sigma and sigma[name] > VAGUE * abs(fit.p[name])]
-        if vague:
-            found.append(
-                f"{joint}: {', '.join(vague)} cannot be told apart: torque, friction and armature scale together where the "
-                "known load is small. Move the joint through gravity, or add a known mass to the robot's file"
-            )
-        if not fit.excitation.off:
-            found.append(f"{joint}: torque is never off, so b is the sum of back-EMF and viscous friction, and Fv is 0")
-        if "rate" not in fit.free:
-            found.append(f"{joint}: no command is faster than the rate limit of the firmware, if there is one")
-        if fit.scale > 20 * fit.servo.step:
-            found.append(
-                f"{joint}: residuals of {fit.scale:.2g} rad are {fit.scale / fit.servo.step:.0f} counts of the encoder: try "
-                "another --friction, --find lead dead_band, and check kp, supply and the mass of the load"
-            )
-    return found
+    """Return what to check, each thing once for all joints that it concerns."""
+    return _grouped((joint, text) for joint, fit in fits.items() if isinstance(fit, ServoFit) for text in _warnings(fit))
+
+
+def _grouped(said: Iterable[tuple[str, str]]) -> list[str]:
+    joints = dict[str, list[str]]()
+    for joint, text in said:
+        joints.setdefault(text, []).append(joint)
+    return [f"{', '.join(of)}: {text}" for text, of in joints.items()]
+
+
+def _warnings(fit: ServoFit) -> Iterator[str]:
+    if spikes := sum(int((~run.read_well).sum()) for run in fit.loop.runs):
+        yield f"{spikes} positions are spikes, from which the joint came back at once: they are left out"
+    sigma = fit.standard_errors
+    if vague := [name for name in RATIOS if name in sigma and sigma[name] > VAGUE * abs(fit.p[name])]:
+        yield (
+            f"{', '.join(vague)} cannot be told apart: torque, friction and armature scale together where the known load is "
+            "small. Move the joint through gravity, or add a known mass to the robot's file"
+        )
+    if not fit.excitation.off:
+        yield "torque is never off, so b is the sum of back-EMF and viscous friction, and Fv is 0"
+    if "rate" not in fit.free:
+        yield "no command is faster than the rate limit of the firmware, if there is one"
+    if fit.scale > UNEXPLAINED * fit.servo.step:
+        yield (
+            f"residuals of {fit.scale:.2g} rad are {fit.scale / fit.servo.step:.0f} counts: try --friction auto, "
+            "--find lead backlash, and check kp, supply and the mass of the load"
+        )
 
 
 def inexpressible(fits: Mapping[str, ServoFit]) -> list[str]:
@@ -100,8 +107,9 @@ def inexpressible(fits: Mapping[str, ServoFit]) -> list[str]:
 
 
 def verdicts(fits: Mapping[str, ServoFit], fitted: Mapping[str, Array], held_out: Mapping[str, Array]) -> list[str]:
-    """Return a line for each joint: whether its model holds on logs that it did not see, and what it lacks most."""
-    return [f"{joint}: {_holds(fit, fitted[joint], held_out.get(joint))}; {_lacks(fit)}" for joint, fit in fits.items()]
+    """Return lines: whether models hold on logs that they did not see, and where their residuals are largest."""
+    said = ((joint, _holds(fit, fitted[joint], held_out.get(joint))) for joint, fit in fits.items())
+    return [*_grouped(said), *_grouped((joint, _lacks(fit)) for joint, fit in fits.items())]
 
 
 def _holds(fit: ServoFit, fitted: Array, held_out: Array | None) -> str:
@@ -117,8 +125,8 @@ def _lacks(fit: ServoFit) -> str:
     lacks, floor = lacks_of(fit), fit.servo.step / 4  # what rounding leaves, on average
     if lacks[0].error <= EXPLAINED * floor:
         return "its residuals are little more than the rounding of the encoder"
-    parts = ", ".join(f"{lack.error / fit.servo.step:.2g} counts while {lack.when} ({lack.share:.0%})" for lack in lacks[:2])
-    return f"residuals are largest by what the joint does: {parts}"
+    parts = ", ".join(f"{lack.error / fit.servo.step:.2g} counts while {lack.when}" for lack in lacks)
+    return f"mean residuals: {parts}"
 
 
 def print_choice(page: Page, joint: str, choice: FrictionChoice) -> None:

@@ -1,6 +1,7 @@
 """The identification of a servo: rows, then the closed loop, law by law and finer from stage to stage."""
 
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 
@@ -29,6 +30,18 @@ MOST_RUNS = 120
 
 COARSE, MEDIUM, FINE = 0.4, 0.2, 0.1
 """Longest steps, as shares of the sampling time: of first stages, of the last with whole runs, and with pieces."""
+
+SHAKEN = 2
+"""Times that a search leaves its valley for others, at most."""
+
+SCALES, ROTORS, LATER = (0.7, 1.0, 1.4), (0.25, 1.0, 4.0), (-2.0, -1.0, -0.5, 0.0, 0.5)
+"""Factors on all torques, further ones on the armature, and changes of the delay [samples] that are tried from there."""
+
+VALLEYS = 3
+"""Other valleys that are searched."""
+
+ESCAPED = 0.01
+"""Share by which another valley must be better."""
 
 REFINED = 15
 """Rounds of the last stage, at most."""
@@ -123,7 +136,28 @@ class _Stages:
             begin["backlash"] = _play(self._servo, self._coarse, begin)
         known = parameters_of(friction, (*more, *self.held))
         begin = {name: x for name, x in begin.items() if name in known}
-        self.p = self._search(self._coarse, begin, self._free(friction, more, begin)).best(begin).p
+        free = self._free(friction, more, begin)
+        found = self._search(self._coarse, begin, free).best(begin)
+        for _ in range(SHAKEN):
+            search = self._search(self._coarse, found.p, free)
+            best = min((search.best(p) for p in self._shaken(search, found.p)), key=lambda other: other.cost)
+            if best.cost > (1 - ESCAPED) * search.cost_of(found.p):
+                break
+            found = best
+        self.p = found.p
+
+    def _shaken(self, search: Search, p: dict[str, float]) -> list[dict[str, float]]:
+        """Return the best of parameters in other valleys: a rotor that is light looks like a command that is late."""
+        base = {**p, "Ia": max(p["Ia"], p["b"] * self._excitation.T / 2)}
+        T, held = self._excitation.T, self.held
+        tried = []
+        for scale, Ia, delay in product(SCALES, ROTORS, LATER):
+            torques = {name: x * scale for name, x in base.items() if name in TORQUES}
+            other = {**base, **torques, "Ia": base["Ia"] * Ia, "delay": max(base["delay"] + delay * T, 0.0)}
+            tried.append({**other, **held})
+        lanes = {name: np.array([x[name] for x in tried]) for name in base}
+        order = np.argsort(search.cost(self._coarse.simulate(lanes)))[:VALLEYS]
+        return [tried[int(k)] for k in order]
 
     def fit(self, friction: str, more: Sequence[str]) -> ServoFit:
         """Return the parameters with all runs, in fine steps."""

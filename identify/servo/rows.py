@@ -64,7 +64,8 @@ class ServoRows:
         p = dict(zip(COLUMNS, X.tolist(), strict=True))
         p |= {"offset": p["offset"] / p["a"], "delay": delay, "rate": float(rate)}
         p["b"] = max(p["b"], 0.02 * p["a"])
-        p["Ia"] = max(p["Ia"], 0.02 * self._runs[0].inertia)
+        # Rotors that stop within half a sample look like none; a search could not leave that.
+        p["Ia"] = max(p["Ia"], 0.02 * self._runs[0].inertia, p["b"] * self._runs[0].T / 2)
         p["Fs"] = max(p["Fs"], 0.0)
         return float(np.mean((Y - W @ X) ** 2)), p
 

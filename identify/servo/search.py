@@ -116,6 +116,10 @@ class Search:
         total = 2 * self.c**2 * (r - np.log1p(r)).sum(axis=(1, 2)) + self._certainty * np.square(ahead).sum(axis=-1)
         return np.nan_to_num(total, nan=np.inf, posinf=np.inf)
 
+    def cost_of(self, p: Mapping[str, float]) -> float:
+        """Return the objective of parameters."""
+        return float(self.cost(self._loop.simulate(p))[0])
+
     def best(self, start: Mapping[str, float], rounds: int = 30) -> Found:
         """Return the best parameters that are found from a start."""
         x, ahead = np.array([start[name] for name in self.free]), np.zeros(len(self._loop.runs))
