@@ -1,7 +1,9 @@
 """Servos in closed loop, simulated from commands alone: many runs and many sets of parameters at once."""
 
+import os
 from collections.abc import Mapping, Sequence
-from typing import Any, final
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 import numpy.typing as npt
@@ -9,6 +11,9 @@ import numpy.typing as npt
 from identify.arrays import Array
 from identify.servo.run import ServoRun
 from identify.servo.servo import Servo
+
+if TYPE_CHECKING:
+    from identify.servo.step import Law
 
 WAY = 6
 """Ranges of its motion that a joint may cross in a step: beyond, it is lost, and numbers would overflow."""
@@ -46,21 +51,27 @@ class ServoLoop:
 
         `ahead`, shape (lane, run) or less, is where runs begin, beyond the position that was measured [rad].
         """
-        from identify.servo.step import Firmware, Law, at_samples, motion  # its compiler takes longer than many a command
+        from identify.servo.step import Law  # its compiler takes longer than many a command
 
         lanes = max(np.size(x) for x in p.values())
         every = {name: np.broadcast_to(np.asarray(x, dtype=np.float64), (lanes,)).tolist() for name, x in p.items()}
+        laws = [Law(**{name: x[lane] for name, x in every.items()}) for lane in range(lanes)]
         begins = np.broadcast_to(np.asarray(ahead, dtype=np.float64), (lanes, len(self.runs)))
-        servo, out = self.servo, np.empty((lanes, *self.q.shape))
-        parts = zip(self.runs, self._tracks, self._places, self._begin, strict=True)
-        for k, (run, track, (before, share), (q, speed)) in enumerate(parts):
-            firmware = Firmware(servo.gain * run.kp, servo.duty_limit, servo.step)
-            for lane in range(lanes):
-                law = Law(**{name: x[lane] for name, x in every.items()})
-                path = motion(law, firmware, track, (q + float(begins[lane, k]), speed), self.h, self._fastest)
-                out[lane, k, : len(before)] = at_samples(path, before, share)
-            out[:, k, len(before) :] = out[:, k, len(before) - 1 : len(before)]
+        out = np.empty((lanes, *self.q.shape))
+        with ThreadPoolExecutor(os.cpu_count()) as pool:  # compiled code runs beside Python
+            list(pool.map(lambda k: self._simulate_run(k, laws, begins[:, k].tolist(), out[:, k]), range(len(self.runs))))
         return out
+
+    def _simulate_run(self, k: int, laws: "Sequence[Law]", ahead: Sequence[float], out: Array) -> None:
+        """Write the positions of a run into `out`, shape (lane, sample)."""
+        from identify.servo.step import Firmware, at_samples, motion
+
+        servo, (before, share), (q, speed) = self.servo, self._places[k], self._begin[k]
+        firmware = Firmware(servo.gain * self.runs[k].kp, servo.duty_limit, servo.step)
+        for lane, (law, more) in enumerate(zip(laws, ahead, strict=True)):
+            path = motion(law, firmware, self._tracks[k], (q + more, speed), self.h, self._fastest)
+            out[lane, : len(before)] = at_samples(path, before, share)
+        out[:, len(before) :] = out[:, len(before) - 1 : len(before)]
 
     def _place(self, run: ServoRun) -> tuple[npt.NDArray[np.int64], Array]:
         """Return the step before each sample, and by how much of a step the sample is later."""

@@ -17,9 +17,9 @@ LIGHT = 1e-9
 def _compiled(function: Callable[..., Any]) -> Any:
     """Return compiled code, kept for the next process where there is a place for it."""
     try:
-        return njit(cache=True)(function)
+        return njit(cache=True, nogil=True)(function)
     except RuntimeError:  # neither the project's folder nor a cache of the user can be written
-        return njit(function)
+        return njit(nogil=True)(function)
 
 
 class Law(NamedTuple):
@@ -118,13 +118,14 @@ def _pushed(p: Law, firmware: Firmware, q: float, speed: float, target: float, v
 @_compiled
 def _after(p: Law, of: Acting, speed: float, h: float) -> float:
     """Return the speed of rotor and link as one body after a step."""
-    whole, damping = of.J + p.Ia, p.b * of.on
-    half = h / 2 * (damping + p.Fv) / whole
-    free = ((1 - half) * speed + h / whole * (of.push + of.external)) / (1 + half)
+    light, damping = 1 / (of.J + p.Ia), p.b * of.on
+    half = h / 2 * (damping + p.Fv) * light
+    later = h * light / (1 + half)
+    free = speed + later * (of.push + of.external - (damping + p.Fv) * speed)
     motor = of.push - damping * speed
-    sent = np.sign(free) * (of.J * motor - p.Ia * of.external) / whole
+    sent = math.copysign(light, free) * (of.J * motor - p.Ia * of.external)
     friction = _friction(p, speed, motor, of.external, sent) + p.Fo * (1 - of.on)
-    return _slowed(free, speed, h / (whole * (1 + half)) * friction)
+    return _slowed(free, speed, later * friction)
 
 
 @_compiled
@@ -173,7 +174,9 @@ def motion(p: Law, firmware: Firmware, track: Track, start: tuple[float, float],
         out[i] = q - p.offset
         now = means[max(i - whole, 0)] if i >= whole else track.command[0]
         past = means[i - whole - 1] if i > whole else track.command[0]
-        external = -((track.sine[i] + p.Mg) * math.sin(q) + track.cosine[i] * math.cos(q) + track.rest[i])
+        external = -((track.sine[i] + p.Mg) * math.sin(q) + track.rest[i])
+        if track.cosine[i] != 0.0:
+            external -= track.cosine[i] * math.cos(q)
         if i == 0 and half > 0.0:
             gap = -half * np.sign(external)  # links rest on the side to which their loads push them
         push = _pushed(p, firmware, q, speed, now + (past - now) * part, track.voltage[i])
