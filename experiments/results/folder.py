@@ -24,7 +24,7 @@ RECORDING = "recording.rrd"
 COMMON = ("summary.json", RECORDING, "recording.*.rrd", "log*.parquet", "fault.txt")
 
 FILES: Mapping[str, tuple[str, ...]] = {
-    "run": (*COMMON, "scenario.toml"),
+    "run": (*COMMON, "scenario.toml", "servo.toml", "commands.csv"),
     "identify": (*COMMON, "report.html"),
     "table1": COMMON,
     "table1-motions": (*COMMON, "motions.png"),
@@ -32,7 +32,7 @@ FILES: Mapping[str, tuple[str, ...]] = {
     "excite": (*COMMON, "scenario.toml", "report.html", "motion*.csv"),
     "payload": ("summary.json", "fault.txt"),
     "gains": ("summary.json", "fault.txt"),
-    "servo": ("summary.json", "fault.txt"),
+    "servo": ("summary.json", RECORDING, "fault.txt"),
     "study": ("summary.json", "report.html", "recording.rrd", "fault.txt"),
 }
 """What an experiment may write: files of these names are looked for before the work."""

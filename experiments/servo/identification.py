@@ -132,8 +132,12 @@ def of_logs(servos: Servos, logs: dict[Path, ServoColumns]) -> Servos:
 def summary_of(fit: ServoFit) -> dict[str, Any]:
     """Return what a summary says of a fit."""
     sigma, bound = fit.standard_errors, fit.bound
-    values = {
+    return {
         name: {"value": x, "sigma": sigma.get(name), "bound": bound.get(name), "unit": SERVO_PARAMETERS[name].unit}
         for name, x in fit.p.items()
     }
-    return {**values, "friction": fit.friction, "lack_of_fit": [lack._asdict() for lack in lacks_of(fit)]}
+
+
+def lacks_summary(fit: ServoFit) -> dict[str, Any]:
+    """Return what a summary says of what a fit lacks."""
+    return {"friction": fit.friction, "residuals": [lack._asdict() for lack in lacks_of(fit)]}

@@ -1,9 +1,13 @@
 """What the owner of a scenario's servos knows of them."""
 
+from pathlib import Path
+
+import numpy as np
 import tomli_w
 
 from identify.servo import Servo
 from sim.drives import ServoDrive
+from sim.engine.run import Run
 from sim.robot.robot import Robot
 from sim.settings import per_joint
 
@@ -22,3 +26,9 @@ def servo_toml(drive: ServoDrive, robot: Robot) -> str:
     first, *others = known_servos(drive, robot.n)
     differing = {joint: {"kp": servo.kp} for joint, servo in zip(robot.joints[1:], others, strict=True) if servo.kp != first.kp}
     return tomli_w.dumps({**vars(first), **({"joints": differing} if differing else {})})
+
+
+def write_commands(run: Run, robot: Robot, path: Path) -> None:
+    """Write commands as they can be played on a robot: t [s], and angles of the robot's file [rad]."""
+    header = ",".join(["t", *(f"command_{joint}" for joint in robot.joints)])
+    np.savetxt(path, np.c_[run.log.t, run.command[0]], "%.6g", ",", header=header, comments="")

@@ -70,6 +70,9 @@ class AbstractDrive(ABC):
     commands: ClassVar[Commanded] = "torque"
     """What it takes."""
 
+    has_own_motors: ClassVar[bool] = False
+    """Whether it needs none of the robot's motors (dcmotor elements of its file)."""
+
     @abstractmethod
     def start(self, robot: Robot, nsim: int, h: float) -> AbstractAmplifier:
         """Return the drive at rest, to be advanced by physics steps of `h` [s].

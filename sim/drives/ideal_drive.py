@@ -1,6 +1,6 @@
 """A drive that gives the commanded torque."""
 
-from typing import final
+from typing import ClassVar, final
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from sim.settings import settings
 @settings
 class IdealDrive(AbstractDrive):
     """Torque as asked: no winding, no limit, no lag."""
+
+    has_own_motors: ClassVar[bool] = True
 
     def start(self, robot: Robot, nsim: int, h: float) -> AbstractAmplifier:
         """Return the drive."""

@@ -39,6 +39,7 @@ class ServoDrive(AbstractDrive):
     """
 
     commands: ClassVar[Commanded] = "position"
+    has_own_motors: ClassVar[bool] = True
 
     torque_constant: EachPositive = (2.05,)
     """K, torque per ampere behind the gear and back-EMF per speed [N m/A], of all joints or of each."""

@@ -72,17 +72,20 @@ def split(path, r):
     well = np.stack([run.read_well for run in runs])
     on = np.stack([run.enabled for run in runs])
     speed = np.gradient(np.stack([run.clean for run in runs]), 0.01, axis=1)
-    r = np.where(well, r, 0.0).mean(axis=0)
-    print(f"without spikes ({(~well).sum()} samples of {(~well).any(axis=1).sum()} runs): {np.abs(r)[well].mean():.4f} rad")
+    r, well, on, speed = np.concatenate(np.where(well, r, 0.0)), *(np.concatenate([x, x]) for x in (well, on, speed))
+    spoilt = sum((~run.read_well).any() for run in runs)
+    print(
+        f"without spikes ({sum((~run.read_well).sum() for run in runs)} samples of {spoilt} runs): {np.abs(r)[well].mean():.4f}"
+    )
     aged = r.copy()
-    for i, k in product(range(len(runs)), range(AGES)):
+    for i, k in product(range(len(r)), range(AGES)):
         own, smooth = slice(k, None, AGES), r[i] - np.convolve(r[i], np.ones(2 * AGES) / (2 * AGES), "same")
         aged[i, own] -= speed[i, own] * (smooth[own] @ speed[i, own]) / (speed[i, own] @ speed[i, own] + 1e-9)
     print(f"without ages of the reported position: {np.abs(aged)[well].mean():.4f} rad")
-    rest = np.abs(speed) < 0.05
-    command = np.stack([run.command for run in runs])
-    kp = np.array([run.kp for run in runs])[:, None]
-    full = (SERVO.gain * kp * np.abs(command - np.stack([run.clean for run in runs])) > SERVO.duty_limit) & on
+    error, kp = (
+        np.concatenate([x, x]) for x in (np.stack([run.command - run.clean for run in runs]), [run.kp for run in runs])
+    )
+    full, rest = (SERVO.gain * kp[:, None] * np.abs(error) > SERVO.duty_limit) & on, np.abs(speed) < 0.05
     kinds = {"off, at rest": ~on & rest, "off, falling": ~on & ~rest, "duty at its limit": full, "at rest": on & rest & ~full}
     kinds["moving"] = on & ~rest & ~full
     for name, when in kinds.items():

@@ -1,6 +1,12 @@
 """`idbench servo`: from logs of commands and positions to servos of MuJoCo, of arms whose servos MuJoCo simulates."""
 
+import importlib.util
 import json
+import os
+import re
+import shlex
+import subprocess
+import sys
 from dataclasses import replace
 from importlib.metadata import files
 from pathlib import Path
@@ -10,6 +16,11 @@ import numpy as np
 import pytest
 
 from experiments.cli import main
+from experiments.recording.folder import known
+from identify.files.servo_file import ServoFile
+from identify.servo import JointLoad, ServoRun
+from identify.servo.closed_loop import ServoLoop
+from identify.servo.parameters import SERVO_PARAMETERS
 from sim.robot.robot import Robot
 from sim.robot.servos import STEP, Commands, ServoValues, replay, with_servos
 from sim.scenario.scenario_file import load, to_toml
@@ -80,6 +91,81 @@ def test_servo_of_a_bench_is_found_and_written(bench, idbench):
     model = mujoco.MjModel.from_xml_path("out.xml")
     assert model.dof_armature[0] == found["Ia"]
     assert model.nu == 1
+    assert "axis: the model holds on other logs" in out
+    assert {"servo/axis/q/measured", "servo/axis/q/simulated", "servo/axis/left"} <= known([Path("results/recording.rrd")])[1]
+
+
+def test_the_python_function_moves_as_the_fit_does(bench, idbench):
+    """Stepped by hand, with friction as the file's first lines say: the fit's own positions to a count."""
+    code, _, err = idbench(*words(bench, "--friction", "load", "--write", "found.py", "--out", "results"))
+    assert code == 0, err
+    spec = importlib.util.spec_from_file_location("found", "found.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    p, h, g = module.SERVOS["axis"], 5e-4, 9.81
+    t, u = np.loadtxt(bench / "fit.csv", delimiter=",", skiprows=1, unpack=True)[[0, 2]]
+    m, x = 0.6, 0.12
+    servo, q, qd, path = module.Servo("axis", h), p["offset"], 0.0, []
+    for k in range(round(3.0 / h)):
+        if k % round(0.01 / h) == 0:
+            path.append(q - p["offset"])
+        motor = servo.torque(u[min(round(k * h / 0.01 - 0.499), len(u) - 1)] + p["offset"], q, qd)
+        external, J = -m * g * x * np.sin(q), m * x**2 + p["Ia"]
+        most = h / J * servo.friction(qd, motor, external)
+        free = qd + h / J * (motor + external - p["Fv"] * qd)
+        qd = free - min(max(free, -most), most)
+        q += h * qd
+    stated = ServoFile.read(bench / "servo.toml").servo("axis", "")
+    run = ServoRun(t, 0 * t, u, JointLoad.pendulum(m, x), stated.kp)
+    of_file = {name: value for name, value in p.items() if name in SERVO_PARAMETERS}
+    expected = ServoLoop(stated, [run], h).simulate(of_file)[0, 0]
+    assert np.abs(np.array(path) - expected[: len(path)]).mean() < 2 * COUNT
+
+
+@pytest.mark.thorough
+def test_joints_that_are_done_are_kept_when_the_others_are_interrupted(tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "servo-arm", "--out", "run", "--no-rerun"]) == 0
+    from experiments.servo import identification
+
+    real, calls = identification.identify_servo, []
+
+    def identify(*args):
+        calls.append(args)
+        if len(calls) > 1:
+            raise KeyboardInterrupt
+        return real(*args)
+
+    monkeypatch.setattr(identification, "identify_servo", identify)
+    words = ["servo", "run/log.parquet", "--robot", "servo_arm", "--servo", "run/servo.toml", "--friction", "coulomb"]
+    assert main([*words, "--out", "found"]) != 0
+    assert "base_yaw" in capfd.readouterr().out
+    assert set(json.loads(Path("found/summary.json").read_text())["joints"]) == {"base_yaw"}
+
+
+@pytest.mark.thorough
+def test_the_page_takes_an_arm_to_a_model(root, tmp_path, monkeypatch, capfd):
+    """Every command of the page, but for viewers."""
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"```sh\n(.*?)```", (root / "docs" / "servo.md").read_text(), re.DOTALL)
+    for block in blocks:
+        if not block.startswith("uv run") or "sed" in block:
+            commands = block.replace("uv run idbench", f"{sys.executable} -c 'from experiments.cli import entry; entry()'")
+            subprocess.run(
+                ["bash", "-euc", commands], check=True, env=os.environ | {"PYTHONPATH": str(root)}, capture_output=True
+            )
+            continue
+        for line in block.splitlines():
+            if " view " not in line and "mujoco.viewer" not in line:
+                assert main(shlex.split(line.removeprefix("uv run idbench "))) == 0, line
+    printed = capfd.readouterr().out
+    assert "(chosen)" in printed
+    summary = json.loads(Path("runs/servos/summary.json").read_text())
+    errors = summary["mujoco_error"]["log.parquet"]
+    assert set(errors) == set(summary["joints"])
+    assert max(errors.values()) < 3 * COUNT
+    for joint in ("shoulder", "elbow"):
+        assert summary["joints"][joint]["a"]["value"] == pytest.approx(2.05 / 3.33, rel=0.01)
 
 
 def test_position_actuators_compile(bench, tmp_path):
@@ -182,10 +268,24 @@ def test_backlash_of_a_simulated_servo_is_found(idbench, tmp_path, degrees, seed
     changed = replace(scenario, seed=seed, trajectory=trajectory, drive=replace(scenario.drive, backlash=(play,)))
     (tmp_path / "servo.toml").write_text(to_toml(changed))
     assert main(["run", str(tmp_path / "servo.toml"), "--out", str(tmp_path / "run"), "--no-rerun"]) == 0
-    log, known = tmp_path / "run" / "log.parquet", tmp_path / "run" / "servo.toml"
-    find = ["--friction", "coulomb", "--find", "backlash", "--out", str(tmp_path / "found")]
-    assert main(["servo", str(log), "--robot", "pendulum", "--servo", str(known), *find]) == 0
+    log, stated = tmp_path / "run" / "log.parquet", tmp_path / "run" / "servo.toml"
+    find = [
+        "--friction",
+        "coulomb",
+        "--find",
+        "backlash",
+        "--write-mjcf",
+        str(tmp_path / "play.xml"),
+        "--out",
+        str(tmp_path / "found"),
+    ]
+    assert main(["servo", str(log), "--robot", "pendulum", "--servo", str(stated), *find]) == 0
     joint = json.loads((tmp_path / "found" / "summary.json").read_text())["joints"]["swing"]
     assert joint["backlash"]["value"] == pytest.approx(play, rel=0.1)
     assert joint["a"]["value"] == pytest.approx(2.05 / 3.33, rel=0.01)
     assert joint["Ia"]["value"] == pytest.approx(0.02, rel=0.02)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "play.xml"))
+    assert np.ptp(model.joint("swing_play").range) == pytest.approx(joint["backlash"]["value"])
+    # the loop of the file sees the rotor, which is within half the play
+    summary = json.loads((tmp_path / "found" / "summary.json").read_text())
+    assert summary["mujoco_error"]["log.parquet"]["swing"] < play

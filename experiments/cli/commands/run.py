@@ -24,7 +24,7 @@ from experiments.plugin_tables import plugin_conflicts
 from experiments.reports.leading import shown_whole
 from experiments.reports.printed import print_fit
 from experiments.results.folder import ResultsFolder
-from experiments.servo.known import servo_toml
+from experiments.servo.known import servo_toml, write_commands
 from experiments.study.method import Method, of_currents
 from identify import CHAINS
 from identify.files.log_file import write_log
@@ -71,8 +71,11 @@ def run(options: Run) -> None:
 def _files(ran: ScenarioRun) -> Files:
     """Return what writes the log and the scenario, and what is known of servos, if there are any."""
     drive, robot = ran.scenario.drive, ran.run.robots[0]
-    known = {"servo.toml": lambda path: path.write_text(servo_toml(drive, robot))} if isinstance(drive, ServoDrive) else {}
-    return {"log.parquet": partial(write_log, ran.run.alone()), "scenario.toml": partial(write_scenario, ran.scenario), **known}
+    files: Files = {"log.parquet": partial(write_log, ran.run.alone()), "scenario.toml": partial(write_scenario, ran.scenario)}
+    if not isinstance(drive, ServoDrive):
+        return files
+    known = {"servo.toml": lambda path: path.write_text(servo_toml(drive, robot))}
+    return {**files, **known, "commands.csv": partial(write_commands, ran.run, robot)}
 
 
 def _as_servos(scenario: Scenario, out: Path) -> str:
@@ -129,7 +132,7 @@ def _with_robot(page: Page, scenario: Scenario, robot: str | None) -> Scenario:
     if isinstance(scenario.trajectory, Quintic) and Robot.load(robot).n != Robot.load(scenario.robot).n:
         page.print(f"the trajectory of {scenario.name} does not fit robot {robot}: the random moves of scenario arm are used")
         other = replace(other, trajectory=load("arm").trajectory, start=())
-    if not isinstance(other.drive, (IdealDrive, ServoDrive)) and not _has_motors(robot):
+    if not other.drive.has_own_motors and not _has_motors(robot):
         page.print(f"robot {robot} has no motors (dcmotor elements of MJCF): its drives are ideal, without ripple")
         other = replace(other, drive=IdealDrive(), ripple=Ripple())
     return other

@@ -18,7 +18,7 @@ from experiments.results.attempts import Attempts
 from experiments.results.folder import ResultsFolder
 from experiments.results.summaries import write_summary
 from experiments.results.writing import require_free, write_text
-from experiments.servo.identification import Servos, held_out, of_logs, summary_of
+from experiments.servo.identification import Servos, held_out, lacks_summary, of_logs, summary_of
 from experiments.servo.servo_function import servo_function
 from experiments.servo.servo_text import inexpressible, print_choice, print_errors, print_servos, verdicts, warnings_of
 from identify.servo import ServoFit
@@ -78,6 +78,7 @@ def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo
 
 def _take(page: Page, folder: ResultsFolder | None, every: dict[str, ServoFit | str]) -> None:
     page.found["joints"] = {joint: summary_of(fit) for joint, fit in every.items() if isinstance(fit, ServoFit)}
+    page.found["lack_of_fit"] = {joint: lacks_summary(fit) for joint, fit in every.items() if isinstance(fit, ServoFit)}
     if page.found["joints"]:
         _save(page, folder)
 

@@ -1,0 +1,92 @@
+"""Servos: samples that were not read well, parts left out, laws compared, and what a fit lacks."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identify.servo import JointLoad, Servo, ServoRun, identify_servo
+from identify.servo.choice import choose_friction
+from identify.servo.closed_loop import ServoLoop
+from identify.servo.lack import lacks_of
+from identify.servo.search import Search
+
+SERVO = Servo(0.166, 16.0, supply=12.0, duty_limit=0.97)
+LAW = {"a": 0.6, "b": 1.2, "Ia": 0.02, "Fs": 0.1, "Fv": 0.02, "offset": 0.0, "delay": 0.02, "rate": 4.5}
+
+
+def simulated(seed: int, **law: float) -> ServoRun:
+    """Return a run of 14 s with torque off twice, in counts, simulated finely from commands alone."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(0, 14, 0.01)
+    command = rng.uniform(-1.3, 1.3, 14)[t.astype(int)]
+    on = ~(((t > 4) & (t < 5)) | ((t > 9) & (t < 10)))
+    run = ServoRun(t, np.linspace(0, 1e-3, len(t)), command, JointLoad.pendulum(0.6, 0.12), 16.0, on)
+    q = ServoLoop(SERVO, [replace(run, q=0 * t)], 2.5e-4).simulate(LAW | law)[0, 0]
+    return replace(run, q=np.rint(q / SERVO.step) * SERVO.step)
+
+
+@pytest.fixture(scope="module")
+def run() -> ServoRun:
+    return simulated(0)
+
+
+def test_spikes_of_the_bus_are_left_out(run):
+    places = np.array([130, 131, 700, 1111])
+    q = run.q.copy()
+    q[places] = -np.pi
+    spoilt = replace(run, q=q)
+    assert np.flatnonzero(~spoilt.read_well).tolist() == places.tolist()
+    assert run.read_well.all()
+    plain, found = (identify_servo(SERVO, [x], "coulomb") for x in (run, spoilt))
+    for name, sigma in plain.standard_errors.items():
+        assert abs(found.p[name] - plain.p[name]) < sigma, name
+    assert found.errors([spoilt])[0] < 2 * plain.errors([run])[0]
+
+
+def test_a_joint_that_rests_and_flickers_has_no_spikes():
+    t = np.arange(0, 1, 0.01)
+    q = SERVO.step * (np.arange(100) % 7 == 0)
+    assert ServoRun(t, q, 0 * t, JointLoad.pendulum(0.6, 0.12), 16.0).read_well.all()
+
+
+def test_a_fit_without_a_piece_is_that_of_the_others(run):
+    """The jackknife's step against the search without the piece, where it matters most."""
+    fit = identify_servo(SERVO, [run], "coulomb")
+    runs, left = fit.loop.runs, fit.left_out
+    assert len(left.costs) % len(runs) == 0
+    worst = int(left.costs[: len(runs)].argmax())
+    others = ServoLoop(SERVO, [x for k, x in enumerate(runs) if k != worst], fit.loop.h)
+    without = Search(others, fit.free, fit.excitation.scales, 3 * fit.scale).best(fit.p, 10).p
+    sigma = fit.standard_errors
+    assert max(abs(without[name] - fit.p[name]) / sigma[name] for name in fit.free) < 3
+    assert np.isfinite(left.covariance).all()
+    assert (np.linalg.eigvalsh(left.covariance) > 0).all()
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("law", "expected"), [({}, {"coulomb"}), ({"Fl": 0.15}, {"load", "load-stribeck", "directional"})])
+def test_the_law_that_the_log_needs_is_chosen(law, expected):
+    choice = choose_friction(SERVO, [simulated(1, **law)])
+    assert choice.chosen in expected
+    assert choice.errors[choice.chosen] <= 1.2 * min(choice.errors.values())
+
+
+def test_a_fit_says_where_it_lacks(run):
+    """A brake that the model does not have, while torque is off."""
+    braked = simulated(0, Fo=0.1)
+    fit = identify_servo(SERVO, [braked], "coulomb", held={"Fs": 0.1, "Fv": 0.02})
+    assert lacks_of(fit)[0].when == "torque is off"
+    assert sum(lack.share for lack in lacks_of(fit)) == pytest.approx(1.0, abs=0.03)
+    assert lacks_of(fit)[0].error > 2 * lacks_of(identify_servo(SERVO, [run], "coulomb"))[0].error
+
+
+def test_a_light_rotor_is_not_taken_for_a_late_command():
+    """With a link of a tenth of the torque, searches from the rows alone end without an armature, at twice the delay."""
+    heavy = simulated(2)
+    light = replace(heavy, load=JointLoad.pendulum(0.1, 0.06), on=None)
+    q = ServoLoop(SERVO, [replace(light, q=0 * light.t)], 2.5e-4).simulate(LAW)[0, 0]
+    fit = identify_servo(SERVO, [replace(light, q=np.rint(q / SERVO.step) * SERVO.step)], "coulomb")
+    assert fit.p["Ia"] > LAW["Ia"] / 2
+    for name in ("Ia", "delay"):
+        assert abs(fit.p[name] - LAW[name]) < 3 * fit.standard_errors[name], name
