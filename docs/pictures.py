@@ -60,6 +60,8 @@ class Movie(Picture):
 DELAY = ("run delay --out OUT", "identify OUT --torque held --torque-delay 0 --label no-delay")
 COGGING = ("run ripple --out OUT --inner 10 10.004",)
 GAIN = ("run gain --out OUT",)
+KNOWN = "--robot pendulum --servo bench/servo.toml --friction coulomb"
+SERVO = ("run servo --out bench --no-rerun", f"servo bench/log.parquet {KNOWN} --out OUT")
 
 BAR = 0.04
 """Height of the viewer's own bar, as a share of a picture."""
@@ -84,6 +86,8 @@ PICTURES = {
     "table2": Picture(("table2 --out OUT",), "", 0.6),
     "recording-compare": Picture(("run quantization --out OUT/quantization", "run ripple --out OUT/ripple"), "compare"),
     "recording-excited": Picture(("excite panda --out OUT --force",), "", 0.55),
+    "recording-servo": Picture(SERVO),
+    "recording-servo-backlash": Picture(("run servo-backlash --out OUT",), "drive"),
     "recording-study": Picture(("study encoder --out OUT",), "study"),
 }
 

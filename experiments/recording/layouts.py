@@ -78,14 +78,14 @@ def excited(shelf: Shelf) -> Part:
 
 
 def servos(shelf: Shelf) -> Part:
-    """Return servos: commands, positions as measured and as they follow from commands alone, and what is left."""
-    joints = shelf.parents("servo/*/left")
+    """Return servos: commands, measured and simulated positions, and residuals."""
+    joints = shelf.parents("servo/*/residual")
     if not joints:
         return None
     each = [
         column(
             plot(shelf, f"{joint} [rad]: commanded, measured, simulated", f"servo/{joint}/q/*", legend=True),
-            plot(shelf, f"{joint}, measured - simulated [rad]", f"servo/{joint}/left"),
+            plot(shelf, f"{joint}, measured - simulated [rad]", f"servo/{joint}/residual"),
             shares=[3, 2],
         )
         for joint in joints

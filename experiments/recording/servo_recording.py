@@ -1,4 +1,4 @@
-"""The recording of servos: commands, positions as measured and as they follow from commands, and what is left."""
+"""The recording of servos: commands, measured and simulated positions, and residuals."""
 
 from collections.abc import Mapping
 
@@ -49,6 +49,6 @@ def record_servos(
                   ("simulated", q, FORMS["explicit"], 1.5))  # fmt: skip
         for kind, values, color, width in curves:
             base.stream.curve(f"{path}/q/{kind}", times, values, f"{kind} {joint}", color, width)
-        base.stream.curve(f"{path}/left", times, log.q[:, j] - q, f"measured - simulated {joint}", GREY, 1.5)
+        base.stream.curve(f"{path}/residual", times, log.q[:, j] - q, f"measured - simulated {joint}", GREY, 1.5)
     base.finish(f"## Servos, simulated from the commands of {name} alone\n\nGrey: measured. The other curve: simulated.")
     return [(BASE, base.stream)]

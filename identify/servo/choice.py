@@ -9,9 +9,10 @@ from scipy.stats import wilcoxon
 
 from identify.errors import IdentificationError
 from identify.servo.fit import ServoFit
-from identify.servo.friction import SERVO_FRICTIONS
-from identify.servo.identification import identify_servo
+from identify.servo.friction import SERVO_FRICTIONS, SIMPLER
+from identify.servo.identification import Stages
 from identify.servo.left_out import left_out
+from identify.servo.parameters import parameters_of
 from identify.servo.run import ServoRun
 from identify.servo.servo import Servo
 
@@ -58,10 +59,13 @@ def choose_friction(
     IdentificationError
         If no law can be fitted.
     """
-    fits, why = dict[str, ServoFit](), ""
-    for law in SERVO_FRICTIONS:
+    fits, why, rough = dict[str, ServoFit](), "", dict[str, dict[str, float]]()
+    parameters_of("coulomb", more)
+    stages = Stages(servo, runs, held or {})
+    for law in SERVO_FRICTIONS:  # simpler ones come first
+        rough[law] = stages.go(law, (), rough[SIMPLER[law]] if law in SIMPLER else stages.start)
         try:
-            fits[law] = identify_servo(servo, runs, law, more, held)
+            fits[law] = stages.fit(law, more, stages.go(law, more, rough[law]) if more else rough[law])
         except IdentificationError as error:
             why = why or str(error)
     if not fits:

@@ -1,6 +1,6 @@
 """What runs of a servo can show, and what they cannot."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self, final
 
@@ -12,6 +12,9 @@ from identify.servo.servo import Servo
 
 TILTS = 0.01
 """Share of gravity that turns with the joint, of its typical torque, from which on an offset of the position shows."""
+
+TYPICAL = 0.1
+"""Duty of a joint that carries nothing."""
 
 DEGREES = 20.0
 """Times the range of the positions from which on commands are in another unit."""
@@ -49,8 +52,8 @@ class Excitation:
     tilts: bool
 
     @classmethod
-    def of(cls, servo: Servo, runs: Sequence[ServoRun]) -> Self:
-        """Return what runs can show; raise IdentificationError if that is nothing."""
+    def of(cls, servo: Servo, runs: Sequence[ServoRun], held: Mapping[str, float]) -> Self:
+        """Return what runs can show, some parameters being known; raise IdentificationError if that is nothing."""
         if not runs:
             raise IdentificationError("there is no run of the servo")
         ranges = [float(np.ptp(run.clean)) for run in runs]
@@ -80,11 +83,12 @@ class Excitation:
         inertia = max(float(np.mean(run.load.inertia)) for run in runs)
         T = float(np.median([run.T for run in runs]))
         speed = float(np.quantile(speeds, 0.99))
-        torque = max(float(np.sqrt(np.mean(np.square(loads)))), inertia * speed / (50 * T))
+        torque = max(float(np.sqrt(np.mean(np.square(loads)))), (inertia + held.get("Ia", 0.0)) * speed / (50 * T))
+        torque = max(torque, TYPICAL * held.get("a", 0.0) * servo.supply, held.get("b", 0.0) * speed, held.get("Fs", 0.0))
         if torque == 0:
             raise ExcitationError(
                 f"{runs[0].name}: the joint carries no known load, so that only ratios of a, b, friction and armature show: "
-                "add a known mass to the robot's file, or move the joint through gravity"
+                "add a known mass to the robot's file, move the joint through gravity, or give one of them (--hold a=0.5)"
             )
         off = any((~run.enabled).any() and np.ptp(run.clean[~run.enabled]) > 20 * servo.step for run in runs)
         swing = max(float(np.hypot(run.load.sine, run.load.cosine).max()) for run in runs)

@@ -1,6 +1,6 @@
 """The identification of a servo: rows, then the closed loop, law by law and finer from stage to stage."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 
 import numpy as np
@@ -82,39 +82,38 @@ def identify_servo(
     SettingError
         If a name is unknown.
     """
-    stages = _Stages(servo, runs, held or {}, (*more, *(held or {})), friction)
-    with one_thread():
-        for law in simpler(friction):
-            stages.go(law, ())
-        stages.go(friction, more)
-        fit = stages.fit(friction, more)
-        require_explained(fit)
-        if not any(name in stages.held for name in TORQUES):
-            require_scale(fit)
-    return fit
+    parameters_of(friction, (*more, *(held or {})))
+    stages = Stages(servo, runs, held or {})
+    p = stages.start
+    for law in simpler(friction):
+        p = stages.go(law, (), p)
+    return stages.fit(friction, more, stages.go(friction, more, p))
 
 
-class _Stages:
-    """Runs at work, and the parameters that were found of them last."""
+class Stages:
+    """Runs at work: from stage to stage with more parameters, and finer.
 
-    def __init__(
-        self, servo: Servo, runs: Sequence[ServoRun], held: dict[str, float], names: Sequence[str], friction: str
-    ) -> None:
-        parameters_of(friction, names)
+    Parameters
+    ----------
+    servo, runs, held
+        As for `identify_servo`.
+    """
+
+    def __init__(self, servo: Servo, runs: Sequence[ServoRun], held: dict[str, float]) -> None:
         require_possible(held)
-        self.held, self._servo, self._excitation = held, servo, Excitation.of(servo, runs)
+        self.held, self._servo, self._excitation = held, servo, Excitation.of(servo, runs, held)
         whole = _evenly(runs)
         self._few = len(whole) <= FEW
         with one_thread():
-            self.p = self._started(whole)
+            self.start = self._started(whole)
         some = whole[::2]
         if self._few:
-            whole = some = [piece for run in whole for piece in pieces(run, servo.step, 1.5 * self.p["delay"])]
+            whole = some = [piece for run in whole for piece in pieces(run, servo.step, 1.5 * self.start["delay"])]
         self._whole, self._coarse = whole, ServoLoop(servo, some, COARSE * self._excitation.T)
 
     def _started(self, runs: Sequence[ServoRun]) -> dict[str, float]:
         """Return the start of the rows whose simulation fits best."""
-        starts = ServoRows(self._servo, runs).starts()[:TRIED]
+        starts = ServoRows(self._servo, runs, self.held).starts()[:TRIED]
         if not starts:
             raise IdentificationError(
                 f"{runs[0].name}: more duty does not make more torque in the direction of the command; has the command the "
@@ -128,23 +127,24 @@ class _Stages:
             del best["rate"]
         return {**best, "offset": best["offset"] * self._excitation.tilts, **self.held}
 
-    def go(self, friction: str, more: Sequence[str]) -> None:
-        """Go on with a law of friction and further parameters."""
-        first = first_of(friction, self.p, self._excitation.speed) | dict.fromkeys(more, 0.0)
-        begin = {**first, **self.p, **self.held}
-        if "backlash" in more and "backlash" not in {**self.p, **self.held}:
+    def go(self, friction: str, more: Sequence[str], p: Mapping[str, float]) -> dict[str, float]:
+        """Return the parameters with a law of friction and further ones, from those of a simpler law."""
+        first = first_of(friction, p, self._excitation.speed) | dict.fromkeys(more, 0.0)
+        begin = {**first, **p, **self.held}
+        if "backlash" in more and "backlash" not in {**p, **self.held}:
             begin["backlash"] = _play(self._servo, self._coarse, begin)
         known = parameters_of(friction, (*more, *self.held))
         begin = {name: x for name, x in begin.items() if name in known}
         free = self._free(friction, more, begin)
-        found = self._search(self._coarse, begin, free).best(begin)
-        for _ in range(SHAKEN):
-            search = self._search(self._coarse, found.p, free)
-            best = min((search.best(p) for p in self._shaken(search, found.p)), key=lambda other: other.cost)
-            if best.cost > (1 - ESCAPED) * search.cost_of(found.p):
-                break
-            found = best
-        self.p = found.p
+        with one_thread():
+            found = self._search(self._coarse, begin, free).best(begin)
+            for _ in range(SHAKEN):
+                search = self._search(self._coarse, found.p, free)
+                best = min((search.best(other) for other in self._shaken(search, found.p)), key=lambda other: other.cost)
+                if best.cost > (1 - ESCAPED) * search.cost_of(found.p):
+                    break
+                found = best
+        return found.p
 
     def _shaken(self, search: Search, p: dict[str, float]) -> list[dict[str, float]]:
         """Return the best of parameters in other valleys: a rotor that is light looks like a command that is late."""
@@ -159,12 +159,17 @@ class _Stages:
         order = np.argsort(search.cost(self._coarse.simulate(lanes)))[:VALLEYS]
         return [tried[int(k)] for k in order]
 
-    def fit(self, friction: str, more: Sequence[str]) -> ServoFit:
-        """Return the parameters with all runs, in fine steps."""
+    def fit(self, friction: str, more: Sequence[str], p: dict[str, float]) -> ServoFit:
+        """Return the fit of all runs, in fine steps; raise IdentificationError if it explains nothing."""
         step = (FINE if self._few else MEDIUM) * self._excitation.T
-        loop, free = ServoLoop(self._servo, self._whole, step), self._free(friction, more, self.p)
-        found = self._search(loop, self.p, free).best(self.p, REFINED)
-        return ServoFit(self._servo, friction, free, found, loop, self._excitation)
+        with one_thread():
+            loop, free = ServoLoop(self._servo, self._whole, step), self._free(friction, more, p)
+            found = self._search(loop, p, free).best(p, REFINED)
+            fit = ServoFit(self._servo, friction, free, found, loop, self._excitation)
+            require_explained(fit)
+            if not any(name in self.held for name in TORQUES):
+                require_scale(fit)
+        return fit
 
     def _search(self, loop: ServoLoop, begin: dict[str, float], free: Sequence[str]) -> Search:
         r = np.abs(loop.q - loop.simulate(begin)[0])[loop.kept]

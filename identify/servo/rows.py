@@ -1,6 +1,6 @@
 """Where a search begins: rows of the servo's law, linear in all but delay and rate limit (variable projection)."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import final
 
 import numpy as np
@@ -31,9 +31,12 @@ class ServoRows:
         What is known.
     runs : sequence of ServoRun
         What was logged.
+    held : mapping of str to float
+        Parameters that are known.
     """
 
-    def __init__(self, servo: Servo, runs: Sequence[ServoRun]) -> None:
+    def __init__(self, servo: Servo, runs: Sequence[ServoRun], held: Mapping[str, float]) -> None:
+        self._held = {COLUMNS.index(name): x for name, x in held.items() if name in COLUMNS[:-1]}
         self.servo, self._runs = servo, [_Uniform(run) for run in runs]
         self.fast = max(run.fast for run in self._runs)
 
@@ -56,9 +59,10 @@ class ServoRows:
     def _solved(self, W: Array, Y: Array, delay: float, rate: float) -> tuple[float, dict[str, float]] | None:
         """Return residual and linear parameters; None if they make no servo."""
         size = np.sqrt((W**2).sum(axis=0))
-        used = size > 0
-        X = np.zeros(len(COLUMNS))
-        X[used] = np.linalg.lstsq(W[:, used] / size[used], Y, rcond=1e-8)[0] / size[used]
+        X, used = np.zeros(len(COLUMNS)), size > 0
+        for column, value in self._held.items():
+            X[column], used[column] = value, False
+        X[used] = np.linalg.lstsq(W[:, used] / size[used], Y - W @ X, rcond=1e-8)[0] / size[used]
         if X[0] <= 0:
             return None
         p = dict(zip(COLUMNS, X.tolist(), strict=True))

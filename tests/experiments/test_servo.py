@@ -92,7 +92,9 @@ def test_servo_of_a_bench_is_found_and_written(bench, idbench):
     assert model.dof_armature[0] == found["Ia"]
     assert model.nu == 1
     assert "axis: the model holds on other logs" in out
-    assert {"servo/axis/q/measured", "servo/axis/q/simulated", "servo/axis/left"} <= known([Path("results/recording.rrd")])[1]
+    assert {"servo/axis/q/measured", "servo/axis/q/simulated", "servo/axis/residual"} <= known([Path("results/recording.rrd")])[
+        1
+    ]
 
 
 def test_the_python_function_moves_as_the_fit_does(bench, idbench):
