@@ -75,9 +75,11 @@ class Servos:
         self, friction: str, find: Sequence[str], held: dict[str, float]
     ) -> Iterator[tuple[str, "ServoFit | str | FrictionChoice"]]:
         """Yield the fit of each joint, all laws of friction compared (`auto`), or why there is none."""
-        for joint, runs in zip(self.links.joints, self.runs, strict=True):
+        for joint, runs, slides in zip(self.links.joints, self.runs, self.links.slides, strict=True):
             servo = self.known.servo(joint, "")
             try:
+                if slides:
+                    raise IdentificationError(f"{joint} slides: gain and counts of servo.toml are those of a joint that turns")
                 if friction == AUTO:
                     yield joint, choose_friction(servo, runs, find, held)
                 else:

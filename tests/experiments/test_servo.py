@@ -217,6 +217,13 @@ def test_wrong_options_are_refused(bench, complaint, more, expected):
     assert expected in complaint(*[str(word) for word in words(bench, *more)])
 
 
+def test_a_joint_that_slides_is_refused(bench, tmp_path, complaint):
+    path = tmp_path / "slide.xml"
+    path.write_text(PENDULUM.replace('name="axis"', 'name="axis" type="slide"'))
+    args = ["servo", str(bench / "fit.csv"), "--robot", str(path), "--servo", str(bench / "servo.toml")]
+    assert "axis slides" in complaint(*args)
+
+
 def test_missing_files_are_named(bench, complaint):
     assert "--servo is missing" in complaint("servo", str(bench / "fit.csv"), "--robot", str(bench / "pendulum.xml"))
     assert "nowhere.csv" in complaint(*[str(word) for word in words(bench)], str(bench / "nowhere.csv"))
