@@ -11,7 +11,7 @@ from identify.servo.closed_loop import ServoLoop
 from identify.servo.excitation import Excitation
 from identify.servo.fit import ServoFit
 from identify.servo.friction import SERVO_FRICTIONS, first_of, simpler
-from identify.servo.parameters import SERVO_PARAMETERS, parameters_of
+from identify.servo.parameters import FURTHER, SERVO_PARAMETERS, parameters_of
 from identify.servo.pieces import pieces
 from identify.servo.refusals import TORQUES, require_explained, require_possible, require_scale
 from identify.servo.rows import ServoRows
@@ -133,8 +133,8 @@ class Stages:
         begin = {**first, **p, **self.held}
         if "backlash" in more and "backlash" not in {**p, **self.held}:
             begin["backlash"] = _play(self._servo, self._coarse, begin)
-        known = parameters_of(friction, (*more, *self.held))
-        begin = {name: x for name, x in begin.items() if name in known}
+        known = {*parameters_of(friction, more), *(name for name in self.held if name in FURTHER)}
+        begin = {name: x for name, x in begin.items() if name in known}  # what is held may be of a further law
         free = self._free(friction, more, begin)
         with one_thread():
             found = self._search(self._coarse, begin, free).best(begin)

@@ -203,6 +203,8 @@ def test_wrong_servo_files_are_refused(bench, tmp_path, complaint, text, expecte
         (["--find", "Fle"], "friction load has no parameter"),
         (["--hold", "Fgd=0.1"], "friction load has no parameter"),
         (["--hold", "a=0"], "impossible"),
+        (["--friction", "auto", "--hold", "Fx=1"], "no parameter 'Fx'"),
+        (["--friction", "auto", "--find", "Fl"], "no parameter 'Fl'"),
         (["--hold", "rate=nan"], "impossible"),
         (["--hold", "a"], "NAME=VALUE"),
         (["--hold", "a=much"], "letters and numbers"),

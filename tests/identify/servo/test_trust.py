@@ -105,3 +105,10 @@ def test_of_a_joint_without_a_load_one_parameter_sets_the_scale(name):
     for other, true in {**LAW, "b": LAW["b"] + LAW["Fv"]}.items():
         if other in fit.standard_errors:
             assert abs(fit.p[other] - true) < 4 * fit.standard_errors[other] + 0.01 * abs(true), other
+
+
+def test_a_parameter_of_a_further_law_may_be_known(run):
+    fit = identify_servo(SERVO, [run], "load", held={"Fl": 0.0})
+    assert fit.p["Fl"] == 0
+    assert "Fl" not in fit.free
+    assert fit.p["Fs"] == pytest.approx(LAW["Fs"], abs=4 * fit.standard_errors["Fs"])
