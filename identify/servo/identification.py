@@ -151,10 +151,10 @@ class Stages:
         base = {**p, "Ia": max(p["Ia"], p["b"] * self._excitation.T / 2)}
         T, held = self._excitation.T, self.held
         tried = []
-        for scale, Ia, delay in product(SCALES, ROTORS, LATER):
+        for scale, Ia, delay, offset in product(SCALES, ROTORS, LATER, (base["offset"], 0.0)):
             torques = {name: x * scale for name, x in base.items() if name in TORQUES}
-            other = {**base, **torques, "Ia": base["Ia"] * Ia, "delay": max(base["delay"] + delay * T, 0.0)}
-            tried.append({**other, **held})
+            late = max(base["delay"] + delay * T, 0.0)
+            tried.append({**base, **torques, "Ia": base["Ia"] * Ia, "delay": late, "offset": offset, **held})
         lanes = {name: np.array([x[name] for x in tried]) for name in base}
         order = np.argsort(search.cost(self._coarse.simulate(lanes)))[:VALLEYS]
         return [tried[int(k)] for k in order]

@@ -3,6 +3,9 @@
 from collections.abc import Sequence
 from typing import NamedTuple, final
 
+import numpy as np
+
+from identify.arrays import Array
 from identify.errors import SettingError
 from identify.servo.friction import SERVO_FRICTIONS
 
@@ -23,8 +26,8 @@ class ServoParameter(NamedTuple):
         Scale of the step where it is absolute: torque, angle, time, speed, or 1.
     share : float
         Step as a share of that scale.
-    low : float
-        Smallest value.
+    low, high : float
+        Smallest and largest value.
     """
 
     unit: str
@@ -33,6 +36,7 @@ class ServoParameter(NamedTuple):
     of: str = "1"
     share: float = 0.01
     low: float = 0.0
+    high: float = float("inf")
 
 
 NEGATIVE = float("-inf")
@@ -43,7 +47,7 @@ SERVO_PARAMETERS: dict[str, ServoParameter] = {
     "Ia": ServoParameter("kg m^2", "armature: inertia of the rotor behind the gear", 0.04),
     "Fs": ServoParameter("N m", "Coulomb friction", of="torque", share=0.01),
     "Fv": ServoParameter("N m s/rad", "viscous friction", of="torque per speed", share=0.01),
-    "offset": ServoParameter("rad", "angle of the file minus angle of the log", of="angle", share=2.0, low=NEGATIVE),
+    "offset": ServoParameter("rad", "angle of the file minus angle of the log", of="angle", share=2.0, low=-np.pi, high=np.pi),
     "delay": ServoParameter("s", "delay of the command", of="time", share=0.15),
     "rate": ServoParameter("rad/s", "rate limit of the target", 0.02),
     "lead": ServoParameter("s", "by how much the loop sees its position early", of="time", share=0.15, low=NEGATIVE),
@@ -90,6 +94,6 @@ def step_of(name: str, value: float, scales: dict[str, float]) -> float:
     return parameter.relative * abs(value) if parameter.relative else parameter.share * scales[parameter.of]
 
 
-def lows(names: Sequence[str]) -> list[float]:
-    """Return the smallest values of parameters."""
-    return [SERVO_PARAMETERS[name].low for name in names]
+def limits_of(names: Sequence[str]) -> Array:
+    """Return the smallest and the largest values of parameters, shape (2, p)."""
+    return np.array([[SERVO_PARAMETERS[name].low, SERVO_PARAMETERS[name].high] for name in names]).reshape(-1, 2).T

@@ -13,7 +13,7 @@ from scipy.special import ndtri
 
 from identify.arrays import Array
 from identify.servo.closed_loop import ServoLoop
-from identify.servo.parameters import SERVO_PARAMETERS, lows, step_of
+from identify.servo.parameters import SERVO_PARAMETERS, limits_of, step_of
 
 DAMPINGS = 10.0 ** np.arange(-2.0, 4.0)
 """Marquardt's parameter, as multiples of the last one that helped."""
@@ -107,7 +107,7 @@ class Search:
         self._count = loop.servo.step
         # Residuals are a third of c in the median; a rounded position is off by its twelfth.
         self._certainty = float((c / 3 / MEDIAN) ** 2 / (self._count**2 / 12))
-        self._low = np.array(lows(self.free))
+        self._low, self._high = limits_of(self.free)
         self._relative = np.array([SERVO_PARAMETERS[name].relative > 0 for name in self.free], dtype=bool)
 
     def cost(self, q: Array, ahead: Array | float = 0.0) -> Array:
@@ -155,7 +155,7 @@ class Search:
     def _within(self, x: Array, steps: Array) -> Array:
         """Return x with steps, which change no parameter whose size is known by more than a third."""
         most = np.where(self._relative, np.abs(x) / 3, np.inf)
-        return np.maximum(x + np.clip(steps, -most, most), self._low)
+        return np.clip(x + np.clip(steps, -most, most), self._low, self._high)
 
     def _simulated(self, start: Mapping[str, float], X: Array, ahead: Array) -> Array:
         lanes: dict[str, Array | float] = {**start, **dict(zip(self.free, X.T, strict=True))}
