@@ -45,7 +45,7 @@ def test_every_scenario_that_ships_runs(name, tmp_path, capsys):
         "recording.idbench-GLS.rrd",
         "recording.rrd",
         "scenario.toml",
-        *(["servo.toml"] if of_servos else []),
+        *(["servo.toml", "commands.csv"] if of_servos else []),
         "summary.json",
     ]
     summary = json.loads((out / "summary.json").read_text())
