@@ -40,14 +40,14 @@ def test_every_scenario_that_ships_runs(name, tmp_path, capsys):
     first = "YYR1" if load(name).robot == "pendulum" else "ZZR1"
     assert all(word in printed for word in (first, "Cond(W)", "expla", "torque: held"))
     assert ("uv run idbench servo" in printed) == of_servos
-    assert sorted({x.name for x in out.iterdir()} - {MANIFEST}) == [
+    assert {x.name for x in out.iterdir()} - {MANIFEST} == {
         "log.parquet",
         "recording.idbench-GLS.rrd",
         "recording.rrd",
         "scenario.toml",
         *(["servo.toml", "commands.csv"] if of_servos else []),
         "summary.json",
-    ]
+    }
     summary = json.loads((out / "summary.json").read_text())
     assert list(summary["models"]) == ["explicit", "implicit", "power"]
     assert summary["scenario"]["name"] == name
@@ -83,7 +83,7 @@ def test_a_csv_is_identified_with_what_its_torque_means(csv, capsys, truth, tmp_
     assert summary["models"]["explicit"]["relative_error_percent"] is None
     np.testing.assert_allclose(summary["models"]["power"]["estimate"], truth, rtol=1e-3)
     assert min(summary["models"]["power"]["explained_share"]) > 0.999
-    assert sorted({x.name for x in out.iterdir()} - {MANIFEST}) == [
+    assert {x.name for x in out.iterdir()} - {MANIFEST} == {
         "log.parquet",
         "recording.idbench-GLS.rrd",
         "recording.rrd",
