@@ -89,7 +89,7 @@ def test_a_csv_is_identified_with_what_its_torque_means(csv, capsys, truth, tmp_
         "recording.rrd",
         "report.html",
         "summary.json",
-    ]
+    }
     assert read_log(out / "log.parquet").torque.meaning == "held"
 
 
