@@ -147,7 +147,7 @@ def test_joints_that_are_done_are_kept_when_the_others_are_interrupted(tmp_path,
 
 @pytest.mark.thorough
 def test_the_page_takes_an_arm_to_a_model(root, tmp_path, monkeypatch, capfd):
-    """Every command of the page, but for viewers."""
+    """Every command of the page, but for viewers, and for all laws of six joints, which take minutes."""
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"```sh\n(.*?)```", (root / "docs" / "servo.md").read_text(), re.DOTALL)
     for block in blocks:
@@ -158,10 +158,9 @@ def test_the_page_takes_an_arm_to_a_model(root, tmp_path, monkeypatch, capfd):
             )
             continue
         for line in block.splitlines():
-            if " view " not in line and "mujoco.viewer" not in line:
+            if not any(word in line for word in (" view ", "mujoco.viewer", "--friction auto")):
                 assert main(shlex.split(line.removeprefix("uv run idbench "))) == 0, line
-    printed = capfd.readouterr().out
-    assert "(chosen)" in printed
+    assert "hold on other logs" in capfd.readouterr().out.replace("holds", "hold")
     summary = json.loads(Path("runs/servos/summary.json").read_text())
     errors = summary["mujoco_error"]["log.parquet"]
     assert set(errors) == set(summary["joints"])
