@@ -7,11 +7,12 @@ from typing import final
 import numpy as np
 from scipy.stats import wilcoxon
 
+from identify.arrays import Array
 from identify.errors import IdentificationError
 from identify.servo.fit import ServoFit
 from identify.servo.friction import SERVO_FRICTIONS, SIMPLER
 from identify.servo.identification import Stages
-from identify.servo.left_out import left_out
+from identify.servo.left_out import left_out, stretches
 from identify.servo.parameters import parameters_of
 from identify.servo.run import ServoRun
 from identify.servo.servo import Servo
@@ -72,7 +73,8 @@ def choose_friction(
     if not fits:
         raise IdentificationError(why)
     c = 3 * float(np.median([fit.scale for fit in fits.values()]))  # one measure for all
-    parts = PER_PARAMETER * max(len(fit.free) for fit in fits.values())
+    clusters = PER_PARAMETER * max(len(fit.free) for fit in fits.values())
+    parts = min(stretches(fit.found, fit.loop, clusters) for fit in fits.values())  # the same parts of the log for all laws
     costs = {law: left_out(fit.found, fit.loop, c, parts).costs for law, fit in fits.items()}
     tests = len(fits) - 1
     first = next(iter(fits))
@@ -84,6 +86,5 @@ def choose_friction(
     return FrictionChoice(fits, chosen, {law: float(np.sqrt(x.mean())) for law, x in costs.items()}, p)
 
 
-def _p(one: "np.typing.NDArray[np.float64]", other: "np.typing.NDArray[np.float64]", tests: int) -> float:
-    n = min(len(one), len(other))
-    return min(1.0, tests * float(wilcoxon(one[:n], other[:n]).pvalue))
+def _p(one: Array, other: Array, tests: int) -> float:
+    return min(1.0, tests * float(wilcoxon(one, other).pvalue))

@@ -10,7 +10,7 @@ import numpy as np
 from identify.arrays import Array
 from identify.servo.closed_loop import ServoLoop
 from identify.servo.excitation import Excitation
-from identify.servo.left_out import LeftOut, left_out
+from identify.servo.left_out import LeftOut, left_out, stretches
 from identify.servo.run import ServoRun
 from identify.servo.search import Found
 from identify.servo.servo import Servo
@@ -55,7 +55,8 @@ class ServoFit:
     @cached_property
     def left_out(self) -> LeftOut:
         """The fit without each run, or piece of a run."""
-        return left_out(self.found, self.loop, 3 * self.scale, CLUSTERS * len(self.free))
+        parts = stretches(self.found, self.loop, CLUSTERS * len(self.free))
+        return left_out(self.found, self.loop, 3 * self.scale, parts)
 
     @property
     def covariance(self) -> Array:

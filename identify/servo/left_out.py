@@ -33,7 +33,7 @@ class LeftOut:
     costs: Array
 
 
-def left_out(found: Found, loop: ServoLoop, c: float, clusters: int) -> LeftOut:
+def left_out(found: Found, loop: ServoLoop, c: float, parts: int) -> LeftOut:
     """Return what a fit is without each cluster, and H^-1 S H^-1, the covariance that follows.
 
     H is the curvature of the objective, S the covariance of its gradient (P. J. Huber, 1967), both those that are left when
@@ -47,8 +47,8 @@ def left_out(found: Found, loop: ServoLoop, c: float, clusters: int) -> LeftOut:
         A fit and its runs.
     c : float
         Scale of Fair's function [rad].
-    clusters : int
-        As many as are needed: runs are cut into stretches where there are fewer.
+    parts : int
+        Stretches of time into which each run is cut (see `stretches`).
     """
     J, r = found.sensitivity, found.residual
     size = np.sqrt((J**2).mean(axis=(0, 1)))
@@ -56,7 +56,6 @@ def left_out(found: Found, loop: ServoLoop, c: float, clusters: int) -> LeftOut:
     J = J / size
     w = 1 / (1 + np.abs(r) / c)
     free = found.beginning.free_of(J, w**2)  # w**2: the weight of Fair's function, the derivative of r w
-    parts = _parts(r, loop, clusters)
     scores = _summed(free * (w * r)[..., None], parts)
     curvatures = _summed(np.einsum("rti,rtj->rtij", free * (w**2)[..., None], J), parts)
     S, inverse, without = _jackknife(scores, curvatures)
@@ -91,8 +90,9 @@ def _summed(x: Array, parts: int) -> Array:
     return np.concatenate([part.sum(axis=1) for part in split])
 
 
-def _parts(r: Array, loop: ServoLoop, clusters: int) -> int:
-    """Return into how many stretches runs are cut: enough, but none shorter than residuals are correlated."""
+def stretches(found: Found, loop: ServoLoop, clusters: int) -> int:
+    """Return into how many stretches runs are cut: enough for so many clusters, none shorter than residuals are correlated."""
+    r = found.residual
     wanted = int(np.ceil(clusters / len(r)))
     return max(1, min(wanted, loop.samples // _correlated(r)))
 

@@ -24,7 +24,7 @@ EARLY = 1.3
 """Steps by which a command acts early: force acts from half a step before, the rate limit moves on before that. Measured."""
 
 
-NO_DRIVE = ("armature", "damping", "frictionloss", "stiffness", "margin")
+NO_DRIVE = ("armature", "damping", "frictionloss", "stiffness", "margin", "ref", "springref")
 """What a joint that is free play has none of, whatever the defaults of the file are."""
 
 GROUPS = 31
@@ -141,7 +141,7 @@ def _set_play(root: ElementTree.Element, plays: Mapping[str, float]) -> None:
             if len(joints) > 1:
                 raise RobotError(f"backlash of {joint.get('name')} needs a body of its own; its body moves in several joints")
             half, limits = plays[str(joint.get("name"))] / 2, {"solreflimit": f"{2 * STEP:g} 1", "solimplimit": _words(HARD)}
-            alike = {key: str(joint.get(key)) for key in ("type", "axis", "pos") if joint.get(key) is not None}
+            alike = {key: str(joint.get(key)) for key in ("class", "type", "axis", "pos") if joint.get(key) is not None}
             own = {"range": f"{-half!r} {half!r}", "limited": "true", **dict.fromkeys(NO_DRIVE, "0")}
             gap = ElementTree.Element("joint", {"name": f"{joint.get('name')}{PLAY}", **alike, **own, **limits})
             body.insert(list(body).index(joint) + 1, gap)
