@@ -1,6 +1,6 @@
 """The servos of a robot, identified joint by joint, and judged on held-out logs."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +13,7 @@ from experiments.servo.loads import loads
 from identify import Array, IdentificationError
 from identify.files.servo_file import ServoFile
 from identify.files.servo_log import ServoColumns
-from identify.servo import ServoFit, ServoRun, identify_servo
+from identify.servo import ServoFit, ServoRun, identify_again, identify_servo
 from identify.servo.choice import FrictionChoice, choose_friction
 from identify.servo.lack import lacks_of
 from identify.servo.parameters import SERVO_PARAMETERS
@@ -57,10 +57,20 @@ class Servos:
 
     @cached_property
     def runs(self) -> list[list[ServoRun]]:
-        """Runs of each joint."""
+        """Runs of each joint, while the others move as they were measured."""
+        return self._runs({})
+
+    def runs_with(self, fits: Mapping[str, ServoFit]) -> list[list[ServoRun]]:
+        """Return runs of each joint, while others that have a fit move as that says, from their commands."""
+        if self.links.n == 1 or not fits:
+            return self.runs
+        place = {self.links.joints.index(joint): fit for joint, fit in fits.items()}
+        return self._runs({j: fit.simulate(self.runs[j]) for j, fit in place.items()})
+
+    def _runs(self, angles: Mapping[int, list[Array]]) -> list[list[ServoRun]]:
         every = [[] for _ in self.links.joints]  # type: list[list[ServoRun]]
-        for path, columns in self.logs.items():
-            for j, load in enumerate(loads(self.links, columns)):
+        for k, (path, columns) in enumerate(self.logs.items()):
+            for j, load in enumerate(loads(self.links, columns, {i: q[k] for i, q in angles.items()})):
                 every[j].append(self._run(path, columns, j, load))
         return every
 
@@ -87,10 +97,21 @@ class Servos:
             except IdentificationError as error:
                 yield joint, str(error)
 
+    def fits_again(self, fits: Mapping[str, ServoFit]) -> Iterator[tuple[str, ServoFit | str]]:
+        """Yield fits of the joints of an arm once more, while the others move as their fits say, not as measured."""
+        if self.links.n == 1 or len(fits) == 1:
+            return
+        runs = dict(zip(self.links.joints, self.runs_with(fits), strict=True))
+        for joint, fit in fits.items():
+            try:
+                yield joint, identify_again(fit, runs[joint])
+            except IdentificationError as error:
+                yield joint, str(error)
+
     def simulated(self, fits: dict[str, ServoFit], path: Path) -> dict[str, Array]:
         """Return the positions of joints from the commands of a log alone [rad], as the log has them, by joint."""
         k = list(self.logs).index(path)
-        runs = dict(zip(self.links.joints, self.runs, strict=True))
+        runs = dict(zip(self.links.joints, self.runs_with(fits), strict=True))
         return {joint: fit.simulate([runs[joint][k]])[0] for joint, fit in fits.items()}
 
     def values(self, fit: ServoFit, joint: str) -> ServoValues:
@@ -122,7 +143,7 @@ class Servos:
 
 def held_out(servos: Servos, fits: dict[str, ServoFit]) -> dict[str, Array]:
     """Return the mean absolute error [rad] of each run of other logs, by joint."""
-    runs = dict(zip(servos.links.joints, servos.runs, strict=True))
+    runs = dict(zip(servos.links.joints, servos.runs_with(fits), strict=True))
     return {joint: fit.errors(runs[joint]) for joint, fit in fits.items()}
 
 

@@ -10,6 +10,7 @@ and rad. Friction and the rotor's inertia Ia act as at any joint.
 
 from identify.servo.fit import ServoFit as ServoFit
 from identify.servo.friction import SERVO_FRICTIONS as SERVO_FRICTIONS
+from identify.servo.identification import identify_again as identify_again
 from identify.servo.identification import identify_servo as identify_servo
 from identify.servo.load import JointLoad as JointLoad
 from identify.servo.parameters import parameters_of as parameters_of

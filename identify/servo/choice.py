@@ -63,7 +63,7 @@ def choose_friction(
     fits, why, rough = dict[str, ServoFit](), "", dict[str, dict[str, float]]()
     of_laws = {name for names in SERVO_FRICTIONS.values() for name in names}
     parameters_of("coulomb", (*more, *(name for name in held or {} if name not in of_laws)))
-    stages = Stages(servo, runs, held or {})
+    stages = Stages.begun(servo, runs, held or {})
     for law in SERVO_FRICTIONS:  # simpler ones come first
         rough[law] = stages.go(law, (), rough[SIMPLER[law]] if law in SIMPLER else stages.start)
         try:

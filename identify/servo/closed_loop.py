@@ -15,6 +15,9 @@ from identify.servo.servo import Servo
 if TYPE_CHECKING:
     from identify.servo.step import Law
 
+IN_COUNTS = 0.1
+"""How far from a whole count a position may be written, as a share of it, and still be one."""
+
 WAY = 6
 """Ranges of its motion that a joint may cross in a step: beyond, it is lost, and numbers would overflow."""
 
@@ -31,10 +34,12 @@ class ServoLoop:
         What was logged.
     step : float
         Longest step [s].
+    count : float
+        Angle to whose multiples positions at rest are rounded [rad], as the servo reports them; 0: none are (see `count_of`).
     """
 
-    def __init__(self, servo: Servo, runs: Sequence[ServoRun], step: float) -> None:
-        self.servo, self.runs = servo, tuple(runs)
+    def __init__(self, servo: Servo, runs: Sequence[ServoRun], step: float, count: float = 0.0) -> None:
+        self.servo, self.runs, self.count = servo, tuple(runs), count
         typical = float(np.median([run.T for run in self.runs]))
         self.h = typical / np.ceil(typical / step - 1e-9)
         self.samples = max(len(run.t) for run in self.runs)
@@ -70,7 +75,7 @@ class ServoLoop:
         firmware = Firmware(servo.gain * self.runs[k].kp, servo.duty_limit, servo.step)
         for lane, (law, more) in enumerate(zip(laws, ahead, strict=True)):
             path = motion(law, firmware, self._tracks[k], (q + more, speed), self.h, self._fastest)
-            out[lane, : len(before)] = at_samples(path, before, share)
+            out[lane, : len(before)] = at_samples(path, before, share, self.count)
         out[:, len(before) :] = out[:, len(before) - 1 : len(before)]
 
     def _place(self, run: ServoRun) -> tuple[npt.NDArray[np.int64], Array]:
@@ -88,6 +93,15 @@ class ServoLoop:
         voltage = np.full(len(t), self.servo.supply) if run.voltage is None else run.voltage[place]
         load = (np.interp(t, run.t - run.t[0], np.broadcast_to(x, run.t.shape)) for x in vars(run.load).values())
         return Track(run.command[place], _centred(voltage * on), _centred(on), *load)
+
+
+def count_of(servo: Servo, runs: Sequence[ServoRun]) -> float:
+    """Return the angle of a count [rad] if nearly all positions are whole counts, else 0, as where they were filtered.
+
+    A joint stops where the firmware sees the next count. There, errors of rounding are no noise: all have one direction.
+    """
+    x = np.concatenate([run.q for run in runs]) / servo.step
+    return servo.step if np.mean(np.abs(x - np.rint(x)) < IN_COUNTS) > 1 - IN_COUNTS else 0.0
 
 
 def _padded(x: npt.NDArray[Any], length: int, value: Any = None) -> npt.NDArray[Any]:

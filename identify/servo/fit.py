@@ -87,9 +87,8 @@ class ServoFit:
         return max(float(np.median(np.abs(self.found.residual[self.loop.kept]))), self.servo.step / 4)
 
     def simulate(self, runs: Sequence[ServoRun]) -> list[Array]:
-        """Return the positions of runs from their commands alone [rad], at their samples."""
-        loop = ServoLoop(self.servo, runs, self.loop.h)
-        q = loop.simulate(self.p)[0]
+        """Return the positions of runs from their commands alone [rad], at their samples, without the encoder's rounding."""
+        q = ServoLoop(self.servo, runs, self.loop.h).simulate(self.p)[0]
         return [x[: len(run.t)] for x, run in zip(q, runs, strict=True)]
 
     def errors(self, runs: Sequence[ServoRun]) -> Array:

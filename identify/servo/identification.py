@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import product
+from typing import Self, final
 
 import numpy as np
 
 from identify.errors import IdentificationError
 from identify.one_thread import one_thread
-from identify.servo.closed_loop import ServoLoop
+from identify.servo.closed_loop import ServoLoop, count_of
 from identify.servo.excitation import Excitation
 from identify.servo.fit import ServoFit
 from identify.servo.friction import SERVO_FRICTIONS, first_of, simpler
@@ -16,7 +17,7 @@ from identify.servo.pieces import pieces
 from identify.servo.refusals import TORQUES, require_explained, require_possible, require_scale
 from identify.servo.rows import ServoRows
 from identify.servo.run import ServoRun
-from identify.servo.search import Search
+from identify.servo.search import Found, Search
 from identify.servo.servo import Servo
 
 TRIED = 48
@@ -34,7 +35,7 @@ COARSE, MEDIUM, FINE = 0.4, 0.2, 0.1
 SHAKEN = 2
 """Times that a search leaves its valley for others, at most."""
 
-SCALES, ROTORS, LATER = (0.7, 1.0, 1.4), (0.25, 1.0, 4.0), (-2.0, -1.0, -0.5, 0.0, 0.5)
+SCALES, ROTORS, LATER = (0.7, 1.0, 1.4), (0.25, 1.0, 4.0), (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
 """Factors on all torques, further ones on the armature, and changes of the delay [samples] that are tried from there."""
 
 VALLEYS = 3
@@ -42,6 +43,9 @@ VALLEYS = 3
 
 ESCAPED = 0.01
 """Share by which another valley must be better."""
+
+ASIDE = 8
+"""Rounds in another valley of the last stage, at most."""
 
 REFINED = 15
 """Rounds of the last stage, at most."""
@@ -83,13 +87,26 @@ def identify_servo(
         If a name is unknown.
     """
     parameters_of(friction, (*more, *(held or {})))
-    stages = Stages(servo, runs, held or {})
+    stages = Stages.begun(servo, runs, held or {})
     p = stages.start
     for law in simpler(friction):
         p = stages.go(law, (), p)
     return stages.fit(friction, more, stages.go(friction, more, p))
 
 
+def identify_again(fit: ServoFit, runs: Sequence[ServoRun]) -> ServoFit:
+    """Return the fit of the same parameters, from where it is, to runs whose loads are known better.
+
+    Raises
+    ------
+    IdentificationError
+        As for `identify_servo`.
+    """
+    held = {name: x for name, x in fit.p.items() if name not in fit.free}
+    return Stages(fit.servo, runs, held, fit.p).last(fit.friction, fit.free, fit.p)
+
+
+@final
 class Stages:
     """Runs at work: from stage to stage with more parameters, and finer.
 
@@ -97,35 +114,26 @@ class Stages:
     ----------
     servo, runs, held
         As for `identify_servo`.
+    start : mapping of str to float
+        Parameters of the first stage.
     """
 
-    def __init__(self, servo: Servo, runs: Sequence[ServoRun], held: dict[str, float]) -> None:
-        require_possible(held)
+    def __init__(self, servo: Servo, runs: Sequence[ServoRun], held: dict[str, float], start: Mapping[str, float]) -> None:
         self.held, self._servo, self._excitation = held, servo, Excitation.of(servo, runs, held)
-        whole = _evenly(runs)
+        whole, self.start = _evenly(runs), dict(start)
         self._few = len(whole) <= FEW
-        with one_thread():
-            self.start = self._started(whole)
         some = whole[::2]
         if self._few:
             whole = some = [piece for run in whole for piece in pieces(run, servo.step, 1.5 * self.start["delay"])]
         self._whole, self._coarse = whole, ServoLoop(servo, some, COARSE * self._excitation.T)
 
-    def _started(self, runs: Sequence[ServoRun]) -> dict[str, float]:
-        """Return the start of the rows whose simulation fits best."""
-        starts = ServoRows(self._servo, runs, self.held).starts()[:TRIED]
-        if not starts:
-            raise IdentificationError(
-                f"{runs[0].name}: more duty does not make more torque in the direction of the command; has the command the "
-                "sign and the unit of the position, and is it the one that the servo received?"
-            )
-        loop = ServoLoop(self._servo, runs, COARSE * self._excitation.T)
-        lanes = {name: np.array([p[name] for p in starts]) for name in starts[0]} | {"Fv": np.zeros(len(starts))}
-        cost = Search(loop, (), self._excitation.scales, self._excitation.range / 10).cost(loop.simulate(lanes))
-        best = {**starts[int(cost.argmin())], "Fv": 0.0}
-        if not np.isfinite(best["rate"]):
-            del best["rate"]
-        return {**best, "offset": best["offset"] * self._excitation.tilts, **self.held}
+    @classmethod
+    def begun(cls, servo: Servo, runs: Sequence[ServoRun], held: dict[str, float]) -> Self:
+        """Return stages that begin with the start of the rows whose simulation fits best."""
+        require_possible(held)
+        excitation, some = Excitation.of(servo, runs, held), _evenly(runs)
+        with one_thread():
+            return cls(servo, runs, held, _started(servo, some, held, excitation))
 
     def go(self, friction: str, more: Sequence[str], p: Mapping[str, float]) -> dict[str, float]:
         """Return the parameters with a law of friction and further ones, from those of a simpler law."""
@@ -155,34 +163,71 @@ class Stages:
             torques = {name: x * scale for name, x in base.items() if name in TORQUES}
             late = max(base["delay"] + delay * T, 0.0)
             tried.append({**base, **torques, "Ia": base["Ia"] * Ia, "delay": late, "offset": offset, **held})
+        tried = [dict(each) for each in {tuple(other.items()): None for other in tried} if dict(each) != base]
         lanes = {name: np.array([x[name] for x in tried]) for name in base}
         order = np.argsort(search.cost(self._coarse.simulate(lanes)))[:VALLEYS]
         return [tried[int(k)] for k in order]
 
     def fit(self, friction: str, more: Sequence[str], p: dict[str, float]) -> ServoFit:
         """Return the fit of all runs, in fine steps; raise IdentificationError if it explains nothing."""
+        return self.last(friction, self._free(friction, more, p), p)
+
+    def last(self, friction: str, free: tuple[str, ...], p: Mapping[str, float]) -> ServoFit:
+        """Return the fit of all runs with parameters that are free, in fine steps."""
         step = (FINE if self._few else MEDIUM) * self._excitation.T
         with one_thread():
-            loop, free = ServoLoop(self._servo, self._whole, step), self._free(friction, more, p)
+            loop = ServoLoop(self._servo, self._whole, step, count_of(self._servo, self._whole))
             found = self._search(loop, p, free).best(p, REFINED)
-            fit = ServoFit(self._servo, friction, free, found, loop, self._excitation)
+            if self._few:
+                found = self._better(loop, free, found)
+            # At rest, rounded positions change by a count or not at all: what parameters do to them shows without rounding.
+            exact = ServoLoop(self._servo, self._whole, step)
+            fit = ServoFit(self._servo, friction, free, self._search(exact, found.p, free).at(found), exact, self._excitation)
             require_explained(fit)
-            if not any(name in self.held for name in TORQUES):
-                require_scale(fit)
+            require_scale(fit)
         return fit
 
-    def _search(self, loop: ServoLoop, begin: dict[str, float], free: Sequence[str]) -> Search:
+    def _better(self, loop: ServoLoop, free: tuple[str, ...], found: Found) -> Found:
+        """Return what is found from both sides of the axes that are known worst, if it is better."""
+        for _ in range(SHAKEN):
+            search = self._search(loop, found.p, free)
+            tried = search.away(found)
+            cost = search.cost(loop.simulate({name: np.array([x[name] for x in tried]) for name in tried[0]}))
+            best = min((search.best(tried[int(k)], ASIDE) for k in np.argsort(cost)[:VALLEYS]), key=lambda other: other.cost)
+            if best.cost > (1 - ESCAPED) * search.cost_of(found.p):
+                break
+            found = best
+        return found
+
+    def _search(self, loop: ServoLoop, begin: Mapping[str, float], free: Sequence[str]) -> Search:
         r = np.abs(loop.q - loop.simulate(begin)[0])[loop.kept]
         c = 3 * max(float(np.median(r)), self._servo.step / 4)
         return Search(loop, free, self._excitation.scales, c)
 
-    def _free(self, friction: str, more: Sequence[str], begin: dict[str, float]) -> tuple[str, ...]:
+    def _free(self, friction: str, more: Sequence[str], begin: Mapping[str, float]) -> tuple[str, ...]:
         """Return the parameters that are searched for, in the order of `SERVO_PARAMETERS`."""
         names = {"a", "b", "Ia", "Fs", "offset", "delay", *SERVO_FRICTIONS[friction], *more}
         names |= {"Fv"} if self._excitation.off else set()
         names -= set() if self._excitation.tilts else {"offset"}
         names |= {"rate"} if "rate" in begin else set()
         return tuple(name for name in SERVO_PARAMETERS if name in names - set(self.held))
+
+
+def _started(servo: Servo, runs: Sequence[ServoRun], held: dict[str, float], excitation: Excitation) -> dict[str, float]:
+    """Return the start of the rows whose simulation fits best."""
+    starts = ServoRows(servo, runs, held).starts()[:TRIED]
+    if not starts:
+        raise IdentificationError(
+            f"{runs[0].name}: more duty does not make more torque in the direction of the command; has the command the "
+            "sign and the unit of the position, and is it the one that the servo received?"
+        )
+    loop = ServoLoop(servo, runs, COARSE * excitation.T)
+    lanes = {name: np.array([p[name] for p in starts]) for name in starts[0]} | {"Fv": np.zeros(len(starts))}
+    cost = Search(loop, (), excitation.scales, excitation.range / 10).cost(loop.simulate(lanes))
+    best = {**starts[int(cost.argmin())], "Fv": 0.0}
+    if not np.isfinite(best["rate"]):
+        del best["rate"]
+    return {**best, "offset": best["offset"] * excitation.tilts, **held}
 
 
 def _play(servo: Servo, loop: ServoLoop, begin: dict[str, float]) -> float:

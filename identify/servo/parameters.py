@@ -41,6 +41,9 @@ class ServoParameter(NamedTuple):
 
 NEGATIVE = float("-inf")
 
+LATEST = 1.0
+"""Longest delay of a command [s]: what comes later is no response to it."""
+
 SERVO_PARAMETERS: dict[str, ServoParameter] = {
     "a": ServoParameter("N m/V", "torque per volt, kt/R", 0.03),
     "b": ServoParameter("N m s/rad", "damping by back-EMF, kt^2/R", 0.03),
@@ -48,7 +51,7 @@ SERVO_PARAMETERS: dict[str, ServoParameter] = {
     "Fs": ServoParameter("N m", "Coulomb friction", of="torque", share=0.01),
     "Fv": ServoParameter("N m s/rad", "viscous friction", of="torque per speed", share=0.01),
     "offset": ServoParameter("rad", "angle of the file minus angle of the log", of="angle", share=2.0, low=-np.pi, high=np.pi),
-    "delay": ServoParameter("s", "delay of the command", of="time", share=0.15),
+    "delay": ServoParameter("s", "delay of the command", of="time", share=0.15, high=LATEST),
     "rate": ServoParameter("rad/s", "rate limit of the target", 0.02),
     "lead": ServoParameter("s", "by how much the loop sees its position early", of="time", share=0.15, low=NEGATIVE),
     "dead_band": ServoParameter("rad", "error below which there is no duty", of="angle", share=1.0),

@@ -38,8 +38,10 @@ def pieces(run: ServoRun, step: float, delay: float) -> list[ServoRun]:
     last = np.searchsorted(run.t, run.t + AFTER, side="right")
     still = np.array([_rests(run, slice(i, k), step) for i, k in zip(first, last, strict=True)])
     still &= (t >= t[0] + rest) & (t <= t[-1] - AFTER)
-    cuts = [0]
-    for k in np.flatnonzero(still):
+    rests = np.flatnonzero(still)
+    settled = rests[:1][t[rests[:1]] - t[0] < SHORTEST]  # how a motion that is over so soon began is not known
+    cuts = [int(settled[0]) if len(settled) else 0]
+    for k in rests:
         if t[k] - t[cuts[-1]] >= SHORTEST and k - cuts[-1] >= MIN_SAMPLES:
             cuts.append(int(k))
     if len(cuts) > 1 and (t[-1] - t[cuts[-1]] < SHORTEST or len(t) - cuts[-1] < MIN_SAMPLES):

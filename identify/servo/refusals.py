@@ -15,8 +15,9 @@ TORQUES = ("a", "b", "Ia", "Fs", "Fv", "Fst")
 SCALED = 1.5
 """Factor on all of them."""
 
-CONTRAST = 0.05
-"""Share by which that must make the objective larger: a model is never exact, and below this its errors set the scale."""
+CONTRAST = 2.0
+"""Times by which that, or its inverse, must make the objective larger: a model is never exact, and where a wrong scale adds
+less than its errors do already, these set the scale."""
 
 UNEXPLAINED = 0.2
 """Typical residual, as a share of the range of the motion, from which on a fit explains nothing."""
@@ -32,11 +33,14 @@ def require_explained(fit: ServoFit) -> None:
 
 
 def require_scale(fit: ServoFit) -> None:
-    """Raise ExcitationError if other torques explain the motion as well."""
+    """Raise ExcitationError if other torques explain the motion as well, none of them being known."""
+    torques = [name for name in TORQUES if fit.p.get(name, 0.0) != 0]
+    if any(name not in fit.free for name in torques):
+        return
     search = Search(fit.loop, fit.free, fit.excitation.scales, 3 * fit.scale)
-    scaled = {name: x * SCALED if name in TORQUES else x for name, x in fit.p.items()}
-    cost = search.cost(fit.loop.simulate({name: np.array([x, scaled[name]]) for name, x in fit.p.items()}))
-    if cost[1] < (1 + CONTRAST) * cost[0]:
+    factors = np.array([1.0, SCALED, 1 / SCALED])
+    cost = search.cost(fit.loop.simulate({name: x * (factors if name in torques else 1.0) for name, x in fit.p.items()}))
+    if cost[1:].min() < CONTRAST * cost[0]:
         raise ExcitationError(
             f"{fit.loop.runs[0].name}: torque constant, friction and armature scale together, because the known load is small "
             "beside them: add a known mass to the robot's file, or give one of them (--hold a=0.5)"

@@ -30,6 +30,9 @@ MEDIAN = float(ndtri(0.75))
 IDLE = 2
 """Rounds without such an improvement after which a search ends."""
 
+WORST, RISES = 2, (0.1, 0.4, 1.6)
+"""Axes along which other valleys are looked for, and shares by which the objective would grow on the way."""
+
 WILD = 4.0
 """Times its typical size from which on the sensitivity of a sample counts less: of motions that depend on a hair."""
 
@@ -148,9 +151,31 @@ class Search:
             x, ahead = every[best], begins[place] if place >= 0 else ahead
             if idle >= IDLE or (promised < SETTLED * cost[0] and width < 1):
                 break
-        _, cost, J, r, beginning = self._differences(start, x, ahead, min(width, 0.5))
-        p = {**start, **dict(zip(self.free, x.tolist(), strict=True))}
+        return self._found({**start, **dict(zip(self.free, x.tolist(), strict=True))}, ahead, min(width, 0.5))
+
+    def at(self, found: Found) -> Found:
+        """Return residuals and sensitivities where another search ended."""
+        return self._found(found.p, found.beginning.ahead, 0.5)
+
+    def _found(self, p: dict[str, float], ahead: Array, width: float) -> Found:
+        x = np.array([p[name] for name in self.free])
+        _, cost, J, r, beginning = self._differences(p, x, ahead, width)
         return Found(p, float(cost[0]), r, J, beginning)
+
+    def away(self, found: Found) -> list[dict[str, float]]:
+        """Return parameters on both sides of what was found, along the axes that are known worst: other valleys lie there."""
+        x = np.array([found.p[name] for name in self.free])
+        normal = self._normal(found.sensitivity, found.residual, found.beginning)
+        values, axes = np.linalg.eigh((normal.A + normal.A.T) / 2)
+        size = np.sqrt(found.cost / np.maximum(values[:WORST], 1e-9))
+        steps = [
+            sign * np.sqrt(rise) * size[k] * axes[:, k] / normal.size
+            for k in range(len(size))
+            for rise in RISES
+            for sign in (1, -1)
+        ]
+        tried = self._within(x, np.array(steps))
+        return [{**found.p, **dict(zip(self.free, one.tolist(), strict=True))} for one in tried]
 
     def _within(self, x: Array, steps: Array) -> Array:
         """Return x with steps, which change no parameter whose size is known by more than a third."""
@@ -171,6 +196,7 @@ class Search:
         begins = np.concatenate([np.repeat(ahead[None], len(tried), axis=0), [ahead + half, ahead - half]])
         q = self._simulated(start, np.concatenate([tried, [x, x]]), begins)
         wide, kept = np.diagonal(upper - lower), self._loop.kept
+        wide = np.where(wide > 0, wide, np.inf)  # what has come to zero, in steps of shares of itself, has no effect
         J = np.moveaxis(q[1 : n + 1] - q[n + 1 : 2 * n + 1], 0, -1) / wide * kept[..., None]
         beginning = Beginning(ahead, (q[-2] - q[-1]) / self._count * kept, self._certainty)
         return tried, self.cost(q[:-2], ahead), J, (self._loop.q - q[0]) * kept, beginning

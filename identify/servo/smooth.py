@@ -25,3 +25,10 @@ def smoothed(t: Array, q: Array) -> tuple[Array, Array, Array]:
     motion = (uniform, qd, np.gradient(qd, T, axis=0))
     smooth, speed, acceleration = (np.stack([np.interp(t, clock, y) for y in x.T], axis=1) for x in motion)
     return smooth, speed, acceleration
+
+
+def differentiated(t: Array, q: Array) -> tuple[Array, Array, Array]:
+    """Return exact positions, shape (time,), with their velocities, and their accelerations about each sample."""
+    steps = np.diff(t)
+    acceleration = np.diff(np.diff(q) / steps) / ((steps[1:] + steps[:-1]) / 2)
+    return q, np.gradient(q, t), np.pad(acceleration, 1, mode="edge")

@@ -192,9 +192,12 @@ def motion(p: Law, firmware: Firmware, track: Track, start: tuple[float, float],
 
 
 @_compiled
-def at_samples(q: Array, before: npt.NDArray[np.int64], share: Array) -> Array:
-    """Return positions between steps, linearly."""
+def at_samples(q: Array, before: npt.NDArray[np.int64], share: Array, count: float) -> Array:
+    """Return positions between steps, linearly; at rest, where rounding is no noise, to the count [rad], if it is above 0."""
     out = np.empty(len(before))
     for k in range(len(before)):
-        out[k] = q[before[k]] + (q[before[k] + 1] - q[before[k]]) * share[k]
+        change = q[before[k] + 1] - q[before[k]]
+        out[k] = q[before[k]] + change * share[k]
+        if change == 0.0 and count > 0.0:
+            out[k] = np.rint(out[k] / count) * count
     return out

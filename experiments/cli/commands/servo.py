@@ -1,5 +1,6 @@
 """The command that identifies servos."""
 
+from collections.abc import Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -66,8 +67,11 @@ def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo
                     page.found.setdefault("laws", {})[joint] = {"errors": result.errors, "p": result.p}
                 every[joint] = result.fits[result.chosen] if isinstance(result, FrictionChoice) else result
                 _take(page, folder, every)
+            for joint, again in servos.fits_again(_fits(every)):
+                every[joint] = again
+                _take(page, folder, every)
     finally:
-        found = {joint: fit for joint, fit in every.items() if isinstance(fit, ServoFit)}
+        found = _fits(every)
         if found:
             print_servos(page, every)
     if not found:
@@ -76,9 +80,13 @@ def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo
     return found
 
 
+def _fits(every: Mapping[str, ServoFit | str]) -> dict[str, ServoFit]:
+    return {joint: fit for joint, fit in every.items() if isinstance(fit, ServoFit)}
+
+
 def _take(page: Page, folder: ResultsFolder | None, every: dict[str, ServoFit | str]) -> None:
-    page.found["joints"] = {joint: summary_of(fit) for joint, fit in every.items() if isinstance(fit, ServoFit)}
-    page.found["lack_of_fit"] = {joint: lacks_summary(fit) for joint, fit in every.items() if isinstance(fit, ServoFit)}
+    page.found["joints"] = {joint: summary_of(fit) for joint, fit in _fits(every).items()}
+    page.found["lack_of_fit"] = {joint: lacks_summary(fit) for joint, fit in _fits(every).items()}
     if page.found["joints"]:
         _save(page, folder)
 

@@ -149,3 +149,15 @@ def test_pieces_begin_when_a_late_command_has_arrived():
     assert len(starts) > 0
     changed = np.array([2.0, 4.0])
     assert all(not ((changed < s) & (changed > s - 0.4)).any() for s in starts)
+
+
+def test_a_motion_that_was_under_way_when_the_log_began_is_left_out():
+    """How it began is not known; nothing of a log is left out whose joint rests at first."""
+    t = np.arange(0, 6, 0.01)
+    command = np.repeat([0.0, 0.5, -0.3], 200)
+    still = np.interp(t, [0, 2, 2.5, 4, 4.5, 6], [0.0, 0.0, 0.5, 0.5, -0.3, -0.3])
+    moving = still + 0.1 * np.clip(1 - t / 0.3, 0, None)
+    load = JointLoad.pendulum(0.5, 0.1)
+    for q in (moving, still):
+        parts = pieces(ServoRun(t, q, command, load, 16.0), 2 * np.pi / 4096, 0.03)
+        assert sum(np.abs(np.diff(part.q)).sum() for part in parts) == pytest.approx(1.3)

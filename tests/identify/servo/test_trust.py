@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from identify import ExcitationError
-from identify.servo import SERVO_FRICTIONS, JointLoad, Servo, ServoRun, identify_servo
+from identify.servo import SERVO_FRICTIONS, JointLoad, Servo, ServoRun, identify_again, identify_servo
 from identify.servo.choice import choose_friction
-from identify.servo.closed_loop import ServoLoop
+from identify.servo.closed_loop import ServoLoop, count_of
 from identify.servo.lack import lacks_of
 from identify.servo.search import Search
 
@@ -88,9 +88,8 @@ def test_a_light_rotor_is_not_taken_for_a_late_command():
     light = replace(heavy, load=JointLoad.pendulum(0.1, 0.06), on=None)
     q = ServoLoop(SERVO, [replace(light, q=0 * light.t)], 2.5e-4).simulate(LAW)[0, 0]
     fit = identify_servo(SERVO, [replace(light, q=np.rint(q / SERVO.step) * SERVO.step)], "coulomb")
-    assert fit.p["Ia"] > LAW["Ia"] / 2
-    for name in ("Ia", "delay"):
-        assert abs(fit.p[name] - LAW[name]) < 3 * fit.standard_errors[name], name
+    for name in ("Ia", "delay"):  # the other valley is off by the whole of each, this one by what the scale is
+        assert fit.p[name] == pytest.approx(LAW[name], rel=0.15), name
 
 
 @pytest.mark.parametrize("name", ["a", "Ia"])
@@ -112,3 +111,34 @@ def test_a_parameter_of_a_further_law_may_be_known(run):
     assert fit.p["Fl"] == 0
     assert "Fl" not in fit.free
     assert fit.p["Fs"] == pytest.approx(LAW["Fs"], abs=4 * fit.standard_errors["Fs"])
+
+
+def test_a_joint_of_which_the_load_does_not_set_the_scale_is_refused():
+    """A load of a fiftieth of the friction: half as much of all torques moves the joint nearly alike."""
+    light = replace(simulated(3), load=JointLoad.pendulum(0.02, 0.03), on=None)
+    q = ServoLoop(SERVO, [replace(light, q=0 * light.t)], 2.5e-4).simulate(LAW)[0, 0]
+    run = replace(light, q=np.rint(q / SERVO.step) * SERVO.step)
+    with pytest.raises(ExcitationError, match="scale together"):
+        identify_servo(SERVO, [run], "coulomb")
+    assert identify_servo(SERVO, [run], "coulomb", held={"a": LAW["a"]}).p["Fs"] == pytest.approx(LAW["Fs"], rel=0.1)
+
+
+def test_positions_at_rest_are_whole_counts_where_the_log_has_them(run):
+    """What a joint does between counts at rest, no log in counts says."""
+    assert count_of(SERVO, [run]) == SERVO.step
+    assert count_of(SERVO, [replace(run, q=run.q + 0.3 * SERVO.step * np.sin(run.t))]) == 0
+    plain, counted = (ServoLoop(SERVO, [run], 1e-3, count).simulate(LAW)[0, 0] / SERVO.step for count in (0.0, SERVO.step))
+    whole = np.isclose(counted, np.rint(counted), rtol=0, atol=1e-9)
+    rests = np.append(np.diff(plain) == 0, False)
+    assert rests.mean() > 0.2
+    assert whole[rests].mean() > 0.95  # but for a sample before or after a motion
+    np.testing.assert_allclose(counted[~whole], plain[~whole])
+
+
+def test_a_fit_again_keeps_its_parameters_and_what_is_held(run):
+    fit = identify_servo(SERVO, [run], "coulomb", held={"Ia": 0.02})
+    again = identify_again(fit, [run])
+    assert again.free == fit.free
+    assert again.p["Ia"] == 0.02
+    for name, sigma in fit.standard_errors.items():
+        assert abs(again.p[name] - fit.p[name]) < 2 * sigma, name
