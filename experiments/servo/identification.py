@@ -82,7 +82,7 @@ class Servos:
         return ServoRun(columns.t, columns.q[:, j], columns.command[:, j], load, kp, on, voltage, name=name)
 
     def fits(
-        self, friction: str, find: Sequence[str], held: dict[str, float]
+        self, friction: str, find: Sequence[str], held: Mapping[str, dict[str, float]]
     ) -> Iterator[tuple[str, "ServoFit | str | FrictionChoice"]]:
         """Yield the fit of each joint, all laws of friction compared (`auto`), or why there is none."""
         for joint, runs, slides in zip(self.links.joints, self.runs, self.links.slides, strict=True):
@@ -91,9 +91,9 @@ class Servos:
                 if slides:
                     raise IdentificationError(f"{joint} slides: gain and counts of servo.toml are those of a joint that turns")
                 if friction == AUTO:
-                    yield joint, choose_friction(servo, runs, find, held)
+                    yield joint, choose_friction(servo, runs, find, held[joint])
                 else:
-                    yield joint, identify_servo(servo, runs, friction, find, held)
+                    yield joint, identify_servo(servo, runs, friction, find, held[joint])
             except IdentificationError as error:
                 yield joint, str(error)
 

@@ -98,7 +98,7 @@ class ServoLoop:
 def count_of(servo: Servo, runs: Sequence[ServoRun]) -> float:
     """Return the angle of a count [rad] if nearly all positions are whole counts, else 0, as where they were filtered.
 
-    A joint stops where the firmware sees the next count. There, errors of rounding are no noise: all have one direction.
+    A joint stops where the firmware sees the next count. There, errors of rounding are not noise: all have one direction.
     """
     x = np.concatenate([run.q for run in runs]) / servo.step
     return servo.step if np.mean(np.abs(x - np.rint(x)) < IN_COUNTS) > 1 - IN_COUNTS else 0.0

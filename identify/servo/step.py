@@ -193,7 +193,7 @@ def motion(p: Law, firmware: Firmware, track: Track, start: tuple[float, float],
 
 @_compiled
 def at_samples(q: Array, before: npt.NDArray[np.int64], share: Array, count: float) -> Array:
-    """Return positions between steps, linearly; at rest, where rounding is no noise, to the count [rad], if it is above 0."""
+    """Return positions between steps, linearly; at rest to the count [rad], if it is above 0."""
     out = np.empty(len(before))
     for k in range(len(before)):
         change = q[before[k] + 1] - q[before[k]]

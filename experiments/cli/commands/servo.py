@@ -58,10 +58,10 @@ def servo(options: IdentifyServo) -> None:
 
 def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo, servos: Servos) -> dict[str, ServoFit]:
     """Return the fits that there are; print and save those of joints that are done if the others are not waited for."""
-    every = dict[str, ServoFit | str]()
+    every, held = dict[str, ServoFit | str](), held_of(options, servos.links.joints)
     try:
         with stages_of(f"identifying {', '.join(servos.links.joints)}"):
-            for joint, result in servos.fits(options.friction, options.find, held_of(options)):
+            for joint, result in servos.fits(options.friction, options.find, held):
                 if isinstance(result, FrictionChoice):
                     print_choice(page, joint, result)
                     page.found.setdefault("laws", {})[joint] = {"errors": result.errors, "p": result.p}

@@ -34,12 +34,19 @@ def servos_of(options: IdentifyServo) -> tuple[Servos, Servos | None]:
     return made, of_logs(servos, others) if others else None
 
 
-def held_of(options: IdentifyServo) -> dict[str, float]:
-    """Return the parameters that are known."""
+def held_of(options: IdentifyServo, joints: Sequence[str]) -> dict[str, dict[str, float]]:
+    """Return the parameters that are known, by joint: what names a joint goes before what names none."""
     try:
-        return {name: float(value) for name, value in _stated("--hold", options.hold).items()}
+        values = {name: float(value) for name, value in _stated("--hold", options.hold).items()}
     except ValueError:
         raise ExperimentError(f"--hold {' '.join(options.hold)}: give letters and numbers, such as a=0.5") from None
+    split = {name: name.rpartition(".") for name in values}
+    if unknown := [joint for joint, _, _ in split.values() if joint and joint not in joints]:
+        raise ExperimentError(f"--hold {unknown[0]}: no such joint; joints are {', '.join(joints)}")
+    return {
+        joint: {letter: values[name] for of in ("", joint) for name, (own, _, letter) in split.items() if own == of}
+        for joint in joints
+    }
 
 
 def files_read(options: IdentifyServo) -> tuple[Path, ...]:

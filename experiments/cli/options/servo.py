@@ -35,7 +35,7 @@ class IdentifyServo(RecordedOptions, Command, action="servo:servo"):
     find: Letters = ()
     """Further parameters to be found: lead, dead_band, backlash, Mg, Fo."""
     hold: Texts = ()
-    """Known parameters, for all joints: a=0.5 (N m/V), Ia=0.02."""
+    """Known parameters, of all joints or of one: Ia=0.02 wrist_roll.a=0.5 (N m/V)."""
     columns: Texts = ()
     """Names of columns: q=position_* command=goal_* on=torque_enable (* stands for numbers or names of joints)."""
     units: Texts = ()

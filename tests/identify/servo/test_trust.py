@@ -51,6 +51,7 @@ def test_a_joint_that_rests_and_flickers_has_no_spikes():
     assert ServoRun(t, q, 0 * t, JointLoad.pendulum(0.6, 0.12), 16.0).read_well.all()
 
 
+@pytest.mark.thorough
 def test_a_fit_without_a_piece_is_that_of_the_others(run):
     """The jackknife's step against the search without the piece, where it matters most."""
     fit = identify_servo(SERVO, [run], "coulomb")
@@ -82,6 +83,7 @@ def test_a_fit_says_where_it_lacks(run):
     assert lacks_of(fit)[0].error > 2 * lacks_of(identify_servo(SERVO, [run], "coulomb"))[0].error
 
 
+@pytest.mark.thorough
 def test_a_light_rotor_is_not_taken_for_a_late_command():
     """With a link of a tenth of the torque, searches from the rows alone end without an armature, at twice the delay."""
     heavy = simulated(2)
@@ -113,6 +115,7 @@ def test_a_parameter_of_a_further_law_may_be_known(run):
     assert fit.p["Fs"] == pytest.approx(LAW["Fs"], abs=4 * fit.standard_errors["Fs"])
 
 
+@pytest.mark.thorough
 def test_a_joint_of_which_the_load_does_not_set_the_scale_is_refused():
     """A load of a fiftieth of the friction: half as much of all torques moves the joint nearly alike."""
     light = replace(simulated(3), load=JointLoad.pendulum(0.02, 0.03), on=None)
@@ -135,6 +138,7 @@ def test_positions_at_rest_are_whole_counts_where_the_log_has_them(run):
     np.testing.assert_allclose(counted[~whole], plain[~whole])
 
 
+@pytest.mark.thorough
 def test_a_fit_again_keeps_its_parameters_and_what_is_held(run):
     fit = identify_servo(SERVO, [run], "coulomb", held={"Ia": 0.02})
     again = identify_again(fit, [run])

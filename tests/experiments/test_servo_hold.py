@@ -1,0 +1,9 @@
+"""`idbench servo --hold`: of all joints, or of one."""
+
+from experiments.cli.commands.servo_inputs import held_of
+from experiments.cli.options.servo import IdentifyServo
+
+
+def test_a_joint_has_what_is_held_for_it_before_what_is_held_for_all():
+    held = held_of(IdentifyServo(hold=("wrist.roll.a=0.7", "a=0.5", "Ia=0.02")), ["elbow", "wrist.roll"])
+    assert held == {"elbow": {"a": 0.5, "Ia": 0.02}, "wrist.roll": {"a": 0.7, "Ia": 0.02}}
