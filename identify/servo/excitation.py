@@ -88,7 +88,7 @@ class Excitation:
         if torque == 0:
             raise ExcitationError(
                 f"{runs[0].name}: the joint carries no known load, so that only ratios of a, b, friction and armature show: "
-                "add a known mass to the robot's file, move the joint through gravity, or give one of them (--hold a=0.5)"
+                "add a known mass to the robot's file, move the joint through gravity, or give one of them (--hold JOINT.a=0.5)"
             )
         off = any((~run.enabled).any() and np.ptp(run.clean[~run.enabled]) > 20 * servo.step for run in runs)
         swing = max(float(np.hypot(run.load.sine, run.load.cosine).max()) for run in runs)

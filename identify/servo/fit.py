@@ -76,6 +76,7 @@ class ServoFit:
         free = rounded.free_of(J, np.ones(J.shape[:2])).reshape(-1, n)
         J = J.reshape(-1, n)
         size = np.sqrt((J**2).sum(axis=0))
+        size = np.where(size > 0, size, 1.0)
         inverse = np.linalg.pinv((free / size).T @ (J / size))
         return dict(
             zip(self.free, (self.servo.step / np.sqrt(12) * np.sqrt(np.diagonal(inverse)) / size).tolist(), strict=True)

@@ -149,7 +149,7 @@ class Stages:
             for _ in range(SHAKEN):
                 search = self._search(self._coarse, found.p, free)
                 best = min((search.best(other) for other in self._shaken(search, found.p)), key=lambda other: other.cost)
-                if best.cost > (1 - ESCAPED) * search.cost_of(found.p):
+                if best.cost > (1 - ESCAPED) * search.at(found).cost:
                     break
                 found = best
         return found.p
@@ -194,7 +194,7 @@ class Stages:
             tried = search.away(found)
             cost = search.cost(loop.simulate({name: np.array([x[name] for x in tried]) for name in tried[0]}))
             best = min((search.best(tried[int(k)], ASIDE) for k in np.argsort(cost)[:VALLEYS]), key=lambda other: other.cost)
-            if best.cost > (1 - ESCAPED) * search.cost_of(found.p):
+            if best.cost > (1 - ESCAPED) * search.at(found).cost:
                 break
             found = best
         return found

@@ -39,8 +39,8 @@ def pieces(run: ServoRun, step: float, delay: float) -> list[ServoRun]:
     still = np.array([_rests(run, slice(i, k), step) for i, k in zip(first, last, strict=True)])
     still &= (t >= t[0] + rest) & (t <= t[-1] - AFTER)
     rests = np.flatnonzero(still)
-    settled = rests[:1][t[rests[:1]] - t[0] < SHORTEST]  # how a motion that is over so soon began is not known
-    cuts = [int(settled[0]) if len(settled) else 0]
+    first_rest = int(rests[0]) if len(rests) else 0
+    cuts = [first_rest if _may_begin(run, first_rest, step) else 0]
     for k in rests:
         if t[k] - t[cuts[-1]] >= SHORTEST and k - cuts[-1] >= MIN_SAMPLES:
             cuts.append(int(k))
@@ -49,6 +49,13 @@ def pieces(run: ServoRun, step: float, delay: float) -> list[ServoRun]:
     parts = [_part(run, slice(a, b)) for a, b in zip(cuts, [*cuts[1:], len(t)], strict=True)]
     moving = [part for part in parts if np.ptp(part.clean) > MOVES * step]
     return moving or parts[:1]
+
+
+def _may_begin(run: ServoRun, k: int, step: float) -> bool:
+    """Return whether a motion before sample k, of which nobody knows how it began, is short, and others follow."""
+    t = run.t
+    long = len(t) - k >= MIN_SAMPLES and t[-1] - t[k] >= SHORTEST
+    return bool(t[k] - t[0] < SHORTEST and long and run.enabled[:k].all() and np.ptp(run.clean[k:]) > MOVES * step)
 
 
 def _rests(run: ServoRun, some: slice, step: float) -> bool:

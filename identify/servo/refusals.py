@@ -44,7 +44,7 @@ def require_scale(fit: ServoFit) -> None:
     if cost[1:].min() < CONTRAST * cost[0]:
         raise ExcitationError(
             f"{fit.loop.runs[0].name}: torque constant, friction and armature scale together, because the known load is small "
-            "beside them: add a known mass to the robot's file, or give one of them (--hold a=0.5)"
+            "beside them: add a known mass to the robot's file, or give one of them (--hold JOINT.a=0.5)"
         )
 
 

@@ -33,6 +33,9 @@ IDLE = 2
 WORST, RISES = 2, (0.1, 0.4, 1.6)
 """Axes along which other valleys are looked for, and shares by which the objective would grow on the way."""
 
+UNSEEN = 1e-6
+"""Curvature of an axis, of those scaled to 1, up to which nothing shows along it."""
+
 WILD = 4.0
 """Times its typical size from which on the sensitivity of a sample counts less: of motions that depend on a hair."""
 
@@ -167,7 +170,9 @@ class Search:
         x = np.array([found.p[name] for name in self.free])
         normal = self._normal(found.sensitivity, found.residual, found.beginning)
         values, axes = np.linalg.eigh((normal.A + normal.A.T) / 2)
-        size = np.sqrt(found.cost / np.maximum(values[:WORST], 1e-9))
+        seen = values > UNSEEN  # along others, nothing changes however far one goes
+        values, axes = values[seen][:WORST], axes[:, seen]
+        size = np.sqrt(found.cost / values)
         steps = [
             sign * np.sqrt(rise) * size[k] * axes[:, k] / normal.size
             for k in range(len(size))

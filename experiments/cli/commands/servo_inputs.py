@@ -10,6 +10,7 @@ from experiments.servo.identification import AUTO, Servos, of_logs
 from identify.files.servo_file import ServoFile
 from identify.files.servo_log import ServoColumns, order, read_servo_log
 from identify.servo import SERVO_FRICTIONS
+from identify.servo.parameters import SERVO_PARAMETERS
 from sim.robot.robot import Robot
 
 
@@ -43,6 +44,8 @@ def held_of(options: IdentifyServo, joints: Sequence[str]) -> dict[str, dict[str
     split = {name: name.rpartition(".") for name in values}
     if unknown := [joint for joint, _, _ in split.values() if joint and joint not in joints]:
         raise ExperimentError(f"--hold {unknown[0]}: no such joint; joints are {', '.join(joints)}")
+    if wrong := [letter for _, _, letter in split.values() if letter not in SERVO_PARAMETERS]:
+        raise ExperimentError(f"--hold: a servo has no parameter {wrong[0]!r}; known: {', '.join(SERVO_PARAMETERS)}")
     return {
         joint: {letter: values[name] for of in ("", joint) for name, (own, _, letter) in split.items() if own == of}
         for joint in joints

@@ -151,6 +151,13 @@ def test_pieces_begin_when_a_late_command_has_arrived():
     assert all(not ((changed < s) & (changed > s - 0.4)).any() for s in starts)
 
 
+def test_the_only_motion_of_a_log_is_kept():
+    """A step at once, and then rest: without the step there would be nothing."""
+    t = np.arange(0, 2, 0.01)
+    run = ServoRun(t, np.interp(t, [0, 0.3], [0.0, 0.5]), np.full(200, 0.5), JointLoad.pendulum(0.5, 0.1), 16.0)
+    assert np.ptp(pieces(run, 2 * np.pi / 4096, 0.03)[0].q) == pytest.approx(0.5)
+
+
 def test_a_motion_that_was_under_way_when_the_log_began_is_left_out():
     """How it began is not known; nothing of a log is left out whose joint rests at first."""
     t = np.arange(0, 6, 0.01)

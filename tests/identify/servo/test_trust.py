@@ -117,7 +117,7 @@ def test_a_parameter_of_a_further_law_may_be_known(run):
 
 @pytest.mark.thorough
 def test_a_joint_of_which_the_load_does_not_set_the_scale_is_refused():
-    """A load of a fiftieth of the friction: half as much of all torques moves the joint nearly alike."""
+    """A load of a fiftieth of the friction: half as much again of all torques moves the joint nearly alike."""
     light = replace(simulated(3), load=JointLoad.pendulum(0.02, 0.03), on=None)
     q = ServoLoop(SERVO, [replace(light, q=0 * light.t)], 2.5e-4).simulate(LAW)[0, 0]
     run = replace(light, q=np.rint(q / SERVO.step) * SERVO.step)
