@@ -34,9 +34,9 @@ def require_explained(fit: ServoFit) -> None:
 
 
 def require_scale(fit: ServoFit) -> None:
-    """Raise ExcitationError if other torques explain the motion as well, none of them being known."""
-    torques = [name for name in TORQUES if fit.p.get(name, 0.0) != 0]
-    if any(name not in fit.free for name in torques):
+    """Raise ExcitationError if other torques explain the motion as well; those that are known stay as they are."""
+    torques = [name for name in TORQUES if name in fit.free]
+    if not torques:
         return
     search = Search(fit.loop, fit.free, fit.excitation.scales, 3 * fit.scale)
     factors = np.array([1.0, SCALED, 1 / SCALED])

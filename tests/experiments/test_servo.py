@@ -206,8 +206,6 @@ def test_wrong_servo_files_are_refused(bench, tmp_path, complaint, text, expecte
         (["--friction", "auto", "--find", "Fl"], "no parameter 'Fl'"),
         (["--hold", "rate=nan"], "impossible"),
         (["--hold", "a"], "NAME=VALUE"),
-        (["--hold", "axis.kt=0.5"], "no parameter 'kt'"),
-        (["--hold", "elbow.a=0.5"], "no such joint; joints are axis"),
         (["--hold", "a=much"], "letters and numbers"),
         (["--units", "command=grad"], "unit 'grad'"),
         (["--units", "q=deg"], "is the command in degrees"),

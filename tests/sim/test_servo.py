@@ -20,7 +20,15 @@ from sim.scenario.scenario_file import from_dict, load, to_dict
 
 H = 5e-4
 K, R, V = 2.05, 3.33, 12.0
-LAW = {"a": K / R, "b": K**2 / R, "Ia": 0.02, "Fs": 0.12, "Fv": 0.02, "offset": 0.0, "delay": 0.018, "rate": 4.7}
+BENCH = load("servo")
+LAW = {
+    "a": K / R,
+    "b": K**2 / R,
+    "Ia": BENCH.drive.armature[0],
+    "Fs": BENCH.friction.coulomb[0],
+    "Fv": BENCH.friction.viscous[0],
+}
+LAW |= {"offset": 0.0, "delay": BENCH.timing.delay, "rate": BENCH.drive.rate}
 
 
 def torque(command, q, qd, steps=1, **settings):
