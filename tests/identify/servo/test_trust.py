@@ -90,8 +90,10 @@ def test_a_light_rotor_is_not_taken_for_a_late_command():
     light = replace(heavy, load=JointLoad.pendulum(0.1, 0.06), on=None)
     q = ServoLoop(SERVO, [replace(light, q=0 * light.t)], 2.5e-4).simulate(LAW)[0, 0]
     fit = identify_servo(SERVO, [replace(light, q=np.rint(q / SERVO.step) * SERVO.step)], "coulomb")
-    for name in ("Ia", "delay"):  # the other valley is off by the whole of each, this one by what the scale is
-        assert fit.p[name] == pytest.approx(LAW[name], rel=0.15), name
+    assert abs(fit.p["delay"] - LAW["delay"]) < 3 * fit.standard_errors["delay"]
+    assert fit.p["Ia"] == pytest.approx(
+        LAW["Ia"], rel=0.15
+    )  # so light a load leaves the scale open; the other valley has no Ia
 
 
 @pytest.mark.parametrize("name", ["a", "Ia"])
