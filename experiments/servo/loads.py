@@ -1,30 +1,39 @@
 """Logs of servos as runs of each joint, with what the robot's links need of it."""
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
 from identify import Array
 from identify.files.servo_log import ServoColumns
 from identify.servo import JointLoad
-from identify.servo.smooth import differentiated, smoothed
+from identify.servo.smooth import corrected, smoothed
 from sim.robot.inverse_dynamics import InverseDynamics, inverse_dynamics
 from sim.robot.robot import Robot
 
 
-def loads(robot: Robot, columns: ServoColumns, angles: Mapping[int, Array] | None = None) -> list[JointLoad]:
-    """Return the load of each joint of a robot while the others move as they were measured, or as their servos are known to.
+class Moving(NamedTuple):
+    """How a joint moves by its fit: positions of the log [rad], shape (time,), and what makes angles of the file of them."""
+
+    q: Array
+    offset: float
+
+
+def loads(robot: Robot, columns: ServoColumns, moving: Mapping[int, Moving] | None = None) -> list[JointLoad]:
+    """Return the load of each joint of a robot while the others move as they were measured, or as their servos do.
 
     Gravity follows the joint's own angle exactly; what accelerations and velocities of the others need is that of the measured
-    motion, smoothed, or that of simulated angles, shape (time,), by the number of the joint.
+    motion, smoothed, or of the simulated one (see `corrected`), by the number of the joint.
     """
     t, q, n = columns.t, columns.q, robot.n
     if n == 1:
         qd = qdd = np.zeros_like(q)
     else:
         q, qd, qdd = smoothed(t, q)
-        for j, simulated in (angles or {}).items():
-            q[:, j], qd[:, j], qdd[:, j] = differentiated(t, simulated)
+        for j, of in (moving or {}).items():
+            q[:, j], qd[:, j], qdd[:, j] = corrected(t, of.q, columns.q[:, j])
+            q[:, j] += of.offset
     dynamics = InverseDynamics(robot, len(q))
     still = np.zeros_like(q)
     whole = dynamics(q, qd, qdd).copy()

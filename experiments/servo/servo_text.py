@@ -1,6 +1,6 @@
 """Servos as text."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 from rich.text import Text
@@ -104,6 +104,12 @@ def inexpressible(fits: Mapping[str, ServoFit]) -> list[str]:
     offsets = {joint: fit.p["offset"] for joint, fit in fits.items()}
     words = ", ".join(f"{joint} {x:+.4g}" for joint, x in offsets.items())
     return [*found, f"the file's angles are the log's plus an offset [rad]: {words}; add it to commands"]
+
+
+def driveless(joints: Sequence[str], fits: Mapping[str, ServoFit]) -> list[str]:
+    """Return which joints of a written file have no servo."""
+    lost = [joint for joint in joints if joint not in fits]
+    return [f"{', '.join(lost)}: no servo is written, so that they swing freely"] if lost else []
 
 
 def verdicts(fits: Mapping[str, ServoFit], fitted: Mapping[str, Array], held_out: Mapping[str, Array]) -> list[str]:

@@ -1,17 +1,17 @@
 """What a study of servos finds: parameters of every joint, from commands and positions alone."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import cache
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from experiments.servo.joints import Joints, JointsLog
 from experiments.servo.known import known_servos
-from experiments.servo.loads import loads
 from experiments.study.statistics import BOUNDS
-from identify import Array, IdentificationError, MotionLog
+from identify import MotionLog
 from identify.files.servo_log import ServoColumns
-from identify.servo import Servo, ServoFit, ServoRun, identify_again, identify_servo, parameters_of
+from identify.servo import Servo, ServoFit, ServoRun, identify_servo, parameters_of
 from sim.drives import ServoDrive
 from sim.engine.run import Run
 from sim.robot.mounting import PLAIN
@@ -72,15 +72,20 @@ def servo_columns(law: str, simulated: Run, i: int) -> dict[str, float] | str:
     """
     truth = truth_of(simulated.scenario)
     found, why = dict[str, float](), list[str]()
-    for j, fit in enumerate(_fits(law, simulated.scenario, simulated.log.run((i,)))):
-        if isinstance(fit, str):
-            why.append(fit)
+    joints = _joints(simulated.scenario, simulated.log.run((i,)))
+    for j, fit in dict(joints.identified(partial(_identified, law))).items():
+        if not isinstance(fit, ServoFit):
+            why.append(str(fit))
             continue
         for name, sigma in fit.standard_errors.items():
             at, bound = f"{name}{j + 1}", fit.bound[name]
             found |= {at: fit.p[name], f"{at}.sigma": sigma, f"{at}.paper_sigma": bound, f"{at}.truth": truth.get(at, np.nan)}
             found |= dict.fromkeys((at + part for part in BOUNDS), bound)
     return found or "; ".join(why)
+
+
+def _identified(law: str, _joint: int, servo: Servo, runs: Sequence[ServoRun]) -> ServoFit:
+    return identify_servo(servo, runs, *law_of(law))
 
 
 def rows_of(
@@ -96,37 +101,14 @@ def rows_of(
             yield {**said, "condition_number": np.nan, "rows": 0, "residual_rms": np.nan, "simulations": 0, **every}
 
 
-def _fits(law: str, scenario: Scenario, log: MotionLog) -> list[ServoFit | str]:
-    """Return the fit of each joint, or why it has none; of an arm, with what the others do by their own fits."""
-    every = _runs(scenario, log, {})
-    fits = [_tried(identify_servo, servo, [run], *law_of(law)) for servo, run in every]
-    angles = {j: fit.simulate([every[j][1]])[0] for j, fit in enumerate(fits) if isinstance(fit, ServoFit)}
-    if len(angles) < 2:
-        return fits
-    again = _runs(scenario, log, angles)
-    return [
-        fit if isinstance(fit, str) else _tried(identify_again, fit, [run]) for fit, (_, run) in zip(fits, again, strict=True)
-    ]
-
-
-def _tried(identify: Callable[..., ServoFit], *arguments: Any) -> ServoFit | str:
-    try:
-        return identify(*arguments)
-    except IdentificationError as error:
-        return str(error)
-
-
-def _runs(scenario: Scenario, log: MotionLog, angles: Mapping[int, Array]) -> list[tuple[Servo, ServoRun]]:
-    """Return what is known of each servo, and its log, with angles of the other joints where they are known."""
+def _joints(scenario: Scenario, log: MotionLog) -> Joints:
+    """Return what the owner of a scenario's servos knows of them, with a log."""
     assert isinstance(scenario.drive, ServoDrive)
-    on = log.conditions.get("on")
-    columns = ServoColumns(log.t, log.q, log.conditions["command"], on, None, ())
-    servos = known_servos(scenario.drive, log.n)
-    enabled = None if on is None else on[:, 0] > 0.5
-    return [
-        (servo, ServoRun(log.t, log.q[:, j], columns.command[:, j], load, servo.kp, enabled, name=f"joint {j + 1}"))
-        for j, (servo, load) in enumerate(zip(servos, loads(_links(scenario.robot), columns, angles), strict=True))
-    ]
+    on, servos = log.conditions.get("on"), known_servos(scenario.drive, log.n)
+    columns = ServoColumns(
+        log.t, log.q, log.conditions["command"], None if on is None else np.broadcast_to(on, log.q.shape), None, ()
+    )
+    return Joints(_links(scenario.robot), tuple(servos), (JointsLog("the log", columns, tuple(servo.kp for servo in servos)),))
 
 
 @cache

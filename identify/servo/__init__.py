@@ -14,5 +14,6 @@ from identify.servo.identification import identify_again as identify_again
 from identify.servo.identification import identify_servo as identify_servo
 from identify.servo.load import JointLoad as JointLoad
 from identify.servo.parameters import parameters_of as parameters_of
+from identify.servo.refusals import UnscaledError as UnscaledError
 from identify.servo.run import ServoRun as ServoRun
 from identify.servo.servo import Servo as Servo

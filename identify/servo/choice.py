@@ -60,18 +60,19 @@ def choose_friction(
     IdentificationError
         If no law can be fitted.
     """
-    fits, why, rough = dict[str, ServoFit](), "", dict[str, dict[str, float]]()
+    fits, why, rough = dict[str, ServoFit](), list[IdentificationError](), dict[str, dict[str, float]]()
     of_laws = {name for names in SERVO_FRICTIONS.values() for name in names}
     parameters_of("coulomb", (*more, *(name for name in held or {} if name not in of_laws)))
     stages = Stages.begun(servo, runs, held or {})
+    stages.require_shown(more)
     for law in SERVO_FRICTIONS:  # simpler ones come first
         rough[law] = stages.go(law, (), rough[SIMPLER[law]] if law in SIMPLER else stages.start)
         try:
             fits[law] = stages.fit(law, more, stages.go(law, more, rough[law]) if more else rough[law])
         except IdentificationError as error:
-            why = why or str(error)
+            why.append(error)
     if not fits:
-        raise IdentificationError(why)
+        raise why[0]
     c = 3 * float(np.median([fit.scale for fit in fits.values()]))  # one measure for all
     clusters = PER_PARAMETER * max(len(fit.free) for fit in fits.values())
     parts = min(stretches(fit.found, fit.loop, clusters) for fit in fits.values())  # the same parts of the log for all laws

@@ -6,7 +6,7 @@ from typing import Self, final
 
 import numpy as np
 
-from identify.errors import IdentificationError
+from identify.errors import ExcitationError, IdentificationError
 from identify.one_thread import one_thread
 from identify.servo.closed_loop import ServoLoop, count_of
 from identify.servo.excitation import Excitation
@@ -88,6 +88,7 @@ def identify_servo(
     """
     parameters_of(friction, (*more, *(held or {})))
     stages = Stages.begun(servo, runs, held or {})
+    stages.require_shown(more)
     p = stages.start
     for law in simpler(friction):
         p = stages.go(law, (), p)
@@ -134,6 +135,13 @@ class Stages:
         excitation, some = Excitation.of(servo, runs, held), _evenly(runs)
         with one_thread():
             return cls(servo, runs, held, _started(servo, some, held, excitation))
+
+    def require_shown(self, more: Sequence[str]) -> None:
+        """Raise ExcitationError if runs cannot show a further parameter."""
+        if "Fo" in more and not self._excitation.off:
+            raise ExcitationError(
+                f"{self._whole[0].name}: torque is never off in a motion, so that Fo does not show; leave it out"
+            )
 
     def go(self, friction: str, more: Sequence[str], p: Mapping[str, float]) -> dict[str, float]:
         """Return the parameters with a law of friction and further ones, from those of a simpler law."""

@@ -24,6 +24,22 @@ UNEXPLAINED = 0.2
 """Typical residual, as a share of the range of the motion, from which on a fit explains nothing."""
 
 
+class UnscaledError(ExcitationError):
+    """Torques without a scale: the fit explains how the joint moves, but not by which torques.
+
+    Parameters
+    ----------
+    message : str
+        The message.
+    fit : ServoFit
+        The fit.
+    """
+
+    def __init__(self, message: str, fit: ServoFit) -> None:
+        super().__init__(message)
+        self.fit = fit
+
+
 def require_explained(fit: ServoFit) -> None:
     """Raise IdentificationError if commands do not explain the motion."""
     if fit.scale > UNEXPLAINED * fit.excitation.range:
@@ -34,7 +50,7 @@ def require_explained(fit: ServoFit) -> None:
 
 
 def require_scale(fit: ServoFit) -> None:
-    """Raise ExcitationError if other torques explain the motion as well; those that are known stay as they are."""
+    """Raise UnscaledError if other torques explain the motion as well; those that are known stay as they are."""
     torques = [name for name in TORQUES if name in fit.free]
     if not torques:
         return
@@ -42,9 +58,10 @@ def require_scale(fit: ServoFit) -> None:
     factors = np.array([1.0, SCALED, 1 / SCALED])
     cost = search.cost(fit.loop.simulate({name: x * (factors if name in torques else 1.0) for name, x in fit.p.items()}))
     if cost[1:].min() < CONTRAST * cost[0]:
-        raise ExcitationError(
+        raise UnscaledError(
             f"{fit.loop.runs[0].name}: torque constant, friction and armature scale together, because the known load is small "
-            "beside them: add a known mass to the robot's file, or give one of them (--hold JOINT.a=0.5)"
+            "beside them: add a known mass to the robot's file, or give one of them (--hold JOINT.a=0.5)",
+            fit,
         )
 
 

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from sim.drives.drive import AbstractAmplifier, AbstractDrive, Commanded, Trace, every
 from sim.drives.electric import Electric
-from sim.drives.profile import Profile
+from sim.drives.profile import Profile, within
 from sim.errors import ScenarioError
 from sim.robot.motors import Array
 from sim.robot.robot import Robot
@@ -136,26 +136,27 @@ class _Amplifier(AbstractAmplifier):
 
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
         done = [self._once(demand, self._q[k % len(self._q)], speed[k % len(speed)]) for k in range(steps)]
-        self.trace = tuple(np.stack(x) for x in zip(*done, strict=True))
+        # Most calls are of one step, where a view does.
+        self.trace = tuple(x[0][None] if steps == 1 else np.stack(x) for x in zip(*done, strict=True))
         return self._K * self.trace[1]
 
     def _once(self, command: Array, q: Array, qd: Array) -> tuple[Array, ...]:
         """Return duty, current, back-EMF and whether a limit holds, in one step."""
         s = self._settings
         target = self._target.follow(command)
-        on = bool(s.enabled(np.array(self._t)))
+        on = not any(first <= self._t < last for first, last in s.off)
         self._t += self._h
         step = 2 * np.pi / s.counts if s.counts else 0.0
         seen = np.rint(q / step) * step if step else q
         error = target - seen - s.lead * qd
         if s.dead_band:
-            error = error - np.clip(error, -s.dead_band, s.dead_band)
+            error = error - within(error, s.dead_band)
         asked = self._gain * error * on
-        duty = np.clip(asked, -s.duty_limit, s.duty_limit)
+        duty = within(asked, s.duty_limit)
         emf = self._K * qd
         driven = on or s.winding == "shorted"
         wanted = driven * (s.supply * duty - emf) / self._R
-        current = np.clip(wanted, -self._most, self._most)
+        current = within(wanted, self._most)
         limited = (np.abs(asked) > s.duty_limit) | (np.abs(wanted) > self._most)
         return duty, current, emf, limited.astype(np.float64), self._R * current + emf
 

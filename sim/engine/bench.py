@@ -146,7 +146,7 @@ class Bench:
         self._plant.step(total, steps, self._going)
         current = step // self._clock.per_sample
         if current < len(self._tau):
-            self._tau[current] += tau.mean(axis=0) * steps
+            self._tau[current] += tau[0] if steps == 1 else tau.mean(axis=0) * steps
         return steps
 
     def _final(self, step: int) -> int:

@@ -72,5 +72,8 @@ class CurrentSensor:
 
     def take(self, tau: Array, dt: float) -> None:
         """Take in the torques [N m], before ripple, of equal parts of the next `dt` [s], shape (part, nsim, joint)."""
-        for part in tau if np.isfinite(self._rate) else tau[-1:]:
+        if self._rate == np.inf:
+            self.value = tau[-1]
+            return
+        for part in tau:
             self.value = part - (part - self.value) * np.exp(-self._rate * dt / len(tau))

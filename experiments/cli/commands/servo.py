@@ -19,9 +19,18 @@ from experiments.results.attempts import Attempts
 from experiments.results.folder import ResultsFolder
 from experiments.results.summaries import write_summary
 from experiments.results.writing import require_free, write_text
-from experiments.servo.identification import Servos, held_out, lacks_summary, of_logs, summary_of
+from experiments.servo.identification import Servos, lacks_summary, summary_of
 from experiments.servo.servo_function import servo_function
-from experiments.servo.servo_text import inexpressible, print_choice, print_errors, print_servos, verdicts, warnings_of
+from experiments.servo.servo_text import (
+    driveless,
+    inexpressible,
+    print_choice,
+    print_errors,
+    print_servos,
+    verdicts,
+    warnings_of,
+)
+from experiments.servo.written import in_mujoco, mjcf_of
 from identify.servo import ServoFit
 from identify.servo.choice import FrictionChoice
 
@@ -60,15 +69,12 @@ def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo
     """Return the fits that there are; print and save those of joints that are done if the others are not waited for."""
     every, held = dict[str, ServoFit | str](), held_of(options, servos.links.joints)
     try:
-        with stages_of(f"identifying {', '.join(servos.links.joints)}"):
-            for joint, result in servos.fits(options.friction, options.find, held):
+        with stages_of("identifying"):
+            for joint, result in servos.identified(options.friction, options.find, held):
                 if isinstance(result, FrictionChoice):
                     print_choice(page, joint, result)
                     page.found.setdefault("laws", {})[joint] = {"errors": result.errors, "p": result.p}
                 every[joint] = result.fits[result.chosen] if isinstance(result, FrictionChoice) else result
-                _take(page, folder, every)
-            for joint, again in servos.fits_again(_fits(every)):
-                every[joint] = again
                 _take(page, folder, every)
     finally:
         found = _fits(every)
@@ -93,7 +99,7 @@ def _take(page: Page, folder: ResultsFolder | None, every: dict[str, ServoFit | 
 
 def _judge(page: Page, servos: Servos, others: Servos | None, found: dict[str, ServoFit]) -> None:
     """Print errors of positions from commands alone, on the logs of the fit and on others, and what they mean."""
-    fitted, elsewhere = held_out(servos, found), held_out(others, found) if others else {}
+    fitted, elsewhere = servos.errors(found), others.errors(found) if others else {}
     for what, each in (("fitted", fitted), ("held out", elsewhere)):
         print_errors(page, f"{what} logs", each)
     every = {"fitted": fitted} | ({"held out": elsewhere} if others else {})
@@ -110,15 +116,14 @@ def _write(page: Page, options: IdentifyServo, servos: Servos, others: Servos | 
     path = options.write_mjcf
     assert path is not None
     place = path.absolute().parent
-    text = servos.text(found, place, options.position)
+    text = mjcf_of(servos, found, place, options.position)
     write_text(path, text, "--write-mjcf", force=options.force, read=files_read(options))
     page.print(Text(f"written to {path}: the robot with its servos, to be commanded with angles of the file"), soft_wrap=True)
-    for each in (of_logs(servos, {log: logs.logs[log]}) for logs in (others or servos,) for log in logs.logs):
-        log = next(iter(each.logs))
-        errors = each.in_mujoco(text, place, found, log)
+    for log in (others or servos).logs:
+        errors = in_mujoco(others or servos, text, place, found, log)
         page.found.setdefault("mujoco_error", {})[log.name] = errors
         print_errors(page, f"{path.name} in plain MuJoCo, {log.name}", {joint: np.array([e]) for joint, e in errors.items()})
-    page.warn({"the written file": inexpressible(found)})
+    page.warn({"the written file": [*inexpressible(found), *driveless(servos.links.joints, found)]})
 
 
 def _write_function(page: Page, options: IdentifyServo, servos: Servos, found: dict[str, ServoFit]) -> None:
@@ -127,7 +132,7 @@ def _write_function(page: Page, options: IdentifyServo, servos: Servos, found: d
     known = {joint: (servos.known.servo(joint, ""), fit) for joint, fit in found.items()}
     text = servo_function(Path(servos.robot).name, known, [log.name for log in servos.logs])
     write_text(path, text, "--write", force=options.force, read=files_read(options))
-    page.print(Text(f"written to {path}: the servos as Python functions"), soft_wrap=True)
+    page.print(Text(f"written to {path}: the servos as a Python file"), soft_wrap=True)
 
 
 def _recorded(servos: Servos, found: dict[str, ServoFit], audience: Audience | None) -> "Streams":

@@ -6,11 +6,12 @@ from pathlib import Path
 from experiments.cli.options.servo import IdentifyServo
 from experiments.errors import ExperimentError
 from experiments.identification.robot_model import absolute
-from experiments.servo.identification import AUTO, Servos, of_logs
+from experiments.servo.identification import AUTO, Servos
 from identify.files.servo_file import ServoFile
 from identify.files.servo_log import ServoColumns, order, read_servo_log
 from identify.servo import SERVO_FRICTIONS
 from identify.servo.parameters import SERVO_PARAMETERS
+from identify.servo.refusals import require_possible
 from sim.robot.robot import Robot
 
 
@@ -30,9 +31,9 @@ def servos_of(options: IdentifyServo) -> tuple[Servos, Servos | None]:
     if not held and len(logs) > 1:
         logs, held = logs[:-1], logs[-1:]
     servos = Servos(absolute(options.robot), mounting, known, {})
-    made = of_logs(servos, {path: _ordered(path, options, servos.links.joints) for path in logs})
+    made = servos.of_logs({path: _ordered(path, options, servos.links.joints) for path in logs})
     others = {path: _ordered(path, options, servos.links.joints) for path in held}
-    return made, of_logs(servos, others) if others else None
+    return made, servos.of_logs(others) if others else None
 
 
 def held_of(options: IdentifyServo, joints: Sequence[str]) -> dict[str, dict[str, float]]:
@@ -46,6 +47,8 @@ def held_of(options: IdentifyServo, joints: Sequence[str]) -> dict[str, dict[str
         raise ExperimentError(f"--hold {unknown[0]}: no such joint; joints are {', '.join(joints)}")
     if wrong := [letter for _, _, letter in split.values() if letter not in SERVO_PARAMETERS]:
         raise ExperimentError(f"--hold: a servo has no parameter {wrong[0]!r}; known: {', '.join(SERVO_PARAMETERS)}")
+    for name, (_, _, letter) in split.items():
+        require_possible({letter: values[name]})
     return {
         joint: {letter: values[name] for of in ("", joint) for name, (own, _, letter) in split.items() if own == of}
         for joint in joints

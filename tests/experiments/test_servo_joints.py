@@ -1,0 +1,80 @@
+"""The joints of an arm, one after the other, twice."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from experiments.servo import joints as module
+from experiments.servo.joints import Joints, JointsLog
+from identify import IdentificationError
+from identify.files.servo_log import ServoColumns
+from identify.servo import Servo, UnscaledError
+from sim.robot.mounting import PLAIN
+from sim.robot.servos import links
+
+SERVO = Servo(0.166, 16.0, 12.0)
+
+
+@pytest.fixture
+def arm():
+    robot = links("servo_arm", PLAIN)
+    t = np.arange(0, 2, 0.01)
+    q = 0.3 * np.sin(np.outer(t, 1 + np.arange(robot.n)))
+    columns = ServoColumns(t, q, q, None, None, robot.joints)
+    return Joints(robot, (SERVO,) * robot.n, (JointsLog("one.csv", columns, (16.0,) * robot.n),))
+
+
+def fit_of(joint):
+    """Return what stands for a fit: it simulates the joint a little ahead of where it was measured."""
+    return SimpleNamespace(name=joint, p={"offset": 0.0}, simulate=lambda runs: [run.q + 1e-3 for run in runs])
+
+
+def test_a_joint_without_a_scale_moves_for_the_others_and_one_that_is_not_explained_does_not(arm, monkeypatch):
+    seen = dict[str, float]()
+
+    def identify(j, servo, runs):
+        assert runs[0].name == f"one.csv, {arm.links.joints[j]}"
+        if j == 4:
+            raise UnscaledError("scale together", fit_of(j))
+        if j == 5:
+            raise IdentificationError("does not move")
+        return fit_of(j)
+
+    def again(fit, runs):
+        seen[fit.name] = float(np.ptp(runs[0].load.rest))
+        return fit
+
+    monkeypatch.setattr(module, "identify_again", again)
+    found = list(arm.identified(identify))
+    assert [j for j, _ in found] == [0, 1, 2, 3, 4, 5, 0, 1, 2, 3, 4]
+    assert found[4][1] == "scale together"
+    assert found[5][1] == "does not move"
+    assert sorted(seen) == [0, 1, 2, 3, 4]
+
+
+def test_a_joint_that_moves_alone_is_identified_once(arm):
+    def identify(j, servo, runs):
+        if j:
+            raise IdentificationError("does not move")
+        return fit_of(j)
+
+    assert len(list(arm.identified(identify))) == arm.links.n
+
+
+CART = """
+<mujoco><worldbody><body><joint name="rail" type="slide" axis="1 0 0"/><geom size="0.1" mass="1"/>
+  <body><joint name="pole" axis="0 1 0"/><geom size="0.1" pos="0 0 -0.2" mass="0.2"/></body>
+</body></worldbody></mujoco>
+"""
+
+
+def test_a_joint_that_slides_is_refused(tmp_path):
+    (tmp_path / "cart.xml").write_text(CART)
+    robot = links(str(tmp_path / "cart.xml"), PLAIN)
+    t = np.arange(0, 2, 0.01)
+    q = np.zeros((len(t), robot.n)) + 0.1 * np.sin(t)[:, None]
+    log = JointsLog("one.csv", ServoColumns(t, q, q, None, None, robot.joints), (16.0,) * robot.n)
+    found = dict(Joints(robot, (SERVO,) * robot.n, (log,)).identified(lambda j, servo, runs: fit_of(j)))
+    assert "rail slides" in found[0]
+    assert not isinstance(found[1], str)
