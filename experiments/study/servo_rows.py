@@ -14,7 +14,7 @@ from identify.files.servo_log import ServoColumns
 from identify.servo import Servo, ServoFit, ServoRun, identify_servo, parameters_of
 from sim.drives import ServoDrive
 from sim.engine.run import Run
-from sim.robot.mounting import PLAIN
+from sim.robot.payload import Payload
 from sim.robot.robot import Robot
 from sim.robot.servos import links
 from sim.scenario.scenario import Scenario
@@ -102,15 +102,19 @@ def rows_of(
 
 
 def _joints(scenario: Scenario, log: MotionLog) -> Joints:
-    """Return what the owner of a scenario's servos knows of them, with a log."""
+    """Return what the owner of a scenario's servos knows of them, and of a mass that is added, with a log."""
     assert isinstance(scenario.drive, ServoDrive)
     on, servos = log.conditions.get("on"), known_servos(scenario.drive, log.n)
     columns = ServoColumns(
         log.t, log.q, log.conditions["command"], None if on is None else np.broadcast_to(on, log.q.shape), None, ()
     )
-    return Joints(_links(scenario.robot), tuple(servos), (JointsLog("the log", columns, tuple(servo.kp for servo in servos)),))
+    return Joints(
+        _links(scenario.robot, scenario.payload),
+        tuple(servos),
+        (JointsLog("the log", columns, tuple(servo.kp for servo in servos)),),
+    )
 
 
 @cache
-def _links(robot: str) -> Robot:
-    return links(robot, PLAIN)
+def _links(robot: str, payload: Payload) -> Robot:
+    return links(robot, payload=payload)

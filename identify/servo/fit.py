@@ -38,6 +38,9 @@ class ServoFit:
         The runs that it looked at.
     excitation : Excitation
         What the runs can show.
+    contrast : float
+        How many times larger the objective is at least with half as much again, or two thirds, of the torque per volt, and with
+        all others as that needs them: near 1 where no known load sets the scale of the torques.
     """
 
     servo: Servo
@@ -46,6 +49,7 @@ class ServoFit:
     found: Found
     loop: ServoLoop
     excitation: Excitation
+    contrast: float
 
     @property
     def p(self) -> dict[str, float]:
@@ -55,8 +59,16 @@ class ServoFit:
     @cached_property
     def left_out(self) -> LeftOut:
         """The fit without each run, or piece of a run."""
-        parts = stretches(self.found, self.loop, CLUSTERS * len(self.free))
-        return left_out(self.found, self.loop, 3 * self.scale, parts)
+        return left_out(self.found, self.loop, 3 * self.scale, self._stretches)
+
+    @property
+    def clusters(self) -> int:
+        """Runs, or parts of them, that are taken as independent."""
+        return self._stretches * len(self.loop.runs)
+
+    @cached_property
+    def _stretches(self) -> int:
+        return stretches(self.found, self.loop, CLUSTERS * len(self.free))
 
     @property
     def covariance(self) -> Array:

@@ -14,7 +14,7 @@ from identify.servo.fit import ServoFit
 from identify.servo.friction import SERVO_FRICTIONS, first_of, simpler
 from identify.servo.parameters import FURTHER, SERVO_PARAMETERS, parameters_of
 from identify.servo.pieces import pieces
-from identify.servo.refusals import TORQUES, require_explained, require_possible, require_scale
+from identify.servo.refusals import SCALED, SETTING, TORQUES, require_explained, require_possible, require_scale
 from identify.servo.rows import ServoRows
 from identify.servo.run import ServoRun
 from identify.servo.search import Found, Search
@@ -188,9 +188,12 @@ class Stages:
             found = self._search(loop, p, free).best(p, REFINED)
             if self._few:
                 found = self._better(loop, free, found)
+            found, contrast = self._of_scale(loop, free, found)
             # At rest, rounded positions change by a count or not at all: what parameters do to them shows without rounding.
             exact = ServoLoop(self._servo, self._whole, step)
-            fit = ServoFit(self._servo, friction, free, self._search(exact, found.p, free).at(found), exact, self._excitation)
+            fit = ServoFit(
+                self._servo, friction, free, self._search(exact, found.p, free).at(found), exact, self._excitation, contrast
+            )
             require_explained(fit)
             require_scale(fit)
         return fit
@@ -206,6 +209,29 @@ class Stages:
                 break
             found = best
         return found
+
+    def _of_scale(self, loop: ServoLoop, free: tuple[str, ...], found: Found) -> tuple[Found, float]:
+        """Return what is found, from other scales of the torques if that is better, and its contrast (see `ServoFit`)."""
+        if any(found.p[name] > 0 for name in SETTING if name not in free):
+            return found, np.inf
+        for _ in range(SHAKEN):
+            scaled, contrast = self._scaled(free, found.p)
+            if contrast > 1 - ESCAPED:
+                break
+            other = self._search(loop, scaled, free).best(scaled, REFINED)
+            if other.cost > (1 - ESCAPED) * self._search(loop, scaled, free).at(found).cost:
+                break
+            found = other
+        return found, contrast
+
+    def _scaled(self, free: tuple[str, ...], p: Mapping[str, float]) -> tuple[dict[str, float], float]:
+        """Return the best parameters with another torque per volt, and how many times larger they make the objective."""
+        search = self._search(self._coarse, p, free)
+        others = Search(self._coarse, [name for name in free if name != "a"], self._excitation.scales, search.c)
+        torques = [name for name in TORQUES if name in free]
+        starts = [{**p, **{name: p[name] * factor for name in torques}} for factor in (SCALED, 1 / SCALED)]
+        best = min((others.best(start, ASIDE) for start in starts), key=lambda other: other.cost)
+        return best.p, best.cost / search.best(p, ASIDE).cost
 
     def _search(self, loop: ServoLoop, begin: Mapping[str, float], free: Sequence[str]) -> Search:
         r = np.abs(loop.q - loop.simulate(begin)[0])[loop.kept]

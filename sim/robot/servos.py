@@ -13,6 +13,7 @@ import numpy.typing as npt
 from sim.errors import RobotError
 from sim.robot.motors import Array
 from sim.robot.mounting import PLAIN, Mounting
+from sim.robot.payload import Payload
 from sim.robot.play import HARD
 from sim.robot.rewrite import compiled, rewritten
 from sim.robot.robot import Robot
@@ -73,9 +74,9 @@ class ServoValues:
     backlash: float = 0.0
 
 
-def links(name: str, mounting: Mounting) -> Robot:
+def links(name: str, mounting: Mounting = PLAIN, payload: Payload = Payload()) -> Robot:  # noqa: B008  # frozen
     """Return a robot without what belongs to its drives: armature, damping and friction of the file."""
-    return Robot.load(name, mounting.edit, _without_drives)
+    return Robot.load(name, mounting.edit, payload.edit, _without_drives)
 
 
 def _without_drives(spec: mujoco.MjSpec) -> None:

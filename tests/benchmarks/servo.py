@@ -1,6 +1,6 @@
 """A servo on a bench: errors of held-out runs, by laws of friction.
 
-    uv run python tests/benchmarks/servo.py shared.npz FOLDER [LAW[+lead] ...]
+    uv run python tests/benchmarks/servo.py shared.npz FOLDER [LAW[+lead+...] ...]
 
 The file has data (run, sample, column), columns (t, goal, q, ..., torque_enable), mass [kg], length [m], kp and trajectory, as
 the logs of GitHub kscalelabs/sysid can be put together. Each run is judged by a fit without its mass, and a second time by one
@@ -47,8 +47,8 @@ def fold(task):
         runs, about = read(path)
         out = about[key] == value
         start = perf_counter()
-        name, _, more = law.partition("+")
-        fit = identify_servo(SERVO, [run for run, o in zip(runs, out, strict=True) if not o], name, [more] if more else [])
+        name, *more = law.split("+")
+        fit = identify_servo(SERVO, [run for run, o in zip(runs, out, strict=True) if not o], name, more)
         seconds = perf_counter() - start
         np.savez(kept, q=fit.simulate([run for run, o in zip(runs, out, strict=True) if o]), seconds=seconds)
     with np.load(kept) as file:

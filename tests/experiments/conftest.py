@@ -123,3 +123,12 @@ def series():
         return (low + high) / 2 + size * (q - middle), size * qd, size * qdd
 
     return made
+
+
+@pytest.fixture
+def few_moves(tmp_path):
+    """Return the file of scenario arm with a few moves: where joints turn twice round, forty take five minutes."""
+    arm = load("arm")
+    path = tmp_path / "arm.toml"
+    path.write_text(to_toml(replace(arm, trajectory=replace(arm.trajectory, moves=8))))
+    return path

@@ -112,7 +112,7 @@ def test_a_file_that_does_not_say_is_asked(csv, complaint):
     ("args", "message"),
     [
         (["--torque-delay", "soon"], "--torque-delay soon must be seconds, such as 0.002, or estimate"),
-        (["--robot", "puma"], "no robot 'puma'; known: panda, pendulum, puma560, scara, servo_arm"),
+        (["--robot", "puma"], "no robot 'puma'; known: horn, panda, pendulum, puma560, scara, servo_arm"),
         (["--chain", "papre"], "no 'papre' among the chains"),
         (["--model", "powr"], "no 'powr' among the models (did you mean 'power'?)"),
         (["--estimator", "LS"], "no 'LS' among the estimators"),

@@ -13,7 +13,7 @@ from sim.robot.robot import Robot
     [
         ("panda", "the log has positions of 6 joints, the robot 7 joints: joint1, joint2"),
         ("scara", "the log has positions of 6 joints, the robot 2 joints: joint1, joint2"),
-        ("kuka", "no robot 'kuka'; known: panda, pendulum, puma560, scara, servo_arm"),
+        ("kuka", "no robot 'kuka'; known: horn, panda, pendulum, puma560, scara, servo_arm"),
         ("gone.xml", "gone.xml': No such file or directory"),
     ],
 )

@@ -272,7 +272,7 @@ def test_every_way_ends_with_a_result(real, way, tmp_path, monkeypatch, capsys):
 
 COMMANDS = {
     "robot": [],
-    "run": ["arm", "--no-rerun", "--robot"],
+    "run": ["arm.toml", "--no-rerun", "--robot"],
     "excite": ["--no-rerun", "--duration", "4", "--velocity", "2", "--acceleration", "10", "--seed", "0"],
 }
 
@@ -282,8 +282,8 @@ PLACEHOLDERS = {"run": "state [friction]", "excite": "of its limit"}
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_other_commands_take_it(real, command, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_other_commands_take_it(real, command, few_moves, monkeypatch, capsys):
+    monkeypatch.chdir(few_moves.parent)
     robot = real.robot_model.robot
     free = [joint for joint, ends in zip(robot.joints, robot.ranges, strict=True) if not np.isfinite(ends).all()]
     Path("limits.toml").write_text("[position]\n" + "".join(f'"{joint}" = [-3.0, 3.0]\n' for joint in free))

@@ -126,13 +126,13 @@ def test_every_way_ends_with_a_result_and_files_of_the_true_robot(real, way, tmp
 
 COMMANDS = {
     "robot": [],
-    "run": ["arm", "--no-rerun", "--robot"],
+    "run": ["arm.toml", "--no-rerun", "--robot"],
     "excite": ["--no-rerun", "--duration", "4", "--velocity", "2", "--acceleration", "10", "--seed", "0"],
 }
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_other_commands_take_it(real, command, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_other_commands_take_it(real, command, few_moves, monkeypatch, capsys):
+    monkeypatch.chdir(few_moves.parent)
     words = [command, str(real.path), *COMMANDS[command]] if command != "run" else [command, *COMMANDS[command], str(real.path)]
     assert main(words) == 0, capsys.readouterr().err
