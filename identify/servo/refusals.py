@@ -19,8 +19,8 @@ SETTING = ("a", "b", "Ia", "Fs")
 
 APART = 16.0
 """By how much another scale must make the objective larger, in shares of a cluster: four standard deviations, if a cluster
-counts as one observation. Simulated joints whose scale was wrong had 0 to 14, those with a mass that sets it 26 and more; runs of the
-public bench 5 to 31 from one, 23 from a hundred."""
+counts as one observation. Simulated joints whose scale was wrong had 0 to 14, those with a mass that sets it 26 and more; runs
+of the public bench 5 to 31 from one, 23 from a hundred."""
 
 UNEXPLAINED = 0.2
 """Typical residual, as a share of the range of the motion, from which on a fit explains nothing."""
