@@ -14,7 +14,7 @@ from identify.servo.fit import ServoFit
 from identify.servo.friction import SERVO_FRICTIONS, first_of, simpler
 from identify.servo.parameters import FURTHER, SERVO_PARAMETERS, parameters_of
 from identify.servo.pieces import pieces
-from identify.servo.refusals import SCALED, SETTING, TORQUES, require_explained, require_possible, require_scale
+from identify.servo.refusals import OTHER_SCALE, SCALE_SETTERS, TORQUES, require_explained, require_possible, require_scale
 from identify.servo.rows import ServoRows
 from identify.servo.run import ServoRun
 from identify.servo.search import Found, Search
@@ -212,7 +212,7 @@ class Stages:
 
     def _of_scale(self, loop: ServoLoop, free: tuple[str, ...], found: Found) -> tuple[Found, float]:
         """Return what is found, from other scales of the torques if that is better, and its contrast (see `ServoFit`)."""
-        if any(found.p[name] > 0 for name in SETTING if name not in free):
+        if any(found.p[name] > 0 for name in SCALE_SETTERS if name not in free):
             return found, np.inf
         for _ in range(SHAKEN):
             scaled, contrast = self._scaled(free, found.p)
@@ -229,7 +229,7 @@ class Stages:
         search = self._search(self._coarse, p, free)
         others = Search(self._coarse, [name for name in free if name != "a"], self._excitation.scales, search.c)
         torques = [name for name in TORQUES if name in free]
-        starts = [{**p, **{name: p[name] * factor for name in torques}} for factor in (SCALED, 1 / SCALED)]
+        starts = [{**p, **{name: p[name] * factor for name in torques}} for factor in (OTHER_SCALE, 1 / OTHER_SCALE)]
         best = min((others.best(start, ASIDE) for start in starts), key=lambda other: other.cost)
         return best.p, best.cost / search.best(p, ASIDE).cost
 

@@ -11,13 +11,13 @@ from identify.servo.parameters import SERVO_PARAMETERS
 TORQUES = ("a", "b", "Ia", "Fs", "Fv", "Fst")
 """Parameters that scale together where no known load sets the scale."""
 
-SCALED = 1.5
+OTHER_SCALE = 1.5
 """Factor on the torque per volt."""
 
-SETTING = ("a", "b", "Ia", "Fs")
+SCALE_SETTERS = ("a", "b", "Ia", "Fs")
 """Parameters of which one that is known sets the scale."""
 
-APART = 16.0
+MIN_RISE = 16.0
 """By how much another scale must make the objective larger, in shares of a cluster: four standard deviations, if a cluster
 counts as one observation. Simulated joints whose scale was wrong had 0 to 14, those with a mass that sets it 26 and more; runs
 of the public bench 5 to 31 from one, 23 from a hundred."""
@@ -53,7 +53,7 @@ def require_explained(fit: ServoFit) -> None:
 
 def require_scale(fit: ServoFit) -> None:
     """Raise UnscaledError if other torques explain the motion as well."""
-    if fit.clusters * (fit.contrast - 1) < APART:
+    if fit.clusters * (fit.contrast - 1) < MIN_RISE:
         raise UnscaledError(
             f"{fit.loop.runs[0].name}: torque constant, friction and armature scale together, because the known load is small "
             "beside them: add a known mass to the robot's file, log more motion, or give one of them (--hold JOINT.a=0.5)",
