@@ -11,11 +11,11 @@ from identify.arrays import Array
 from identify.errors import IdentificationError
 from identify.servo.fit import ServoFit
 from identify.servo.friction import SERVO_FRICTIONS, SIMPLER
-from identify.servo.identification import Stages
 from identify.servo.left_out import left_out, stretches
 from identify.servo.parameters import parameters_of
 from identify.servo.run import ServoRun
 from identify.servo.servo import Servo
+from identify.servo.stages import Stages
 
 LEVEL = 0.05
 """p value, of all comparisons together, below which a law is better."""

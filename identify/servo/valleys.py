@@ -1,0 +1,123 @@
+"""Other valleys of a servo's objective: a light armature looks like a late command, torques look like larger ones."""
+
+from collections.abc import Mapping, Sequence
+from itertools import product
+from typing import final
+
+import numpy as np
+
+from identify.servo.closed_loop import ServoLoop
+from identify.servo.excitation import Excitation
+from identify.servo.refusals import OTHER_SCALE, SCALE_SETTERS, TORQUES
+from identify.servo.search import Found, Search
+
+SHAKEN = 2
+"""Times that a search leaves its valley for others, at most."""
+
+SCALES, ROTORS, LATER = (0.7, 1.0, 1.4), (0.25, 1.0, 4.0), (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
+"""Factors on all torques, further ones on the armature, and changes of the delay [samples] that are tried from there."""
+
+VALLEYS = 3
+"""Other valleys that are searched."""
+
+ESCAPED = 0.01
+"""Share by which another valley must be better."""
+
+ASIDE = 8
+"""Rounds in another valley of the last stage, at most."""
+
+REFINED = 15
+"""Rounds of the last stage, at most."""
+
+
+@final
+class Valleys:
+    """Searches that leave the valley where they are, if another one is deeper.
+
+    Parameters
+    ----------
+    coarse : ServoLoop
+        Runs in coarse steps, in which other valleys are looked for.
+    excitation : Excitation
+        What the runs can show.
+    held : mapping of str to float
+        Parameters that are known.
+    """
+
+    def __init__(self, coarse: ServoLoop, excitation: Excitation, held: Mapping[str, float]) -> None:
+        self._coarse, self._excitation, self._held = coarse, excitation, dict(held)
+
+    def from_start(self, p: Mapping[str, float], free: Sequence[str]) -> Found:
+        """Return what is found in coarse steps."""
+        found = self._search(self._coarse, p, free).best(p)
+        for _ in range(SHAKEN):
+            search = self._search(self._coarse, found.p, free)
+            best = min((search.best(other) for other in self._shaken(search, found.p)), key=lambda other: other.cost)
+            if best.cost > (1 - ESCAPED) * search.at(found).cost:
+                break
+            found = best
+        return found
+
+    def refined(self, loop: ServoLoop, p: Mapping[str, float], free: Sequence[str], many: bool) -> tuple[Found, float]:
+        """Return what is found in the steps of a loop, and its contrast (see `ServoFit`)."""
+        found = self._search(loop, p, free).best(p, REFINED)
+        return self._of_scale(loop, free, found if many else self._better(loop, free, found))
+
+    def at(self, loop: ServoLoop, found: Found, free: Sequence[str]) -> Found:
+        """Return residuals and sensitivities in another loop."""
+        return self._search(loop, found.p, free).at(found)
+
+    def _shaken(self, search: Search, p: dict[str, float]) -> list[dict[str, float]]:
+        """Return the best of parameters in other valleys: a rotor that is light looks like a command that is late."""
+        base = {**p, "Ia": max(p["Ia"], p["b"] * self._excitation.T / 2)}
+        T, held = self._excitation.T, self._held
+        tried = []
+        for scale, Ia, delay, offset in product(SCALES, ROTORS, LATER, (base["offset"], 0.0)):
+            torques = {name: x * scale for name, x in base.items() if name in TORQUES}
+            late = max(base["delay"] + delay * T, 0.0)
+            tried.append({**base, **torques, "Ia": base["Ia"] * Ia, "delay": late, "offset": offset, **held})
+        tried = [dict(each) for each in {tuple(other.items()): None for other in tried} if dict(each) != base]
+        lanes = {name: np.array([x[name] for x in tried]) for name in base}
+        order = np.argsort(search.cost(self._coarse.simulate(lanes)))[:VALLEYS]
+        return [tried[int(k)] for k in order]
+
+    def _better(self, loop: ServoLoop, free: Sequence[str], found: Found) -> Found:
+        """Return what is found from both sides of the axes that are known worst, if it is better."""
+        for _ in range(SHAKEN):
+            search = self._search(loop, found.p, free)
+            tried = search.away(found)
+            cost = search.cost(loop.simulate({name: np.array([x[name] for x in tried]) for name in tried[0]}))
+            best = min((search.best(tried[int(k)], ASIDE) for k in np.argsort(cost)[:VALLEYS]), key=lambda other: other.cost)
+            if best.cost > (1 - ESCAPED) * search.at(found).cost:
+                break
+            found = best
+        return found
+
+    def _of_scale(self, loop: ServoLoop, free: Sequence[str], found: Found) -> tuple[Found, float]:
+        """Return what is found, from other scales of the torques if that is better, and its contrast (see `ServoFit`)."""
+        if any(found.p[name] > 0 for name in SCALE_SETTERS if name not in free):
+            return found, np.inf
+        scaled, contrast = self._scaled(free, found.p)
+        for _ in range(SHAKEN):
+            if contrast > 1 - ESCAPED:
+                break
+            other = self._search(loop, scaled, free).best(scaled, REFINED)
+            if other.cost > (1 - ESCAPED) * self._search(loop, scaled, free).at(found).cost:
+                break
+            found = other
+            scaled, contrast = self._scaled(free, found.p)
+        return found, contrast
+
+    def _scaled(self, free: Sequence[str], p: Mapping[str, float]) -> tuple[dict[str, float], float]:
+        """Return the best parameters with another torque per volt, and how many times larger they make the objective."""
+        search = self._search(self._coarse, p, free)
+        others = Search(self._coarse, [name for name in free if name != "a"], self._excitation.scales, search.c)
+        torques = [name for name in TORQUES if name in free]
+        starts = [{**p, **{name: p[name] * factor for name in torques}} for factor in (OTHER_SCALE, 1 / OTHER_SCALE)]
+        best = min((others.best(start, ASIDE) for start in starts), key=lambda other: other.cost)
+        return best.p, best.cost / search.best(p, ASIDE).cost
+
+    def _search(self, loop: ServoLoop, begin: Mapping[str, float], free: Sequence[str]) -> Search:
+        r = np.abs(loop.q - loop.simulate(begin)[0])[loop.kept]
+        c = 3 * max(float(np.median(r)), loop.servo.step / 4)
+        return Search(loop, free, self._excitation.scales, c)
