@@ -53,16 +53,16 @@ class Servos:
     @cached_property
     def joints(self) -> Joints:
         """The joints with their logs."""
-        names, same = self.links.joints, Counter(path.name for path in self.logs)
+        names = self.links.joints
         logs = [
-            JointsLog(
-                path.name if same[path.name] == 1 else str(path),
-                columns,
-                tuple(self.known.servo(joint, path.name).kp for joint in names),
-            )
+            JointsLog(self.name(path), columns, tuple(self.known.servo(joint, path.name).kp for joint in names))
             for path, columns in self.logs.items()
         ]
         return Joints(self.links, tuple(self.known.servo(joint, "") for joint in names), tuple(logs))
+
+    def name(self, path: Path) -> str:
+        """Return what messages call a log: its file, with the folder where several files have the same name."""
+        return path.name if Counter(other.name for other in self.logs)[path.name] == 1 else str(path)
 
     def identified(
         self, friction: str, find: Sequence[str], held: Mapping[str, dict[str, float]]

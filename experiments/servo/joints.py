@@ -5,11 +5,14 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import NamedTuple, final
 
+import numpy as np
+
 from experiments.servo.loads import Moving, loads
 from identify import IdentificationError
 from identify.files.servo_log import ServoColumns
 from identify.servo import JointLoad, Servo, ServoFit, ServoRun, UnscaledError, identify_again
 from identify.servo.choice import FrictionChoice
+from identify.servo.refusals import has_scale
 from identify.telling import stage
 from sim.robot.robot import Robot
 
@@ -18,6 +21,9 @@ Identified = ServoFit | FrictionChoice
 
 Identify = Callable[[int, Servo, Sequence[ServoRun]], Identified]
 """Identifies one joint by its number, what is known of its servo, and its runs."""
+
+
+UNLOADED = JointLoad(*(np.zeros(()) for _ in range(4)))
 
 
 class JointsLog(NamedTuple):
@@ -53,14 +59,14 @@ class Joints:
         return self._runs({})
 
     def runs_with(self, fits: Mapping[int, ServoFit]) -> list[list[ServoRun]]:
-        """Return runs of each joint, while others that have a fit move as that says, but for what was measured slowly."""
+        """Return runs of each joint, while others that have a fit move as simulated, corrected by the measured slow motion."""
         return self.runs if self.links.n == 1 or not fits else self._runs(fits)
 
     def identified(self, identify: Identify) -> Iterator[tuple[int, Identified | str]]:
-        """Yield what becomes of each joint, or why nothing does; joints of an arm come twice.
+        """Yield the result of each joint, or why it has none; joints of an arm come twice.
 
-        Counts of an encoder say little of accelerations. Once all have a fit, joints are fitted again, from where they are, to
-        loads that follow from the fits of the others; whether a known load sets the scale of its torques does not matter there.
+        Encoder counts hide accelerations. Joints are therefore fitted a second time, starting from their first estimates, to
+        loads that follow from the fits of the others. A joint whose torques have no scale still moves as its fit simulates.
         """
         moving = dict[int, ServoFit]()
         for j, (joint, servo, runs) in enumerate(zip(self.links.joints, self.servos, self.runs, strict=True)):
@@ -88,15 +94,19 @@ class Joints:
         simulated = {j: fit.simulate(self.runs[j]) for j, fit in fits.items()}
         every = [[] for _ in self.links.joints]  # type: list[list[ServoRun]]
         for k, log in enumerate(self.logs):
-            moving = {j: Moving(q[k], fits[j].p["offset"]) for j, q in simulated.items()}
+            for j in range(self.links.n):
+                self._run(log, j, UNLOADED)  # what makes no run makes no load
+            # Without a scale, an angle at which gravity is right is none of the joint.
+            moving = {j: Moving(q[k], fits[j].p["offset"] if has_scale(fits[j]) else 0.0) for j, q in simulated.items()}
             for j, load in enumerate(loads(self.links, log.columns, moving)):
                 every[j].append(self._run(log, j, load))
         return every
 
     def _run(self, log: JointsLog, j: int, load: JointLoad) -> ServoRun:
-        t, q, command, on, voltage, _ = vars(log.columns).values()
-        own = (None if on is None else on[:, j] > 0.5, None if voltage is None else voltage[:, j])
-        return ServoRun(t, q[:, j], command[:, j], load, log.kp[j], *own, name=f"{log.name}, {self.links.joints[j]}")
+        columns, name = log.columns, f"{log.name}, {self.links.joints[j]}"
+        on = None if columns.on is None else columns.on[:, j] > 0.5
+        voltage = None if columns.voltage is None else columns.voltage[:, j]
+        return ServoRun(columns.t, columns.q[:, j], columns.command[:, j], load, log.kp[j], on, voltage, name=name)
 
 
 def _attempt(identify: Callable[[], Identified]) -> tuple[Identified | str, ServoFit | None]:
@@ -107,4 +117,4 @@ def _attempt(identify: Callable[[], Identified]) -> tuple[Identified | str, Serv
         return str(error), error.fit
     except IdentificationError as error:
         return str(error), None
-    return result, result.fits[result.chosen] if isinstance(result, FrictionChoice) else result
+    return result, result.fit if isinstance(result, FrictionChoice) else result

@@ -8,6 +8,7 @@ import numpy as np
 from identify import Array
 from identify.files.servo_log import ServoColumns
 from identify.servo import JointLoad
+from identify.servo.run import without_spikes
 from identify.servo.smooth import corrected, smoothed
 from sim.robot.inverse_dynamics import InverseDynamics, inverse_dynamics
 from sim.robot.robot import Robot
@@ -26,13 +27,14 @@ def loads(robot: Robot, columns: ServoColumns, moving: Mapping[int, Moving] | No
     Gravity follows the joint's own angle exactly; what accelerations and velocities of the others need is that of the measured
     motion, smoothed, or of the simulated one (see `corrected`), by the number of the joint.
     """
-    t, q, n = columns.t, columns.q, robot.n
+    t, n = columns.t, robot.n
+    measured = q = np.stack([without_spikes(t, x) for x in columns.q.T], axis=1)
     if n == 1:
         qd = qdd = np.zeros_like(q)
     else:
         q, qd, qdd = smoothed(t, q)
         for j, of in (moving or {}).items():
-            q[:, j], qd[:, j], qdd[:, j] = corrected(t, of.q, columns.q[:, j])
+            q[:, j], qd[:, j], qdd[:, j] = corrected(t, of.q, measured[:, j])
             q[:, j] += of.offset
     dynamics = InverseDynamics(robot, len(q))
     still = np.zeros_like(q)

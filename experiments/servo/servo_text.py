@@ -98,7 +98,7 @@ def inexpressible(fits: Mapping[str, ServoFit]) -> list[str]:
     """Return what MuJoCo's servos do not have of what was found."""
     lost = dict.fromkeys(x for fit in fits.values() for x in fit.free if x not in EXPRESSIBLE)
     meanings = ", ".join(f"{x} ({SERVO_PARAMETERS[x].meaning})" for x in lost)
-    found = [f"MuJoCo's dcmotor cannot express {meanings}: the errors above include that"] if lost else []
+    found = [f"MuJoCo's dcmotor cannot express {meanings}: the errors in plain MuJoCo include that"] if lost else []
     if any("backlash" in fit.free for fit in fits.values()):
         found.append("backlash is written as a second joint; the loop of the dcmotor sees the rotor, before the play")
     offsets = {joint: fit.p["offset"] for joint, fit in fits.items()}
@@ -106,10 +106,10 @@ def inexpressible(fits: Mapping[str, ServoFit]) -> list[str]:
     return [*found, f"the file's angles are the log's plus an offset [rad]: {words}; add it to commands"]
 
 
-def driveless(joints: Sequence[str], fits: Mapping[str, ServoFit]) -> list[str]:
+def without_servo(joints: Sequence[str], fits: Mapping[str, ServoFit]) -> list[str]:
     """Return which joints of a written file have no servo."""
     lost = [joint for joint in joints if joint not in fits]
-    return [f"{', '.join(lost)}: no servo is written, so that they swing freely"] if lost else []
+    return [f"{', '.join(lost)}: no servo is written; what the robot's file has there stays"] if lost else []
 
 
 def verdicts(fits: Mapping[str, ServoFit], fitted: Mapping[str, Array], held_out: Mapping[str, Array]) -> list[str]:

@@ -13,6 +13,7 @@ from identify.servo.fit import ServoFit
 from identify.servo.friction import SERVO_FRICTIONS, SIMPLER
 from identify.servo.left_out import left_out, stretches
 from identify.servo.parameters import parameters_of
+from identify.servo.refusals import UnscaledError, require_scale
 from identify.servo.run import ServoRun
 from identify.servo.servo import Servo
 from identify.servo.stages import Stages
@@ -46,6 +47,11 @@ class FrictionChoice:
     errors: dict[str, float]
     p: dict[str, float]
 
+    @property
+    def fit(self) -> ServoFit:
+        """That of the chosen law."""
+        return self.fits[self.chosen]
+
 
 def choose_friction(
     servo: Servo, runs: Sequence[ServoRun], more: Sequence[str] = (), held: dict[str, float] | None = None
@@ -63,12 +69,13 @@ def choose_friction(
     fits, why, rough = dict[str, ServoFit](), list[IdentificationError](), dict[str, dict[str, float]]()
     of_laws = {name for names in SERVO_FRICTIONS.values() for name in names}
     parameters_of("coulomb", (*more, *(name for name in held or {} if name not in of_laws)))
-    stages = Stages.begun(servo, runs, held or {})
-    stages.require_shown(more)
+    stages = Stages.begun(servo, runs, more, held or {})
     for law in SERVO_FRICTIONS:  # simpler ones come first
         rough[law] = stages.go(law, (), rough[SIMPLER[law]] if law in SIMPLER else stages.start)
         try:
             fits[law] = stages.fit(law, more, stages.go(law, more, rough[law]) if more else rough[law])
+        except UnscaledError as error:  # whether a law is the right one, its scale does not say
+            fits[law] = error.fit
         except IdentificationError as error:
             why.append(error)
     if not fits:
@@ -84,6 +91,7 @@ def choose_friction(
         p[law] = _p(costs[law], costs[first], tests)
         if costs[law].mean() < costs[chosen].mean() and _p(costs[law], costs[chosen], tests) < LEVEL:
             chosen = law
+    require_scale(fits[chosen])
     return FrictionChoice(fits, chosen, {law: float(np.sqrt(x.mean())) for law, x in costs.items()}, p)
 
 

@@ -19,6 +19,10 @@ CLUSTERS = 2
 """Clusters per parameter: where there are fewer runs, or pieces of them, these are cut into stretches of time."""
 
 
+MIN_PARTS = 24
+"""Parts of a log by which scales are compared, at least, whatever the number of parameters."""
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class ServoFit:
@@ -59,16 +63,12 @@ class ServoFit:
     @cached_property
     def left_out(self) -> LeftOut:
         """The fit without each run, or piece of a run."""
-        return left_out(self.found, self.loop, 3 * self.scale, self._stretches)
+        return left_out(self.found, self.loop, 3 * self.scale, stretches(self.found, self.loop, CLUSTERS * len(self.free)))
 
     @property
-    def clusters(self) -> int:
-        """Runs, or parts of them, that are taken as independent."""
-        return self._stretches * len(self.loop.runs)
-
-    @cached_property
-    def _stretches(self) -> int:
-        return stretches(self.found, self.loop, CLUSTERS * len(self.free))
+    def parts(self) -> int:
+        """Runs, or parts of them, by which scales are compared."""
+        return stretches(self.found, self.loop, MIN_PARTS) * len(self.loop.runs)
 
     @property
     def covariance(self) -> Array:

@@ -43,8 +43,7 @@ def identify_servo(
         If a name is unknown.
     """
     parameters_of(friction, (*more, *(held or {})))
-    stages = Stages.begun(servo, runs, held or {})
-    stages.require_shown(more)
+    stages = Stages.begun(servo, runs, more, held or {})
     p = stages.start
     for law in simpler(friction):
         p = stages.go(law, (), p)

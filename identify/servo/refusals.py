@@ -8,19 +8,16 @@ from identify.errors import ExcitationError, IdentificationError, SettingError
 from identify.servo.fit import ServoFit
 from identify.servo.parameters import SERVO_PARAMETERS
 
-TORQUES = ("a", "b", "Ia", "Fs", "Fv", "Fst")
+TORQUES = ("a", "b", "Ia", "Fs", "Fv", "Fst", "Fo")
 """Parameters that scale together where no known load sets the scale."""
 
 OTHER_SCALE = 1.5
 """Factor on the torque per volt."""
 
-SCALE_SETTERS = ("a", "b", "Ia", "Fs")
-"""Parameters of which one that is known sets the scale."""
-
 MIN_RISE = 16.0
-"""By how much another scale must make the objective larger, in shares of a cluster: four standard deviations, if a cluster
-counts as one observation. Simulated joints whose scale was wrong had 0 to 14, those with a mass that sets it 26 and more; runs
-of the public bench 5 to 31 from one, 23 from a hundred."""
+"""By how much another scale must make the objective larger, in means over the parts of the log: four standard deviations, if a
+part counts as one observation. Simulated joints whose scale was wrong had 0 to 14, those with a mass that sets it 26 and more;
+the public bench had 5 to 31 from single runs, 23 from a hundred."""
 
 UNEXPLAINED = 0.2
 """Typical residual, as a share of the range of the motion, from which on a fit explains nothing."""
@@ -51,9 +48,14 @@ def require_explained(fit: ServoFit) -> None:
         )
 
 
+def has_scale(fit: ServoFit) -> bool:
+    """Return whether other torques explain the motion less well."""
+    return fit.parts * (fit.contrast - 1) >= MIN_RISE
+
+
 def require_scale(fit: ServoFit) -> None:
     """Raise UnscaledError if other torques explain the motion as well."""
-    if fit.clusters * (fit.contrast - 1) < MIN_RISE:
+    if not has_scale(fit):
         raise UnscaledError(
             f"{fit.loop.runs[0].name}: torque constant, friction and armature scale together, because the known load is small "
             "beside them: add a known mass to the robot's file, log more motion, or give one of them (--hold JOINT.a=0.5)",
@@ -65,7 +67,9 @@ def require_possible(held: Mapping[str, float]) -> None:
     """Raise SettingError if a value cannot be."""
     for name, x in held.items():
         parameter = SERVO_PARAMETERS[name]
-        if not np.isfinite(x) or x < parameter.low or (parameter.relative and x <= 0):
+        if not np.isfinite(x) or not parameter.low <= x <= parameter.high or (parameter.relative and x <= 0):
+            least = "above 0" if parameter.relative else f"at least {parameter.low:.4g}"
+            most = f" and at most {parameter.high:.4g}" if np.isfinite(parameter.high) else ""
             raise SettingError(
-                f"{name} = {x:g} {parameter.unit} is impossible: {parameter.meaning} must be finite and not negative"
+                f"{name} = {x:g} {parameter.unit} is impossible: {parameter.meaning} must be finite, {least}{most}"
             )

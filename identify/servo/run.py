@@ -22,6 +22,20 @@ BESIDE = 5
 """Samples whose median a position is compared with."""
 
 
+def well_read(q: Array) -> npt.NDArray[np.bool_]:
+    """Return whether each position of a joint [rad], shape (time,), is no spike."""
+    typical = median_filter(q, BESIDE, mode="nearest")
+    moves = np.abs(np.diff(q))
+    longest = max(np.abs(np.diff(typical)).max(), moves[moves > 0].min(initial=np.inf) if moves.any() else 0.0)
+    return np.asarray(np.abs(q - typical) <= SPIKE * longest)
+
+
+def without_spikes(t: Array, q: Array) -> Array:
+    """Return positions of a joint [rad], shape (time,), spikes interpolated."""
+    well = well_read(q)
+    return np.interp(t, t[well], q[well])
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class ServoRun:
@@ -98,12 +112,9 @@ class ServoRun:
     @cached_property
     def read_well(self) -> npt.NDArray[np.bool_]:
         """Whether each position can be one, shape (time,): spikes of the bus come back at once, joints do not."""
-        typical = median_filter(self.q, BESIDE, mode="nearest")
-        moves = np.abs(np.diff(self.q))
-        longest = max(np.abs(np.diff(typical)).max(), moves[moves > 0].min(initial=np.inf) if moves.any() else 0.0)
-        return np.abs(self.q - typical) <= SPIKE * longest
+        return well_read(self.q)
 
     @cached_property
     def clean(self) -> Array:
         """Positions without spikes, which are interpolated [rad], shape (time,)."""
-        return np.interp(self.t, self.t[self.read_well], self.q[self.read_well])
+        return without_spikes(self.t, self.q)

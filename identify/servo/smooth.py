@@ -10,8 +10,10 @@ from identify.arrays import Array
 CUTOFF = 1 / 12
 """Cut-off of the low-pass, as a share of the sampling frequency: motion lies below, differentiated counts above."""
 
-CORRECTED = CUTOFF / 2
-"""Of what simulated positions lack: chosen on an arm of six whose servos were known exactly, to 3 % and to 10 %. Torques of the
+DRIFT_CUTOFF = CUTOFF / 2
+"""Cut-off of the residuals that correct a simulated motion, as a share of the sampling frequency.
+
+Chosen on an arm of six whose servos were known exactly, to 3 % and to 10 %. Torques of the
 joints were then off by 3, 9 and 30 mN m; by 4, 13 and 54 uncorrected, by 21 where positions were only measured."""
 
 
@@ -37,13 +39,13 @@ def smoothed(t: Array, q: Array, cutoff: float = CUTOFF) -> tuple[Array, Array, 
 
 
 def corrected(t: Array, simulated: Array, measured: Array) -> tuple[Array, Array, Array]:
-    """Return a simulated motion, shape (time,), with what slow motion it lacks, its velocities, and its accelerations.
+    """Return positions, velocities and accelerations of a simulated motion, shape (time,), corrected by the measured one.
 
-    Jolts are those of the simulation, which counts of an encoder hide; where it drifts away, it is the measured motion.
+    The residual is added below `DRIFT_CUTOFF`. Jolts, which encoder counts hide, come from the simulation, drift from neither.
     """
     steps = np.diff(t)
     acceleration = np.diff(np.diff(simulated) / steps) / ((steps[1:] + steps[:-1]) / 2)
     motion = (simulated, np.gradient(simulated, t), np.pad(acceleration, 1, mode="edge"))
-    lacking = smoothed(t, (measured - simulated)[:, None], CORRECTED)
+    lacking = smoothed(t, (measured - simulated)[:, None], DRIFT_CUTOFF)
     q, qd, qdd = (x + y[:, 0] for x, y in zip(motion, lacking, strict=True))
     return q, qd, qdd

@@ -59,19 +59,14 @@ class Stages:
         self._valleys = Valleys(self._coarse, self._excitation, held)
 
     @classmethod
-    def begun(cls, servo: Servo, runs: Sequence[ServoRun], held: dict[str, float]) -> Self:
+    def begun(cls, servo: Servo, runs: Sequence[ServoRun], more: Sequence[str], held: dict[str, float]) -> Self:
         """Return stages that begin with the start of the rows whose simulation fits best."""
         require_possible(held)
         excitation, some = Excitation.of(servo, runs, held), _evenly(runs)
+        if "Fo" in more and not excitation.off:
+            raise ExcitationError(f"{runs[0].name}: Fo is unidentifiable, because torque is never off in a motion")
         with one_thread():
             return cls(servo, runs, held, _started(servo, some, held, excitation))
-
-    def require_shown(self, more: Sequence[str]) -> None:
-        """Raise ExcitationError if runs cannot show a further parameter."""
-        if "Fo" in more and not self._excitation.off:
-            raise ExcitationError(
-                f"{self._whole[0].name}: torque is never off in a motion, so that Fo does not show; leave it out"
-            )
 
     def go(self, friction: str, more: Sequence[str], p: Mapping[str, float]) -> dict[str, float]:
         """Return the parameters with a law of friction and further ones, from those of a simpler law."""

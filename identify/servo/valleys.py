@@ -8,7 +8,7 @@ import numpy as np
 
 from identify.servo.closed_loop import ServoLoop
 from identify.servo.excitation import Excitation
-from identify.servo.refusals import OTHER_SCALE, SCALE_SETTERS, TORQUES
+from identify.servo.refusals import OTHER_SCALE, TORQUES
 from identify.servo.search import Found, Search
 
 SHAKEN = 2
@@ -95,14 +95,15 @@ class Valleys:
 
     def _of_scale(self, loop: ServoLoop, free: Sequence[str], found: Found) -> tuple[Found, float]:
         """Return what is found, from other scales of the torques if that is better, and its contrast (see `ServoFit`)."""
-        if any(found.p[name] > 0 for name in SCALE_SETTERS if name not in free):
+        if "a" not in free:
             return found, np.inf
         scaled, contrast = self._scaled(free, found.p)
         for _ in range(SHAKEN):
             if contrast > 1 - ESCAPED:
                 break
-            other = self._search(loop, scaled, free).best(scaled, REFINED)
-            if other.cost > (1 - ESCAPED) * self._search(loop, scaled, free).at(found).cost:
+            search = self._search(loop, scaled, free)
+            other = search.best(scaled, REFINED)
+            if other.cost > (1 - ESCAPED) * search.at(found).cost:
                 break
             found = other
             scaled, contrast = self._scaled(free, found.p)
@@ -112,10 +113,22 @@ class Valleys:
         """Return the best parameters with another torque per volt, and how many times larger they make the objective."""
         search = self._search(self._coarse, p, free)
         others = Search(self._coarse, [name for name in free if name != "a"], self._excitation.scales, search.c)
-        torques = [name for name in TORQUES if name in free]
-        starts = [{**p, **{name: p[name] * factor for name in torques}} for factor in (OTHER_SCALE, 1 / OTHER_SCALE)]
+        starts = [self._times(factor, free, p) for factor in (OTHER_SCALE, 1 / OTHER_SCALE)]
         best = min((others.best(start, ASIDE) for start in starts), key=lambda other: other.cost)
         return best.p, best.cost / search.best(p, ASIDE).cost
+
+    def _times(self, factor: float, free: Sequence[str], p: Mapping[str, float]) -> dict[str, float]:
+        """Return parameters with torques of another scale; where gravity is free, it and the armature make up for the load."""
+        scaled = {**p, **{name: p[name] * factor for name in TORQUES if name in free}}
+        if "Flq" in free:
+            scaled["Flq"] = p["Flq"] / factor
+        if "Mg" in free:
+            J, sine = (
+                float(np.mean([np.mean(getattr(run.load, x)) for run in self._coarse.runs])) for x in ("inertia", "sine")
+            )
+            scaled["Mg"] = factor * (p["Mg"] + sine) - sine
+            scaled["Ia"] = max(factor * (p["Ia"] + J) - J, 0.1 * p["Ia"]) if "Ia" in free else p["Ia"]
+        return scaled
 
     def _search(self, loop: ServoLoop, begin: Mapping[str, float], free: Sequence[str]) -> Search:
         r = np.abs(loop.q - loop.simulate(begin)[0])[loop.kept]

@@ -116,7 +116,11 @@ class ServoDrive(AbstractDrive):
 
     def enabled(self, t: Array) -> Array:
         """Return 1 where torque is on and 0 where it is off, at the instants t [s]."""
-        return np.asarray(~np.any([(t >= first) & (t < last) for first, last in self.off], axis=0), dtype=np.float64)
+        return np.array([self.is_on(instant) for instant in t], dtype=np.float64)
+
+    def is_on(self, t: float) -> bool:
+        """Return whether torque is enabled at an instant [s]."""
+        return not any(first <= t < last for first, last in self.off)
 
 
 class _Amplifier(AbstractAmplifier):
@@ -144,7 +148,7 @@ class _Amplifier(AbstractAmplifier):
         """Return duty, current, back-EMF and whether a limit holds, in one step."""
         s = self._settings
         target = self._target.follow(command)
-        on = not any(first <= self._t < last for first, last in s.off)
+        on = s.is_on(self._t)
         self._t += self._h
         step = 2 * np.pi / s.counts if s.counts else 0.0
         seen = np.rint(q / step) * step if step else q

@@ -26,14 +26,16 @@ def arm():
 
 
 def fit_of(joint):
-    """Return what stands for a fit: it simulates the joint a little ahead of where it was measured."""
-    return SimpleNamespace(name=joint, p={"offset": 0.0}, simulate=lambda runs: [run.q + 1e-3 for run in runs])
+    """Return what stands for a fit: it simulates the joint as it was measured, with a jolt that was not seen."""
+    jolt = np.where(np.arange(200) == 100, 1e-3, 0.0)
+    return SimpleNamespace(name=joint, p={"offset": 0.0}, parts=1, contrast=1.0, simulate=lambda runs: [runs[0].q + jolt])
 
 
 def test_a_joint_without_a_scale_moves_for_the_others_and_one_that_is_not_explained_does_not(arm, monkeypatch):
-    seen = dict[str, float]()
+    seen, before = dict[str, float](), dict[str, float]()
 
     def identify(j, servo, runs):
+        before[j] = runs[0].load.rest
         assert runs[0].name == f"one.csv, {arm.links.joints[j]}"
         if j == 4:
             raise UnscaledError("scale together", fit_of(j))
@@ -42,7 +44,7 @@ def test_a_joint_without_a_scale_moves_for_the_others_and_one_that_is_not_explai
         return fit_of(j)
 
     def again(fit, runs):
-        seen[fit.name] = float(np.ptp(runs[0].load.rest))
+        seen[fit.name] = runs[0].load.rest
         return fit
 
     monkeypatch.setattr(module, "identify_again", again)
@@ -51,6 +53,18 @@ def test_a_joint_without_a_scale_moves_for_the_others_and_one_that_is_not_explai
     assert found[4][1] == "scale together"
     assert found[5][1] == "does not move"
     assert sorted(seen) == [0, 1, 2, 3, 4]
+    # The gripper, which nothing explains, moves as measured; only the jolt of the wrist roll reaches it.
+    assert np.abs(seen[3] - before[3])[100] > 10 * np.abs(seen[3] - before[3])[:80].max()
+    monkeypatch.setattr(module, "identify_again", lambda fit, runs: seen.update({fit.name: runs[0].load.rest}) or fit)
+    alone = dict(seen)
+
+    def without_roll(j, servo, runs):
+        if j >= 4:
+            raise IdentificationError("does not move")
+        return fit_of(j)
+
+    list(arm.identified(without_roll))
+    assert np.abs(seen[3] - alone[3]).max() > 0  # the roll no longer moves it
 
 
 def test_a_joint_that_moves_alone_is_identified_once(arm):

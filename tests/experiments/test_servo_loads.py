@@ -72,3 +72,14 @@ def test_angles_of_the_file_are_those_of_the_log_plus_the_offset(motion):
     found, _ = torques(robot, t, moved, {j: Moving(x, offset[j]) for j, x in enumerate(moved.T)})
     others = [j for j in range(robot.n) if j != 2]  # the joint itself has its offset in the law of its servo
     np.testing.assert_allclose(found[:, others], right[:, others], atol=1e-9 * np.abs(right).max())
+
+
+def test_spikes_of_one_joint_load_no_other(motion):
+    robot, t, q, _, _ = motion
+    spoilt = q.copy()
+    spoilt[200, 2] = -np.pi
+    for moving in ({}, exact(q)):
+        right, _ = torques(robot, t, q, moving)
+        columns = ServoColumns(t, spoilt, spoilt, None, None, robot.joints)
+        found = np.stack([load.torque(q[:, j]) for j, load in enumerate(loads(robot, columns, moving))], axis=1)
+        assert np.abs(found - right).max() < 0.01 * np.abs(right).max()

@@ -22,13 +22,13 @@ from experiments.results.writing import require_free, write_text
 from experiments.servo.identification import Servos, lacks_summary, summary_of
 from experiments.servo.servo_function import servo_function
 from experiments.servo.servo_text import (
-    driveless,
     inexpressible,
     print_choice,
     print_errors,
     print_servos,
     verdicts,
     warnings_of,
+    without_servo,
 )
 from experiments.servo.written import in_mujoco, mjcf_of
 from identify.servo import ServoFit
@@ -74,7 +74,9 @@ def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo
                 if isinstance(result, FrictionChoice):
                     print_choice(page, joint, result)
                     page.found.setdefault("laws", {})[joint] = {"errors": result.errors, "p": result.p}
-                every[joint] = result.fits[result.chosen] if isinstance(result, FrictionChoice) else result
+                if isinstance(result, str):
+                    page.found.get("laws", {}).pop(joint, None)
+                every[joint] = result.fit if isinstance(result, FrictionChoice) else result
                 _take(page, folder, every)
     finally:
         found = _fits(every)
@@ -119,11 +121,11 @@ def _write(page: Page, options: IdentifyServo, servos: Servos, others: Servos | 
     text = mjcf_of(servos, found, place, options.position)
     write_text(path, text, "--write-mjcf", force=options.force, read=files_read(options))
     page.print(Text(f"written to {path}: the robot with its servos, to be commanded with angles of the file"), soft_wrap=True)
+    page.warn({"the written file": [*inexpressible(found), *without_servo(servos.links.joints, found)]})
     for log in (others or servos).logs:
         errors = in_mujoco(others or servos, text, place, found, log)
-        page.found.setdefault("mujoco_error", {})[log.name] = errors
+        page.found.setdefault("mujoco_error", {})[(others or servos).name(log)] = errors
         print_errors(page, f"{path.name} in plain MuJoCo, {log.name}", {joint: np.array([e]) for joint, e in errors.items()})
-    page.warn({"the written file": [*inexpressible(found), *driveless(servos.links.joints, found)]})
 
 
 def _write_function(page: Page, options: IdentifyServo, servos: Servos, found: dict[str, ServoFit]) -> None:

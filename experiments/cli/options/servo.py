@@ -47,6 +47,6 @@ class IdentifyServo(RecordedOptions, Command, action="servo:servo"):
     write_mjcf: File = None
     """Write the robot's MJCF file with these servos as `dcmotor` actuators, and measure it on a log in plain MuJoCo."""
     write: File = None
-    """Write the servos as a Python file (class `Servo`), for those who step themselves."""
+    """Write the servos as a Python file (class `Servo`), for your own simulator."""
     position: bool = False
     """Write `position` actuators instead, for older versions of MuJoCo."""

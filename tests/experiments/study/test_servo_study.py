@@ -37,6 +37,20 @@ def test_rows_have_every_parameter_beside_its_truth():
         assert np.isnan(row["Fv1"])  # torque is never off: it shows as part of b
 
 
+@pytest.mark.thorough
+@pytest.mark.parametrize(("mass", "refused"), [(0.0, True), (0.2, False)])
+def test_a_bare_horn_is_refused_and_a_known_mass_is_not(mass, refused):
+    axis = {"field": "payload.mass", "values": [mass]}
+    payload = {"mass": mass, "position": [0.0, 0.0, -0.15]}
+    study = study_from(SHORT | {"settings": {"robot": "horn", "payload": payload}, "axes": [axis], "seeds": 3}, "study")
+    for row in run_shard(study, range(3)).rows:
+        assert (row["failure"] is not None) == refused
+        if refused:
+            assert "scale together" in row["failure"]
+        else:
+            assert row["a1"] == pytest.approx(row["a1.truth"], rel=0.03)
+
+
 def test_a_joint_that_does_not_move_has_a_reason():
     still = SHORT | {"settings": {"trajectory": {"kind": "steps", "steps": 4, "reach": 0.001}}}
     rows = run_shard(study_from(still, "study"), range(2)).rows

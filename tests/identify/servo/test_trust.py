@@ -77,7 +77,7 @@ def test_the_law_that_the_log_needs_is_chosen(law, expected):
 def test_a_fit_says_where_it_lacks(run):
     """A brake that the model does not have, while torque is off."""
     braked = simulated(0, Fo=0.1)
-    fit = identify_servo(SERVO, [braked], "coulomb", held={"Fs": 0.1, "Fv": 0.02})
+    fit = identify_servo(SERVO, [braked], "coulomb", held={"a": 0.6, "Fs": 0.1, "Fv": 0.02})
     assert lacks_of(fit)[0].when == "torque is off"
     assert sum(lack.share for lack in lacks_of(fit)) == pytest.approx(1.0, abs=0.03)
     assert lacks_of(fit)[0].error > 2 * lacks_of(identify_servo(SERVO, [run], "coulomb"))[0].error
@@ -148,3 +148,19 @@ def test_a_fit_again_keeps_its_parameters_and_what_is_held(run):
     assert again.p["Ia"] == 0.02
     for name, sigma in fit.standard_errors.items():
         assert abs(again.p[name] - fit.p[name]) < 2 * sigma, name
+
+
+def test_gravity_that_the_file_lacks_needs_a_torque_that_is_known(run):
+    """With gravity free, the known inertia alone sets the scale, and an armature makes up for that exactly."""
+    with pytest.raises(UnscaledError, match="scale together"):
+        identify_servo(SERVO, [run], "coulomb", ("Mg",))
+    fit = identify_servo(SERVO, [run], "coulomb", ("Mg",), {"a": LAW["a"]})
+    assert abs(fit.p["Mg"]) < 4 * fit.standard_errors["Mg"]
+
+
+@pytest.mark.thorough
+def test_a_friction_next_to_nothing_sets_no_scale():
+    light = replace(simulated(2), load=JointLoad.pendulum(0.1, 0.06), on=None)
+    q = ServoLoop(SERVO, [replace(light, q=0 * light.t)], 2.5e-4).simulate(LAW)[0, 0]
+    with pytest.raises(UnscaledError):
+        identify_servo(SERVO, [replace(light, q=np.rint(q / SERVO.step) * SERVO.step)], "coulomb", held={"Fs": 1e-6})
