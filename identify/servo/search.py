@@ -179,7 +179,7 @@ class Search:
             for rise in RISES
             for sign in (1, -1)
         ]
-        tried = self._within(x, np.array(steps))
+        tried = self._within(x, np.array(steps or [0 * x]))  # where nothing has an effect, there is no other place
         return [{**found.p, **dict(zip(self.free, one.tolist(), strict=True))} for one in tried]
 
     def _within(self, x: Array, steps: Array) -> Array:
