@@ -164,3 +164,11 @@ def test_a_friction_next_to_nothing_sets_no_scale():
     q = ServoLoop(SERVO, [replace(light, q=0 * light.t)], 2.5e-4).simulate(LAW)[0, 0]
     with pytest.raises(UnscaledError):
         identify_servo(SERVO, [replace(light, q=np.rint(q / SERVO.step) * SERVO.step)], "coulomb", held={"Fs": 1e-6})
+
+
+def test_where_no_parameter_has_an_effect_no_other_valley_is_tried(run):
+    fit = identify_servo(SERVO, [run], "coulomb")
+    search = Search(fit.loop, fit.free, fit.excitation.scales, fit.scale)
+    nothing = replace(fit.found.beginning, sensitivity=np.zeros_like(fit.found.beginning.sensitivity))
+    still = replace(fit.found, sensitivity=np.zeros_like(fit.found.sensitivity), beginning=nothing)
+    assert search.away(still) == [fit.p]
