@@ -76,15 +76,22 @@ class Guess:
     doubts: tuple[str, ...] = ()
 
 
-def guess(path: Path) -> Guess:
+def guess(path: Path, table: LogTable | None = None) -> Guess:
     """Return what the columns of a file probably are.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    table : LogTable, optional
+        What it holds, where that was read already.
 
     Raises
     ------
     LogError
         If it cannot be read, or nothing in it looks like times, positions and torques.
     """
-    table = read_table(path)
+    table = table or read_table(path)
     if table.rows < FEWEST:
         raise LogError(f"{path} has {table.rows} rows: too few to say what its columns are")
     found = _by_names(table) if table.named else _by_values(path, table)
@@ -98,6 +105,7 @@ def guess(path: Path) -> Guess:
             "log.toml"
         )
     episodes, doubts = _episodes(table)
+    doubts += _alike(table, found)
     made = _with_units(replace(found, rows=episodes), table)
     return replace(made, doubts=(*doubts, *made.doubts))
 
@@ -109,6 +117,22 @@ def _episodes(table: LogTable) -> tuple[dict[str, float], list[str]]:
             first = float(values[0])
             return {name: first}, [f"{len(values)} runs by {name}: rows in which it is {first:g} are taken ([rows])"]
     return {}, []
+
+
+def _alike(table: LogTable, found: LogLayout) -> list[str]:
+    """Return doubts about columns that could have been taken in the place of others."""
+    groups, doubts = _groups(table), list[str]()
+    n, torques = (sum(_entries(table, name) for name in source.columns) for source in (found.q, found.tau))
+    if n != torques:
+        doubts.append(f"{n} columns of positions and {torques} of torques: one of each a joint")
+    for kind in ("t", "q", "tau"):
+        chosen = set(getattr(found, kind).columns)
+        for (of, _), names in groups.items():
+            others = [name for name, _ in names]
+            count = 1 if kind == "t" else sum(_entries(table, name) for name in others)
+            if of == kind and not chosen & set(others) and count == (1 if kind == "t" else n):
+                doubts.append(f"{kind}: {', '.join(sorted(chosen))} are taken; {', '.join(others)} could be meant, too")
+    return doubts
 
 
 def _by_names(table: LogTable) -> LogLayout:

@@ -12,6 +12,7 @@ from identify.data.log_columns import LogColumns
 from identify.data.motion_log import TorqueChannel
 from identify.errors import LogError
 from identify.files.formats import read_table
+from identify.files.guess import guess
 from identify.files.layout import LAYOUT, LogLayout, Source, matching
 from identify.files.table import LogTable
 from identify.files.units import needs_gain
@@ -61,7 +62,24 @@ def read_columns(path: Path, layout: LogLayout | None = None) -> LogColumns:
     if found:
         return replace(_Files(path, found[1].parent, found[0]).columns, said=found[0].words(found[1]))
     table = table or read_table(path)
-    return _Files(path, path.parent, standard_layout(path, table), {path: table}).columns
+    layout, said = _undoubted(path, table)
+    return replace(_Files(path, path.parent, layout, {path: table}).columns, said=said)
+
+
+def _undoubted(path: Path, table: LogTable) -> tuple[LogLayout, str]:
+    """Return the layout of a file whose columns are called as idbench calls them, or whose names leave no doubt; and words."""
+    try:
+        return standard_layout(path, table), ""
+    except LogError as error:
+        try:
+            found = guess(path, table)
+        except LogError:
+            raise error from None
+        if found.doubts or not table.named or not found.layout.t.columns:
+            raise
+    sources = ((name, getattr(found.layout, name)) for name in ("t", "q", "qd", "tau"))
+    words = ", ".join(f"{name}={','.join(source.columns)}" for name, source in sources if source.columns)
+    return found.layout, f"columns by their names: {words}"
 
 
 def layout_of(path: Path) -> LogLayout:

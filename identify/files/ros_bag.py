@@ -1,20 +1,24 @@
-"""ROS bags, of ROS 1 and 2: the messages JointState, read by rosbags (extra `ros`)."""
+"""ROS bags, of ROS 1 and 2: the messages JointState and JointTrajectory, read by rosbags (extra `ros`)."""
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from identify.arrays import Array
 from identify.errors import LogError
 from identify.files.table import LogTable
 
-JOINT_STATE = "sensor_msgs/msg/JointState"
+Columns = tuple[dict[str, Array], dict[str, tuple[str, ...]]]
+"""Columns of one topic, and the names of their entries."""
 
 
 def read_bag(path: Path) -> LogTable:
-    """Return time, position, velocity and effort of the joint states of a bag.
+    """Return time, position, velocity and effort of the joints of a bag.
 
-    Where several topics have joint states, their columns begin with the topic. Times are those in the headers of the
-    messages, or of recording where the headers have none.
+    Joint states are taken, or the points of joint trajectories where there are no states. Where several topics have them, their
+    columns begin with the topic. Times are those in the headers of the messages, or of recording where the headers have none.
     """
     try:
         from rosbags.highlevel import AnyReader
@@ -24,36 +28,78 @@ def read_bag(path: Path) -> LogTable:
     folder = path.parent if path.suffix in (".db3", ".mcap") and (path.parent / "metadata.yaml").is_file() else path
     try:
         with AnyReader([folder], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
-            topics = [c for c in reader.connections if c.msgtype == JOINT_STATE]
-            if not topics:
-                known = ", ".join(sorted({c.msgtype for c in reader.connections})) or "none"
-                raise LogError(f"{path} holds no messages {JOINT_STATE}; it holds {known}")
+            kinds = {c.msgtype for c in reader.connections}
+            kind = next((kind for kind in KINDS if kind in kinds), None)
+            if kind is None:
+                known = ", ".join(sorted(kinds)) or "none"
+                raise LogError(f"{path} holds no messages {' or '.join(KINDS)}; it holds {known}")
             tables = {
-                c.topic: [(stamp, reader.deserialize(raw, c.msgtype)) for _, stamp, raw in reader.messages([c])] for c in topics
+                c.topic: [(stamp, reader.deserialize(raw, c.msgtype)) for _, stamp, raw in reader.messages([c])]
+                for c in reader.connections
+                if c.msgtype == kind
             }
     except LogError:
         raise
     except Exception as error:  # rosbags raises what its parsers do
         raise LogError(f"cannot read the log {path} as a ROS bag: {str(error).splitlines()[0]}") from error
     several = len(tables) > 1
-    found = [_columns(path, messages, f"{topic}/" if several else "") for topic, messages in tables.items() if messages]
+    found = [KINDS[kind](path, messages, f"{topic}/" if several else "") for topic, messages in tables.items() if messages]
     return LogTable(
         {name: column for columns, _ in found for name, column in columns.items()},
         entries={name: joints for _, entries in found for name, joints in entries.items()},
     )
 
 
-def _columns(path: Path, messages: list, before: str) -> tuple[dict, dict]:  # type: ignore[type-arg]  # of rosbags
-    """Return columns of one topic, and the names of their entries."""
-    joints = tuple(messages[0][1].name)
-    if any(tuple(message.name) != joints for _, message in messages):
-        raise LogError(f"{path}: joint states name different joints from message to message: split them by topic first")
-    stamps = np.array([m.header.stamp.sec + 1e-9 * m.header.stamp.nanosec for _, m in messages])
+def _of_states(path: Path, messages: Sequence[tuple[int, Any]], before: str) -> Columns:
+    """Return columns of joint states."""
+    joints = _same_joints(path, [message.name for _, message in messages])
+    samples = [message for _, message in messages]
+    values = {name: [getattr(message, name) for message in samples] for name in ("position", "velocity", "effort")}
+    return _columns(before, joints, _stamps(messages), values)
+
+
+def _of_trajectories(path: Path, messages: Sequence[tuple[int, Any]], before: str) -> Columns:
+    """Return columns of the points of joint trajectories, one message after the other."""
+    joints = _same_joints(path, [message.joint_names for _, message in messages])
+    points = [
+        (start, point) for start, (_, message) in zip(_stamps(messages), messages, strict=True) for point in message.points
+    ]
+    t = np.array([start + _seconds(point.time_from_start) for start, point in points])
+    fields = {"position": "positions", "velocity": "velocities", "effort": "effort"}
+    values = {name: [getattr(point, field) for _, point in points] for name, field in fields.items()}
+    return _columns(before, joints, t, values)
+
+
+KINDS: dict[str, Callable[[Path, Sequence[tuple[int, Any]], str], Columns]] = {
+    "sensor_msgs/msg/JointState": _of_states,
+    "trajectory_msgs/msg/JointTrajectory": _of_trajectories,
+}
+"""What reads the messages of a kind; those that come first are preferred."""
+
+
+def _same_joints(path: Path, names: Sequence[Sequence[str]]) -> tuple[str, ...]:
+    joints = tuple(names[0])
+    if any(tuple(each) != joints for each in names):
+        raise LogError(f"{path}: messages name different joints: split them by topic first")
+    return joints
+
+
+def _seconds(stamp: Any) -> float:
+    return float(stamp.sec + 1e-9 * stamp.nanosec)
+
+
+def _stamps(messages: Sequence[tuple[int, Any]]) -> Array:
+    """Return times of messages [s] since the first: those of their headers, or of recording where these have none."""
+    stamps = np.array([_seconds(message.header.stamp) for _, message in messages])
     if not stamps.any():
-        stamps = 1e-9 * np.array([stamp for stamp, _ in messages], dtype=np.float64)
-    columns = {f"{before}t": stamps - stamps[0]}
-    for name in ("position", "velocity", "effort"):
-        values = [np.asarray(getattr(message, name), dtype=np.float64) for _, message in messages]
-        if all(len(value) == len(joints) for value in values):
-            columns[f"{before}{name}"] = np.array(values)
+        stamps = 1e-9 * np.array([stamp - messages[0][0] for stamp, _ in messages], dtype=np.float64)
+    return stamps - stamps[0]
+
+
+def _columns(before: str, joints: tuple[str, ...], t: Array, values: dict[str, list[Sequence[float]]]) -> Columns:
+    """Return the columns that every sample has."""
+    columns = {f"{before}t": t}
+    for name, samples in values.items():
+        if samples and all(len(sample) == len(joints) for sample in samples):
+            columns[f"{before}{name}"] = np.array(samples, dtype=np.float64)
     return columns, {name: joints for name in columns if name != f"{before}t"}
