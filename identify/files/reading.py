@@ -15,7 +15,7 @@ from identify.files.formats import read_table
 from identify.files.guess import guess
 from identify.files.layout import LAYOUT, LogLayout, Source, matching
 from identify.files.table import LogTable
-from identify.files.units import needs_gain
+from identify.files.units import SI, needs_gain
 
 CLOCKS = 1e6
 """Times [s] beyond this are those of a calendar: logs count from their beginning."""
@@ -78,7 +78,7 @@ def _undoubted(path: Path, table: LogTable) -> tuple[LogLayout, str]:
         if found.doubts or not table.named or not found.layout.t.columns:
             raise
     sources = ((name, getattr(found.layout, name)) for name in ("t", "q", "qd", "tau"))
-    words = ", ".join(f"{name}={','.join(source.columns)}" for name, source in sources if source.columns)
+    words = "; ".join(f"{name} [{of.unit or SI[name]}] = {', '.join(of.columns)}" for name, of in sources if of.columns)
     return found.layout, f"columns by their names: {words}"
 
 

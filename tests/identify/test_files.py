@@ -299,7 +299,7 @@ def test_names_that_leave_no_doubt_need_no_layout(name, tmp_path):
 
 @pytest.mark.parametrize("name", sorted(set(WRITERS) - set(UNDOUBTED)))
 def test_where_there_is_doubt_a_layout_is_needed(name, tmp_path):
-    """Nanoseconds and degrees by their size, no names, several runs: idbench log shows what is likely, and nothing is taken for granted."""
+    """Nanoseconds and degrees by their size, no names, several runs: idbench log shows what is likely; nothing is assumed."""
     path = tmp_path / name
     WRITERS[name](path)
     with pytest.raises(LogError):
