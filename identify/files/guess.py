@@ -125,6 +125,10 @@ def _alike(table: LogTable, found: LogLayout) -> list[str]:
     n, torques = (sum(_entries(table, name) for name in source.columns) for source in (found.q, found.tau))
     if n != torques:
         doubts.append(f"{n} columns of positions and {torques} of torques: one of each a joint")
+    place = {name: place for names in groups.values() for name, place in names}
+    q, tau = ([place.get(name, "") for name in source.columns] for source in (found.q, found.tau))
+    if n == torques and len(q) == len(tau) and set(q) != set(tau):
+        doubts.append(f"positions are of {', '.join(q)}, torques of {', '.join(tau)}: are these the same joints?")
     for kind in ("t", "q", "tau"):
         chosen = set(getattr(found, kind).columns)
         for (of, _), names in groups.items():
