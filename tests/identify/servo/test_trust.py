@@ -48,7 +48,7 @@ def test_spikes_of_the_bus_are_left_out(run, fit):
     found = identify_servo(SERVO, [spoilt], "coulomb")
     for name, sigma in fit.standard_errors.items():
         assert abs(found.p[name] - fit.p[name]) < sigma, name
-    assert found.errors([spoilt])[0] < 2 * plain.errors([run])[0]
+    assert found.errors([spoilt])[0] < 2 * fit.errors([run])[0]
 
 
 def test_a_joint_that_rests_and_flickers_has_no_spikes():
