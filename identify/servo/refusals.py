@@ -1,6 +1,7 @@
 """What refuses a servo's parameters: values that cannot be, motions that commands do not explain, torques without a scale."""
 
 from collections.abc import Mapping
+from typing import Self
 
 import numpy as np
 
@@ -37,6 +38,10 @@ class UnscaledError(ExcitationError):
     def __init__(self, message: str, fit: ServoFit) -> None:
         super().__init__(message)
         self.fit = fit
+
+    def __reduce__(self) -> tuple[type[Self], tuple[str, ServoFit]]:
+        """Return what other processes make it of: an exception has its message alone."""
+        return type(self), (str(self), self.fit)
 
 
 def require_explained(fit: ServoFit) -> None:
