@@ -61,7 +61,11 @@ class Valleys:
     def refined(self, loop: ServoLoop, p: Mapping[str, float], free: Sequence[str], many: bool) -> tuple[Found, float]:
         """Return what is found in the steps of a loop, and its contrast (see `ServoFit`)."""
         found = self._search(loop, p, free).best(p, REFINED)
-        return self._of_scale(loop, free, found if many else self._better(loop, free, found))
+        if "a" not in free:
+            return found if many else self._better(loop, free, found), np.inf
+        if many:  # a model that is wrong fits them better by a per cent at scales that extrapolate worse: measured
+            return found, self._scaled(free, found.p)[1]
+        return self._of_scale(loop, free, self._better(loop, free, found))
 
     def at(self, loop: ServoLoop, found: Found, free: Sequence[str]) -> Found:
         """Return residuals and sensitivities in another loop."""
@@ -95,8 +99,6 @@ class Valleys:
 
     def _of_scale(self, loop: ServoLoop, free: Sequence[str], found: Found) -> tuple[Found, float]:
         """Return what is found, from other scales of the torques if that is better, and its contrast (see `ServoFit`)."""
-        if "a" not in free:
-            return found, np.inf
         scaled, contrast = self._scaled(free, found.p)
         for _ in range(SHAKEN):
             if contrast > 1 - ESCAPED:
