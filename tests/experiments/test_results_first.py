@@ -140,6 +140,7 @@ def test_a_screen_that_is_full_costs_no_view(logs, tmp_path):
     assert (tmp_path / "found" / "report.html").is_file()
 
 
+@pytest.mark.thorough
 def test_a_run_without_a_recording_gets_no_layer(idbench, tmp_path):
     assert idbench("run", "ideal", "--no-rerun", "--out", "ran")[0] == 0
     code, out, err = idbench("identify", "ran", "--estimator", "WLS")
@@ -196,6 +197,7 @@ def test_a_disk_that_is_full_for_one_file_leaves_the_others(lost, idbench, logs,
     assert there == {"summary.json", "log.parquet", "report.html", *RECORDING, *WRITTEN} - gone
 
 
+@pytest.mark.thorough
 def test_json_is_whole_whatever_fails(idbench, logs, monkeypatch):
     monkeypatch.setattr("experiments.reports.page.rendered", broken)
     code, out, err = idbench("identify", logs / "first.parquet", *WORDS, "--out", "found", "--no-rerun", "--json")

@@ -5,6 +5,7 @@ import pytest
 from experiments.cli import main
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("factors", "said"),
     [

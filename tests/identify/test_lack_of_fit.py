@@ -28,6 +28,7 @@ def found(exact, seed, more=0.0, noise=NOISE):
     return lack_of_fit(problem, ESTIMATORS.create("GLS").solve(problem).X)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("noise", [NOISE, 10 * NOISE])
 def test_p_values_of_the_right_model_are_what_they_say(exact, noise):
     """Of 60: within four standard deviations of a binomial number; one below 1e-3 comes in one of sixteen such tests."""

@@ -198,6 +198,7 @@ def test_a_watched_run_that_fails_says_why():
         simulate(scenario, watch=Watch(lambda stretch: None))
 
 
+@pytest.mark.thorough
 def test_positions_are_renewed_once_a_period():
     """A log of twice the frequency sees every position twice, and none that is older than a period."""
     plain = replace(load("servo"), fs=200.0, encoder=ExactEncoder(), timing=replace(load("servo").timing, jitter=0.0))

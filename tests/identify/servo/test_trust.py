@@ -81,6 +81,7 @@ def test_the_law_that_the_log_needs_is_chosen(law, expected):
     assert set(choice.fits) == set(SERVO_FRICTIONS)
 
 
+@pytest.mark.thorough
 def test_a_fit_says_where_it_lacks(fit):
     """A brake that the model does not have, while torque is off."""
     braked = simulated(0, Fo=0.1)
@@ -175,6 +176,7 @@ def test_a_friction_next_to_nothing_sets_no_scale():
         identify_servo(SERVO, [replace(light, q=np.rint(q / SERVO.step) * SERVO.step)], "coulomb", held={"Fs": 1e-6})
 
 
+@pytest.mark.thorough
 def test_where_no_parameter_has_an_effect_no_other_valley_is_tried(fit):
     search = Search(fit.loop, fit.free, fit.excitation.scales, fit.scale)
     nothing = replace(fit.found.beginning, sensitivity=np.zeros_like(fit.found.beginning.sensitivity))
