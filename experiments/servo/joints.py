@@ -95,8 +95,8 @@ class Joints:
         every = [[] for _ in self.links.joints]  # type: list[list[ServoRun]]
         for k, log in enumerate(self.logs):
             for j in range(self.links.n):
-                self._run(log, j, UNLOADED)  # what makes no run makes no load
-            # Without a scale, an angle at which gravity is right is none of the joint.
+                self._run(log, j, UNLOADED)  # raises LogError before loads are computed from a bad log
+            # Offsets follow from gravity: without a scale they are wrong.
             moving = {j: Moving(q[k], fits[j].p["offset"] if has_scale(fits[j]) else 0.0) for j, q in simulated.items()}
             for j, load in enumerate(loads(self.links, log.columns, moving)):
                 every[j].append(self._run(log, j, load))

@@ -16,7 +16,7 @@ OTHER_SCALE = 1.5
 """Factor on the torque per volt."""
 
 MIN_RISE = 16.0
-"""By how much another scale must make the objective larger, in means over the parts of the log: four standard deviations, if a
+"""By how much another scale must make the objective larger, in means over the parts of the log: four standard errors, if a
 part counts as one observation. Simulated joints whose scale was wrong had 0 to 14, those with a mass that sets it 26 and more;
 the public bench had 5 to 31 from single runs, 23 from a hundred."""
 
@@ -40,7 +40,7 @@ class UnscaledError(ExcitationError):
         self.fit = fit
 
     def __reduce__(self) -> tuple[type[Self], tuple[str, ServoFit]]:
-        """Return what other processes make it of: an exception has its message alone."""
+        """Keep the fit when the error comes from another process."""
         return type(self), (str(self), self.fit)
 
 
@@ -73,8 +73,9 @@ def require_possible(held: Mapping[str, float]) -> None:
     for name, x in held.items():
         parameter = SERVO_PARAMETERS[name]
         if not np.isfinite(x) or not parameter.low <= x <= parameter.high or (parameter.relative and x <= 0):
-            least = "above 0" if parameter.relative else f"at least {parameter.low:.4g}"
-            most = f" and at most {parameter.high:.4g}" if np.isfinite(parameter.high) else ""
+            limits = ["finite", "above 0"] if parameter.relative else ["finite"]
+            limits += [f"at least {parameter.low:.4g}"] if np.isfinite(parameter.low) and not parameter.relative else []
+            limits += [f"at most {parameter.high:.4g}"] if np.isfinite(parameter.high) else []
             raise SettingError(
-                f"{name} = {x:g} {parameter.unit} is impossible: {parameter.meaning} must be finite, {least}{most}"
+                f"{name} = {x:g} {parameter.unit} is impossible: {parameter.meaning} must be {', '.join(limits)}"
             )

@@ -1,6 +1,6 @@
 """A servo: a position loop in firmware, a chopper averaged away, a DC motor and a gear inside the joint."""
 
-from typing import Annotated, ClassVar, Literal, final
+from typing import Annotated, Any, ClassVar, Literal, final
 
 import mujoco
 import numpy as np
@@ -116,11 +116,14 @@ class ServoDrive(AbstractDrive):
 
     def enabled(self, t: Array) -> Array:
         """Return 1 where torque is on and 0 where it is off, at the instants t [s]."""
-        return np.array([self.is_on(instant) for instant in t], dtype=np.float64)
+        return np.where(self.is_off(t), np.zeros_like(t), 1.0)
 
-    def is_on(self, t: float) -> bool:
-        """Return whether torque is enabled at an instant [s]."""
-        return not any(first <= t < last for first, last in self.off)
+    def is_off(self, t: Any) -> Any:
+        """Return whether torque is off at an instant, or at instants [s]."""
+        off: Any = False
+        for first, last in self.off:
+            off = off | ((first <= t) & (t < last))
+        return off
 
 
 class _Amplifier(AbstractAmplifier):
@@ -148,7 +151,7 @@ class _Amplifier(AbstractAmplifier):
         """Return duty, current, back-EMF and whether a limit holds, in one step."""
         s = self._settings
         target = self._target.follow(command)
-        on = s.is_on(self._t)
+        on = not s.is_off(self._t)
         self._t += self._h
         step = 2 * np.pi / s.counts if s.counts else 0.0
         seen = np.rint(q / step) * step if step else q

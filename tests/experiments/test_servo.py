@@ -281,17 +281,9 @@ def test_backlash_of_a_simulated_servo_is_found(idbench, tmp_path, degrees, seed
     (tmp_path / "servo.toml").write_text(to_toml(changed))
     assert main(["run", str(tmp_path / "servo.toml"), "--out", str(tmp_path / "run"), "--no-rerun"]) == 0
     log, stated = tmp_path / "run" / "log.parquet", tmp_path / "run" / "servo.toml"
-    find = [
-        "--friction",
-        "coulomb",
-        "--find",
-        "backlash",
-        "--write-mjcf",
-        str(tmp_path / "play.xml"),
-        "--out",
-        str(tmp_path / "found"),
-    ]
-    assert main(["servo", str(log), "--robot", "pendulum", "--servo", str(stated), *find]) == 0
+    find = ["--friction", "coulomb", "--find", "backlash"]
+    files = ["--write-mjcf", str(tmp_path / "play.xml"), "--out", str(tmp_path / "found")]
+    assert main(["servo", str(log), "--robot", "pendulum", "--servo", str(stated), *find, *files]) == 0
     joint = json.loads((tmp_path / "found" / "summary.json").read_text())["joints"]["swing"]
     assert joint["backlash"]["value"] == pytest.approx(play, rel=0.1)
     assert joint["a"]["value"] == pytest.approx(2.05 / 3.33, rel=0.01)

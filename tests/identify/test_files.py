@@ -54,24 +54,6 @@ def bag(path, efforts=TAU):
             writer.write(topic, int(t * 1e9), store.serialize_cdr(message, state.__msgtype__))
 
 
-def trajectory_bag(path):
-    """Write all points of a motion into one message of a trajectory."""
-    rosbag2 = pytest.importorskip("rosbags.rosbag2")
-    from rosbags.typesys import Stores, get_typestore
-
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    names = ("trajectory_msgs/msg/JointTrajectory", "trajectory_msgs/msg/JointTrajectoryPoint", "std_msgs/msg/Header")
-    trajectory, point, header = (store.types[name] for name in names)
-    stamp, duration = (store.types[f"builtin_interfaces/msg/{name}"] for name in ("Time", "Duration"))
-    after = [duration(sec=int(t), nanosec=round((t - int(t)) * 1e9)) for t in T]
-    none = np.zeros(0)
-    points = [point(q, qd, none, tau, t) for t, q, qd, tau in zip(after, Q, QD, TAU, strict=True)]
-    with rosbag2.Writer(path, version=9) as writer:
-        topic = writer.add_connection("/executed", trajectory.__msgtype__, typestore=store)
-        message = trajectory(header(stamp(sec=0, nanosec=0), "base"), ["base", "elbow", "wrist"], points)
-        writer.write(topic, 1, store.serialize_cdr(message, trajectory.__msgtype__))
-
-
 WRITERS = {
     "a.csv": lambda p: text(p, [x if x != "t" else "time" for x in numbered("q", "tau")], [T, Q, TAU]),
     "degrees.csv": lambda p: text(
@@ -284,13 +266,13 @@ def test_files_that_are_something_else_are_told_in_one_line(tmp_path, name):
     assert "\n" not in str(found.value)
 
 
-UNDOUBTED = ("a.csv", "degrees.csv", "packed.csv.gz", "arrays.npz", "matlab.mat", "bag", "trajectory")
+UNDOUBTED = ("a.csv", "degrees.csv", "packed.csv.gz", "arrays.npz", "matlab.mat", "bag")
 
 
 @pytest.mark.parametrize("name", UNDOUBTED)
 def test_names_that_leave_no_doubt_need_no_layout(name, tmp_path):
     path = tmp_path / name
-    {**WRITERS, "trajectory": trajectory_bag}[name](path)
+    WRITERS[name](path)
     columns = read_columns(path)
     np.testing.assert_allclose(columns.q, Q, atol=1e-9)
     np.testing.assert_allclose(columns.tau, TAU, atol=1e-9)
@@ -304,14 +286,6 @@ def test_where_there_is_doubt_a_layout_is_needed(name, tmp_path):
     WRITERS[name](path)
     with pytest.raises(LogError):
         read_columns(path)
-
-
-def test_two_groups_of_positions_are_a_doubt(tmp_path):
-    names = ["t", *(f"{x}_{j}" for x in ("joint_position", "motor_position", "effort") for j in (1, 2, 3))]
-    text(tmp_path / "log.csv", names, [T, Q, 100 * Q, TAU])
-    assert any("could be meant" in doubt for doubt in guess(tmp_path / "log.csv").doubts)
-    with pytest.raises(LogError, match="must have a header"):
-        read_columns(tmp_path / "log.csv")
 
 
 def test_a_bag_without_rosbags_says_what_is_missing(tmp_path, monkeypatch):

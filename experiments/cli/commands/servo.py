@@ -122,10 +122,16 @@ def _write(page: Page, options: IdentifyServo, servos: Servos, others: Servos | 
     write_text(path, text, "--write-mjcf", force=options.force, read=files_read(options))
     page.print(Text(f"written to {path}: the robot with its servos, to be commanded with angles of the file"), soft_wrap=True)
     page.warn({"the written file": [*inexpressible(found), *without_servo(servos.links.joints, found)]})
-    for log in (others or servos).logs:
-        errors = in_mujoco(others or servos, text, place, found, log)
-        page.found.setdefault("mujoco_error", {})[(others or servos).name(log)] = errors
-        print_errors(page, f"{path.name} in plain MuJoCo, {log.name}", {joint: np.array([e]) for joint, e in errors.items()})
+    judged = others or servos
+    for log in judged.logs:
+        try:
+            errors = in_mujoco(judged, text, place, found, log)
+        except ExperimentError as error:  # other logs may be of the gain that was written
+            page.warn({"the written file": [str(error)]})
+            continue
+        name = judged.name(log)
+        page.found.setdefault("mujoco_error", {})[name] = errors
+        print_errors(page, f"{path.name} in plain MuJoCo, {name}", {joint: np.array([e]) for joint, e in errors.items()})
 
 
 def _write_function(page: Page, options: IdentifyServo, servos: Servos, found: dict[str, ServoFit]) -> None:

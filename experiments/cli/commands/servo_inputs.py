@@ -7,6 +7,7 @@ from experiments.cli.options.servo import IdentifyServo
 from experiments.errors import ExperimentError
 from experiments.identification.robot_model import absolute
 from experiments.servo.identification import AUTO, Servos
+from identify import SettingError
 from identify.files.servo_file import ServoFile
 from identify.files.servo_log import ServoColumns, order, read_servo_log
 from identify.servo import SERVO_FRICTIONS
@@ -48,7 +49,10 @@ def held_of(options: IdentifyServo, joints: Sequence[str]) -> dict[str, dict[str
     if wrong := [letter for _, _, letter in split.values() if letter not in SERVO_PARAMETERS]:
         raise ExperimentError(f"--hold: a servo has no parameter {wrong[0]!r}; known: {', '.join(SERVO_PARAMETERS)}")
     for name, (_, _, letter) in split.items():
-        require_possible({letter: values[name]})
+        try:
+            require_possible({letter: values[name]})
+        except SettingError as error:
+            raise ExperimentError(f"--hold {name}: {error}") from error
     return {
         joint: {letter: values[name] for of in ("", joint) for name, (own, _, letter) in split.items() if own == of}
         for joint in joints
