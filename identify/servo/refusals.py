@@ -61,9 +61,10 @@ def has_scale(fit: ServoFit) -> bool:
 def require_scale(fit: ServoFit) -> None:
     """Raise UnscaledError if other torques explain the motion as well."""
     if not has_scale(fit):
+        why = "gravity is free as well (Mg)" if "Mg" in fit.free else "the known load is small beside them"
         raise UnscaledError(
-            f"{fit.loop.runs[0].name}: torque constant, friction and armature scale together, because the known load is small "
-            "beside them: add a known mass to the robot's file, log more motion, or give one of them (--hold JOINT.a=0.5)",
+            f"{fit.loop.runs[0].name}: torque constant, friction and armature scale together, because {why}: add a known mass to "
+            "the robot's file, log more motion, or give one of them (--hold JOINT.a=0.5)",
             fit,
         )
 

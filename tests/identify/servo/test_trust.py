@@ -162,7 +162,7 @@ def test_a_fit_again_keeps_its_parameters_and_what_is_held(run):
 @pytest.mark.thorough
 def test_gravity_that_the_file_lacks_needs_a_torque_that_is_known(run):
     """With gravity free, the known inertia alone sets the scale, and an armature makes up for that exactly."""
-    with pytest.raises(UnscaledError, match="scale together"):
+    with pytest.raises(UnscaledError, match="gravity is free as well"):
         identify_servo(SERVO, [run], "coulomb", ("Mg",))
     fit = identify_servo(SERVO, [run], "coulomb", ("Mg",), {"a": LAW["a"]})
     assert abs(fit.p["Mg"]) < 4 * fit.standard_errors["Mg"]
