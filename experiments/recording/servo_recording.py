@@ -51,6 +51,6 @@ def record_servos(
             base.stream.curve(f"{path}/q/{kind}", times, values, f"{kind} {joint}", color, width)
         base.stream.curve(f"{path}/residual", times, log.q[:, j] - q, f"measured - simulated {joint}", GREY, 1.5)
     base.finish(
-        f"## Servos, simulated from the commands of {name} alone\n\nGrey: measured. Yellow: commanded. The third curve: simulated."
+        f"## Servos, simulated from the commands of {name} alone\n\nYellow: commanded. Grey: measured. Third curve: simulated."
     )
     return [(BASE, base.stream)]

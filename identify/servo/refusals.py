@@ -63,8 +63,8 @@ def require_scale(fit: ServoFit) -> None:
     if not has_scale(fit):
         why = "gravity is free as well (Mg)" if "Mg" in fit.free else "the known load is small beside them"
         raise UnscaledError(
-            f"{fit.loop.runs[0].name}: torque constant, friction and armature scale together, because {why}: add a known mass to "
-            "the robot's file, log more motion, or give one of them (--hold JOINT.a=0.5)",
+            f"{fit.loop.runs[0].name}: torque constant, friction and armature scale together, because {why}: add a known mass "
+            "to the robot's file, log more motion, or give one of them (--hold JOINT.a=0.5)",
             fit,
         )
 
