@@ -13,6 +13,8 @@ from identify.files.servo_log import ServoColumns
 from identify.servo import JointLoad, Servo, ServoFit, ServoRun, UnscaledError, identify_again
 from identify.servo.choice import FrictionChoice
 from identify.servo.refusals import has_scale
+from identify.servo.stages import looked_at
+from identify.servo.together import APART, Joint, per_offset, together
 from identify.telling import stage
 from sim.robot.robot import Robot
 
@@ -56,17 +58,18 @@ class Joints:
     @cached_property
     def runs(self) -> list[list[ServoRun]]:
         """Runs of each joint, while the others move as they were measured."""
-        return self._runs({})
+        return self._loaded([{}] * len(self.logs))
 
     def runs_with(self, fits: Mapping[int, ServoFit]) -> list[list[ServoRun]]:
         """Return runs of each joint, while others that have a fit move as simulated, corrected by the measured slow motion."""
-        return self.runs if self.links.n == 1 or not fits else self._runs(fits)
+        return self.runs if self.links.n == 1 or not fits else self._loaded(self._moving(fits))
 
     def identified(self, identify: Identify) -> Iterator[tuple[int, Identified | str]]:
-        """Yield the result of each joint, or why it has none; joints of an arm come twice.
+        """Yield the result of each joint, or why it has none; joints of an arm come again when more is known.
 
         Encoder counts hide accelerations. Joints are therefore fitted a second time, starting from their first estimates, to
         loads that follow from the fits of the others. A joint whose torques have no scale still moves as its fit simulates.
+        Then all offsets are made to agree.
         """
         moving = dict[int, ServoFit]()
         for j, (joint, servo, runs) in enumerate(zip(self.links.joints, self.servos, self.runs, strict=True)):
@@ -77,11 +80,26 @@ class Joints:
             yield j, result
         if len(moving) < 2:
             return
-        every = self.runs_with(moving)
+        every, known = self.runs_with(moving), dict[int, ServoFit]()
         for j, fit in moving.items():
             with stage(f"{self.links.joints[j]}, while the others move as their servos do"):
-                again, _ = _attempt(partial(identify_again, fit, every[j]))
+                again, found = _attempt(partial(identify_again, fit, every[j]))
+            if found is not None and not isinstance(again, str):
+                known[j] = found
             yield j, again
+        with stage("offsets of all joints"):
+            yield from self._together(moving, known).items()
+
+    def _together(self, before: Mapping[int, ServoFit], fits: Mapping[int, ServoFit]) -> dict[int, ServoFit]:
+        """Return fits whose offsets agree, of some whose loads assume the offsets of the fits before."""
+        moving, joints = self._moving(before), {j: Joint(fit, {}) for j, fit in fits.items()}
+        assumed = {k: offset_of(fit) for k, fit in before.items() if k in fits and has_scale(fit)}
+        for k, offset in assumed.items():
+            runs = self._loaded([{**each, k: each[k]._replace(offset=offset + APART)} for each in moving])
+            for j, (fit, changes) in joints.items():
+                if j != k:
+                    changes[k] = per_offset(fit, looked_at(fit.servo, runs[j], before[j].p["delay"]))
+        return together(joints, assumed)
 
     def _first(
         self, identify: Identify, j: int, servo: Servo, runs: Sequence[ServoRun]
@@ -90,15 +108,18 @@ class Joints:
             return f"{self.links.joints[j]} slides: gain and counts of servo.toml are those of a joint that turns", None
         return _attempt(partial(identify, j, servo, runs))
 
-    def _runs(self, fits: Mapping[int, ServoFit]) -> list[list[ServoRun]]:
+    def _moving(self, fits: Mapping[int, ServoFit]) -> list[dict[int, Moving]]:
+        """Return how joints move by their fits, in each log."""
         simulated = {j: fit.simulate(self.runs[j]) for j, fit in fits.items()}
+        return [{j: Moving(q[k], offset_of(fits[j])) for j, q in simulated.items()} for k in range(len(self.logs))]
+
+    def _loaded(self, moving: Sequence[Mapping[int, Moving]]) -> list[list[ServoRun]]:
+        """Return runs of each joint while the others move so, or as they were measured."""
         every = [[] for _ in self.links.joints]  # type: list[list[ServoRun]]
-        for k, log in enumerate(self.logs):
+        for log, by_fits in zip(self.logs, moving, strict=True):
             for j in range(self.links.n):
                 self._run(log, j, UNLOADED)  # raises LogError before loads are computed from a bad log
-            # Offsets follow from gravity: without a scale they are wrong.
-            moving = {j: Moving(q[k], fits[j].p["offset"] if has_scale(fits[j]) else 0.0) for j, q in simulated.items()}
-            for j, load in enumerate(loads(self.links, log.columns, moving)):
+            for j, load in enumerate(loads(self.links, log.columns, by_fits)):
                 every[j].append(self._run(log, j, load))
         return every
 
@@ -107,6 +128,11 @@ class Joints:
         on = None if columns.on is None else columns.on[:, j] > 0.5
         voltage = None if columns.voltage is None else columns.voltage[:, j]
         return ServoRun(columns.t, columns.q[:, j], columns.command[:, j], load, log.kp[j], on, voltage, name=name)
+
+
+def offset_of(fit: ServoFit) -> float:
+    """Return the offset that others assume of a joint [rad]: it follows from gravity, and is wrong without a scale."""
+    return fit.p["offset"] if has_scale(fit) else 0.0
 
 
 def _attempt(identify: Callable[[], Identified]) -> tuple[Identified | str, ServoFit | None]:

@@ -45,6 +45,8 @@ class ServoFit:
     contrast : float
         How many times larger the objective is at least with half as much again, or two thirds, of the torque per volt, and with
         all others as that needs them: near 1 where no known load sets the scale of the torques.
+    of_all : Array, shape (p, p), optional
+        Covariance of the free parameters, where it contains errors of other joints (see `identify.servo.together`).
     """
 
     servo: Servo
@@ -54,6 +56,7 @@ class ServoFit:
     loop: ServoLoop
     excitation: Excitation
     contrast: float
+    of_all: Array | None = None
 
     @property
     def p(self) -> dict[str, float]:
@@ -73,7 +76,7 @@ class ServoFit:
     @property
     def covariance(self) -> Array:
         """Of the free parameters, from the scatter of the residuals, shape (p, p)."""
-        return self.left_out.covariance
+        return self.left_out.covariance if self.of_all is None else self.of_all
 
     @property
     def standard_errors(self) -> dict[str, float]:

@@ -50,12 +50,9 @@ class Stages:
 
     def __init__(self, servo: Servo, runs: Sequence[ServoRun], held: dict[str, float], start: Mapping[str, float]) -> None:
         self.held, self._servo, self._excitation = held, servo, Excitation.of(servo, runs, held)
-        whole, self.start = _evenly(runs), dict(start)
-        self._few = len(whole) <= FEW
-        some = whole[::2]
-        if self._few:
-            whole = some = [piece for run in whole for piece in pieces(run, servo.step, 1.5 * self.start["delay"])]
-        self._whole, self._coarse = whole, ServoLoop(servo, some, COARSE * self._excitation.T)
+        self.start, self._few = dict(start), len(_evenly(runs)) <= FEW
+        self._whole = looked_at(servo, runs, self.start["delay"])
+        self._coarse = ServoLoop(servo, self._whole if self._few else self._whole[::2], COARSE * self._excitation.T)
         self._valleys = Valleys(self._coarse, self._excitation, held)
 
     @classmethod
@@ -105,6 +102,12 @@ class Stages:
         names -= set() if self._excitation.tilts else {"offset"}
         names |= {"rate"} if "rate" in begin else set()
         return tuple(name for name in SERVO_PARAMETERS if name in names - set(self.held))
+
+
+def looked_at(servo: Servo, runs: Sequence[ServoRun], delay: float) -> list[ServoRun]:
+    """Return runs, or their pieces, that a search looks at, commands being as late as its start says [s]."""
+    whole = _evenly(runs)
+    return whole if len(whole) > FEW else [piece for run in whole for piece in pieces(run, servo.step, 1.5 * delay)]
 
 
 def _started(servo: Servo, runs: Sequence[ServoRun], held: dict[str, float], excitation: Excitation) -> dict[str, float]:

@@ -1,5 +1,6 @@
-"""The joints of an arm, one after the other, twice."""
+"""The joints of an arm, one after the other, twice, and then their offsets."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,11 +8,16 @@ import pytest
 
 from experiments.servo import joints as module
 from experiments.servo.joints import Joints, JointsLog
+from experiments.study.servo_rows import _joints
 from identify import IdentificationError
 from identify.files.servo_log import ServoColumns
-from identify.servo import Servo, UnscaledError
+from identify.servo import Servo, UnscaledError, identify_again, identify_servo
+from identify.servo.stages import looked_at
+from identify.servo.together import APART, per_offset
+from sim.engine.simulation import simulate
 from sim.robot.mounting import PLAIN
 from sim.robot.servos import links
+from sim.scenario.scenario_file import load
 
 SERVO = Servo(0.166, 16.0, 12.0)
 
@@ -49,7 +55,7 @@ def test_a_joint_without_a_scale_moves_for_the_others_and_one_that_is_not_explai
 
     monkeypatch.setattr(module, "identify_again", again)
     found = list(arm.identified(identify))
-    assert [j for j, _ in found] == [0, 1, 2, 3, 4, 5, 0, 1, 2, 3, 4]
+    assert [j for j, _ in found] == [0, 1, 2, 3, 4, 5, 0, 1, 2, 3, 4, 0, 1, 2, 3, 4]
     assert found[4][1] == "scale together"
     assert found[5][1] == "does not move"
     assert sorted(seen) == [0, 1, 2, 3, 4]
@@ -92,3 +98,32 @@ def test_a_joint_that_slides_is_refused(tmp_path):
     found = dict(Joints(robot, (SERVO,) * robot.n, (log,)).identified(lambda j, servo, runs: fit_of(j)))
     assert "rail slides" in found[0]
     assert not isinstance(found[1], str)
+
+
+@pytest.mark.thorough
+def test_offsets_are_what_gravity_says_of_all_joints_and_their_changes_what_another_fit_finds():
+    """Of a simulated arm whose encoders have their zeros where its file has them."""
+    scenario = load("servo-arm")
+    scenario = replace(scenario, trajectory=replace(scenario.trajectory, steps=36), seed=4)
+    joints = _joints(scenario, simulate(scenario).alone())
+    found = {
+        j: fit for j, fit in joints.identified(lambda j, *known: identify_servo(*known, "coulomb")) if not isinstance(fit, str)
+    }
+    assert {1, 2} <= set(found)
+    for j in (1, 2):
+        sigma = found[j].standard_errors["offset"]
+        assert abs(found[j].p["offset"]) < 3 * sigma < 0.05
+    shoulder, elbow = found[1], found[2]
+    alone = {k: fit for k, fit in found.items() if k != 1}
+    place = elbow.free.index("offset")
+    for apart in (0.0, 0.03):
+        other = replace(shoulder, found=replace(shoulder.found, p={**shoulder.p, "offset": apart}))
+        runs = joints.runs_with({**alone, 1: other})
+        again = identify_again(elbow, runs[2])
+        if not apart:
+            one = again
+    shifted = joints.runs_with(
+        {**alone, 1: replace(shoulder, found=replace(shoulder.found, p={**shoulder.p, "offset": APART}))}
+    )
+    slope = per_offset(one, looked_at(one.servo, shifted[2], elbow.p["delay"]))[place]
+    assert again.p["offset"] - one.p["offset"] == pytest.approx(0.03 * slope, rel=0.2)

@@ -1,0 +1,79 @@
+"""Offsets of the joints of an arm that depend on each other."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identify.servo import Servo, ServoFit
+from identify.servo.search import Found
+from identify.servo.together import Joint, together
+
+RNG = np.random.default_rng(0)
+FREE = ("a", "offset", "delay")
+PLACE = FREE.index("offset")
+
+
+def fit_of(covariance, free=FREE):
+    p = dict(zip(FREE, RNG.normal(size=3), strict=True))
+    found = Found(p, 0.0, None, None, None)
+    return ServoFit(Servo(0.166, 16.0, 12.0), "coulomb", free, found, None, None, np.inf, covariance)
+
+
+def covariance(n=3):
+    root = RNG.normal(size=(n, n))
+    return root @ root.T
+
+
+@pytest.fixture
+def three():
+    """Return three joints whose fits depend on each other's offsets, the last without one of its own."""
+    fits = [fit_of(covariance()), fit_of(covariance()), fit_of(covariance(2), ("a", "delay"))]
+    return {j: Joint(fit, {k: 0.4 * RNG.normal(size=len(fit.free)) for k in (0, 1) if k != j}) for j, fit in enumerate(fits)}
+
+
+def whole(joints):
+    """Return what parameters of all joints do to each other, shape (8, 8), a matrix for each pair of joints side by side."""
+    starts = np.cumsum([0] + [len(joint.fit.free) for joint in joints.values()])
+    K = np.zeros((starts[-1], starts[-1]))
+    for j, joint in joints.items():
+        for k, column in joint.per_offset.items():
+            K[starts[j] : starts[j + 1], starts[k] + PLACE] = column
+    return K, starts
+
+
+def test_offsets_agree_and_covariances_are_those_of_the_whole_system(three):
+    assumed = {0: 0.3, 1: -0.2}
+    found = together(three, assumed)
+    K, starts = whole(three)
+    through = np.linalg.inv(np.eye(len(K)) - K)
+    alone = np.concatenate([[joint.fit.p[name] for name in joint.fit.free] for joint in three.values()])
+    at = np.zeros(len(K))
+    at[[starts[k] + PLACE for k in assumed]] = list(assumed.values())
+    all_of = through @ (alone - K @ at)  # x = alone + K (x - at)
+    C = np.zeros_like(K)
+    for j, joint in three.items():
+        C[starts[j] : starts[j + 1], starts[j] : starts[j + 1]] = joint.fit.covariance
+    C = through @ C @ through.T
+    for j, fit in found.items():
+        some = slice(starts[j], starts[j + 1])
+        np.testing.assert_allclose([fit.p[name] for name in fit.free], all_of[some], rtol=1e-12)
+        np.testing.assert_allclose(fit.covariance, C[some, some], rtol=1e-12, atol=1e-12)
+    assert found[2].p["offset"] == three[2].fit.p["offset"]  # held, or without effect
+
+
+def test_joints_without_an_effect_on_each_other_stay(three):
+    apart = {j: Joint(joint.fit, {}) for j, joint in three.items()}
+    for assumed in ({}, {0: 0.3, 1: -0.2}):
+        found = together(apart, assumed)
+        assert {j: fit.p for j, fit in found.items()} == {j: joint.fit.p for j, joint in three.items()}
+        for j, fit in found.items():
+            np.testing.assert_allclose(fit.covariance, three[j].fit.covariance)
+
+
+def test_an_offset_that_is_held_has_no_error(three):
+    held = {**three, 0: Joint(replace(fit_of(covariance(2)), free=("a", "delay")), {1: np.array([0.1, 0.2])})}
+    found = together(held, {0: 0.3, 1: -0.2})
+    alone, other = three[1].fit, found[1]
+    np.testing.assert_allclose(other.covariance, alone.covariance)  # nothing comes back to it
+    assert other.p == alone.p
