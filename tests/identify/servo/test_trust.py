@@ -92,16 +92,24 @@ def test_a_fit_says_where_it_lacks(fit):
 
 
 @pytest.mark.thorough
-def test_a_light_rotor_is_not_taken_for_a_late_command():
+@pytest.mark.parametrize("seed", [2, 5, 9])
+def test_a_light_rotor_is_not_taken_for_a_late_command(seed):
     """With a link of a tenth of the torque, searches from the rows alone end without an armature, at twice the delay."""
-    heavy = simulated(2)
-    light = replace(heavy, load=JointLoad.pendulum(0.1, 0.06), on=None)
+    light = replace(simulated(seed), load=JointLoad.pendulum(0.1, 0.06), on=None)
     q = ServoLoop(SERVO, [replace(light, q=0 * light.t)], 2.5e-4).simulate(LAW)[0, 0]
-    with pytest.raises(UnscaledError) as refused:  # so light a load leaves the scale open, not the delay
-        identify_servo(SERVO, [replace(light, q=np.rint(q / SERVO.step) * SERVO.step)], "coulomb")
-    fit = pickle.loads(pickle.dumps(refused.value)).fit  # as it comes from another process
+    try:  # so light a load may leave the scale open, not the delay
+        fit = identify_servo(SERVO, [replace(light, q=np.rint(q / SERVO.step) * SERVO.step)], "coulomb")
+    except UnscaledError as refused:
+        fit = refused.fit
     assert abs(fit.p["delay"] - LAW["delay"]) < 3 * fit.standard_errors["delay"]
     assert fit.p["Ia"] / fit.p["a"] == pytest.approx(LAW["Ia"] / LAW["a"], rel=0.02)  # the other valley has no Ia
+    assert fit.p["a"] == pytest.approx(LAW["a"], rel=0.06)  # a search of all parameters ended 11 % away
+
+
+def test_a_refusal_from_another_process_has_its_fit():
+    refused = pickle.loads(pickle.dumps(UnscaledError("scale together", fit={"a": 1.0})))
+    assert str(refused) == "scale together"
+    assert refused.fit == {"a": 1.0}
 
 
 @pytest.mark.parametrize("name", ["a", "Ia"])
