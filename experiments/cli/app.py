@@ -59,7 +59,7 @@ def run(args: Sequence[str] | None = None) -> int:
                 _print(OVERVIEW)
             else:
                 with importing():
-                    command = _parsed(words)
+                    command = parsed(words)
                 if command is not None:
                     _do(command)
     except KeyboardInterrupt:
@@ -86,7 +86,7 @@ def _require_memory() -> None:
             )
 
 
-def _parsed(words: list[str]) -> Callable[[], None] | None:
+def parsed(words: list[str]) -> Callable[[], None] | None:
     """Return the command that words name, with its options, or None if they asked for its help, which is shown."""
     from experiments.cli.help_text import show_help, without_short
     from experiments.cli.wrong_words import refused, require_command, require_once

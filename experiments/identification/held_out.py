@@ -17,6 +17,7 @@ from identify.arrays import combined
 from identify.rows.long_logs import manageable
 from sim.engine.replay import Replay, replay
 from sim.errors import BenchError
+from sim.robot.robot import Robot
 
 BANDWIDTH = 5.0
 """Of the loop that holds the simulated robot to the log [rad/s]: weak, so that errors of the model show."""
@@ -84,11 +85,21 @@ class HeldOut:
 
     def _replay(self, model: str) -> Replay | str:
         try:
-            written = Written(self.fit, model)
-            log, qd = self._replayed
-            return replay(written.robot, _without(log, qd, self.fit.basis, written.lost), qd, BANDWIDTH)
+            robot, log, qd = self.driven(model)
+            return replay(robot, log, qd, BANDWIDTH)
         except (BenchError, IdentificationError) as error:
             return str(error)
+
+    def driven(self, model: str) -> tuple[Robot, MotionLog, Array]:
+        """Return the robot with a model's parameters, what drives it, and velocities of the log [rad/s].
+
+        Raises
+        ------
+        BenchError, IdentificationError
+            If there is no such robot.
+        """
+        written, (log, qd) = Written(self.fit, model), self._replayed
+        return written.robot, _without(log, qd, self.fit.basis, written.lost), qd
 
     @cached_property
     def _replayed(self) -> tuple[MotionLog, Array]:

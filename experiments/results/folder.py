@@ -32,6 +32,8 @@ FILES: Mapping[str, tuple[str, ...]] = {
     "excite": (*COMMON, "scenario.toml", "report.html", "motion*.csv"),
     "payload": ("summary.json", "fault.txt"),
     "gains": ("summary.json", "fault.txt"),
+    "benchmark": ("summary.json", "report.html", "fault.txt"),
+    "benchmark-set": ("summary.json", "fit*.npz", "held_out*.npz", "robot.urdf", "fault.txt"),
     "servo": ("summary.json", RECORDING, "fault.txt"),
     "study": ("summary.json", "report.html", "recording.rrd", "fault.txt"),
 }

@@ -24,6 +24,7 @@ from experiments.identification.iterations import iterations
 from experiments.identification.judgement import Judgement, judge
 from experiments.identification.load import load, with_held_out
 from experiments.identification.log_warnings import warnings_of_log
+from experiments.identification.logs import Logs
 from experiments.identification.reading import file_of, stated_by
 from experiments.identification.request import Request
 from experiments.recording.audience import Audience
@@ -63,7 +64,7 @@ def identify(options: Identify) -> None:
         audience = stack.enter_context(options.watching.audience())
         options = _followed(stack, options, request, audience)
         with stages_of("identifying"):
-            result = _fitted(options, request, stated)
+            result = fitted(options, request, stated)
         _show_fit(page, result, options, read[0])
         _save(folder, page, result)
         kept = f"the estimates are printed{f', and with the logs in {folder.out}' if folder else ''}"
@@ -111,12 +112,21 @@ def _followed(stack: ExitStack, options: Identify, request: Request, audience: A
     return replace(options, log=(follower.complete(Path(folder)),))
 
 
-def _fitted(options: Identify, request: Request, stated: dict[str, Any]) -> Fit:
-    """Return the fit; what goes wrong says what is suspicious about the logs, too."""
+def fitted(options: Identify, request: Request, stated: dict[str, Any]) -> Fit:
+    """Return the fit of logs."""
+    return fit_of(*loaded_logs(options, request, stated))
+
+
+def loaded_logs(options: Identify, request: Request, stated: dict[str, Any]) -> tuple[Request, Logs]:
+    """Return the request with the band that suits the logs, and the logs."""
     loaded = load(options.log, read_options(options), request, band=chooses_band(options))
-    logs = with_held_out(loaded, options.validate, read_options(options), _truth(stated, request))
+    return loaded.request, with_held_out(loaded, options.validate, read_options(options), _truth(stated, request))
+
+
+def fit_of(request: Request, logs: Logs) -> Fit:
+    """Return the fit of logs; what goes wrong says what is suspicious about them, too."""
     try:
-        return fit(loaded.request, logs)
+        return fit(request, logs)
     except IdentificationError as error:
         doubts = dict.fromkeys(doubt for log in logs.fitted for doubt in warnings_of_log(log, request.robot_model.tree))
         why = f"; what is suspicious: {'; '.join(doubts)}" if doubts else ""

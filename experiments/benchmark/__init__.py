@@ -1,0 +1,1 @@
+"""Sets of logs of real robots, identified and judged on logs that no fit has seen: one protocol for all."""

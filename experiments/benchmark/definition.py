@@ -1,0 +1,110 @@
+"""What a set is: a folder with logs, a robot, and a benchmark.toml that states what is fitted and what is held out."""
+
+import shlex
+import tomllib
+from pathlib import Path
+
+from experiments.errors import ExperimentError
+from sim.errors import ScenarioError
+from sim.settings import NotNegative, make, settings
+
+FILE = "benchmark.toml"
+"""What states the set of a folder."""
+
+SHIPPED = Path(__file__).parent / "sets"
+"""Definitions that ship; their data do not."""
+
+WORDS_OF_IDENTIFY = "options of `idbench identify`, but for logs, --validate and results"
+
+TAKEN = ("--validate", "--out", "--force", "--json", "--write", "--write-mjcf", "--follow", "--live", "--serve", "--label")
+"""Options of `idbench identify` that a set does not state."""
+
+
+@settings
+class Definition:
+    """A set of logs."""
+
+    title: str
+    """What to call it."""
+    fit: tuple[str, ...]
+    """Logs that are fitted together."""
+    held_out: tuple[str, ...] = ()
+    """Logs on which the fit is judged. Default: the last quarter of the longest log, which is then not fitted."""
+    options: str = ""
+    """How they are identified: options of `idbench identify`, as on the command line."""
+    repeats: tuple[str, ...] = ()
+    """Logs that are also fitted one by one, to compare their parameters. Default: those of the fit."""
+    free_run: NotNegative = 0.0
+    """How long the identified robot is simulated from torques alone, again and again along held-out logs [s]; 0: not at all."""
+    source: str = ""
+    """Where the data are from, with their version."""
+    license: str = ""
+    """Licence of the data."""
+    get: str = ""
+    """How to get the data: commands, to be run in the folder."""
+    published: str = ""
+    """Figures that others have published for these data."""
+
+    def __post_init__(self) -> None:
+        if not self.fit:
+            raise ValueError("fit must name at least one log")
+        if taken := [word for word in self.words if word.partition("=")[0].replace("_", "-") in TAKEN]:
+            raise ValueError(f"options must not have {taken[0]}: they are {WORDS_OF_IDENTIFY}")
+
+    @property
+    def words(self) -> list[str]:
+        """The options as words."""
+        return shlex.split(self.options)
+
+    @property
+    def every_repeat(self) -> tuple[str, ...]:
+        """Logs that are fitted one by one."""
+        return self.repeats or self.fit
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """All logs."""
+        return tuple(dict.fromkeys([*self.fit, *self.held_out, *self.every_repeat]))
+
+
+def read_definition(folder: Path) -> Definition:
+    """Return the definition of a folder.
+
+    Raises
+    ------
+    ExperimentError
+        If there is none, or it cannot be read.
+    """
+    path = folder / FILE
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        made: Definition = make(Definition, content, "")
+    except FileNotFoundError as error:
+        raise ExperimentError(_missing(folder)) from error
+    except OSError as error:
+        raise ExperimentError(f"cannot read {path}: {error.strerror}") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError, ScenarioError) as error:
+        raise ExperimentError(f"{path}: {error}") from error
+    if "No closing quotation" in _unquoted(made.options):
+        raise ExperimentError(f"{path}: options = {made.options!r:.60} has a quotation mark without another")
+    return made
+
+
+def shipped() -> tuple[str, ...]:
+    """Return the names of the sets that ship."""
+    return tuple(sorted(path.parent.name for path in SHIPPED.glob(f"*/{FILE}")))
+
+
+def _missing(folder: Path) -> str:
+    if str(folder) in shipped():
+        return f"{folder}: its definition ships, data do not; `idbench new set {folder}` writes it, and says how to get them"
+    known = ", ".join(shipped())
+    return f"{folder} has no {FILE}; name folders that have one, or get a definition: `idbench new set NAME`, of {known}"
+
+
+def _unquoted(options: str) -> str:
+    try:
+        shlex.split(options)
+    except ValueError as error:
+        return str(error)
+    return ""

@@ -1,0 +1,44 @@
+"""The page of a benchmark: one HTML file that needs no other."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from experiments.benchmark.tables import HEADS, Row, of_tools, overview, remarks, shares
+from experiments.reports.html import rendered, svg
+from experiments.style import JOINTS
+
+
+def report(rows: Sequence[Row]) -> str:
+    """Return the page of some rows."""
+    return rendered(
+        "experiments.benchmark",
+        "report.html.j2",
+        heads=[head.replace("\n", " ") for head in HEADS],
+        overview=list(overview(rows)),
+        figure=svg(errors_figure(rows)) if rows else "",
+        sets=[
+            {"title": row["title"], "joints": row["joints"], "tools": list(of_tools(row)), "remarks": list(remarks(row))}
+            for row in rows
+        ],
+    )
+
+
+def errors_figure(rows: Sequence[Row]) -> Figure:
+    """Return torque errors of every joint [% of its torque], a line a set, a colour a tool."""
+    tools = list(dict.fromkeys(tool for row in rows for tool in shares(row)))
+    figure = Figure(figsize=(8, 1.0 + 0.5 * len(rows)), layout="constrained")
+    panel = figure.subplots()
+    for k, tool in enumerate(tools):
+        height = 0.6 * ((k + 0.5) / len(tools) - 0.5)
+        places = [(share, y + height) for y, row in enumerate(rows) for share in shares(row).get(tool, ())]
+        x, y = np.array(places).T
+        color = [c / 255 for c in JOINTS[k % len(JOINTS)]]
+        panel.plot(x, y, ".", color=color, label=tool, markersize=7)
+    panel.set_yticks(range(len(rows)), [row["title"] for row in rows])
+    panel.invert_yaxis()
+    panel.set_xscale("log")
+    panel.set_xlabel("torque error of a joint on held-out logs [% of its torque]")
+    figure.legend(loc="outside upper right", ncols=4, frameon=False)
+    return figure

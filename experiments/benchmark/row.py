@@ -1,0 +1,108 @@
+"""One set: its fit, judged on every held-out log, and beside it all that the protocol asks for."""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, final
+
+from experiments.benchmark.definition import Definition
+from experiments.benchmark.free_runs import free_runs
+from experiments.benchmark.repeats import repeats
+from experiments.benchmark.tools import Predicted, judged
+from experiments.faults import is_told, reason
+from experiments.identification.fit import Fit
+from experiments.identification.held_out import HeldOut
+from experiments.identification.judgement import Unjudged, judge
+from experiments.identification.verdict import WORDS
+from experiments.results.summaries import finite
+from identify import MotionLog
+from identify.judge.leaks import seen
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class SetFit:
+    """A set that is fitted.
+
+    Parameters
+    ----------
+    definition : Definition
+        What it is.
+    fit : Fit
+        Its fit.
+    repeated : mapping of str to MotionLog
+        Logs that are fitted one by one, by name.
+    seconds : float
+        How long reading and fitting took.
+    """
+
+    definition: Definition
+    fit: Fit
+    repeated: Mapping[str, MotionLog]
+    seconds: float
+
+
+def row_of(made: SetFit, predicted: Callable[[Sequence[HeldOut]], list[Predicted]]) -> dict[str, Any]:
+    """Return the row of a set; a part that fails has its reason in its place."""
+    fit, definition = made.fit, made.definition
+    judgement, begin = judge(fit), time.perf_counter()
+    there = [one for one in judgement.on if isinstance(one, HeldOut)]
+    row: dict[str, Any] = {
+        "title": definition.title,
+        "joints": list(fit.robot_model.robot.joints),
+        "model": fit.leading,
+        "estimator": fit.request.estimator,
+        "parameters": len(fit.basis.names),
+        "seconds": made.seconds,
+        "logs": [_log(one, fit) for one in judgement.on],
+        "published": definition.published,
+        "notes": list(fit.logs.notes),
+    }
+    row["verdict"] = _worst([log["verdict"] for log in row["logs"] if "verdict" in log])
+    row["repeats"] = _attempted(lambda: _repeats(made))
+    if definition.free_run:
+        row["free_run"] = [_attempted(lambda: free_runs(one, fit.leading, definition.free_run)) for one in there]  # noqa: B023
+    row["tools"] = {
+        tool.tool: _attempted(lambda: judged(there, tool))  # noqa: B023  # called at once
+        for tool in (predicted(there) if len(there) == len(judgement.on) else [])
+    }
+    row["seconds_of_judging"] = time.perf_counter() - begin
+    return row
+
+
+def _log(one: HeldOut | Unjudged, fit: Fit) -> dict[str, Any]:
+    if isinstance(one, Unjudged):
+        return {"title": one.title, "failure": one.why}
+    own, verdict = one.torques[fit.leading], one.verdicts[fit.leading]
+    return {
+        "title": one.title,
+        "torque_error_rms": [finite(x) for x in own.rms],
+        "torque_error_percent": [finite(x) for x in own.percent],
+        "noise_rms": [finite(x) for x in own.noise],
+        "R2": [finite(x) for x in own.R2],
+        "verdict": verdict.word,
+        "reasons": verdict.reasons,
+        "samples": one.log.samples,
+        "samples_seen": seen(one.log, fit.logs.fitted),
+    }
+
+
+def _repeats(made: SetFit) -> dict[str, Any]:
+    if len(made.repeated) < 2:
+        return {}
+    found = repeats(made.fit.request, list(made.repeated.values()), list(made.repeated))
+    return {"inside": found.inside, "compared": found.compared, "failed": list(found.failed)}
+
+
+def _attempted(make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """Return a part of a row, or why there is none."""
+    try:
+        return make()
+    except Exception as error:
+        if not is_told(error):
+            raise
+        return {"failure": reason(error)}
+
+
+def _worst(verdicts: Sequence[str]) -> str | None:
+    return max(verdicts, key=WORDS.index, default=None)

@@ -1,0 +1,143 @@
+"""Rows of a benchmark as tables."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.text import Text
+
+from experiments.text import new_table, percentage, print_table
+from identify import Array
+
+OWN = "idbench"
+"""What our own row is called beside those of other tools."""
+
+HEADS = (
+    "joints",
+    "torque error\nmedian %",
+    "torque error\nworst %",
+    "R2\nmedian",
+    "R2\nworst",
+    "intervals\nagree",
+    "free run\nNRMSE",
+    "fit\nseconds",
+    "verdict",
+)
+"""Columns of the table of all sets, beside their names."""
+
+Row = Mapping[str, Any]
+
+
+def overview(rows: Sequence[Row]) -> Iterator[list[str]]:
+    """Yield the cells of each set: how well torques of held-out logs are predicted, and what the protocol asks for."""
+    for row in rows:
+        share, R2 = _over_logs(row["logs"], "torque_error_percent"), _over_logs(row["logs"], "R2")
+        if not len(share):
+            yield [row["title"], str(len(row["joints"])), *[""] * 7]
+            continue
+        yield [
+            row["title"],
+            str(len(row["joints"])),
+            percentage(_median(share)),
+            percentage(_largest(share)),
+            f"{_median(R2):.3f}",
+            f"{_largest(-R2) * -1:.3f}",
+            _agree(row["repeats"]),
+            _free_run(row.get("free_run", ())),
+            f"{row['seconds']:.2g}",
+            row["verdict"] or "",
+        ]
+
+
+def of_tools(row: Row) -> Iterator[list[str]]:
+    """Yield the torque errors of each joint [N m], rms over all held-out logs, by each tool, with seconds."""
+    for tool, logs, seconds in _tools(row):
+        errors = _over_logs(logs, "torque_error_rms")
+        yield [tool, *(f"{x:.3g}" if np.isfinite(x) else "" for x in errors), "" if seconds is None else f"{seconds:.2g}"]
+
+
+def print_rows(console: Console, rows: Sequence[Row]) -> None:
+    """Print the table of all sets, and of each the joints by tool."""
+    grid = new_table("", HEADS)
+    for cells in overview(rows):
+        grid.add_row(*cells)
+    grid.columns[0].header = "set"
+    print_table(console, grid)
+    for row in rows:
+        _print_set(console, row)
+
+
+def _print_set(console: Console, row: Row) -> None:
+    console.print(Text(f"{row['title']}: torque error on held-out logs, rms [N m, N]", style="bold"), soft_wrap=True)
+    grid = new_table("", [*row["joints"], "seconds"])
+    for cells in of_tools(row):
+        grid.add_row(*cells)
+    print_table(console, grid)
+    for words in remarks(row):
+        console.print(Text(words), soft_wrap=True)
+    console.print()
+
+
+def remarks(row: Row) -> Iterator[str]:
+    """Yield what else is to be said of a set."""
+    for log in row["logs"]:
+        if "failure" in log:
+            yield f"{log['title']}: {log['failure']}"
+        elif log["samples_seen"]:
+            yield (
+                f"{log['title']}: {log['samples_seen']} of its {log['samples']} samples are also in the fitted logs: "
+                "its errors are those of data that the fit has seen"
+            )
+    for part in (row["repeats"], *row.get("free_run", ())):
+        yield from [part["failure"]] if "failure" in part else []
+        yield from part.get("failed", ())
+        if part.get("diverged"):
+            yield f"{part['diverged']} of {part['stretches']} free runs diverge"
+    yield from (f"{tool}: {found['failure']}" for tool, found in row["tools"].items() if "failure" in found)
+    if row["published"]:
+        yield f"published: {row['published']}"
+
+
+def _tools(row: Row) -> Iterator[tuple[str, Sequence[Row], float | None]]:
+    yield f"{OWN}, {row['model']}, {row['estimator']}", row["logs"], row["seconds"]
+    for tool, found in row["tools"].items():
+        if "logs" in found:
+            yield tool, found["logs"], found["seconds"]
+
+
+def _over_logs(logs: Sequence[Row], name: str) -> Array:
+    """Return the rms over logs of a figure of each joint; of R2, which may be negative, the mean; nothing if no log has it."""
+    each = np.array([[np.nan if x is None else x for x in log[name]] for log in logs if name in log], dtype=float)
+    if not len(each):
+        return np.zeros(0)
+    return np.asarray(each.mean(axis=0) if name == "R2" else np.sqrt((each**2).mean(axis=0)))
+
+
+def _median(x: Array) -> float:
+    known = x[np.isfinite(x)]
+    return float(np.median(known)) if len(known) else float("nan")
+
+
+def _largest(x: Array) -> float:
+    known = x[np.isfinite(x)]
+    return float(known.max()) if len(known) else float("nan")
+
+
+def _agree(found: Row) -> str:
+    return f"{100 * found['inside'] / found['compared']:.0f} %" if found.get("compared") else ""
+
+
+def _free_run(found: Sequence[Row]) -> str:
+    each = np.array([[np.nan if x is None else x for x in part["nrmse"]] for part in found if "nrmse" in part], dtype=float)
+    return f"{_median(each.mean(axis=1)):.3f}" if len(each) else ""
+
+
+def shares(row: Row) -> dict[str, list[float]]:
+    """Return the torque errors of each joint [% of its torque] by tool."""
+    own = _over_logs(row["logs"], "torque_error_rms")
+    if not len(own):
+        return {}
+    level = own / _over_logs(row["logs"], "torque_error_percent")
+    every = {tool: _over_logs(logs, "torque_error_rms") / level for tool, logs, _ in _tools(row)}
+    return {(OWN if tool.startswith(OWN) else tool): [float(x) for x in e if np.isfinite(x)] for tool, e in every.items()}

@@ -1,0 +1,94 @@
+"""Torques that other tools predict for held-out logs, judged as ours are."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+
+from experiments.errors import ExperimentError
+from experiments.identification.held_out import HeldOut
+from experiments.results.summaries import finite
+from identify import Array, MotionLog, Problem, TorqueChannel, validate
+
+PREDICTED = "predicted-*.npz"
+"""Names of the files of other tools, in the folder of a set's results."""
+
+
+@final
+@dataclass(frozen=True)
+class Predicted:
+    """What a tool has predicted.
+
+    Parameters
+    ----------
+    tool : str
+        Its name.
+    torques : tuple of Array, each of shape (time, joint)
+        Torques at the samples of each held-out log [N m].
+    seconds : float
+        How long its fit took.
+    note : str
+        Its settings, and what else is to be known.
+    """
+
+    tool: str
+    torques: tuple[Array, ...]
+    seconds: float
+    note: str
+
+
+def predictions(folder: Path, count: int) -> list[Predicted]:
+    """Return what tools have left in the folder of a set's results; raise ExperimentError if a file is none.
+
+    A file `predicted-TOOL.npz` has `held_out1`, `held_out2`, ..., and `seconds` and `note` if it has them.
+    """
+    found = []
+    for path in sorted(folder.glob(PREDICTED)):
+        try:
+            with np.load(path) as file:
+                torques = tuple(np.asarray(file[f"held_out{k + 1}"], dtype=float) for k in range(count))
+                seconds = float(file["seconds"]) if "seconds" in file else float("nan")
+                note = str(file["note"]) if "note" in file else ""
+        except (OSError, KeyError, ValueError) as error:
+            raise ExperimentError(f"{path} must have held_out1 to held_out{count}, torques of each log: {error}") from error
+        found.append(Predicted(path.stem.partition("-")[2], torques, seconds, note))
+    return found
+
+
+def acting(torque: TorqueChannel, fs: float) -> float:
+    """Return how much later than its sample a torque acts, on average [s]."""
+    return torque.delay + (0.0 if torque.meaning == "instantaneous" else 0.5 / fs)
+
+
+def prepared(log: MotionLog) -> dict[str, Array]:
+    """Return a log for other tools: times [s], positions [rad], and the torques that act then [N m], gains included."""
+    tau = log.tau * np.asarray(log.torque.gain)
+    return {"t": log.t, "q": log.q, "tau": _at(log.t, log.t + acting(log.torque, log.fs), tau)}
+
+
+def _at(t: Array, times: Array, tau: Array) -> Array:
+    return np.stack([np.interp(t, times, x) for x in tau.T], axis=1)
+
+
+def judged(held_out: Sequence[HeldOut], predicted: Predicted) -> dict[str, Any]:
+    """Return what a summary says of a tool: of each log, what is left of the torque, on the rows on which ours is judged."""
+    return {
+        "seconds": finite(predicted.seconds),
+        "note": predicted.note,
+        "logs": [_judged(one, tau) for one, tau in zip(held_out, predicted.torques, strict=True)],
+    }
+
+
+def _judged(held_out: HeldOut, tau: Array) -> dict[str, Any]:
+    log = held_out.log
+    if tau.shape != log.tau.shape or not np.isfinite(tau).all():
+        return {"failure": f"torques of the shape {tau.shape}, of a log of {log.tau.shape}, or not all finite"}
+    as_logged = _at(log.t + acting(log.torque, log.fs), log.t, tau)
+    left = replace(log, tau=log.tau * np.asarray(log.torque.gain) - as_logged, torque=replace(log.torque, gain=1.0))
+    problem = Problem((left,), held_out.fit.basis, held_out.fit.problem.model, held_out.fit.processing)
+    validation = validate(problem, np.zeros(len(held_out.fit.basis.names)))
+    own = next(iter(held_out.torques.values()))
+    R2 = 1 - (1 - own.R2) * (validation.rms / own.rms) ** 2
+    return {"torque_error_rms": [finite(x) for x in validation.rms], "R2": [finite(x) for x in R2]}

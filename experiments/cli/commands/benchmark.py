@@ -1,0 +1,129 @@
+"""The command that makes the table of a benchmark, a row a set."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rich.text import Text
+
+from experiments.benchmark.definition import SHIPPED, read_definition, shipped
+from experiments.benchmark.report import report
+from experiments.benchmark.tables import print_rows
+from experiments.cli.commands.benchmark_set import set_row
+from experiments.cli.options.benchmark import Benchmark
+from experiments.cli.page import Page, new_page, shown
+from experiments.cli.progress import Told, stages_of
+from experiments.errors import ExperimentError
+from experiments.faults import is_told, reason
+from experiments.results.attempts import Attempts
+from experiments.results.folder import ResultsFolder
+from experiments.results.summaries import write_summary
+from experiments.study.versions import require_versions, versions
+
+Made = dict[str, Any] | str
+"""A row, or why there is none."""
+
+
+def benchmark(options: Benchmark) -> None:
+    """Make the rows of sets that are missing, and the table of all; or list the sets that ship."""
+    page = new_page(machine=options.json)
+    if not options.sets:
+        _list(page)
+        return
+    sets = _sets(options.sets)
+    out = options.out or Path("runs") / "benchmark"
+    for folder in sets.values():
+        read_definition(folder)
+    whole = ResultsFolder(out, "benchmark", f"idbench benchmark {' '.join(map(str, sets.values()))}", options.force)
+    rows = dict[str, Made]()
+    with shown(page), whole.held():
+        try:
+            with stages_of("benchmark") as told, _workers(options) as run:
+                for name, made in run(sets, out.absolute(), told):
+                    rows[name] = made
+        finally:
+            _show(page, {name: rows[name] for name in sets if name in rows})
+        with whole.complete() as hidden:
+            write_summary(hidden / "summary.json", page.found)
+        with Attempts(f"the table is printed, and in {out}", whole) as attempts:
+            for name, made in rows.items():
+                if isinstance(made, str):
+                    attempts.failed(name, made)
+            attempts.file("report.html", lambda: report(page.found["rows"]))
+            page.print(Text(f"written to {out}: open {out / 'report.html'}"), soft_wrap=True)
+
+
+def _list(page: Page) -> None:
+    for name in shipped():
+        known = read_definition(SHIPPED / name)
+        page.out(f"{name:12}  {known.title}; {known.source}; {known.license}")
+        page.found[name] = {"title": known.title, "source": known.source, "license": known.license}
+    page.close()
+
+
+def _sets(folders: Sequence[Path]) -> dict[str, Path]:
+    """Return the folders by their names; raise ExperimentError if two have one."""
+    found = dict[str, Path]()
+    for folder in folders:
+        name = folder.absolute().name
+        if name in found:
+            raise ExperimentError(f"{found[name]} and {folder} have one name, and would have one folder of results: rename one")
+        found[name] = folder.absolute()
+    return found
+
+
+def _show(page: Page, rows: Mapping[str, Made]) -> None:
+    there = [row for row in rows.values() if not isinstance(row, str)]
+    page.found |= {"experiment": "benchmark", "rows": there}
+    page.found["failures"] = {name: why for name, why in rows.items() if isinstance(why, str)}
+    if there:
+        print_rows(page, there)
+    page.show()
+
+
+Run = Callable[[Mapping[str, Path], Path, Told], Iterator[tuple[str, Made]]]
+
+
+@contextmanager
+def _workers(options: Benchmark) -> Iterator[Run]:
+    """Give what makes rows: this process, or workers."""
+    if options.workers is not None and options.workers < 1:
+        raise ExperimentError(f"--workers {options.workers} must be at least 1")
+    if options.workers and options.scheduler:
+        raise ExperimentError("--workers, --scheduler name several places to run: give one")
+    if not options.workers and not options.scheduler:
+        yield lambda sets, out, told: _here(sets, out, options.force, told)
+        return
+    from experiments.study.dask_client import connected
+
+    with connected(options.scheduler, options.workers or 1, "give the same command again") as client:
+        from distributed import as_completed
+
+        def run(sets: Mapping[str, Path], out: Path, told: Told) -> Iterator[tuple[str, Made]]:
+            waiting = {
+                client.submit(attempted, folder, out / name, options.force, versions(), pure=False): name
+                for name, folder in sets.items()
+            }
+            for k, future in enumerate(as_completed(waiting)):
+                told(f"{k + 1} of {len(sets)} sets", (k + 1) / len(sets))
+                yield waiting[future], future.result()
+
+        yield run
+
+
+def _here(sets: Mapping[str, Path], out: Path, force: bool, told: Told) -> Iterator[tuple[str, Made]]:
+    for k, (name, folder) in enumerate(sets.items()):
+        told(f"{name}, {k + 1} of {len(sets)}", k / len(sets))
+        yield name, attempted(folder, out / name, force, versions())
+
+
+def attempted(folder: Path, out: Path, force: bool, theirs: dict[str, str]) -> Made:
+    """Return the row of a set, or why there is none; on a worker, too."""
+    require_versions(theirs, "the process that makes the benchmark")
+    try:
+        return set_row(folder, out, force)
+    except Exception as error:
+        if not is_told(error):
+            raise
+        return reason(error)
