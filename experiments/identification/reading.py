@@ -115,6 +115,7 @@ def read(path: Path, options: ReadOptions, request: Request) -> ReadLog:
     """Return the log, its torque read as the options say; its delay is that which is stated."""
     columns, delay, joints = columns_of(path, options.columns), options.delay, request.robot_model.mounting.joints
     columns = columns if columns.joints or len(joints) != columns.n else replace(columns, joints=joints)
+    before = columns.prefixed(request.robot_model.robot.joints)
     try:
         columns = columns.ordered(request.robot_model.robot.joints)
     except LogError as error:
@@ -135,6 +136,7 @@ def read(path: Path, options: ReadOptions, request: Request) -> ReadLog:
     columns = replace(columns, q=_turned(path, columns.q, request, options.unwrap))
     assumed = delay is None and stated is None
     notes = [columns.said] if columns.said else []
+    notes += [f"names of the log's joints have {before!r} before those of the robot's"] if before else []
     notes += ["no --torque-delay was given, 0 is assumed: `estimate` finds it"] if assumed else []
     if options.columns.resample or columns.t_tau is not None:
         repaired = Repaired.of(columns, channel)

@@ -56,14 +56,24 @@ class LogColumns:
         """Number of joints."""
         return self.q.shape[1]
 
+    def prefixed(self, joints: Sequence[str]) -> str:
+        """Return what stands before all names of the log and not before those of `joints`, as in fer_joint1, or else ""."""
+        for joint in joints:
+            before = next((name.removesuffix(joint) for name in self.joints if name.endswith(joint)), "")
+            if before and {before + name for name in joints} == set(self.joints):
+                return before
+        return ""
+
     def ordered(self, joints: Sequence[str]) -> Self:
-        """Return the columns in the order of `joints`, where they have names.
+        """Return the columns in the order of `joints`, where they have names, perhaps with the same text before each.
 
         Raises
         ------
         LogError
             If there are others, or not as many.
         """
+        if before := self.prefixed(joints):
+            return replace(self, joints=tuple(name.removeprefix(before) for name in self.joints)).ordered(joints)
         if self.joints and set(self.joints) != set(joints):
             missing = ", ".join(joint for joint in joints if joint not in self.joints)
             over = ", ".join(joint for joint in self.joints if joint not in joints)

@@ -22,6 +22,9 @@ NEAR = 1e-4
 CONFIDENCE = 0.999
 """A model within the ellipsoid that holds the truth with this probability agrees with the estimate."""
 
+LARGER = 30.0
+"""Times the size of the given bodies from which on an estimate says that these stand for bodies of an unknown size."""
+
 REACHED = 0.1
 """Sigma of the estimate by which what the solver left outside the cones may be off: nothing that anybody would see."""
 
@@ -106,7 +109,7 @@ def consistent_parameters(
         the solver does not reach bodies that can.
     """
     clarabel = _solver()
-    root, given = _root(covariance), np.array(given, dtype=np.float64)
+    root, given = _root(covariance), _sized(grouping, X, covariance, np.array(given, dtype=np.float64))
     rows, columns = _touched(grouping, X)
     standard = _as_estimated(grouping, X, given, columns)
     if not rows.any():
@@ -122,6 +125,20 @@ def consistent_parameters(
     standard[columns] = bodies.projected(reached)
     _require_reached(scaled @ ((standard[columns] - reached) / bodies.scale), own)
     return _found(grouping, X, root, standard, rows)
+
+
+def _sized(grouping: BaseParameters, X: Array, covariance: Array, given: Array) -> Array:
+    """Return the given model, with bodies of the size of the estimate where they are far smaller.
+
+    Robots of a table, or of links without inertias, have bodies of a gram, and the distance to these would be all that counts.
+    """
+    inertial = np.array([parameter.symbol in INERTIAL for parameter in grouping.standard.parameters])
+    of_bodies = grouping.K[:, inertial] @ given[inertial]
+    there, sigma = of_bodies != 0, np.sqrt(np.diagonal(covariance))
+    size, estimated = (float(np.linalg.norm((x / sigma)[there])) for x in (of_bodies, X))
+    if not estimated > LARGER * size > 0:
+        return given
+    return np.where(inertial, given * estimated / size, given)
 
 
 def _touched(grouping: BaseParameters, X: Array) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:

@@ -188,3 +188,16 @@ def test_the_entropic_prior_keeps_a_link_from_becoming_thin():
     least = [min(np.linalg.eigvalsh(S)[0] for S in links(grouping, found.standard)) for found in (thin, thick)]
     assert least[1] > 3 * least[0] > 0
     assert max(thin.distance, thick.distance) < 1
+
+
+def test_a_given_model_of_unknown_size_takes_that_of_the_estimate(arm):
+    """Tables have no bodies: those of a gram that stand for them would hold the estimate, not what no motion shows."""
+    grouping, X = arm
+    base = grouping.base(X)
+    sigma = 1e-3 * np.maximum(np.abs(base), 0.01)
+    dust = X.copy()
+    for j in range(grouping.standard.n):
+        dust[[grouping.standard.names.index(f"{x}{j + 1}") for x in INERTIAL]] *= 1e-6
+    found = consistent_parameters(grouping, base, np.diag(sigma**2), dust)
+    assert found.agrees
+    assert np.abs(found.departure).max() < 0.1  # of a sigma
