@@ -87,8 +87,9 @@ def _judged(held_out: HeldOut, tau: Array) -> dict[str, Any]:
         return {"failure": f"torques of the shape {tau.shape}, of a log of {log.tau.shape}, or not all finite"}
     as_logged = _at(log.t + acting(log.torque, log.fs), log.t, tau)
     left = replace(log, tau=log.tau * np.asarray(log.torque.gain) - as_logged, torque=replace(log.torque, gain=1.0))
-    problem = Problem((left,), held_out.fit.basis, held_out.fit.problem.model, held_out.fit.processing)
-    validation = validate(problem, np.zeros(len(held_out.fit.basis.names)))
+    plain = held_out.fit.robot_model.plain.basis
+    problem = Problem((left,), plain, held_out.fit.problem.model, held_out.fit.processing)
+    validation = validate(problem, np.zeros(len(plain.names)))
     own = next(iter(held_out.torques.values()))
     R2 = 1 - (1 - own.R2) * (validation.rms / own.rms) ** 2
     return {"torque_error_rms": [finite(x) for x in validation.rms], "R2": [finite(x) for x in R2]}

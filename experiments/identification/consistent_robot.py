@@ -1,5 +1,6 @@
 """The robot's file with the parameters that were identified."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -55,6 +56,12 @@ class Written:
         """Return the file, to stand in a folder; in that of the robot's own file by default."""
         robot_model = self.fit.robot_model
         return rewritten(robot_model.name, self.values, folder, robot_model.mounting)
+
+    def without_friction(self, joints: Collection[int]) -> Robot:
+        """Return the robot without the friction of some joints."""
+        robot_model = self.fit.robot_model
+        none = {f"{letters}{j + 1}": 0.0 for letters in ("Fv", "Fs") for j in joints}
+        return compiled(robot_model.name, rewritten(robot_model.name, self.values | none, None, robot_model.mounting))
 
     @property
     def warnings(self) -> list[str]:

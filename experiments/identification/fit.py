@@ -12,7 +12,7 @@ from experiments.identification.lack import advice_on_lack
 from experiments.identification.logs import Logs
 from experiments.identification.request import Request
 from experiments.identification.robot_model import RobotModel
-from experiments.identification.suited_mask import suited_mask
+from experiments.identification.suited_mask import masked_laws, suited_mask
 from experiments.results.summaries import finite, summarize
 from identify import (
     ESTIMATORS,
@@ -57,6 +57,9 @@ def fit(request: Request, logs: Logs) -> "Fit":
     if raised:
         request = replace(request, mask_speed=speeds)
         problem = request.problem(logs.fitted)
+        if masked := masked_laws(problem):
+            request = replace(request, robot_model=request.robot_model.without(masked))
+            problem = request.problem(logs.fitted)
     found, hidden = _fit(request, logs, problem), list[str]()
     leading = next(iter(found.outcomes.values()))
     while isinstance(leading, ExcitationError) and leading.hidden and len(leading.hidden) < len(found.basis.names):

@@ -14,6 +14,7 @@ from experiments.identification.verdict import Verdict
 from experiments.results.summaries import finite
 from identify import Array, Basis, IdentificationError, MotionLog, Problem, State, Validation, split, validate
 from identify.arrays import combined
+from identify.basis.parameter import FRICTION, NOT_NEGATIVE, Parameter
 from identify.rows.long_logs import manageable
 from sim.engine.replay import Replay, replay
 from sim.errors import BenchError
@@ -21,6 +22,9 @@ from sim.robot.robot import Robot
 
 BANDWIDTH = 5.0
 """Of the loop that holds the simulated robot to the log [rad/s]: weak, so that errors of the model show."""
+
+SHAPE = "shape of friction"
+"""Kind of parameters that enter nonlinearly."""
 
 LONGEST = 60.0
 """Time [s] that is simulated, from the beginning of the held-out log."""
@@ -99,7 +103,14 @@ class HeldOut:
             If there is no such robot.
         """
         written, (log, qd) = Written(self.fit, model), self._replayed
-        return written.robot, _without(log, qd, self.fit.basis, written.lost), qd
+        basis, estimate = self.fit.basis, self.fit.estimates[model].X.tolist()
+        lost = {p for p in basis.parameters if p.name in written.lost}
+        X = dict(zip(basis.parameters, estimate, strict=True))
+        negative = {p.joint for p, x in X.items() if p.kind in FRICTION & NOT_NEGATIVE and x < 0}
+        joints = {p.joint for p in lost if p.kind in FRICTION and p.joint is not None} & negative
+        # Sizes of laws are those at their shapes.
+        apart = {p: x for p, x in X.items() if (p in lost or (p.joint in joints and p.kind in FRICTION)) and p.kind != SHAPE}
+        return written.without_friction(joints) if joints else written.robot, _without(log, qd, basis, apart), qd
 
     @cached_property
     def _replayed(self) -> tuple[MotionLog, Array]:
@@ -139,12 +150,16 @@ class HeldOut:
         return {**found, "position_error_rms": None if off is None else off.tolist()}
 
 
-def _without(log: MotionLog, qd: Array, basis: Basis, lost: Mapping[str, float]) -> MotionLog:
-    """Return a log without the torques of laws of friction that a simulated robot does not have."""
-    if not (there := [parameter for parameter in basis.parameters if parameter.name in lost]):
+def _without(log: MotionLog, qd: Array, basis: Basis, laws: Mapping[Parameter, float]) -> MotionLog:
+    """Return a log without the torques of laws of friction, of joints that have one without a place in a simulated robot.
+
+    What other laws leave of viscous or Coulomb friction may be negative, which no simulated robot can have, either: it then has
+    no friction at that joint.
+    """
+    if not laws:
         return log
     q, v, conditions = log.q.T, np.ascontiguousarray(qd.T), {name: x.T for name, x in log.conditions.items()}
     state = State(q, v, lambda _: np.gradient(v, 1 / log.fs, axis=-1), conditions)
-    laws, X = basis.of(there), np.array([lost[parameter.name] for parameter in there])
-    tau = log.tau * np.asarray(log.torque.gain) - combined(laws.explicit(state), X, np.zeros(q.shape)).T
+    friction, X = basis.of(list(laws)), np.array(list(laws.values()))
+    tau = log.tau * np.asarray(log.torque.gain) - combined(friction.explicit(state), X, np.zeros(q.shape)).T
     return replace(log, tau=tau, torque=replace(log.torque, gain=1.0))

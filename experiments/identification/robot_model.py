@@ -60,6 +60,11 @@ class RobotModel:
         standard = self._with_laws(tree_basis(self.tree, self.laws.blocks()))
         return BaseParameters.of(self.tree, standard, in_letters_of_the_paper(self.tree) if self.name == SCARA else None)
 
+    @property
+    def plain(self) -> Self:
+        """The robot with standard friction alone, linear in its parameters whatever the laws of friction are."""
+        return replace(self, asked=replace(self.asked, friction=Parameters().friction, add=(), without=()))
+
     def without(self, names: Sequence[str]) -> Self:
         """Return the robot with more parameters left out, as if they were zero."""
         return replace(self, asked=replace(self.asked, without=(*self.asked.without, *names)))

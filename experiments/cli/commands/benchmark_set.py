@@ -124,6 +124,8 @@ def _for_tools(made: SetFit) -> dict[str, Any]:
         "gravity": [float(x) for x in fit.robot_model.tree.gravity],
         "fit": [f"fit{k + 1}.npz" for k in range(len(fit.logs.fitted))],
         "held_out": [f"held_out{k + 1}.npz" for k in range(len(fit.logs.held_out or {}))],
+        "couplings": [list(map(float, coupling.weights)) for coupling in fit.robot_model.tree.couplings],
+        "rotors": fit.robot_model.asked.armature != "none",
         "cutoff": getattr(fit.processing.operator, "cutoff", None),
     }
 
