@@ -96,8 +96,9 @@ def shipped() -> tuple[str, ...]:
 
 
 def _missing(folder: Path) -> str:
-    if str(folder) in shipped():
-        return f"{folder}: its definition ships, data do not; `idbench new set {folder}` writes it, and says how to get them"
+    if folder.name in shipped() and not folder.exists():
+        name = folder.name
+        return f"{folder} is not there: `idbench new set {name}` writes the definition that ships, and says how to get its data"
     known = ", ".join(shipped())
     return f"{folder} has no {FILE}; name folders that have one, or get a definition: `idbench new set NAME`, of {known}"
 

@@ -94,7 +94,8 @@ def remarks(row: Row) -> Iterator[str]:
         yield from part.get("failed", ())
         if part.get("diverged"):
             yield f"{part['diverged']} of {part['stretches']} free runs diverge"
-    yield from (f"{tool}: {found['failure']}" for tool, found in row["tools"].items() if "failure" in found)
+    for tool, found in row["tools"].items():
+        yield from (f"{tool}: {part['failure']}" for part in (found, *found.get("logs", ())) if "failure" in part)
     if row["published"]:
         yield f"published: {row['published']}"
 
@@ -102,7 +103,7 @@ def remarks(row: Row) -> Iterator[str]:
 def _tools(row: Row) -> Iterator[tuple[str, Sequence[Row], float | None]]:
     yield f"{OWN}, {row['model']}, {row['estimator']}", row["logs"], row["seconds"]
     for tool, found in row["tools"].items():
-        if "logs" in found:
+        if any("failure" not in log for log in found.get("logs", ())):
             yield tool, found["logs"], found["seconds"]
 
 

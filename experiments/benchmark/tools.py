@@ -73,7 +73,7 @@ def _at(t: Array, times: Array, tau: Array) -> Array:
 
 
 def judged(held_out: Sequence[HeldOut], predicted: Predicted) -> dict[str, Any]:
-    """Return what a summary says of a tool: of each log, what is left of the torque, on the rows on which ours is judged."""
+    """Return what a summary says of a tool: the residual torque of each log, on the rows on which ours is judged."""
     return {
         "seconds": finite(predicted.seconds),
         "note": predicted.note,

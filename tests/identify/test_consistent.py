@@ -191,7 +191,7 @@ def test_the_entropic_prior_keeps_a_link_from_becoming_thin():
 
 
 def test_a_given_model_of_unknown_size_takes_that_of_the_estimate(arm):
-    """Tables have no bodies: those of a gram that stand for them would hold the estimate, not what no motion shows."""
+    """Tables have no bodies: those of a gram that stand for them would hold the whole estimate."""
     grouping, X = arm
     base = grouping.base(X)
     sigma = 1e-3 * np.maximum(np.abs(base), 0.01)

@@ -10,12 +10,12 @@ from experiments.cli.progress import stages_of
 from experiments.contracts.contract import Example
 from experiments.contracts.contracts import found, keeps
 from experiments.errors import ExperimentError
-from experiments.starters.starters import new_example, new_plugin, new_scenario, new_study
+from experiments.starters.starters import new_example, new_plugin, new_scenario, new_set, new_study
 
 
 def begin(options: New) -> None:
     """Write what to start from."""
-    folder = options.what in ("plugin", "example")
+    folder = options.what in ("plugin", "example", "set")
     page, out = new_page(), options.out or Path(options.name if folder else f"{options.name}.toml")
     if options.what == "scenario":
         new_scenario(options.name, options.like, out)
@@ -23,6 +23,8 @@ def begin(options: New) -> None:
     elif options.what == "study":
         new_study(options.name, out)
         how = f"uv run idbench study {out}"
+    elif options.what == "set":
+        how = f"get the data, in {out}:\n{new_set(options.name, out).strip()}\nthen: uv run idbench benchmark {out}"
     elif options.what == "example":
         with stages_of("simulating an arm"):
             new_example(options.name, out)

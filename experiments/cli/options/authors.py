@@ -14,10 +14,10 @@ from experiments.option_types import File, Json
 @final
 @dataclass(frozen=True)
 class New(Command, action="authors:begin"):
-    """Create a scenario, a study, or a plug-in package: a commented template that runs; or an example: an arm and its logs."""
+    """Create a scenario, a study, a plug-in package (templates that run), an example arm with logs, or a set of public logs."""
 
-    what: tyro.conf.Positional[Literal["scenario", "study", "plugin", "example"]]
-    """What to create."""
+    what: tyro.conf.Positional[Literal["scenario", "study", "plugin", "example", "set"]]
+    """What to create. Of a set, of those that `idbench benchmark` lists, it is the definition; it says how to get the logs."""
     name: tyro.conf.Positional[str]
     """Its name."""
     kind: Annotated[str, tyro.conf.arg(metavar="KIND")] = "estimator"

@@ -1,0 +1,169 @@
+"""`idbench benchmark`: sets of logs, from definitions to a table."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from experiments.benchmark.definition import SHIPPED, read_definition, shipped
+from experiments.benchmark.tools import prepared
+from experiments.cli import main
+from identify.files.log_file import write_log
+from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
+from sim.robot.robot import Robot
+
+
+def row_of(out, name="arm"):
+    return json.loads((out / name / "summary.json").read_text())
+
+
+def test_a_set_becomes_a_row_and_is_kept(scara_set, tmp_path, capfd, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["benchmark", "arm", "--out", "found"]) == 0
+    printed = capfd.readouterr().out
+    assert "A SCARA" in printed
+    row = row_of(tmp_path / "found")
+    assert row["verdict"] == "good"
+    assert min(row["logs"][0]["R2"]) > 0.99
+    assert row["logs"][0]["samples_seen"] == 0
+    assert row["repeats"]["compared"] == 8
+    assert (tmp_path / "found" / "report.html").read_text().count("A SCARA") >= 2
+    written = (tmp_path / "found" / "arm" / "summary.json").stat().st_mtime_ns
+    assert main(["benchmark", "arm", "--out", "found"]) == 0
+    assert capfd.readouterr().out == printed  # seconds, too: nothing was made again
+    assert (tmp_path / "found" / "arm" / "summary.json").stat().st_mtime_ns == written
+    (scara_set / "benchmark.toml").write_text((scara_set / "benchmark.toml").read_text().replace("A SCARA", "Another"))
+    assert main(["benchmark", "arm", "--out", "found"]) == 0
+    assert row_of(tmp_path / "found")["title"] == "Another"
+
+
+def test_torques_of_other_tools_are_judged_on_the_same_rows(scara_set, scara_logs, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["benchmark", "arm", "--out", "found"]) == 0
+    out, log = tmp_path / "found" / "arm", scara_logs[2]
+    exported = dict(np.load(out / "held_out1.npz"))
+    for name, values in prepared(log).items():
+        np.testing.assert_array_equal(exported[name], values)
+    robot = Robot.load("scara")
+    qd = np.gradient(log.q, 1 / log.fs, axis=0)
+    right = inverse_dynamics(robot, log.q, qd, np.gradient(qd, 1 / log.fs, axis=0)) + coulomb_torque(robot, qd)
+    np.savez(out / "predicted-right.npz", held_out1=right, seconds=1.5, note="from the file")
+    np.savez(out / "predicted-none.npz", held_out1=0 * right)
+    np.savez(out / "predicted-short.npz", held_out1=right[:-1])
+    assert main(["benchmark", "arm", "--out", "found"]) == 0
+    row = row_of(tmp_path / "found")
+    own, tools = row["logs"][0], row["tools"]
+    assert tools["right"]["seconds"] == 1.5
+    level = np.array(own["torque_error_rms"]) / np.array(own["torque_error_percent"]) * 100
+    # Differences over one sample are late or early where accelerations jump.
+    assert (np.array(tools["right"]["logs"][0]["torque_error_rms"]) < 0.01 * level).all()
+    assert tools["none"]["logs"][0]["torque_error_rms"] == pytest.approx(level.tolist(), rel=1e-6)
+    assert "shape" in tools["short"]["logs"][0]["failure"]
+
+
+def test_without_held_out_logs_the_last_quarter_is(scara_set, scara_logs, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = (scara_set / "benchmark.toml").read_text()
+    (scara_set / "benchmark.toml").write_text(text.replace('held_out = ["new.parquet"]\n', ""))
+    assert main(["benchmark", "arm", "--out", "found"]) == 0
+    row = row_of(tmp_path / "found")
+    assert "last quarter" in row["logs"][0]["title"]
+    longest = max(scara_logs[:2], key=lambda log: log.samples).samples
+    assert row["logs"][0]["samples"] == longest - round(0.75 * longest)
+
+
+def test_samples_that_the_fit_has_seen_are_counted(scara_set, scara_logs, tmp_path, monkeypatch, capfd):
+    """A held-out log of which a half is a part of the fitted one."""
+    monkeypatch.chdir(tmp_path)
+    from dataclasses import replace
+
+    fitted, new = scara_logs[0], scara_logs[2]
+    half = new.samples // 2
+    q, tau = (np.concatenate([a[:half], b[:half]]) for a, b in ((new.q, fitted.q), (new.tau, fitted.tau)))
+    write_log(replace(new, q=q, tau=tau), scara_set / "new.parquet")
+    assert main(["benchmark", "arm", "--out", "found"]) == 0
+    seen = row_of(tmp_path / "found")["logs"][0]["samples_seen"]
+    moving = int((np.diff(fitted.q[:half], axis=0) != 0).any(axis=1).sum())
+    assert moving - 1 <= seen <= half
+    assert "are also in the fitted logs" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("fitt = []", "fit"),
+        ("fit = []", "at least one log"),
+        ('options = "--out x"', "--out"),
+        ('options = "--robto scara"', "--robto"),
+        ('options = "--robot \\"scara"', "quotation"),
+        ('held_out = ["gone.csv"]\nget = "ask them"', "gone.csv; get the data with: ask them"),
+        ("free_run = -1.0", "free_run"),
+        ("title = 3", "title"),
+    ],
+)
+def test_wrong_definitions_are_refused_by_name(scara_set, tmp_path, monkeypatch, capfd, change, words):
+    monkeypatch.chdir(tmp_path)
+    key = change.partition(" ")[0]
+    kept = [line for line in (scara_set / "benchmark.toml").read_text().splitlines() if not line.startswith(f"{key} =")]
+    (scara_set / "benchmark.toml").write_text("\n".join([*kept, change]) + "\n")
+    assert main(["benchmark", "arm", "--out", "found"]) == 2
+    said = capfd.readouterr().err
+    assert words in said
+    assert "Traceback" not in said
+
+
+def test_one_set_that_fails_leaves_the_others(scara_set, tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(scara_set, tmp_path / "broken")
+    (tmp_path / "broken" / "one.parquet").write_bytes(b"nothing")
+    assert main(["benchmark", "broken", "arm", "--out", "found"]) == 2
+    captured = capfd.readouterr()
+    assert "A SCARA" in captured.out
+    assert "broken" in captured.err
+    assert row_of(tmp_path / "found")["verdict"] == "good"
+    assert json.loads((tmp_path / "found" / "summary.json").read_text())["failures"].keys() == {"broken"}
+
+
+def test_folders_that_are_no_sets_are_named(tmp_path, monkeypatch, complaint):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty").mkdir()
+    assert "empty has no benchmark.toml" in complaint("benchmark", "empty")
+    assert "idbench new set ur10e" in complaint("benchmark", "ur10e")
+    assert "did you mean 'panda'" in complaint("new", "set", "pandas")
+
+
+def test_two_folders_of_one_name_are_refused(scara_set, tmp_path, monkeypatch, complaint):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "more").mkdir()
+    shutil.copytree(scara_set, tmp_path / "more" / "arm")
+    assert "one name" in complaint("benchmark", "arm", "more/arm")
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_sets_that_ship_are_complete_but_for_their_data(name, tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "set", name]) == 0
+    assert "git clone" in capfd.readouterr().out
+    made = read_definition(tmp_path / name)
+    assert made.title
+    assert made.source
+    assert made.license
+    ships = {path.name for path in (SHIPPED / name).iterdir() if path.is_file()}
+    assert {path.name for path in (tmp_path / name).iterdir()} == ships
+    assert main(["benchmark", name]) == 2
+    assert "get the data with" in capfd.readouterr().err
+    for path in (tmp_path / name).glob("*.py"):
+        compile(path.read_text(), path.name, "exec")
+
+
+@pytest.mark.thorough
+def test_rows_are_the_same_on_workers(scara_set, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(scara_set, tmp_path / "second")
+    assert main(["benchmark", "arm", "second", "--out", "here"]) == 0
+    assert main(["benchmark", "arm", "second", "--out", "there", "--workers", "2"]) == 0
+    for name in ("arm", "second"):
+        one, other = row_of(tmp_path / "here", name), row_of(tmp_path / "there", name)
+        times = {"seconds", "seconds_of_judging"}
+        assert {k: v for k, v in one.items() if k not in times} == {k: v for k, v in other.items() if k not in times}
