@@ -9,6 +9,7 @@ from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -142,4 +143,13 @@ def _write_for_tools(made: SetFit, folder: Path) -> None:
     text = urdf_text(
         robot_model.name, robot_model.robot, robot_model.tree, standard_parameters(robot_model.robot), robot_model.mounting
     )
-    (folder / "robot.urdf").write_text(text, encoding="utf-8")
+    (folder / "robot.urdf").write_text(_without_shapes(text), encoding="utf-8")
+
+
+def _without_shapes(urdf: str) -> str:
+    """Return a URDF without meshes: they are elsewhere, and some tools refuse a robot whose meshes are missing."""
+    root = ElementTree.fromstring(urdf)
+    for link in root.iter("link"):
+        for shape in [*link.findall("visual"), *link.findall("collision")]:
+            link.remove(shape)
+    return ElementTree.tostring(root, encoding="unicode") + "\n"

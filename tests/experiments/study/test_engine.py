@@ -5,7 +5,7 @@ from distributed import LocalCluster
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from experiments.errors import StudyError
-from experiments.study import cluster
+from experiments.study import cluster, dask_client
 from experiments.study.again import compare_again
 from experiments.study.cluster import cluster_pool, compute
 from experiments.study.shard import run_shard
@@ -75,7 +75,7 @@ def test_a_worker_with_another_version_is_refused(small):
 
 
 def test_workers_with_another_version_are_refused_before_anything_is_run(small, monkeypatch):
-    monkeypatch.setattr(cluster, "ready", lambda: {"idbench": "0.0"})
+    monkeypatch.setattr(dask_client, "ready", lambda: {"idbench": "0.0"})
     with pytest.raises(StudyError, match=r"worker tcp.* has idbench 0\.0 \(here "), cluster_pool(small, None, 1):
         pass
 
