@@ -190,7 +190,9 @@ class _Joint:
         own = rows.group == joint
         spread = np.sqrt(torque_paths(rows.maps[0]).variance(np.ones(rows.kinds))[own])
         share = shares(rows.maps[0])[joint]
-        return cls(rows.Y[own], (rows.Y - rows.predicted(X))[own], rows.W[own], rows.valid[own], spread, share)
+        # Y has the constant of laws that are linear about an estimate, too, which may be many times the torque.
+        measured = rows.maps[0].measurement(rows.maps[0].signals.torque.mean)
+        return cls(measured[own], (rows.Y - rows.predicted(X))[own], rows.W[own], rows.valid[own], spread, share)
 
     def judged(self) -> tuple[float, float, float, float, int]:
         """Return the rms of residual and torque, R2, correlation, and the number of valid rows."""
