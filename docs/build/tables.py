@@ -14,13 +14,14 @@ from math import log2
 from pathlib import Path
 from typing import Any
 
+from benchmark_tables import BENCHMARK_TABLES
 from estimator_tables import compared, compared_in_birdys_shape
 from excitation_tables import coarse, criteria, foretold, motions, ranks
 from results import DOCS, RESULTS, Cell, Column, by_settings, cells, coverage, keep, table, typical
 from reversal_tables import reversals
 
 sys.path.insert(0, str(DOCS.parent))
-PAGES = ("answers.md", "any-arm.md", "estimators.md", "excitation.md", "noise.md", "appendix.md")
+PAGES = ("answers.md", "any-arm.md", "estimators.md", "excitation.md", "noise.md", "appendix.md", "benchmark.md")
 MARK = re.compile(r"<!-- table: ([\w-]+) -->\n.*?<!-- end -->", re.DOTALL)
 
 I, P = "idbench", "paper"
@@ -165,6 +166,7 @@ TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "estimators-idbench": compared("idbench"),
     "estimators-unfiltered": compared("unfiltered"),
     "estimators-puma560": compared_in_birdys_shape,
+    **BENCHMARK_TABLES,
 }
 
 if __name__ == "__main__":

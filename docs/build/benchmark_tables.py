@@ -1,0 +1,148 @@
+"""The tables of the benchmark of public sets, from what `idbench benchmark` leaves.
+
+    uv run python docs/build/benchmark_tables.py runs/benchmark runs/simulated
+
+keeps in docs/results what the page needs, and writes the page anew.
+"""
+
+import json
+import sys
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from results import RESULTS, short, table
+
+OWN = "idbench"
+TOOLS = {
+    OWN: "idbench",
+    "pinocchio": "least squares",
+    "flobaroid": "FloBaRoID",
+    "figaroh": "FIGAROH",
+    "figaroh-tuned": "FIGAROH, tuned",
+}
+"""What tools are called in the tables, by their names in files."""
+
+Row = dict[str, Any]
+
+
+def keep_benchmark(folder: Path, name: str) -> None:
+    """Keep of the rows of a benchmark what the page needs."""
+    rows = [_kept(json.loads(path.read_text())) for path in sorted(folder.glob("*/summary.json"))]
+    text = "[\n" + ",\n".join(json.dumps(row) for row in rows) + "\n]\n"
+    (RESULTS / f"{name}.json").write_text(text)
+
+
+def _kept(row: Row) -> Row:
+    free = [x for part in row.get("free_run", ()) for x in part.get("nrmse", ())]
+    tools = {OWN: (row["logs"], row["seconds"])}
+    tools |= {tool: (found["logs"], found["seconds"]) for tool, found in row["tools"].items() if "logs" in found}
+    own = row["logs"]
+    level = [[100 * e / p for e, p in zip(x["torque_error_rms"], x["torque_error_percent"], strict=True)] for x in own]
+    return {
+        "title": row["title"],
+        "joints": len(row["joints"]),
+        "parameters": row["parameters"],
+        "verdict": row["verdict"],
+        "R2": short([min(x) for x in zip(*(log["R2"] for log in own), strict=True)]),
+        "agree": row["repeats"].get("compared", 0) and short(row["repeats"]["inside"] / row["repeats"]["compared"]),
+        "free_run": short(median(free)) if free else None,
+        "seconds": {tool: short(seconds) for tool, (_, seconds) in tools.items()},
+        "percent": {tool: short(_percent(logs, level)) for tool, (logs, _) in tools.items()},
+    }
+
+
+def _percent(logs: Sequence[Row], level: Sequence[Sequence[float]]) -> list[float]:
+    """Return the torque error of every joint over that of its torque, rms over the held-out logs [%]."""
+    joints = zip(*(log["torque_error_rms"] for log in logs), strict=True)
+    return [
+        100 * (sum(x**2 for x in errors) / sum(y**2 for y in own)) ** 0.5
+        for errors, own in zip(joints, zip(*level, strict=True), strict=True)
+    ]
+
+
+def _rows(name: str) -> list[Row]:
+    found: list[Row] = json.loads((RESULTS / f"{name}.json").read_text())
+    return found
+
+
+def overview() -> Iterator[str]:
+    """Yield the table of the public sets."""
+    head = ["set", "joints", "error, median %", "worst joint %", "R2, worst", "intervals agree", "free run", "seconds", "verdict"]
+    rows = (
+        [
+            row["title"],
+            str(row["joints"]),
+            f"{median(row['percent'][OWN]):.2g}",
+            f"{max(row['percent'][OWN]):.2g}",
+            f"{min(row['R2']):.3f}",
+            f"{100 * row['agree']:.0f} %" if row["agree"] else "",
+            f"{row['free_run']:.2g}",
+            f"{row['seconds'][OWN]:.0f}",
+            row["verdict"],
+        ]
+        for row in _rows("benchmark")
+    )
+    yield from table(head, rows)
+
+
+def of_tools() -> Iterator[str]:
+    """Yield errors of torque by tool, the median joint and the worst [%]."""
+    rows = _rows("benchmark")
+    head = ["set", *TOOLS.values()]
+    yield from table(head, ([row["title"], *(_pair(row, tool) for tool in TOOLS)] for row in rows))
+
+
+def _pair(row: Row, tool: str) -> str:
+    found = row["percent"].get(tool)
+    return f"{median(found):.2g} ({max(found):.2g})" if found else ""
+
+
+def seconds() -> Iterator[str]:
+    """Yield the seconds of a fit by tool."""
+    head = ["set", *TOOLS.values()]
+    rows = ([row["title"], *(f"{row['seconds'].get(tool, float('nan')):.2g}" for tool in TOOLS)] for row in _rows("benchmark"))
+    yield from table(head, rows)
+
+
+def simulated() -> Iterator[str]:
+    """Yield errors of torque of simulated arms by tool [%]: rms over logs of the median joint."""
+    groups = defaultdict[tuple[str, str], list[Row]](list)
+    for row in _rows("benchmark-simulated"):
+        arm, imperfection, _ = row["title"].split(", ")
+        groups[arm, imperfection].append(row)
+    head = ["arm", "imperfection", "logs", *TOOLS.values()]
+    rows = (
+        [arm, imperfection, str(len(group)), *(_rms(group, tool) for tool in TOOLS)]
+        for (arm, imperfection), group in groups.items()
+    )
+    yield from table(head, rows)
+
+
+def _rms(group: Sequence[Row], tool: str) -> str:
+    every = [median(row["percent"][tool]) for row in group if tool in row["percent"]]
+    failed = len(group) - len(every)
+    text = f"{(sum(x**2 for x in every) / len(every)) ** 0.5:.2g}" if every else ""
+    return f"{text} ({failed} failed)" if failed and every else text
+
+
+BENCHMARK_TABLES = {
+    "benchmark": overview,
+    "benchmark-tools": of_tools,
+    "benchmark-seconds": seconds,
+    "benchmark-simulated": simulated,
+}
+
+if __name__ == "__main__":
+    from tables import DOCS, filled
+
+    from experiments.benchmark.report import errors_figure
+
+    keep_benchmark(Path(sys.argv[1]), "benchmark")
+    every = [json.loads(path.read_text()) for path in sorted(Path(sys.argv[1]).glob("*/summary.json"))]
+    errors_figure(every).savefig(DOCS / "benchmark.png", dpi=120)
+    if len(sys.argv) > 2:
+        keep_benchmark(Path(sys.argv[2]), "benchmark-simulated")
+    (DOCS / "benchmark.md").write_text(filled((DOCS / "benchmark.md").read_text()))
