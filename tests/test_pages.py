@@ -23,7 +23,9 @@ def tables(root):
     return tables
 
 
-@pytest.mark.parametrize("page", ["answers.md", "any-arm.md", "estimators.md", "excitation.md", "noise.md", "appendix.md", "benchmark.md"])
+@pytest.mark.parametrize(
+    "page", ["answers.md", "any-arm.md", "estimators.md", "excitation.md", "noise.md", "appendix.md", "benchmark.md"]
+)
 def test_tables_are_made_of_the_results(root, tables, page):
     text = (root / "docs" / page).read_text()
     assert tables.MARK.search(text)

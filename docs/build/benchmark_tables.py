@@ -70,7 +70,17 @@ def _rows(name: str) -> list[Row]:
 
 def overview() -> Iterator[str]:
     """Yield the table of the public sets."""
-    head = ["set", "joints", "error, median %", "worst joint %", "R2, worst", "intervals agree", "free run", "seconds", "verdict"]
+    head = [
+        "set",
+        "joints",
+        "error, median %",
+        "worst joint %",
+        "R2, worst",
+        "intervals agree",
+        "free run",
+        "seconds",
+        "verdict",
+    ]
     rows = (
         [
             row["title"],

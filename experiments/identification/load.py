@@ -10,7 +10,7 @@ import numpy as np
 from experiments.errors import ExperimentError
 from experiments.identification.chain_settings import with_cutoff
 from experiments.identification.logs import Logs
-from experiments.identification.reading import ReadLog, ReadOptions, file_of, read, with_delays
+from experiments.identification.reading import ReadLog, ReadOptions, file_of, read, read_as, with_delays
 from experiments.identification.request import Request
 from experiments.text import of_each
 from identify import LogError, MotionLog
@@ -109,7 +109,7 @@ def with_held_out(loaded: Loaded, paths: Sequence[Path], options: ReadOptions, t
     for given in paths:
         path = file_of(given)
         try:
-            one = read(path, options, loaded.request)
+            one = read_as(loaded.read[0].path, path, options, loaded.request)
         except (LogError, ExperimentError) as error:
             words = f"--validate {error}" if str(path) in str(error) else f"--validate {path}: {error}"
             raise ExperimentError(words) from error

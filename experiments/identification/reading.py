@@ -16,6 +16,7 @@ from experiments.option_types import Meaning
 from identify import Array, AsLogged, LogError, MotionLog, RangeError, SettingError, TimeError, TorqueChannel
 from identify.data.log_columns import LogColumns
 from identify.data.resample import Repaired
+from identify.files.formats import read_table
 from identify.files.layout import LogLayout
 from identify.files.reading import LAYOUT_FILE, layout_of, read_columns
 from identify.judge.delay import DelayEstimate
@@ -151,6 +152,23 @@ def read(path: Path, options: ReadOptions, request: Request) -> ReadLog:
             f"--torque {meaning}{late} --out uniform.parquet"
         ) from error
     return ReadLog(path, (log,), columns, channel, None, tuple(notes))
+
+
+def read_as(first: Path, path: Path, options: ReadOptions, request: Request) -> ReadLog:
+    """Return a log, its columns as the file beside another log says where none is beside this one.
+
+    Logs that idbench wrote say it themselves; so do those that do not have the columns of the other.
+    """
+    beside = LogLayout.beside(first)
+    if beside is None or beside[0].files or options.columns.stated or LogLayout.beside(path) is not None:
+        return read(path, options, request)
+    if read_table(path).torque is not None:
+        return read(path, options, request)
+    try:
+        found = read(path, replace(options, columns=replace(options.columns, layout=beside[1])), request)
+    except (LogError, ExperimentError):
+        return read(path, options, request)
+    return replace(found, notes=(f"columns are what {beside[1].name} beside {first.name} says", *found.notes))
 
 
 def with_delays(every: Sequence[ReadLog], request: Request) -> list[ReadLog]:

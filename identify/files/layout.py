@@ -105,6 +105,11 @@ class LogLayout:
                 return cls.read(path), path
         return None
 
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Files that it names."""
+        return tuple(source.file for source in (getattr(self, name) for name in QUANTITIES) if source.file)
+
     @classmethod
     def read(cls, path: Path) -> Self:
         """Return the layout of a file; raise LogError that names what is unknown or wrong in it."""

@@ -163,3 +163,24 @@ def test_a_joint_that_never_moves_does_not_keep_the_others_from_being_recorded(t
     assert main(["identify", str(tmp_path / "still.parquet"), "--out", str(tmp_path / "found")]) == 0
     assert "joint2 never moves" in capsys.readouterr().out
     assert (tmp_path / "found" / "recording.rrd").is_file()
+
+
+DEGREES = '[q]\ncolumns = "q*"\nunit = "deg"\n[tau]\ncolumns = "tau*"\n[torque]\nmeaning = "held"\n'
+
+
+def test_a_held_out_log_elsewhere_is_read_as_the_fitted_one_is(idbench, logs, tmp_path):
+    """In degrees, which nothing beside it says; Parquet of idbench says itself that it is in rad."""
+    for name, folder in (("first", "fitted"), ("second", "elsewhere")):
+        log = read_log(logs / f"{name}.parquet")
+        (tmp_path / folder).mkdir()
+        columns = np.column_stack([log.t, np.rad2deg(log.q), log.tau])
+        names = ",".join(["t", *(f"{x}{j + 1}" for x in ("q", "tau") for j in range(6))])
+        np.savetxt(tmp_path / folder / "log.csv", columns, delimiter=",", header=names, comments="", fmt="%.9g")
+    (tmp_path / "fitted" / "log.toml").write_text(DEGREES)
+    errors = []
+    for held_out in ("elsewhere/log.csv", str(logs / "second.parquet")):
+        code, out, err = idbench("identify", "fitted/log.csv", *NEEDED, "--validate", held_out)
+        assert code == 0, err
+        assert ("columns are what log.toml beside log.csv says" in out) == held_out.startswith("elsewhere")
+        errors.append(next(float(line.split()[2]) for line in out.splitlines() if line.strip().startswith("joint1")))
+    assert errors[0] == pytest.approx(errors[1], rel=0.1)  # held and averaged torques differ a little, degrees would by 57
