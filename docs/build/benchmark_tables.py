@@ -107,7 +107,12 @@ def of_tools() -> Iterator[str]:
 
 def _pair(row: Row, tool: str) -> str:
     found = row["percent"].get(tool)
-    return f"{median(found):.2g} ({max(found):.2g})" if found else ""
+    return f"{_two(median(found))} ({_two(max(found))})" if found else ""
+
+
+def _two(x: float) -> str:
+    """Return a number to two digits, to none from a hundred on."""
+    return f"{x:.0f}" if x >= 100 else f"{x:.2g}"
 
 
 def seconds() -> Iterator[str]:
@@ -142,7 +147,6 @@ BENCHMARK_TABLES = {
     "benchmark": overview,
     "benchmark-tools": of_tools,
     "benchmark-seconds": seconds,
-    "benchmark-simulated": simulated,
 }
 
 if __name__ == "__main__":
