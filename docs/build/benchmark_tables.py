@@ -36,31 +36,22 @@ def keep_benchmark(folder: Path, name: str) -> None:
 
 
 def _kept(row: Row) -> Row:
-    free = [x for part in row.get("free_run", ()) for x in part.get("nrmse", ())]
+    from experiments.benchmark.tables import free_run, share, worst_R2
+
     tools = {OWN: (row["logs"], row["seconds"])}
     tools |= {tool: (found["logs"], found["seconds"]) for tool, found in row["tools"].items() if "logs" in found}
-    own = row["logs"]
-    level = [[100 * e / p for e, p in zip(x["torque_error_rms"], x["torque_error_percent"], strict=True)] for x in own]
+    free = free_run(row)
     return {
         "title": row["title"],
         "joints": len(row["joints"]),
         "parameters": row["parameters"],
         "verdict": row["verdict"],
-        "R2": short([min(x) for x in zip(*(log["R2"] for log in own), strict=True)]),
+        "R2": short(worst_R2(row).tolist()),
         "agree": row["repeats"].get("compared", 0) and short(row["repeats"]["inside"] / row["repeats"]["compared"]),
-        "free_run": short(median(free)) if free else None,
+        "free_run": short(free) if free == free else None,  # noqa: PLR0124  # NaN is not itself
         "seconds": {tool: short(seconds) for tool, (_, seconds) in tools.items()},
-        "percent": {tool: short(_percent(logs, level)) for tool, (logs, _) in tools.items()},
+        "percent": {tool: short(share(row, logs).tolist()) for tool, (logs, _) in tools.items()},
     }
-
-
-def _percent(logs: Sequence[Row], level: Sequence[Sequence[float]]) -> list[float]:
-    """Return the torque error of every joint over that of its torque, rms over the held-out logs [%]."""
-    joints = zip(*(log["torque_error_rms"] for log in logs), strict=True)
-    return [
-        100 * (sum(x**2 for x in errors) / sum(y**2 for y in own)) ** 0.5
-        for errors, own in zip(joints, zip(*level, strict=True), strict=True)
-    ]
 
 
 def _rows(name: str) -> list[Row]:
@@ -89,7 +80,7 @@ def overview() -> Iterator[str]:
             f"{max(row['percent'][OWN]):.2g}",
             f"{min(row['R2']):.3f}",
             f"{100 * row['agree']:.0f} %" if row["agree"] else "",
-            f"{row['free_run']:.2g}",
+            "" if row["free_run"] is None else f"{row['free_run']:.2g}",
             f"{row['seconds'][OWN]:.0f}",
             row["verdict"],
         ]

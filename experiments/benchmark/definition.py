@@ -16,7 +16,21 @@ SHIPPED = Path(__file__).parent / "sets"
 
 WORDS_OF_IDENTIFY = "options of `idbench identify`, but for logs, --validate and results"
 
-TAKEN = ("--validate", "--out", "--force", "--json", "--write", "--write-mjcf", "--follow", "--live", "--serve", "--label")
+TAKEN = (
+    "-h",
+    "--help",
+    "--help-all",
+    "--validate",
+    "--out",
+    "--force",
+    "--json",
+    "--write",
+    "--write-mjcf",
+    "--follow",
+    "--live",
+    "--serve",
+    "--label",
+)
 """Options of `idbench identify` that a set does not state."""
 
 
@@ -46,15 +60,20 @@ class Definition:
     """Figures that others have published for these data."""
 
     def __post_init__(self) -> None:
-        if not self.fit:
-            raise ValueError("fit must name at least one log")
+        if not self.fit or not all(name.strip(" .") for name in self.files):
+            raise ValueError(
+                f"fit must name at least one log, and each log must have a name: {', '.join(map(repr, self.files))}"
+            )
         if taken := [word for word in self.words if word.partition("=")[0].replace("_", "-") in TAKEN]:
             raise ValueError(f"options must not have {taken[0]}: they are {WORDS_OF_IDENTIFY}")
 
     @property
     def words(self) -> list[str]:
-        """The options as words."""
-        return shlex.split(self.options)
+        """The options as words; ValueError if a quotation mark has no other."""
+        try:
+            return shlex.split(self.options)
+        except ValueError as error:
+            raise ValueError(f"options = {self.options!r:.60}: {error}; each quotation mark needs another") from error
 
     @property
     def every_repeat(self) -> tuple[str, ...]:
@@ -85,8 +104,6 @@ def read_definition(folder: Path) -> Definition:
         raise ExperimentError(f"cannot read {path}: {error.strerror}") from error
     except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError, ScenarioError) as error:
         raise ExperimentError(f"{path}: {error}") from error
-    if "No closing quotation" in _unquoted(made.options):
-        raise ExperimentError(f"{path}: options = {made.options!r:.60} has a quotation mark without another")
     return made
 
 
@@ -101,11 +118,3 @@ def _missing(folder: Path) -> str:
         return f"{folder} is not there: `idbench new set {name}` writes the definition that ships, and says how to get its data"
     known = ", ".join(shipped())
     return f"{folder} has no {FILE}; name folders that have one, or get a definition: `idbench new set NAME`, of {known}"
-
-
-def _unquoted(options: str) -> str:
-    try:
-        shlex.split(options)
-    except ValueError as error:
-        return str(error)
-    return ""

@@ -46,13 +46,19 @@ def repeats(request: Request, logs: Sequence[MotionLog], names: Sequence[str]) -
             failed.append(f"{name}: {error}")
         else:
             fits.append(found.estimates[found.leading])
-    z = [x for one, other in combinations(fits, 2) for x in _differences(one, other)]
+    # What is grouped with what differs where fits left parameters out.
+    alike = [(one, other) for one, other in combinations(fits, 2) if one.names == other.names]
+    failed += (
+        ["fits of single logs have different parameters and are not compared"]
+        if len(alike) < len(fits) * (len(fits) - 1) / 2
+        else []
+    )
+    z = [x for one, other in alike for x in _differences(one, other)]
     return Repeats(int(np.sum(np.abs(z) < SIGMAS)), len(z), tuple(failed))
 
 
 def _differences(one: Estimate, other: Estimate) -> list[float]:
-    """Return the differences of the parameters that both have, in standard errors."""
-    values = [dict(zip(e.names, zip(e.X, e.standard_errors, strict=True), strict=True)) for e in (one, other)]
-    both = [(values[0][name], values[1][name]) for name in values[0] if name in values[1]]
-    z = [(x - y) / np.hypot(sigma, tau) for (x, sigma), (y, tau) in both if sigma > 0 or tau > 0]
-    return [float(x) for x in z if np.isfinite(x)]
+    """Return the differences of the parameters, in standard errors."""
+    sigma = np.hypot(one.standard_errors, other.standard_errors)
+    z = (one.X - other.X) / np.where(sigma > 0, sigma, np.nan)
+    return [float(x) for x in z[np.isfinite(z)]]

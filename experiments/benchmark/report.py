@@ -33,10 +33,10 @@ def errors_figure(rows: Sequence[Row]) -> Figure:
     for k, tool in enumerate(tools):
         height = 0.6 * ((k + 0.5) / len(tools) - 0.5)
         places = [(share, y + height) for y, row in enumerate(rows) for share in shares(row).get(tool, ())]
-        x, y = np.array(places).T
+        x, y = np.array(places).reshape(-1, 2).T
         color = [c / 255 for c in JOINTS[k % len(JOINTS)]]
         panel.plot(x, y, ".", color=color, label=tool, markersize=7)
-    panel.set_yticks(range(len(rows)), [row["title"] for row in rows])
+    panel.set_yticks(range(len(rows)), [row["title"] for row in rows], parse_math=False)
     panel.invert_yaxis()
     panel.set_xscale("log")
     panel.set_xlabel("torque error of a joint on held-out logs [% of its torque]")

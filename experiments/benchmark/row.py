@@ -30,15 +30,15 @@ class SetFit:
         What it is.
     fit : Fit
         Its fit.
-    repeated : mapping of str to MotionLog
-        Logs that are fitted one by one, by name.
+    repeated : callable
+        Reads the logs that are fitted one by one, by name.
     seconds : float
         How long reading and fitting took.
     """
 
     definition: Definition
     fit: Fit
-    repeated: Mapping[str, MotionLog]
+    repeated: Callable[[], Mapping[str, MotionLog]]
     seconds: float
 
 
@@ -78,6 +78,7 @@ def _log(one: HeldOut | Unjudged, fit: Fit) -> dict[str, Any]:
         "title": one.title,
         "torque_error_rms": [finite(x) for x in own.rms],
         "torque_error_percent": [finite(x) for x in own.percent],
+        "torque_rms": [finite(x) for x in own.level],
         "noise_rms": [finite(x) for x in own.noise],
         "R2": [finite(x) for x in own.R2],
         "verdict": verdict.word,
@@ -88,9 +89,10 @@ def _log(one: HeldOut | Unjudged, fit: Fit) -> dict[str, Any]:
 
 
 def _repeats(made: SetFit) -> dict[str, Any]:
-    if len(made.repeated) < 2:
+    logs = made.repeated()
+    if len(logs) < 2:
         return {}
-    found = repeats(made.fit.request, list(made.repeated.values()), list(made.repeated))
+    found = repeats(made.fit.request, list(logs.values()), list(logs))
     return {"inside": found.inside, "compared": found.compared, "failed": list(found.failed)}
 
 

@@ -32,19 +32,19 @@ Row = Mapping[str, Any]
 def overview(rows: Sequence[Row]) -> Iterator[list[str]]:
     """Yield the cells of each set: how well torques of held-out logs are predicted, and what the protocol asks for."""
     for row in rows:
-        share, R2 = _over_logs(row["logs"], "torque_error_percent"), _over_logs(row["logs"], "R2")
-        if not len(share):
+        percent, R2, free = share(row, row["logs"]), worst_R2(row), free_run(row)
+        if not len(percent):
             yield [row["title"], str(len(row["joints"])), *[""] * 7]
             continue
         yield [
             row["title"],
             str(len(row["joints"])),
-            percentage(_median(share)),
-            percentage(_largest(share)),
+            percentage(_median(percent)),
+            percentage(_largest(percent)),
             f"{_median(R2):.3f}",
             f"{_largest(-R2) * -1:.3f}",
             _agree(row["repeats"]),
-            _free_run(row.get("free_run", ())),
+            f"{free:.3f}" if np.isfinite(free) else "",
             f"{row['seconds']:.2g}",
             row["verdict"] or "",
         ]
@@ -53,7 +53,7 @@ def overview(rows: Sequence[Row]) -> Iterator[list[str]]:
 def of_tools(row: Row) -> Iterator[list[str]]:
     """Yield the torque errors of each joint [N m], rms over all held-out logs, by each tool, with seconds."""
     for tool, logs, seconds in _tools(row):
-        errors = _over_logs(logs, "torque_error_rms")
+        errors = pooled(logs, "torque_error_rms")
         yield [tool, *(f"{x:.3g}" if np.isfinite(x) else "" for x in errors), "" if seconds is None else f"{seconds:.2g}"]
 
 
@@ -86,8 +86,8 @@ def remarks(row: Row) -> Iterator[str]:
             yield f"{log['title']}: {log['failure']}"
         elif log["samples_seen"]:
             yield (
-                f"{log['title']}: {log['samples_seen']} of its {log['samples']} samples are also in the fitted logs: "
-                "its errors are those of data that the fit has seen"
+                f"{log['title']}: {log['samples_seen']} of its {log['samples']} samples are also in the fitted logs, which the "
+                "fit has seen"
             )
     for part in (row["repeats"], *row.get("free_run", ())):
         yield from [part["failure"]] if "failure" in part else []
@@ -96,6 +96,7 @@ def remarks(row: Row) -> Iterator[str]:
             yield f"{part['diverged']} of {part['stretches']} free runs diverge"
     for tool, found in row["tools"].items():
         yield from (f"{tool}: {part['failure']}" for part in (found, *found.get("logs", ())) if "failure" in part)
+    yield from [f"not saved: {row['unsaved']}"] if "unsaved" in row else []
     if row["published"]:
         yield f"published: {row['published']}"
 
@@ -107,12 +108,31 @@ def _tools(row: Row) -> Iterator[tuple[str, Sequence[Row], float | None]]:
             yield tool, found["logs"], found["seconds"]
 
 
-def _over_logs(logs: Sequence[Row], name: str) -> Array:
-    """Return the rms over logs of a figure of each joint; of R2, which may be negative, the mean; nothing if no log has it."""
-    each = np.array([[np.nan if x is None else x for x in log[name]] for log in logs if name in log], dtype=float)
-    if not len(each):
-        return np.zeros(0)
-    return np.asarray(each.mean(axis=0) if name == "R2" else np.sqrt((each**2).mean(axis=0)))
+def pooled(logs: Sequence[Row], name: str) -> Array:
+    """Return the rms over logs of a figure of each joint, shape (joint,); nothing if no log has it."""
+    each = _each(logs, name)
+    return np.sqrt((each**2).mean(axis=0)) if len(each) else np.zeros(0)
+
+
+def share(row: Row, logs: Sequence[Row]) -> Array:
+    """Return the torque error of each joint over its torque, both over all logs [%], shape (joint,)."""
+    errors, level = pooled(logs, "torque_error_rms"), pooled(row["logs"], "torque_rms")
+    return 100 * errors / np.where(level > 0, level, np.nan) if len(errors) else errors
+
+
+def worst_R2(row: Row) -> Array:
+    """Return the least R2 of each joint over the logs, shape (joint,); nothing if no log has it."""
+    each = _each(row["logs"], "R2")
+    return each.min(axis=0) if len(each) else np.zeros(0)
+
+
+def free_run(row: Row) -> float:
+    """Return the NRMSE of free runs of the median joint, rms over logs; NaN if there is none."""
+    return _median(pooled(row.get("free_run", ()), "nrmse"))
+
+
+def _each(logs: Sequence[Row], name: str) -> Array:
+    return np.array([[np.nan if x is None else x for x in log[name]] for log in logs if name in log], dtype=float)
 
 
 def _median(x: Array) -> float:
@@ -129,16 +149,7 @@ def _agree(found: Row) -> str:
     return f"{100 * found['inside'] / found['compared']:.0f} %" if found.get("compared") else ""
 
 
-def _free_run(found: Sequence[Row]) -> str:
-    each = np.array([[np.nan if x is None else x for x in part["nrmse"]] for part in found if "nrmse" in part], dtype=float)
-    return f"{_median(each.mean(axis=1)):.3f}" if len(each) else ""
-
-
 def shares(row: Row) -> dict[str, list[float]]:
-    """Return the torque errors of each joint [% of its torque] by tool."""
-    own = _over_logs(row["logs"], "torque_error_rms")
-    if not len(own):
-        return {}
-    level = own / _over_logs(row["logs"], "torque_error_percent")
-    every = {tool: _over_logs(logs, "torque_error_rms") / level for tool, logs, _ in _tools(row)}
+    """Return the torque errors of each joint over its torque [%], by tool."""
+    every = {tool: share(row, logs) for tool, logs, _ in _tools(row)}
     return {(OWN if tool.startswith(OWN) else tool): [float(x) for x in e if np.isfinite(x)] for tool, e in every.items()}

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, final
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from experiments.errors import ExperimentError
 from experiments.identification.held_out import HeldOut
@@ -69,7 +70,8 @@ def prepared(log: MotionLog) -> dict[str, Array]:
 
 
 def _at(t: Array, times: Array, tau: Array) -> Array:
-    return np.stack([np.interp(t, times, x) for x in tau.T], axis=1)
+    """Return torques at other times; straight lines between samples would be low-passes, twice."""
+    return np.asarray(CubicSpline(times, tau)(np.clip(t, times[0], times[-1])))
 
 
 def judged(held_out: Sequence[HeldOut], predicted: Predicted) -> dict[str, Any]:

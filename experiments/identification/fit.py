@@ -53,14 +53,14 @@ def fit(request: Request, logs: Logs) -> "Fit":
         with stage("laws of friction"):
             request, choice = chosen_friction(request, logs.fitted)
     problem = request.problem(logs.fitted)
-    speeds, raised = suited_mask(problem)
+    (speeds, raised), hidden = suited_mask(problem), list[str]()
     if raised:
-        request = replace(request, mask_speed=speeds)
+        request, before = replace(request, mask_speed=speeds), problem
         problem = request.problem(logs.fitted)
-        if masked := masked_laws(problem):
+        if masked := masked_laws(before, problem):
             request = replace(request, robot_model=request.robot_model.without(masked))
-            problem = request.problem(logs.fitted)
-    found, hidden = _fit(request, logs, problem), list[str]()
+            problem, hidden = request.problem(logs.fitted), list(masked)
+    found = _fit(request, logs, problem)
     leading = next(iter(found.outcomes.values()))
     while isinstance(leading, ExcitationError) and leading.hidden and len(leading.hidden) < len(found.basis.names):
         hidden += leading.hidden

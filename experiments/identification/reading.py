@@ -160,9 +160,8 @@ def read_as(first: Path, path: Path, options: ReadOptions, request: Request) -> 
     Logs that idbench wrote say it themselves; so do those that do not have the columns of the other.
     """
     beside = LogLayout.beside(first)
-    if beside is None or beside[0].files or options.columns.stated or LogLayout.beside(path) is not None:
-        return read(path, options, request)
-    if read_table(path).torque is not None:
+    itself = path.suffix.lower() == LAYOUT_FILE or LogLayout.beside(path) is not None
+    if beside is None or beside[0].files or options.columns.stated or itself or read_table(path).torque is not None:
         return read(path, options, request)
     try:
         found = read(path, replace(options, columns=replace(options.columns, layout=beside[1])), request)

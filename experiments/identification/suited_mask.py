@@ -5,10 +5,12 @@ import numpy as np
 from identify import ESTIMATORS, IdentificationError, Problem, ReversalMask
 from identify.basis.friction.shape import ShapedFriction
 from identify.basis.of_joints import OfJoints
+from identify.basis.parameter import Parameter
 from identify.judge.slow_motion import slow_motion
+from identify.rows.rows import Rows
 
 SHOWN = 0.02
-"""Share of the force of a law at its largest that some row must have for the rows to show it."""
+"""Share of the largest entry of a law's column that a mask must leave for the rows to show the law."""
 
 
 def suited_mask(problem: Problem) -> tuple[tuple[float, ...], tuple[int, ...]]:
@@ -28,17 +30,23 @@ def suited_mask(problem: Problem) -> tuple[tuple[float, ...], tuple[int, ...]]:
     return (tuple((speed * factor).tolist()), raised) if raised else ((), ())
 
 
-def masked_laws(problem: Problem) -> tuple[str, ...]:
-    """Return the parameters of laws that act in slow motion only, of joints in which all that is masked.
+def masked_laws(before: Problem, after: Problem) -> tuple[str, ...]:
+    """Return the parameters of laws that act in slow motion only, where a mask that reaches farther takes all that.
 
     Stribeck friction that no row shows could have any size, and would be added to the torque of slow motion.
     """
-    rows, basis, found = problem.explicit.some_rows, problem.basis, list[str]()
+    basis, found = after.basis, list[str]()
+    rows, usual = after.explicit.some_rows, before.explicit.some_rows
     for block in basis.blocks:
         inner, joints = (block.block, block.joints) if isinstance(block, OfJoints) else (block, range(basis.n))
         if not isinstance(inner, ShapedFriction):
             continue
         own = [p for p in basis.parameters if p.symbol in inner.letters() and p.joint in joints]
-        sizes = {p.joint: np.abs(rows.W[..., basis.places[p]]).max() for p in own if p.symbol == inner.law.symbol}
+        sizes = {p.joint: _largest(rows, p) / _largest(usual, p) for p in own if p.symbol == inner.law.symbol}
         found += [p.name for p in own if sizes.get(p.joint, 1.0) < SHOWN]
     return tuple(found)
+
+
+def _largest(rows: Rows, parameter: Parameter) -> float:
+    """Return the largest entry of a column, by size."""
+    return float(np.abs(rows.W[..., rows.names.index(parameter.name)]).max()) or 1.0

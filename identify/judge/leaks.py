@@ -11,7 +11,8 @@ from identify.data.motion_log import MotionLog
 def seen(held_out: MotionLog, fitted: Sequence[MotionLog]) -> int:
     """Return how many samples of a log, in which a joint moves, are also in another: equal positions and torques.
 
-    A robot that rests repeats its readings; noise of the torques tells other samples apart.
+    A robot that rests repeats its readings; noise of the torques tells other samples apart. Logs that were put on another clock
+    do not have their samples any more: what was resampled shows no repetition.
 
     Parameters
     ----------
@@ -21,7 +22,7 @@ def seen(held_out: MotionLog, fitted: Sequence[MotionLog]) -> int:
         Those of the fit.
     """
     own = _keys(held_out)
-    moving = np.ones(len(own), dtype=bool)
+    moving = np.zeros(len(own), dtype=bool)
     moving[1:] = (np.diff(held_out.q, axis=0) != 0).any(axis=1)
     others = np.concatenate([_keys(log) for log in fitted if log.n == held_out.n] or [own[:0]])
     return int(np.isin(own, others)[moving].sum())

@@ -133,12 +133,16 @@ def _sized(grouping: BaseParameters, X: Array, covariance: Array, given: Array) 
     Robots of a table, or of links without inertias, have bodies of a gram, and the distance to these would be all that counts.
     """
     inertial = np.array([parameter.symbol in INERTIAL for parameter in grouping.standard.parameters])
-    of_bodies = grouping.K[:, inertial] @ given[inertial]
-    there, sigma = of_bodies != 0, np.sqrt(np.diagonal(covariance))
-    size, estimated = (float(np.linalg.norm((x / sigma)[there])) for x in (of_bodies, X))
-    if not estimated > LARGER * size > 0:
-        return given
-    return np.where(inertial, given * estimated / size, given)
+    bodies, sigma = grouping.K[:, inertial] @ given[inertial], np.sqrt(np.diagonal(covariance))
+    # A large rotor that is grouped with bodies says nothing of their size, and neither does one small body among others.
+    alone = (bodies != 0) & (grouping.K[:, ~inertial] == 0).all(axis=1)
+    ratios = [_ratio(X[rows] / sigma[rows], bodies[rows] / sigma[rows]) for rows in (alone, bodies != 0)]
+    return np.where(inertial, given * ratios[0], given) if min(ratios) > LARGER else given
+
+
+def _ratio(some: Array, others: Array) -> float:
+    size = float(np.linalg.norm(others))
+    return float(np.linalg.norm(some)) / size if size > 0 else 0.0
 
 
 def _touched(grouping: BaseParameters, X: Array) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:

@@ -10,10 +10,15 @@ from identify.arrays import Array
 from identify.one_thread import one_thread
 from identify.servo.closed_loop import ServoLoop
 from identify.servo.fit import ServoFit
+from identify.servo.parameters import limits_of
 from identify.servo.run import ServoRun
 
 APART = 0.01
 """By how much an offset is changed to see what that does to other joints [rad]."""
+
+
+INSEPARABLE = 100.0
+"""Condition number from which on offsets cannot be told apart: what gravity says of one, another can make up for."""
 
 
 @final
@@ -57,7 +62,8 @@ def together(joints: Mapping[int, Joint], assumed: Mapping[int, float]) -> dict[
     """Return fits whose offsets agree with each other, and whose covariances contain the errors of all offsets.
 
     The free parameters of joint j are linear in the offsets o of the others, near those that its loads assume:
-    theta_j + B_jk (o_k - assumed_k). Its own offset is one of them, so that the offsets solve a linear system.
+    theta_j + B_jk (o_k - assumed_k). Its own offset is one of them, so that the offsets solve a linear system. Where gravity
+    does not tell them apart, fits stay as they are. Joints whose torques have no scale have no part in it.
 
     Parameters
     ----------
@@ -70,12 +76,12 @@ def together(joints: Mapping[int, Joint], assumed: Mapping[int, float]) -> dict[
     own = {k: joints[k].fit.free.index("offset") for k in sources}
     B = {j: np.stack([_of(joint, k) for k in sources], axis=-1) for j, joint in joints.items()} if sources else {}
     A = np.array([B[k][own[k]] for k in sources]).reshape(len(sources), len(sources))
-    agreed = np.linalg.inv(np.eye(len(sources)) - A)
+    coupled = np.eye(len(sources)) - A
+    if not sources or np.linalg.cond(coupled) > INSEPARABLE:
+        return {j: joint.fit for j, joint in joints.items()}
+    agreed = np.linalg.inv(coupled)
     ahead = agreed @ np.array([joints[k].fit.p["offset"] - assumed[k] for k in sources])
-    return {
-        j: _moved(joints[j].fit, B[j] @ ahead, _covariance(j, joints, B[j] @ agreed, own)) if sources else joints[j].fit
-        for j in joints
-    }
+    return {j: _moved(joint.fit, B[j] @ ahead, _covariance(j, joints, B[j] @ agreed, own)) for j, joint in joints.items()}
 
 
 def _of(joint: Joint, k: int) -> Array:
@@ -94,5 +100,7 @@ def _covariance(j: int, joints: Mapping[int, Joint], per_error: Array, own: Mapp
 
 
 def _moved(fit: ServoFit, by: Array, covariance: Array) -> ServoFit:
-    p = {**fit.p, **{name: fit.p[name] + float(x) for name, x in zip(fit.free, by, strict=True)}}
+    low, high = limits_of(fit.free)
+    moved = np.clip(np.array([fit.p[name] for name in fit.free]) + by, low, high)
+    p = {**fit.p, **dict(zip(fit.free, moved.tolist(), strict=True))}
     return replace(fit, found=replace(fit.found, p=p), of_all=covariance)

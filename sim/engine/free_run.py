@@ -34,7 +34,9 @@ def free_run(robot: Robot, log: MotionLog, qd: Array, length: float) -> tuple[Ar
     """
     samples = round(length * log.fs)
     count = log.samples // max(samples, 1)
-    if samples < 1 or count < 1:
+    if samples < 1:
+        raise ScenarioError(f"a stretch of {length:g} s has no sample at {log.fs:g} Hz: use a longer one")
+    if count < 1:
         raise ScenarioError(f"a log of {log.samples / log.fs:.3g} s has no stretch of {length:g} s: use a shorter one")
     physics = Physics()
     h, per_sample = physics_steps(log.fs, physics.step)

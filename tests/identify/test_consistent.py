@@ -201,3 +201,18 @@ def test_a_given_model_of_unknown_size_takes_that_of_the_estimate(arm):
     found = consistent_parameters(grouping, base, np.diag(sigma**2), dust)
     assert found.agrees
     assert np.abs(found.departure).max() < 0.1  # of a sigma
+
+
+def test_a_large_rotor_does_not_make_bodies_heavier(monkeypatch):
+    """It is grouped with the first link's inertia; the bodies that are given are right, and are not taken for placeholders."""
+    robot = Robot.load("scara")
+    tree = kinematic_tree(robot)
+    grouping = BaseParameters.of(tree, tree_basis(tree))
+    given = np.array([standard_parameters(robot)[name] for name in grouping.standard.names])
+    truth = given.copy()
+    truth[grouping.standard.names.index("Ia1")] = 400.0
+    base = grouping.base(truth)
+    sigma = 1e-3 * np.maximum(np.abs(base), 0.01)
+    found = consistent_parameters(grouping, base, np.diag(sigma**2), given)
+    monkeypatch.setattr("identify.parameters.consistent.LARGER", np.inf)
+    np.testing.assert_array_equal(found.standard, consistent_parameters(grouping, base, np.diag(sigma**2), given).standard)

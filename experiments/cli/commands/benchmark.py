@@ -7,7 +7,7 @@ from typing import Any
 
 from rich.text import Text
 
-from experiments.benchmark.definition import SHIPPED, read_definition, shipped
+from experiments.benchmark.definition import FILE, SHIPPED, read_definition, shipped
 from experiments.benchmark.report import report
 from experiments.benchmark.tables import print_rows
 from experiments.cli.commands.benchmark_set import set_row
@@ -16,6 +16,7 @@ from experiments.cli.page import Page, new_page, shown
 from experiments.cli.progress import Told, stages_of
 from experiments.errors import ExperimentError
 from experiments.faults import is_told, reason
+from experiments.faults import report as report_fault
 from experiments.results.attempts import Attempts
 from experiments.results.folder import ResultsFolder
 from experiments.results.summaries import write_summary
@@ -35,12 +36,12 @@ def benchmark(options: Benchmark) -> None:
     out = options.out or Path("runs") / "benchmark"
     for folder in sets.values():
         read_definition(folder)
-    whole = ResultsFolder(out, "benchmark", f"idbench benchmark {' '.join(map(str, sets.values()))}", options.force)
+    whole = ResultsFolder(out, "benchmark", "idbench benchmark", options.force)
     rows = dict[str, Made]()
     with shown(page), whole.held():
         try:
             with stages_of("benchmark") as told, _workers(options) as run:
-                for name, made in run(sets, out.absolute(), told):
+                for name, made in run(sets, out.resolve(), told):
                     rows[name] = made
         finally:
             _show(page, {name: rows[name] for name in sets if name in rows})
@@ -66,10 +67,12 @@ def _sets(folders: Sequence[Path]) -> dict[str, Path]:
     """Return the folders by their names; raise ExperimentError if two have one."""
     found = dict[str, Path]()
     for folder in folders:
-        name = folder.absolute().name
-        if name in found:
-            raise ExperimentError(f"{found[name]} and {folder} have one name, and would have one folder of results: rename one")
-        found[name] = folder.absolute()
+        place = (folder.parent if folder.name == FILE else folder).resolve()
+        if place.name in found:
+            raise ExperimentError(
+                f"{found[place.name]} and {folder} have one name, and would have one folder of results: rename one"
+            )
+        found[place.name] = place
     return found
 
 
@@ -98,7 +101,7 @@ def _workers(options: Benchmark) -> Iterator[Run]:
     from experiments.study.dask_client import connected
 
     with connected(options.scheduler, options.workers or 1, "give the same command again") as client:
-        from distributed import as_completed
+        from distributed import KilledWorker, as_completed
 
         def run(sets: Mapping[str, Path], out: Path, told: Told) -> Iterator[tuple[str, Made]]:
             waiting = {
@@ -107,7 +110,11 @@ def _workers(options: Benchmark) -> Iterator[Run]:
             }
             for k, future in enumerate(as_completed(waiting)):
                 told(f"{k + 1} of {len(sets)} sets", (k + 1) / len(sets))
-                yield waiting[future], future.result()
+                try:
+                    made = future.result()
+                except KilledWorker as error:
+                    made = f"the worker ended with it: {' '.join(str(error).split())[:200]}"
+                yield waiting[future], made
 
         yield run
 
@@ -123,7 +130,5 @@ def attempted(folder: Path, out: Path, force: bool, theirs: dict[str, str]) -> M
     require_versions(theirs, "the process that makes the benchmark")
     try:
         return set_row(folder, out, force)
-    except Exception as error:
-        if not is_told(error):
-            raise
-        return reason(error)
+    except Exception as error:  # a fault of one set takes no other away
+        return reason(error) if is_told(error) else f"{reason(error)}; its traceback is in {report_fault(error)}"

@@ -56,7 +56,7 @@ class Arm:
         wrist = [
             (x @ w)[:, None, None] * np.array(w)[None, :, None]
             for w in self.told["couplings"]
-            for x in diagonal[: 2 + self.told["rotors"]][: 1 + self.told["rotors"]]
+            for x in diagonal[: 1 + self.told["rotors"]]
         ]
         wrist += [np.sign(qd @ w)[:, None, None] * np.array(w)[None, :, None] for w in self.told["couplings"]]
         return np.concatenate([np.array(bodies), joints, *wrist], axis=2)
@@ -123,4 +123,7 @@ def of_set(folder: Path) -> None:
 if __name__ == "__main__":
     for out in map(Path, sys.argv[1:]):
         for place in sorted(path.parent for path in out.glob("*/summary.json")):
-            of_set(place)
+            try:
+                of_set(place)
+            except (ValueError, KeyError, OSError) as error:
+                print(f"{place.name}: {type(error).__name__}: {error}")

@@ -2,13 +2,18 @@
 
 import json
 import shutil
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from experiments.benchmark.definition import SHIPPED, read_definition, shipped
+from experiments.benchmark.tables import share
 from experiments.benchmark.tools import prepared
 from experiments.cli import main
+from experiments.cli.commands.benchmark_set import set_row
+from identify import MotionLog, TorqueChannel
 from identify.files.log_file import write_log
 from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from sim.robot.robot import Robot
@@ -76,7 +81,6 @@ def test_without_held_out_logs_the_last_quarter_is(scara_set, scara_logs, tmp_pa
 def test_samples_that_the_fit_has_seen_are_counted(scara_set, scara_logs, tmp_path, monkeypatch, capfd):
     """A held-out log of which a half is a part of the fitted one."""
     monkeypatch.chdir(tmp_path)
-    from dataclasses import replace
 
     fitted, new = scara_logs[0], scara_logs[2]
     half = new.samples // 2
@@ -167,3 +171,62 @@ def test_rows_are_the_same_on_workers(scara_set, tmp_path, monkeypatch):
         one, other = row_of(tmp_path / "here", name), row_of(tmp_path / "there", name)
         times = {"seconds", "seconds_of_judging"}
         assert {k: v for k, v in one.items() if k not in times} == {k: v for k, v in other.items() if k not in times}
+
+
+def test_sets_in_two_threads_read_their_own_files(scara_set, scara_logs, tmp_path):
+    """A scheduler's workers have several threads, and a process is in one folder."""
+    other = tmp_path / "other"
+    shutil.copytree(scara_set, other)
+    for name, log in zip(("one", "two", "new"), scara_logs, strict=True):
+        write_log(replace(log, tau=1.5 * log.tau), other / f"{name}.parquet")
+    alone = [set_row(place, tmp_path / "alone" / place.name, force=False) for place in (scara_set, other)]
+    with ThreadPoolExecutor(2) as pool:
+        both = list(pool.map(lambda place: set_row(place, tmp_path / "both" / place.name, force=False), (scara_set, other)))
+    errors = [[row["logs"][0]["torque_error_rms"] for row in rows] for rows in (alone, both)]
+    assert errors[0] == errors[1]
+    assert errors[0][0] != errors[0][1]
+
+
+def test_a_row_is_made_again_when_its_data_change_and_repeats_keep_the_delay(scara_set, scara_logs, tmp_path, monkeypatch):
+    """Logs in a folder of the set, 10 ms late, which the fit finds."""
+    monkeypatch.chdir(tmp_path)
+    (scara_set / "data").mkdir()
+    for name, log in zip(("one", "two", "new"), scara_logs, strict=True):
+        (scara_set / f"{name}.parquet").unlink()
+        late = MotionLog(log.fs, log.q[1:], log.tau[:-1], TorqueChannel("instantaneous"))
+        write_log(late, scara_set / "data" / f"{name}.parquet")
+    (scara_set / "benchmark.toml").write_text(
+        'title = "late"\nfit = ["data/one.parquet", "data/two.parquet"]\nheld_out = ["data/new.parquet"]\n'
+        'options = "--robot scara --model explicit --torque-delay estimate"\nfree_run = 0.2\n'
+    )
+    assert main(["benchmark", "arm", "--out", "found"]) == 0
+    row = row_of(tmp_path / "found")
+    assert row["repeats"]["inside"] >= 6  # of eight; without the delay friction and inertias differ
+    assert row["free_run"][0]["diverged"] == 0
+    assert max(row["free_run"][0]["nrmse"]) < 0.1
+    shutil.copy(scara_set / "data" / "one.parquet", scara_set / "data" / "new.parquet")
+    assert main(["benchmark", "arm", "--out", "found"]) == 2  # held out is what is fitted
+
+
+def test_tools_get_late_torques_without_loss():
+    """At 10 Hz, where straight lines between samples would take a fifth of what moves at 2 Hz."""
+    t = np.arange(200) / 10
+    tau = np.sin(2 * np.pi * t)[:, None]
+    late = MotionLog(10.0, tau, np.sin(2 * np.pi * (t + 0.05))[:, None], TorqueChannel("instantaneous", delay=0.05))
+    assert np.abs(prepared(late)["tau"] - tau)[5:-5].max() < 0.01
+
+
+def test_results_stay_out_of_the_set(scara_set, tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    assert main(["benchmark", "arm", "--out", "."]) == 2
+    capfd.readouterr()
+    (tmp_path / "below").mkdir()
+    monkeypatch.chdir(tmp_path / "below")
+    assert main(["benchmark", "../arm/.", "--out", ".."]) == 2
+    assert "choose another --out" in capfd.readouterr().err
+    assert not (scara_set / "summary.json").exists()
+
+
+def test_errors_over_logs_are_pooled():
+    logs = [{"torque_error_rms": [1.0], "torque_rms": [10.0]}, {"torque_error_rms": [0.1], "torque_rms": [0.2]}]
+    assert share({"logs": logs}, logs)[0] == pytest.approx(100 * np.sqrt(1.01 / 100.04))

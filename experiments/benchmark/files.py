@@ -1,0 +1,58 @@
+"""The files of a set: those that a row follows from, and whether an earlier row follows from the same."""
+
+import json
+import os
+from hashlib import file_digest
+from importlib.metadata import version
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from experiments.benchmark.definition import Definition
+from experiments.benchmark.tools import PREDICTED
+from experiments.errors import ExperimentError
+from identify.files.layout import LogLayout
+
+BESIDE = (".toml", ".urdf", ".xml")
+"""What names of files end with that may say something of a set."""
+
+
+def require_files(folder: Path, definition: Definition) -> None:
+    """Raise ExperimentError that names logs that are not there, and how to get them."""
+    missing = [name for name in definition.files if not (folder / name).exists()]
+    if missing:
+        how = f"; get the data with: {definition.get.strip()}" if definition.get else ""
+        raise ExperimentError(f"{folder} has no {', '.join(missing)}{how}")
+
+
+def files_of(folder: Path, definition: Definition) -> tuple[Path, ...]:
+    """Return the files that a row follows from: logs, whole folders of them, files beside them, robots."""
+    logs = [folder / name for name in definition.files]
+    places = {folder, *(log.parent for log in logs)}
+    beside = [path for place in places for path in place.iterdir() if path.suffix in BESIDE]
+    inside = [path for log in logs if log.is_dir() for path in log.rglob("*")]
+    layouts = [found for log in logs if log.is_file() and (found := LogLayout.beside(log))]
+    named = [path.parent / name for layout, path in layouts for name in layout.files]
+    return tuple(sorted({path for path in (*logs, *beside, *inside, *named) if path.is_file()}))
+
+
+def made_of_files(folder: Path, definition: Definition, out: Path) -> dict[str, str]:
+    """Return digests of all that a row follows from, by its path."""
+    found = {os.path.relpath(path, folder): _digest(path) for path in files_of(folder, definition)}
+    found |= {path.name: _digest(path) for path in sorted(out.glob(PREDICTED))}
+    solver = "with Clarabel" if find_spec("clarabel") else "without Clarabel"
+    return {"idbench": version("idbench"), "consistent bodies": solver, **found}
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return file_digest(file, "sha256").hexdigest()
+
+
+def kept_row(out: Path, made_of: dict[str, str]) -> dict[str, Any] | None:
+    """Return the row of earlier results, if it follows from the same files."""
+    try:
+        row: dict[str, Any] = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return None
+    return row if isinstance(row, dict) and row.get("made_of") == made_of else None
