@@ -1,0 +1,35 @@
+"""Masks that reach farther, and the laws of slow motion that they hide."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.identification.suited_mask import masked_laws
+from identify import BLOCKS, CHAINS, ExplicitModel, Problem, ReversalMask, scara
+from identify.basis.of_joints import OfJoints
+from sim.engine.simulation import simulate
+from sim.scenario.scenario_file import load
+
+
+@pytest.fixture(scope="module")
+def log():
+    return simulate(load("ideal")).alone()
+
+
+def problem(log, law, speed, **shapes):
+    block = BLOCKS.create(law).at({name: np.array([x, x]) for name, x in shapes.items()})
+    chain = CHAINS.create("idbench")
+    masked = replace(chain, mask=replace(chain.mask, threshold=(speed,)))
+    assert isinstance(masked.mask, ReversalMask)
+    return Problem((log,), scara() + OfJoints(block, (0,)), ExplicitModel(), masked)
+
+
+def test_stribeck_friction_below_the_mask_is_dropped_and_above_it_is_not(log):
+    assert set(masked_laws(problem(log, "stribeck", 0.02, vs=0.02), problem(log, "stribeck", 0.2, vs=0.02))) == {"Fst1", "vs1"}
+    assert masked_laws(problem(log, "stribeck", 0.02, vs=0.2), problem(log, "stribeck", 0.2, vs=0.2)) == ()
+
+
+def test_laws_of_all_speeds_stay_however_small_they_are(log):
+    shape = {"exponent": 3.0}
+    assert masked_laws(problem(log, "power", 0.02, **shape), problem(log, "power", 0.2, **shape)) == ()
