@@ -1,14 +1,13 @@
 """The tables of the benchmark of public sets, from what `idbench benchmark` leaves.
 
-    uv run python docs/build/benchmark_tables.py runs/benchmark runs/simulated
+    uv run python docs/build/benchmark_tables.py runs/benchmark
 
 keeps in docs/results what the page needs, and writes the page anew.
 """
 
 import json
 import sys
-from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -28,11 +27,11 @@ TOOLS = {
 Row = dict[str, Any]
 
 
-def keep_benchmark(folder: Path, name: str) -> None:
+def keep_benchmark(folder: Path) -> None:
     """Keep of the rows of a benchmark what the page needs."""
     rows = [_kept(json.loads(path.read_text())) for path in sorted(folder.glob("*/summary.json"))]
     text = "[\n" + ",\n".join(json.dumps(row) for row in rows) + "\n]\n"
-    (RESULTS / f"{name}.json").write_text(text)
+    (RESULTS / "benchmark.json").write_text(text)
 
 
 def _kept(row: Row) -> Row:
@@ -54,8 +53,8 @@ def _kept(row: Row) -> Row:
     }
 
 
-def _rows(name: str) -> list[Row]:
-    found: list[Row] = json.loads((RESULTS / f"{name}.json").read_text())
+def _rows() -> list[Row]:
+    found: list[Row] = json.loads((RESULTS / "benchmark.json").read_text())
     return found
 
 
@@ -84,14 +83,14 @@ def overview() -> Iterator[str]:
             f"{row['seconds'][OWN]:.0f}",
             row["verdict"],
         ]
-        for row in _rows("benchmark")
+        for row in _rows()
     )
     yield from table(head, rows)
 
 
 def of_tools() -> Iterator[str]:
     """Yield errors of torque by tool, the median joint and the worst [%]."""
-    rows = _rows("benchmark")
+    rows = _rows()
     head = ["set", *TOOLS.values()]
     yield from table(head, ([row["title"], *(_pair(row, tool) for tool in TOOLS)] for row in rows))
 
@@ -109,29 +108,8 @@ def _two(x: float) -> str:
 def seconds() -> Iterator[str]:
     """Yield the seconds of a fit by tool."""
     head = ["set", *TOOLS.values()]
-    rows = ([row["title"], *(f"{row['seconds'].get(tool, float('nan')):.2g}" for tool in TOOLS)] for row in _rows("benchmark"))
+    rows = ([row["title"], *(f"{row['seconds'].get(tool, float('nan')):.2g}" for tool in TOOLS)] for row in _rows())
     yield from table(head, rows)
-
-
-def simulated() -> Iterator[str]:
-    """Yield errors of torque of simulated arms by tool [%]: rms over logs of the median joint."""
-    groups = defaultdict[tuple[str, str], list[Row]](list)
-    for row in _rows("benchmark-simulated"):
-        arm, imperfection, _ = row["title"].split(", ")
-        groups[arm, imperfection].append(row)
-    head = ["arm", "imperfection", "logs", *TOOLS.values()]
-    rows = (
-        [arm, imperfection, str(len(group)), *(_rms(group, tool) for tool in TOOLS)]
-        for (arm, imperfection), group in groups.items()
-    )
-    yield from table(head, rows)
-
-
-def _rms(group: Sequence[Row], tool: str) -> str:
-    every = [median(row["percent"][tool]) for row in group if tool in row["percent"]]
-    failed = len(group) - len(every)
-    text = f"{(sum(x**2 for x in every) / len(every)) ** 0.5:.2g}" if every else ""
-    return f"{text} ({failed} failed)" if failed and every else text
 
 
 BENCHMARK_TABLES = {
@@ -145,9 +123,7 @@ if __name__ == "__main__":
 
     from experiments.benchmark.report import errors_figure
 
-    keep_benchmark(Path(sys.argv[1]), "benchmark")
+    keep_benchmark(Path(sys.argv[1]))
     every = [json.loads(path.read_text()) for path in sorted(Path(sys.argv[1]).glob("*/summary.json"))]
     errors_figure(every).savefig(DOCS / "benchmark.png", dpi=120)
-    if len(sys.argv) > 2:
-        keep_benchmark(Path(sys.argv[2]), "benchmark-simulated")
     (DOCS / "benchmark.md").write_text(filled((DOCS / "benchmark.md").read_text()))
