@@ -30,11 +30,6 @@ class Repeats(NamedTuple):
     compared: int
     failed: tuple[str, ...]
 
-    @property
-    def share(self) -> float:
-        """Share within two standard errors: 95 % if these are right; NaN if nothing was compared."""
-        return self.inside / self.compared if self.compared else float("nan")
-
 
 def repeats(request: Request, logs: Sequence[MotionLog], names: Sequence[str]) -> Repeats:
     """Return how fits of single logs agree, by the first model that each has."""
@@ -47,12 +42,10 @@ def repeats(request: Request, logs: Sequence[MotionLog], names: Sequence[str]) -
         else:
             fits.append(found.estimates[found.leading])
     # What is grouped with what differs where fits left parameters out.
-    alike = [(one, other) for one, other in combinations(fits, 2) if one.names == other.names]
-    failed += (
-        ["fits of single logs have different parameters and are not compared"]
-        if len(alike) < len(fits) * (len(fits) - 1) / 2
-        else []
-    )
+    pairs = list(combinations(fits, 2))
+    alike = [(one, other) for one, other in pairs if one.names == other.names]
+    if len(alike) < len(pairs):
+        failed.append("fits of single logs that have different parameters are not compared")
     z = [x for one, other in alike for x in _differences(one, other)]
     return Repeats(int(np.sum(np.abs(z) < SIGMAS)), len(z), tuple(failed))
 

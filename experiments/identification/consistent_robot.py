@@ -9,6 +9,7 @@ from typing import final
 from experiments.identification.consistent_estimate import consistent_of
 from experiments.identification.fit import Fit
 from identify import Consistent
+from identify.basis.parameter import FRICTION
 from sim.robot.rewrite import compiled, rewritten
 from sim.robot.robot import Robot
 from sim.robot.tree import standard_parameters
@@ -60,7 +61,8 @@ class Written:
     def without_friction(self, joints: Collection[int]) -> Robot:
         """Return the robot without the friction of some joints."""
         robot_model = self.fit.robot_model
-        none = {f"{letters}{j + 1}": 0.0 for letters in ("Fv", "Fs") for j in joints}
+        of_joints = (p for p in robot_model.grouping.standard.parameters if p.joint in joints and p.kind in FRICTION)
+        none = {p.name: 0.0 for p in of_joints}
         return compiled(robot_model.name, rewritten(robot_model.name, self.values | none, None, robot_model.mounting))
 
     @property

@@ -3,6 +3,7 @@
 import numpy as np
 
 from identify import ESTIMATORS, IdentificationError, Problem, ReversalMask
+from identify.arrays import TINY
 from identify.basis.friction.shape import ShapedFriction
 from identify.basis.of_joints import OfJoints
 from identify.basis.parameter import Parameter
@@ -42,11 +43,11 @@ def masked_laws(before: Problem, after: Problem) -> tuple[str, ...]:
         if not isinstance(inner, ShapedFriction):
             continue
         own = [p for p in basis.parameters if p.symbol in inner.letters() and p.joint in joints]
-        sizes = {p.joint: _largest(rows, p) / _largest(usual, p) for p in own if p.symbol == inner.law.symbol}
+        sizes = {p.joint: _largest(rows, p) / max(_largest(usual, p), TINY) for p in own if p.symbol == inner.law.symbol}
         found += [p.name for p in own if sizes.get(p.joint, 1.0) < SHOWN]
     return tuple(found)
 
 
 def _largest(rows: Rows, parameter: Parameter) -> float:
     """Return the largest entry of a column, by size."""
-    return float(np.abs(rows.W[..., rows.names.index(parameter.name)]).max()) or 1.0
+    return float(np.abs(rows.W[..., rows.names.index(parameter.name)]).max())

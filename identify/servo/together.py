@@ -16,7 +16,6 @@ from identify.servo.run import ServoRun
 APART = 0.01
 """By how much an offset is changed to see what that does to other joints [rad]."""
 
-
 INSEPARABLE = 100.0
 """Condition number from which on offsets cannot be told apart: what gravity says of one, another can make up for."""
 

@@ -64,7 +64,7 @@ def identify(options: Identify) -> None:
         audience = stack.enter_context(options.watching.audience())
         options = _followed(stack, options, request, audience)
         with stages_of("identifying"):
-            result = fitted(options, request, stated)
+            result = _fitted(options, request, stated)
         _show_fit(page, result, options, read[0])
         _save(folder, page, result)
         kept = f"the estimates are printed{f', and with the logs in {folder.out}' if folder else ''}"
@@ -112,7 +112,7 @@ def _followed(stack: ExitStack, options: Identify, request: Request, audience: A
     return replace(options, log=(follower.complete(Path(folder)),))
 
 
-def fitted(options: Identify, request: Request, stated: dict[str, Any]) -> Fit:
+def _fitted(options: Identify, request: Request, stated: dict[str, Any]) -> Fit:
     """Return the fit of logs."""
     return fit_of(*loaded_logs(options, request, stated))
 
