@@ -3,6 +3,7 @@
 import numpy as np
 
 from experiments.identification.fit import Fit
+from identify import Problem
 from identify.arrays import Array
 from identify.basis.parameter import FRICTION, RIGID, Kind
 
@@ -18,7 +19,7 @@ def unlike_file(fit: Fit) -> list[str]:
 
     If only friction is, or only what has inertia, that is said: the file has placeholders.
     """
-    robot_model, R = fit.robot_model, fit.problem.factors.R
+    robot_model, R = fit.robot_model, without_shapes(fit.problem)
     if robot_model.robot.weightless:
         return []
     filed = np.array(list(robot_model.truth(robot_model.robot).values()))
@@ -36,6 +37,15 @@ def unlike_file(fit: Fit) -> list[str]:
         return [f"{words}: are they in N m?"]
     each = ", ".join(f"its {part} {ratio:.2g} times" for part, ratio in ratios.items())
     return [f"{words}, {each} at {robot_model.robot.joints[j]}: are the file's values of {' and '.join(far)} placeholders?"]
+
+
+def without_shapes(problem: Problem) -> Array:
+    """Return R of the measured torques: rows of laws that are linear about an estimate contain what that makes of these."""
+    R = problem.factors.R.copy()
+    for place, value in problem.basis.operating_point.items():
+        R[..., -1] -= R[..., place] * value
+        R[..., place] = 0.0
+    return R
 
 
 def _far(ratio: float) -> bool:

@@ -27,6 +27,9 @@ SOLID = 0.3
 WORSE = 0.25
 """Share of the squared error that a law may add at speeds above those of a fit: an eighth of the error."""
 
+BEST = 2
+"""So many of the laws that take most are compared with shapes that are their own."""
+
 WORTH = 0.02
 """Least share of a joint's squared error that a law must take: less is of no use, and of a chain's own errors."""
 
@@ -89,7 +92,7 @@ class _Choice:
         while True:
             search = self._search(laws, self.candidates)
             tried = {key: search.score(*key) for key in search.places}
-            scores = tried | scores
+            scores |= tried
             found = [_best(tried, j) for j in range(len(laws))]
             if not any(found):
                 break
@@ -109,7 +112,7 @@ class _Choice:
         solvable = bool(np.isfinite(self._search(first, {}).errors).all())
         # Where one law cannot be solved for, it must not decide about those of other joints.
         others = first if solvable else list(laws)
-        shaped = [any(isinstance(self.candidates[name], ShapedFriction) for name in names[:2]) for names in found]
+        shaped = [any(isinstance(self.candidates[name], ShapedFriction) for name in names[:BEST]) for names in found]
         plain = (solvable and not own for own in shaped)
         each = enumerate(zip(found, plain, strict=True))
         return [first[j] if only or not names else self._best_of(others, laws[j], names, j) for j, (names, only) in each]
@@ -117,18 +120,23 @@ class _Choice:
     def _best_of(
         self, others: Sequence[tuple[str, ...]], own: tuple[str, ...], names: Sequence[str], j: int
     ) -> tuple[str, ...]:
-        """Return the laws of a joint with the better of its best two; as they are if neither can be solved for."""
-        marks = [(True, np.inf, own)]
-        for name in names[:2]:
-            more = [*others[:j], (*own, name), *others[j + 1 :]]
-            search = self._search(more, {})
-            marks.append((self._drives(search, more[j], j), float(search.errors[j]), more[j]))
-        return min((mark for mark in marks if np.isfinite(mark[1]) or mark[2] == own), key=lambda mark: mark[:2])[2]
+        """Return the laws of a joint with the better of its best two that are determined; as they are if there is none.
 
-    def _drives(self, search: LawSearch, own: Sequence[str], j: int) -> bool:
-        """Return whether the last law of a joint has a size below zero: a law of another form, stood on its head."""
-        block = self.candidates[own[-1]] if own else None
-        return isinstance(block, ShapedFriction) and search.products.value(block.law.symbol, j) < 0
+        A law whose shape the motion leaves open is another one in disguise: arctan about a velocity above all those of a log is
+        viscous friction, and the two of them grow without limit against each other.
+        """
+        marks = list[tuple[bool, float, tuple[str, ...]]]()
+        for name in names:
+            more = [*others[:j], (*own, name), *others[j + 1 :]]
+            search, block = self._search(more, {}), self.candidates[name]
+            size = search.products.in_sigmas(block.law.symbol, j) if isinstance(block, ShapedFriction) else np.inf
+            error = float(search.errors[j])
+            if np.isfinite(error) and abs(size) > PLAIN:
+                # A size below zero is a law of another form, stood on its head.
+                marks.append((size < 0, error, more[j]))
+            if len(marks) == BEST:
+                break
+        return min(marks)[2] if marks else own
 
     def _needed(self, laws: Sequence[tuple[str, ...]], j: int) -> tuple[str, ...]:
         """Return the laws of a joint without those that gain nothing beside the others."""

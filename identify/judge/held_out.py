@@ -14,6 +14,7 @@ from identify.basis.joint_law import AbstractFriction
 from identify.basis.of_joints import OfJoints
 from identify.estimators.problem import Problem
 from identify.estimators.settle import Candidates
+from identify.rows.factors import Status
 
 GRID = 32
 """Values of each unknown shape of a law that are compared."""
@@ -81,10 +82,11 @@ class HeldOut:
         weight = start.factors.rows / np.maximum(level, 1e-300)
         return cls(start, _held(joined, speed), weight, len(start.names), places)
 
-    def value(self, letters: str, j: int) -> float:
-        """Return the estimate of a parameter of a joint without further laws."""
+    def in_sigmas(self, letters: str, j: int) -> float:
+        """Return the estimate of a parameter of a joint without further laws, in sigma of independent rows, shapes free."""
         place = next(k for p, k in self.start.basis.places.items() if (p.symbol, p.joint) == (letters, j))
-        return float(self.start.factors.fit(2).X[place])
+        fit = self.start.factors.fit(2)
+        return float(fit.X[place] / np.sqrt(fit.factor.inverse(fit.factor.status == Status.OK)[place, place]))
 
     def sigmas(self, law: str, j: int) -> float:
         """Return how many sigma the parameters of a law are away from zero, at the shapes that explain most."""

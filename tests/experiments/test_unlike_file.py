@@ -1,8 +1,13 @@
 """Torques far from those of the robot's file: whether units, friction or links are what differs."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from experiments.cli import main
+from experiments.identification.unlike_file import without_shapes
+from identify import BLOCKS, ExplicitModel, MotionLog, NoMask, Problem, TorqueChannel, idbench_chain, scara
 
 
 @pytest.mark.thorough
@@ -24,3 +29,16 @@ def test_what_of_the_file_differs_is_said(four_joints, tmp_path, capsys, factors
     warnings = capsys.readouterr().out
     assert ("times what the robot's file says" in warnings) == (said is not None)
     assert said is None or said in warnings
+
+
+def test_what_makes_a_law_linear_is_no_torque_of_the_log():
+    """Rows of a law contain F0 dg/db b0, which is far larger than what is measured where the shape is open."""
+    rng, chain = np.random.default_rng(0), replace(idbench_chain(), mask=NoMask())
+    log = MotionLog(
+        100.0, np.cumsum(rng.normal(size=(500, 2)), axis=0) / 50, rng.normal(size=(500, 2)), TorqueChannel("instantaneous")
+    )
+    steep = replace(BLOCKS.create("arctan"), size=1e4, values={"vat": 4.0})
+    plain, shaped = (Problem((log,), basis, ExplicitModel(), chain) for basis in (scara(), scara() + steep))
+    measured = np.linalg.norm(plain.factors.R[..., -1])
+    assert np.linalg.norm(shaped.factors.R[..., -1]) > 100 * measured
+    np.testing.assert_allclose(np.linalg.norm(without_shapes(shaped)[..., -1]), measured, rtol=1e-9)

@@ -204,3 +204,9 @@ def test_friction_without_a_jump_takes_the_place_of_coulomb(smooth):
     found = choose_friction(problem, {each: BLOCKS.create(each) for each in ("offset", "stribeck", "tanh")})
     assert found.laws == (("tanh",),) * 2 if smooth else ((), ())
     assert found.idle == (("Fs",),) * 2 if smooth else ((), ())
+
+
+def test_a_law_whose_shape_the_motion_leaves_open_is_not_chosen():
+    """Arctan of a velocity above those of the log, about whose size nothing is known: it stands in for viscous friction."""
+    problem = Problem((made(lambda q, qd, load: -0.02 * qd**3, 0.02),), scara(), ExplicitModel(), idbench_chain())
+    assert choose_friction(problem, {"arctan": BLOCKS.create("arctan")}).laws == ((), ())
