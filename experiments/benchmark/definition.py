@@ -50,6 +50,8 @@ class Definition:
     """Logs that are also fitted one by one, to compare their parameters. Default: those of the fit."""
     free_run: NotNegative = 0.0
     """How long the identified robot is simulated from torques alone, again and again along held-out logs [s]; 0: not at all."""
+    delay_told: bool = True
+    """Whether other tools get fitted torques at the instants when they act; otherwise as late as they are logged."""
     source: str = ""
     """Where the data are from, with their version."""
     license: str = ""

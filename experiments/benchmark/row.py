@@ -1,13 +1,14 @@
 """One set: its fit, judged on every held-out log, and beside it all that the protocol asks for."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, final
+from collections.abc import Callable, Sequence
+from typing import Any
 
-from experiments.benchmark.definition import Definition
+import numpy as np
+
 from experiments.benchmark.free_runs import free_runs
 from experiments.benchmark.repeats import repeats
+from experiments.benchmark.set_fit import SetFit
 from experiments.benchmark.tools import Predicted, judged
 from experiments.faults import is_told, reason
 from experiments.identification.fit import Fit
@@ -15,31 +16,7 @@ from experiments.identification.held_out import HeldOut
 from experiments.identification.judgement import Unjudged, judge
 from experiments.identification.verdict import WORDS
 from experiments.results.summaries import finite
-from identify import MotionLog
 from identify.judge.leaks import seen
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class SetFit:
-    """A set that is fitted.
-
-    Parameters
-    ----------
-    definition : Definition
-        What it is.
-    fit : Fit
-        Its fit.
-    repeated : callable
-        Reads the logs that are fitted one by one, by name.
-    seconds : float
-        How long reading and fitting took.
-    """
-
-    definition: Definition
-    fit: Fit
-    repeated: Callable[[], Mapping[str, MotionLog]]
-    seconds: float
 
 
 def row_of(made: SetFit, predicted: Callable[[Sequence[HeldOut]], list[Predicted]]) -> dict[str, Any]:
@@ -53,6 +30,7 @@ def row_of(made: SetFit, predicted: Callable[[Sequence[HeldOut]], list[Predicted
         "model": fit.leading,
         "estimator": fit.request.estimator,
         "parameters": len(fit.basis.names),
+        "estimate": _estimate(fit),
         "seconds": made.seconds,
         "logs": [_log(one, fit) for one in judgement.on],
         "published": definition.published,
@@ -68,6 +46,17 @@ def row_of(made: SetFit, predicted: Callable[[Sequence[HeldOut]], list[Predicted
     }
     row["seconds_of_judging"] = time.perf_counter() - begin
     return row
+
+
+def _estimate(fit: Fit) -> dict[str, list[Any]]:
+    """Return what the row says of the parameters: estimates, their sigma, and what the robot's file says."""
+    found, filed = fit.estimates[fit.leading], fit.robot_model.truth(fit.robot_model.robot)
+    return {
+        "names": list(fit.basis.names),
+        "X": [finite(x) for x in found.X],
+        "sigma": [finite(x) for x in np.sqrt(np.diagonal(found.covariance))],
+        "filed": [finite(filed[name]) if name in filed else None for name in fit.basis.names],
+    }
 
 
 def _log(one: HeldOut | Unjudged, fit: Fit) -> dict[str, Any]:

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any, final
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
+from experiments.benchmark.for_tools import acting, at_times
 from experiments.errors import ExperimentError
 from experiments.identification.held_out import HeldOut
 from experiments.results.summaries import finite
-from identify import Array, MotionLog, Problem, TorqueChannel, validate
+from identify import Array, Problem, validate
 
 PREDICTED = "predicted-*.npz"
 """Names of the files of other tools, in the folder of a set's results."""
@@ -58,22 +58,6 @@ def predictions(folder: Path, count: int) -> list[Predicted]:
     return found
 
 
-def acting(torque: TorqueChannel, fs: float) -> float:
-    """Return how much later than its sample a torque acts, on average [s]."""
-    return torque.delay + (0.0 if torque.meaning == "instantaneous" else 0.5 / fs)
-
-
-def prepared(log: MotionLog) -> dict[str, Array]:
-    """Return a log for other tools: times [s], positions [rad], and the torques that act then [N m], gains included."""
-    tau = log.tau * np.asarray(log.torque.gain)
-    return {"t": log.t, "q": log.q, "tau": _at(log.t, log.t + acting(log.torque, log.fs), tau)}
-
-
-def _at(t: Array, times: Array, tau: Array) -> Array:
-    """Return torques at other times; straight lines between samples would be low-passes, twice."""
-    return np.asarray(CubicSpline(times, tau)(np.clip(t, times[0], times[-1])))
-
-
 def judged(held_out: Sequence[HeldOut], predicted: Predicted) -> dict[str, Any]:
     """Return what a summary says of a tool: the residual torque of each log, on the rows on which ours is judged."""
     return {
@@ -87,7 +71,7 @@ def _judged(held_out: HeldOut, tau: Array) -> dict[str, Any]:
     log = held_out.log
     if tau.shape != log.tau.shape or not np.isfinite(tau).all():
         return {"failure": f"torques of the shape {tau.shape}, of a log of {log.tau.shape}, or not all finite"}
-    as_logged = _at(log.t + acting(log.torque, log.fs), log.t, tau)
+    as_logged = at_times(log.t + acting(log.torque, log.fs), log.t, tau)
     left = replace(log, tau=log.tau * np.asarray(log.torque.gain) - as_logged, torque=replace(log.torque, gain=1.0))
     plain = held_out.fit.robot_model.plain.basis
     problem = Problem((left,), plain, held_out.fit.problem.model, held_out.fit.processing)

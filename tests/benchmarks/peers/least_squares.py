@@ -4,7 +4,9 @@
 
 Positions are filtered without delay and differentiated; torques and columns are filtered alike and thinned out; rows where the
 joint is slow are left out; joints are weighted by their residuals, in turns; columns are reduced to those that are independent.
-Torques of the held-out logs, from filtered positions, go into predicted-pinocchio.npz; `idbench benchmark` judges them.
+Torques of the held-out logs, from filtered positions, go into predicted-pinocchio.npz; `idbench benchmark` judges them. Beside
+them are the estimate, its sigma, and `exact`, which fits the moving joints of the last held-out log: of one without noise,
+the truth.
 """
 
 import json
@@ -89,7 +91,7 @@ def rows(arm, log, cutoff):
 
 
 def fitted(parts):
-    """Return parameters of the independent columns, and which these are."""
+    """Return parameters of the independent columns, which these are, and their sigma by the residuals, rows independent."""
     W, tau, there = (np.concatenate(x) for x in zip(*parts, strict=True))
     n, joint = W.shape[1], np.broadcast_to(np.arange(W.shape[1]), there.shape)[there]
     A, y = W[there], tau[there]
@@ -103,20 +105,24 @@ def fitted(parts):
         x = np.linalg.lstsq(A[:, kept] * weights[joint, None] / size[kept], y * weights[joint], rcond=None)[0] / size[kept]
         left = y - A[:, kept] @ x
         weights = np.array([1 / np.sqrt((left[joint == j] ** 2).mean()) for j in range(n)])
-    return kept, x
+    root = np.linalg.inv(np.linalg.qr(A[:, kept] * weights[joint, None] / size[kept], mode="r"))
+    return kept, x, np.sqrt((root**2).sum(axis=1)) / size[kept]
 
 
 def of_set(folder: Path) -> None:
     told = json.loads((folder / "summary.json").read_text())["tools_read"]
     arm, begin = Arm(folder, told), time.perf_counter()
     cutoff = told["cutoff"]
-    kept, x = fitted([rows(arm, dict(np.load(folder / name)), cutoff) for name in told["fit"]])
+    kept, x, sigma = fitted([rows(arm, dict(np.load(folder / name)), cutoff) for name in told["fit"]])
     seconds, predicted = time.perf_counter() - begin, {}
     for k, name in enumerate(told["held_out"]):
         log = dict(np.load(folder / name))
         fs = 1 / np.median(np.diff(log["t"]))
         predicted[f"held_out{k + 1}"] = arm.columns(*motion(log, fs, cutoff))[:, :, kept] @ x
-    np.savez(folder / "predicted-pinocchio.npz", seconds=seconds, note=NOTE, **predicted)
+        W, tau, there = rows(arm, log, cutoff)
+        exact = np.linalg.lstsq(W[there][:, kept], tau[there], rcond=None)[0]
+    estimate = {"estimate": x, "sigma": sigma, "exact": exact}
+    np.savez(folder / "predicted-pinocchio.npz", seconds=seconds, note=NOTE, **estimate, **predicted)
     print(f"{folder.name}: {len(kept)} parameters, {seconds:.1f} s")
 
 

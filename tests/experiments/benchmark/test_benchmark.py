@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from experiments.benchmark.definition import SHIPPED, read_definition, shipped
+from experiments.benchmark.for_tools import prepared
 from experiments.benchmark.tables import share
-from experiments.benchmark.tools import prepared
 from experiments.cli import main
 from experiments.cli.commands.benchmark_set import set_row
 from identify import MotionLog, TorqueChannel
