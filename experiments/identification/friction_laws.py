@@ -60,7 +60,7 @@ class FrictionLaws:
         given = dict[int | str | None, tuple[str, tuple[str, ...]]]()  # by joint; None: of all
         for text in texts:
             where, mark, laws = text.rpartition("=")
-            place = _joint(text, where, joints) if mark else AUTO if laws == AUTO else None
+            place = joint_of(f"--friction {text}", where, joints) if mark else AUTO if laws == AUTO else None
             if place in given:
                 raise ExperimentError(_twice(given[place][0], text, mark))
             given[place] = text, () if place == AUTO else _laws(text, laws)
@@ -169,10 +169,10 @@ def said(j: int, joints: Sequence[str]) -> str:
     return joints[j] if str(j + 1) in joints else str(j + 1)
 
 
-def _joint(text: str, where: str, joints: Sequence[str]) -> int:
-    """Return the number of a joint by its number, from 1, or its name."""
+def joint_of(option: str, where: str, joints: Sequence[str]) -> int:
+    """Return the number of a joint, from 0, by its number, from 1, or its name; ExperimentError if there is none."""
     if where in joints:
         return joints.index(where)
     if where.isdecimal() and 1 <= int(where) <= len(joints):
         return int(where) - 1
-    raise ExperimentError(f"--friction {text}: there is no joint {where!r}; there are 1 to {len(joints)}: {', '.join(joints)}")
+    raise ExperimentError(f"{option}: there is no joint {where!r}; there are 1 to {len(joints)}: {', '.join(joints)}")

@@ -110,7 +110,13 @@ class HeldOut:
         joints = {p.joint for p in lost if p.kind in FRICTION and p.joint is not None} & negative
         # Sizes of laws are those at their shapes.
         apart = {p: x for p, x in X.items() if (p in lost or (p.joint in joints and p.kind in FRICTION)) and p.kind != SHAPE}
-        return written.without_friction(joints) if joints else written.robot, _without(log, qd, basis, apart), qd
+        log = _without(_without(log, qd, basis, apart), qd, *self._grouped(written))
+        return written.without_friction(joints) if joints else written.robot, log, qd
+
+    def _grouped(self, written: Written) -> tuple[Basis, dict[Parameter, float]]:
+        """Return standard parameters that have no place in a simulated robot and stand in no base parameter of their own."""
+        standard, alone = self.fit.robot_model.grouping.standard, set(self.fit.basis.names)
+        return standard, {p: written.lost[p.name] for p in standard.parameters if p.name in written.lost.keys() - alone}
 
     @cached_property
     def _replayed(self) -> tuple[MotionLog, Array]:
@@ -151,7 +157,7 @@ class HeldOut:
 
 
 def _without(log: MotionLog, qd: Array, basis: Basis, laws: Mapping[Parameter, float]) -> MotionLog:
-    """Return a log without the torques of laws of friction, of joints that have one without a place in a simulated robot.
+    """Return a log without the torques of what has no place in a simulated robot: some laws of friction, balancers.
 
     What other laws leave of viscous or Coulomb friction may be negative, which no simulated robot can have, either: it then has
     no friction at that joint.

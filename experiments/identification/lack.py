@@ -9,7 +9,7 @@ from identify.judge.lack_of_fit import WRONG, Lack
 
 TRY: Mapping[str, str] = {
     "velocity": "--friction auto, or {joint}=standard+stribeck",
-    "position": "{joint}=standard+cogging with --friction, a spring in the robot's file, or a straighter encoder",
+    "position": "{joint}=standard+cogging with --friction, a spring in the robot's file, a --balancer, or a straighter encoder",
     "load": "--friction auto, or {joint}=standard+load",
     "time": "a log of a warm robot, a shorter one, or {joint}=standard+temperature with the temperature in the log",
 }

@@ -8,6 +8,8 @@ import tyro
 Names = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME")]
 Laws = Annotated[tuple[str, ...], tyro.conf.arg(metavar="[JOINT=]LAW+LAW")]
 
+Balancers = Annotated[tuple[str, ...], tyro.conf.arg(metavar="JOINT=a:M,b:M,...")]
+
 
 @final
 @dataclass(frozen=True)
@@ -25,3 +27,6 @@ class Parameters:
     """Friction laws: standard (viscous and Coulomb), none (torques measured at the links), asymmetric, or a sum such as
     standard+load+stribeck; for one joint: 2=standard+load. auto chooses those that predict held-out stretches best. `idbench
     list` lists them."""
+    balancer: Balancers = ()
+    """Springs and gas springs between two points, by their geometry from a drawing, such as 2=a:0.2,b:0.8,zero:-1.66 with
+    volume:0.58 for gas [m, rad]: F0, Kb and Fg are identified."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Self, final
 
 from experiments.errors import ExperimentError
+from experiments.identification.balancers import balancers
 from experiments.identification.friction_laws import FrictionLaws, law_of
 from experiments.identification.parameters import Parameters
 from identify import BLOCKS, AbstractJointLaw, BaseParameters, Basis, KinematicTree, tree_basis
@@ -119,6 +120,8 @@ class RobotModel:
                 laws = [known for known in BLOCKS if isinstance(BLOCKS.create(known), AbstractJointLaw)]
                 raise ExperimentError(f"--add {name}: that is no law of a joint's friction; known: {', '.join(laws)}")
             basis = basis + block
+        for balancer in balancers(self.asked.balancer, self.tree):
+            basis = basis + balancer
         return basis
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from identify.arrays import Array
 from identify.basis.block import AbstractConservativeBlock, BlockColumns
 from identify.basis.parameter import Parameter
-from identify.errors import require_positive
+from identify.errors import SettingError, require_finite, require_positive
 from identify.signals.state import State
 
 
@@ -31,7 +31,7 @@ class Balancer(AbstractConservativeBlock):
     zero : float
         Position of the joint at which both points lie in one direction from the axis [rad].
     volume : float, optional
-        V, gas volume over the area of the piston [m], longer than the stroke; without it there is no gas.
+        V, gas volume over the area of the piston [m], longer than the stroke of a whole turn; without it there is no gas.
     kappa : float
         1 of slow, 1.4 of fast motion (nitrogen).
     """
@@ -45,6 +45,9 @@ class Balancer(AbstractConservativeBlock):
 
     def __post_init__(self) -> None:
         require_positive(a=self.a, b=self.b, kappa=self.kappa, volume=1.0 if self.volume is None else self.volume)
+        require_finite(zero=self.zero)
+        if self.volume is not None and self.volume <= (stroke := 2 * min(self.a, self.b)):
+            raise SettingError(f"volume = {self.volume:g} m must be longer than the stroke of a whole turn, {stroke:g} m")
 
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return F0 and Kb, and Fg of one with gas."""

@@ -4,7 +4,7 @@
     uv run idbench benchmark sets/* --out runs/simulated
 
 Of each of three arms, with each imperfection and each seed: a log to fit, and one motion of the same arm without noise, held
-out, so that errors are those of the parameters alone. Other tools are not told the delay that idbench estimates: to find it is
+out, so that errors are those of the parameters alone. Other tools do not get the delay that idbench estimates: to find it is
 part of an identification.
 """
 
@@ -53,7 +53,7 @@ class Imperfection:
     delay : float
         Of the logged torques [s].
     options : str
-        What idbench is told beside the robot.
+        Further options of idbench.
     """
 
     changes: tuple[Callable[[Scenario, Array], Scenario], ...] = ()
