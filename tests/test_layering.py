@@ -48,7 +48,7 @@ ALLOWED_IN = {
     "experiments/study/dask_client.py": {"dask", "distributed"},
     "experiments/cli/commands/benchmark.py": {"distributed"},
     "experiments/benchmark/report.py": {"matplotlib"},
-    "experiments/benchmark/tools.py": {"scipy"},
+    "experiments/benchmark/for_tools.py": {"scipy"},
     "experiments/study/statistics.py": {"scipy"},
     "experiments/study/comparison.py": {"scipy"},
     "experiments/reports/figures.py": {"matplotlib"},

@@ -1,8 +1,11 @@
 """What a set is: a folder with logs, a robot, and a benchmark.toml that states what is fitted and what is held out."""
 
 import shlex
+import threading
 import tomllib
+from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 from experiments.errors import ExperimentError
 from sim.errors import ScenarioError
@@ -14,7 +17,10 @@ FILE = "benchmark.toml"
 SHIPPED = Path(__file__).parent / "sets"
 """Definitions that ship; their data do not."""
 
-WORDS_OF_IDENTIFY = "options of `idbench identify`, but for logs, --validate and results"
+WORDS = "options of `idbench {}`, but for logs, --validate and results"
+
+IN_FOLDER = threading.Lock()
+"""Held while this process is in the folder of a set: options name files there, and other threads have sets of their own."""
 
 TAKEN = (
     "-h",
@@ -31,7 +37,7 @@ TAKEN = (
     "--serve",
     "--label",
 )
-"""Options of `idbench identify` that a set does not state."""
+"""Options that a set does not state."""
 
 
 @settings
@@ -41,11 +47,13 @@ class Definition:
     title: str
     """What to call it."""
     fit: tuple[str, ...]
-    """Logs that are fitted together."""
+    """Logs that are fitted together; * stands for any letters."""
     held_out: tuple[str, ...] = ()
     """Logs on which the fit is judged. Default: the last quarter of the longest log, which is then not fitted."""
+    command: Literal["identify", "servo"] = "identify"
+    """The command that identifies them: from torques, or, of servos, from commands and positions alone."""
     options: str = ""
-    """How they are identified: options of `idbench identify`, as on the command line."""
+    """How they are identified: options of that command, as on the command line."""
     repeats: tuple[str, ...] = ()
     """Logs that are also fitted one by one, to compare their parameters. Default: those of the fit."""
     free_run: NotNegative = 0.0
@@ -67,7 +75,7 @@ class Definition:
                 f"fit must name at least one log, and each log must have a name: {', '.join(map(repr, self.files))}"
             )
         if taken := [word for word in self.words if word.partition("=")[0].replace("_", "-") in TAKEN]:
-            raise ValueError(f"options must not have {taken[0]}: they are {WORDS_OF_IDENTIFY}")
+            raise ValueError(f"options must not have {taken[0]}: they are {WORDS.format(self.command)}")
 
     @property
     def words(self) -> list[str]:
@@ -100,6 +108,8 @@ def read_definition(folder: Path) -> Definition:
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
         made: Definition = make(Definition, content, "")
+        fit, held_out, repeats = (_named(folder, names) for names in (made.fit, made.held_out, made.repeats))
+        made = replace(made, fit=fit, held_out=held_out, repeats=repeats)
     except FileNotFoundError as error:
         raise ExperimentError(_missing(folder)) from error
     except OSError as error:
@@ -107,6 +117,12 @@ def read_definition(folder: Path) -> Definition:
     except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError, ScenarioError) as error:
         raise ExperimentError(f"{path}: {error}") from error
     return made
+
+
+def _named(folder: Path, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return names with those of files in the place of patterns that some have."""
+    every = {name: sorted(str(path.relative_to(folder)) for path in folder.glob(name)) if "*" in name else [] for name in names}
+    return tuple(dict.fromkeys(name for pattern, found in every.items() for name in found or [pattern]))
 
 
 def shipped() -> tuple[str, ...]:

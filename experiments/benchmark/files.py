@@ -21,7 +21,7 @@ def require_files(folder: Path, definition: Definition) -> None:
     """Raise ExperimentError that names logs that are not there, and how to get them."""
     missing = [name for name in definition.files if not (folder / name).exists()]
     if missing:
-        how = f"; get the data with: {definition.get.strip()}" if definition.get else ""
+        how = f"; get the data with: {' && '.join(definition.get.strip().splitlines())}" if definition.get else ""
         raise ExperimentError(f"{folder} has no {', '.join(missing)}{how}")
 
 

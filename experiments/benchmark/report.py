@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from experiments.benchmark.tables import HEADS, Row, of_tools, overview, remarks, shares
+from experiments.benchmark.measures import TORQUE, Row, measure_of
+from experiments.benchmark.tables import HEADS, of_tools, overview, remarks, shares
 from experiments.reports.html import rendered, svg
 from experiments.style import JOINTS
 
@@ -17,16 +18,23 @@ def report(rows: Sequence[Row]) -> str:
         "report.html.j2",
         heads=[head.replace("\n", " ") for head in HEADS],
         overview=list(overview(rows)),
-        figure=svg(errors_figure(rows)) if rows else "",
+        figure=svg(errors_figure(rows)) if any(measure_of(row) is TORQUE for row in rows) else "",
         sets=[
-            {"title": row["title"], "joints": row["joints"], "tools": list(of_tools(row)), "remarks": list(remarks(row))}
+            {
+                "title": row["title"],
+                "measure": measure_of(row).words,
+                "joints": row["joints"],
+                "tools": list(of_tools(row)),
+                "remarks": list(remarks(row)),
+            }
             for row in rows
         ],
     )
 
 
 def errors_figure(rows: Sequence[Row]) -> Figure:
-    """Return torque errors of every joint [% of its torque], a line a set, a colour a tool."""
+    """Return torque errors of every joint [% of its torque], a line a set that has torques, a colour a tool."""
+    rows = [row for row in rows if measure_of(row) is TORQUE]
     tools = list(dict.fromkeys(tool for row in rows for tool in shares(row)))
     figure = Figure(figsize=(8, 1.0 + 0.5 * len(rows)), layout="constrained")
     panel = figure.subplots()

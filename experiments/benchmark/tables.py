@@ -1,12 +1,12 @@
 """Rows of a benchmark as tables."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from rich.console import Console
 from rich.text import Text
 
+from experiments.benchmark.measures import TORQUE, Row, measure_of, of_logs, pooled
 from experiments.text import new_table, percentage, print_table
 from identify import Array
 
@@ -26,23 +26,16 @@ HEADS = (
 )
 """Columns of the table of all sets, beside their names."""
 
-Row = Mapping[str, Any]
-
 
 def overview(rows: Sequence[Row]) -> Iterator[list[str]]:
     """Yield the cells of each set: how well torques of held-out logs are predicted, and what the protocol asks for."""
     for row in rows:
         percent, R2, free = share(row, row["logs"]), worst_R2(row), free_run(row)
-        if not len(percent):
-            yield [row["title"], str(len(row["joints"])), *[""] * 7]
-            continue
         yield [
             row["title"],
             str(len(row["joints"])),
-            percentage(_median(percent)),
-            percentage(_largest(percent)),
-            f"{_median(R2):.3f}",
-            f"{_largest(-R2) * -1:.3f}",
+            *(percentage(x) if np.isfinite(x) else "" for x in (_median(percent), _largest(percent))),
+            *(f"{x:.3f}" if np.isfinite(x) else "" for x in (_median(R2), -_largest(-R2))),
             _agree(row["repeats"]),
             f"{free:.3f}" if np.isfinite(free) else "",
             f"{row['seconds']:.2g}",
@@ -51,9 +44,10 @@ def overview(rows: Sequence[Row]) -> Iterator[list[str]]:
 
 
 def of_tools(row: Row) -> Iterator[list[str]]:
-    """Yield the torque errors of each joint [N m], rms over all held-out logs, by each tool, with seconds."""
+    """Yield the errors of each joint over all held-out logs, by each tool, with seconds."""
+    measure = measure_of(row)
     for tool, logs, seconds in _tools(row):
-        errors = pooled(logs, "torque_error_rms")
+        errors = pooled(logs, measure.name, measure.over_logs)
         yield [tool, *(f"{x:.3g}" if np.isfinite(x) else "" for x in errors), "" if seconds is None else f"{seconds:.2g}"]
 
 
@@ -69,7 +63,7 @@ def print_rows(console: Console, rows: Sequence[Row]) -> None:
 
 
 def _print_set(console: Console, row: Row) -> None:
-    console.print(Text(f"{row['title']}: torque error on held-out logs, rms [N m, N]", style="bold"), soft_wrap=True)
+    console.print(Text(f"{row['title']}: {measure_of(row).words}", style="bold"), soft_wrap=True)
     grid = new_table("", [*row["joints"], "seconds"])
     for cells in of_tools(row):
         grid.add_row(*cells)
@@ -96,6 +90,7 @@ def remarks(row: Row) -> Iterator[str]:
             yield f"{part['diverged']} of {part['stretches']} free runs diverge"
     for tool, found in row["tools"].items():
         yield from (f"{tool}: {part['failure']}" for part in (found, *found.get("logs", ())) if "failure" in part)
+    yield from row.get("verdicts", ())
     yield from [f"not saved: {row['unsaved']}"] if "unsaved" in row else []
     if row["published"]:
         yield f"published: {row['published']}"
@@ -108,31 +103,21 @@ def _tools(row: Row) -> Iterator[tuple[str, Sequence[Row], float | None]]:
             yield tool, found["logs"], found["seconds"]
 
 
-def pooled(logs: Sequence[Row], name: str) -> Array:
-    """Return the rms over logs of a figure of each joint, shape (joint,); nothing if no log has it."""
-    each = _each(logs, name)
-    return np.sqrt((each**2).mean(axis=0)) if len(each) else np.zeros(0)
-
-
 def share(row: Row, logs: Sequence[Row]) -> Array:
     """Return the torque error of each joint over its torque, both over all logs [%], shape (joint,)."""
-    errors, level = pooled(logs, "torque_error_rms"), pooled(row["logs"], "torque_rms")
+    errors, level = pooled(logs, TORQUE.name), pooled(row["logs"], "torque_rms")
     return 100 * errors / np.where(level > 0, level, np.nan) if len(errors) else errors
 
 
 def worst_R2(row: Row) -> Array:
     """Return the least R2 of each joint over the logs, shape (joint,); nothing if no log has it."""
-    each = _each(row["logs"], "R2")
+    each = of_logs(row["logs"], "R2")
     return each.min(axis=0) if len(each) else np.zeros(0)
 
 
 def free_run(row: Row) -> float:
     """Return the NRMSE of free runs of the median joint, rms over logs; NaN if there is none."""
     return _median(pooled(row.get("free_run", ()), "nrmse"))
-
-
-def _each(logs: Sequence[Row], name: str) -> Array:
-    return np.array([[np.nan if x is None else x for x in log[name]] for log in logs if name in log], dtype=float)
 
 
 def _median(x: Array) -> float:

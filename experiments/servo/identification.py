@@ -7,6 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, final
 
+from experiments.errors import ExperimentError
 from experiments.servo.joints import Identified, Joints, JointsLog
 from identify import Array
 from identify.files.servo_file import ServoFile
@@ -50,12 +51,40 @@ class Servos:
         """The robot without its drives."""
         return links(self.robot, self.mounting)
 
+    def links_of(self, path: Path) -> Robot:
+        """Return the robot without its drives, with what it carried in a log.
+
+        Raises
+        ------
+        ExperimentError
+            If that robot has other joints.
+        """
+        name = self.known.robot(path.name)
+        if name is None:
+            return self.links
+        if name not in self._others:
+            self._others[name] = links(name, self.mounting)
+        other = self._others[name]
+        if other.joints != self.links.joints:
+            raise ExperimentError(
+                f"{self.name(path)}: the joints of {name} are {', '.join(other.joints)}, those of {self.robot} "
+                f"{', '.join(self.links.joints)}: they must be the same, in the same order"
+            )
+        return other
+
+    @cached_property
+    def _others(self) -> dict[str, Robot]:
+        """Robots that logs are of, by their names."""
+        return {}
+
     @cached_property
     def joints(self) -> Joints:
         """The joints with their logs."""
         names = self.links.joints
         logs = [
-            JointsLog(self.name(path), columns, tuple(self.known.servo(joint, path.name).kp for joint in names))
+            JointsLog(
+                self.name(path), columns, tuple(self.known.servo(joint, path.name).kp for joint in names), self.links_of(path)
+            )
             for path, columns in self.logs.items()
         ]
         return Joints(self.links, tuple(self.known.servo(joint, "") for joint in names), tuple(logs))

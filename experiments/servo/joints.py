@@ -29,11 +29,12 @@ UNLOADED = JointLoad(*(np.zeros(()) for _ in range(4)))
 
 
 class JointsLog(NamedTuple):
-    """A log of all joints: its name, its columns, and the firmware gain of each joint."""
+    """A log of all joints: its name, its columns, the firmware gain of each joint, and the links with what they carried."""
 
     name: str
     columns: ServoColumns
     kp: tuple[float, ...]
+    links: Robot
 
 
 @final
@@ -119,7 +120,7 @@ class Joints:
         for log, by_fits in zip(self.logs, moving, strict=True):
             for j in range(self.links.n):
                 self._run(log, j, UNLOADED)  # raises LogError before loads are computed from a bad log
-            for j, load in enumerate(loads(self.links, log.columns, by_fits)):
+            for j, load in enumerate(loads(log.links, log.columns, by_fits)):
                 every[j].append(self._run(log, j, load))
         return every
 

@@ -32,6 +32,8 @@ def in_mujoco(servos: Servos, text: str, folder: Path, fits: dict[str, ServoFit]
     offset[places] = [fit.p["offset"] for fit in fits.values()]
     if any(known.servo(joint, path.name).kp != known.servo(joint, "").kp for joint in fits):
         raise ExperimentError(f"{path.name} has another kp than the file that was written")
+    if servos.links_of(path) is not servos.links:
+        raise ExperimentError(f"{path.name} is of another robot than the file that was written")
     on = None if columns.on is None else columns.on[:, places] > 0.5
     sent = Commands(columns.t, (columns.command + offset)[:, places], places, on)
     q = replay(servos.robot, text, folder, sent, columns.q[0] + offset)

@@ -108,11 +108,8 @@ def _joints(scenario: Scenario, log: MotionLog) -> Joints:
     columns = ServoColumns(
         log.t, log.q, log.conditions["command"], None if on is None else np.broadcast_to(on, log.q.shape), None, ()
     )
-    return Joints(
-        _links(scenario.robot, scenario.payload),
-        tuple(servos),
-        (JointsLog("the log", columns, tuple(servo.kp for servo in servos)),),
-    )
+    robot = _links(scenario.robot, scenario.payload)
+    return Joints(robot, tuple(servos), (JointsLog("the log", columns, tuple(servo.kp for servo in servos), robot),))
 
 
 @cache

@@ -3,6 +3,7 @@
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, final
 
@@ -18,6 +19,9 @@ GAIN_UNITS = {"1/rad": 1.0, "1/deg": 180 / np.pi, "1/count": 0.0}
 KEYS = ("model", "gain_unit", *(field.name for field in fields(Servo)))
 """What a servo may state."""
 
+ROBOT = "robot"
+"""What a log may state beside: the robot, links and load, that it is of."""
+
 
 @final
 @dataclass(frozen=True)
@@ -31,12 +35,16 @@ class ServoFile:
     joints : mapping of str to mapping
         What holds for one joint alone, by its name.
     logs : mapping of str to mapping
-        What holds for one log alone, by the name of its file: kp.
+        What holds for some logs alone, by the name of the file or a pattern (* for any letters): kp, or the robot that carried
+        another load.
+    folder : Path
+        Where the file is: robots of logs are named from there.
     """
 
     stated: Mapping[str, Any]
     joints: Mapping[str, Mapping[str, Any]]
     logs: Mapping[str, Mapping[str, Any]]
+    folder: Path = Path()
 
     @classmethod
     def read(cls, path: Path) -> "ServoFile":
@@ -54,9 +62,10 @@ class ServoFile:
         try:
             stated = tomllib.loads(path.read_text(encoding="utf-8"))
             joints, logs = stated.pop("joints", {}), stated.pop("logs", {})
-            made = cls(stated, joints, logs)
-            for part in (stated, *joints.values(), *logs.values()):
+            made = cls(stated, joints, logs, path.absolute().parent)
+            for part in (stated, *joints.values(), *({k: x for k, x in each.items() if k != ROBOT} for each in logs.values())):
                 _require_known(part)
+            _require_names(logs)
             made.servo("", "")
         except OSError as error:
             raise SettingError(f"cannot read {path}: {error.strerror or error}") from error
@@ -66,7 +75,8 @@ class ServoFile:
 
     def servo(self, joint: str, log: str) -> Servo:
         """Return the servo of a joint in a log."""
-        stated = {**self.stated, **self.joints.get(joint, {}), **self.logs.get(log, {})}
+        stated = {**self.stated, **self.joints.get(joint, {}), **self._of_log(log)}
+        stated.pop(ROBOT, None)
         model, unit = stated.pop("model", None), stated.pop("gain_unit", "1/rad")
         if model is not None:
             if model not in PUBLISHED:
@@ -79,6 +89,21 @@ class ServoFile:
         counts = stated.get("counts", Servo.counts)
         stated["gain"] *= GAIN_UNITS[unit] or counts / (2 * np.pi)
         return Servo(**stated)
+
+    def robot(self, log: str) -> str | None:
+        """Return the robot that a log is of, if that is stated: its name, or the path of its file."""
+        name = self._of_log(log).get(ROBOT)
+        return str(self.folder / name) if name and (self.folder / name).exists() else name
+
+    def _of_log(self, log: str) -> dict[str, Any]:
+        """Return what is stated of a log; later patterns go before earlier ones."""
+        return {key: x for pattern, part in self.logs.items() if fnmatchcase(log, pattern) for key, x in part.items()}
+
+
+def _require_names(logs: Mapping[str, Mapping[str, Any]]) -> None:
+    for pattern, part in logs.items():
+        if ROBOT in part and not isinstance(part[ROBOT], str):
+            raise IdentificationError(f'[logs."{pattern}"]: robot = {part[ROBOT]!r} must be the name of a robot or of its file')
 
 
 def _require_known(part: Mapping[str, Any]) -> None:

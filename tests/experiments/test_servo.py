@@ -293,3 +293,43 @@ def test_backlash_of_a_simulated_servo_is_found(idbench, tmp_path, degrees, seed
     # the loop of the file sees the rotor, which is within half the play
     summary = json.loads((tmp_path / "found" / "summary.json").read_text())
     assert summary["mujoco_error"]["log.parquet"]["swing"] < play
+
+
+@pytest.mark.thorough
+def test_logs_may_be_of_other_loads(bench, idbench, tmp_path):
+    """A heavier arm in one log: named, both logs have one servo; not named, no scale fits both."""
+    heavy = PENDULUM.replace('mass="0.6"', 'mass="1.2"')
+    (tmp_path / "heavy.xml").write_text(heavy)
+    text = with_servos(str(tmp_path / "heavy.xml"), {0: TRUTH}, tmp_path)
+    t, u = commands(6.0, 1, 5)
+    write(
+        tmp_path / "heavy-5.csv", t, replay(str(tmp_path / "heavy.xml"), text, tmp_path, Commands(t, u, [0]), u[0]), u, ["axis"]
+    )
+    plain = (bench / "servo.toml").read_text()
+    (tmp_path / "servo.toml").write_text(f'{plain}[logs."heavy*"]\nrobot = "heavy.xml"\n')
+    logs = ["servo", bench / "fit.csv", tmp_path / "heavy-5.csv", "--robot", bench / "pendulum.xml", "--friction", "coulomb"]
+    more = ["--servo", tmp_path / "servo.toml", "--validate", tmp_path / "heavy-5.csv", bench / "new.csv", "--json"]
+    code, out, err = idbench(*logs, *more, "--write-mjcf", "out.xml", "--out", "named")
+    assert code == 0, err
+    found = json.loads(out)
+    p = {name: entry["value"] for name, entry in found["joints"]["axis"].items()}
+    assert (p["a"], p["b"]) == pytest.approx((TRUTH.a, TRUTH.b), rel=0.02)
+    assert max(found["position_error"]["held out"]["axis"]) < 2 * COUNT
+    assert list(found["mujoco_error"]) == ["new.csv"]
+    assert "heavy-5.csv is of another robot than the file that was written" in str(found["warnings"])
+    more[1] = bench / "servo.toml"
+    code, _, err = idbench(*logs, *more, "--out", "unnamed")
+    assert code != 0
+    assert "scale together" in err
+
+
+@pytest.mark.parametrize(
+    ("robot", "said"),
+    [("'other.xml'", "the joints of"), ("3", "robot = 3 must be the name of a robot"), ("'none.xml'", "none.xml")],
+)
+def test_the_robot_of_a_log_has_the_same_joints(bench, idbench, tmp_path, robot, said):
+    (tmp_path / "other.xml").write_text(PENDULUM.replace('name="axis"', 'name="wheel"'))
+    (tmp_path / "servo.toml").write_text(f'{(bench / "servo.toml").read_text()}[logs."f*"]\nrobot = {robot}\n')
+    code, _, err = idbench("servo", bench / "fit.csv", "--robot", bench / "pendulum.xml", "--servo", tmp_path / "servo.toml")
+    assert code != 0
+    assert said in err

@@ -28,7 +28,7 @@ def arm():
     t = np.arange(0, 2, 0.01)
     q = 0.3 * np.sin(np.outer(t, 1 + np.arange(robot.n)))
     columns = ServoColumns(t, q, q, None, None, robot.joints)
-    return Joints(robot, (SERVO,) * robot.n, (JointsLog("one.csv", columns, (16.0,) * robot.n),))
+    return Joints(robot, (SERVO,) * robot.n, (JointsLog("one.csv", columns, (16.0,) * robot.n, robot),))
 
 
 def fit_of(joint):
@@ -94,7 +94,7 @@ def test_a_joint_that_slides_is_refused(tmp_path):
     robot = links(str(tmp_path / "cart.xml"), PLAIN)
     t = np.arange(0, 2, 0.01)
     q = np.zeros((len(t), robot.n)) + 0.1 * np.sin(t)[:, None]
-    log = JointsLog("one.csv", ServoColumns(t, q, q, None, None, robot.joints), (16.0,) * robot.n)
+    log = JointsLog("one.csv", ServoColumns(t, q, q, None, None, robot.joints), (16.0,) * robot.n, robot)
     found = dict(Joints(robot, (SERVO,) * robot.n, (log,)).identified(lambda j, servo, runs: fit_of(j)))
     assert "rail slides" in found[0]
     assert not isinstance(found[1], str)

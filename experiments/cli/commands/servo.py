@@ -147,7 +147,7 @@ def _recorded(servos: Servos, found: dict[str, ServoFit], audience: Audience | N
     from experiments.recording.servo_recording import record_servos
 
     path, log = next(iter(servos.logs.items()))
-    return record_servos(servos.links, path.stem, log, servos.simulated(found, path), audience)
+    return record_servos(servos.links_of(path), path.stem, log, servos.simulated(found, path), audience)
 
 
 def _folder(options: IdentifyServo) -> ResultsFolder | None:

@@ -1,0 +1,64 @@
+"""A set of torques and positions, as a benchmark identifies it."""
+
+import time
+from collections.abc import Callable
+from contextlib import chdir
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from experiments.benchmark.definition import FILE, IN_FOLDER, Definition
+from experiments.benchmark.for_tools import what_tools_read, write_for_tools
+from experiments.benchmark.row import row_of
+from experiments.benchmark.set_fit import SetFit
+from experiments.benchmark.tools import predictions
+from experiments.cli.app import parsed
+from experiments.cli.commands.identify import fit_of, loaded_logs
+from experiments.cli.commands.requests import read_options, request_of
+from experiments.cli.options.identify import Identify
+from experiments.errors import ExperimentError
+from experiments.identification.fit import Fit
+from experiments.identification.logs import Logs
+from experiments.identification.reading import file_of, read_as
+from experiments.identification.request import Request
+from identify import MotionLog
+from identify.judge.validation import split
+
+
+def identified(folder: Path, definition: Definition, out: Path) -> tuple[dict[str, Any], Callable[[Path], None]]:
+    """Return the row of a set, and what writes the files of other tools into a folder."""
+    with IN_FOLDER, chdir(folder):
+        made = _fitted(folder, definition)
+    row = row_of(made, lambda held_out: predictions(out, len(held_out)))
+    return {**row, "tools_read": what_tools_read(made)}, partial(write_for_tools, made)
+
+
+def _fitted(folder: Path, definition: Definition) -> SetFit:
+    begin = time.perf_counter()
+    held_out = ["--validate", *definition.held_out] if definition.held_out else []
+    command = parsed(["identify", *definition.fit, *definition.words, *held_out])
+    if not isinstance(command, Identify) or command.log != tuple(map(Path, definition.fit)):
+        raise ExperimentError(f"{FILE}: options = {definition.options!r:.60} must be options of `idbench identify`, no logs")
+    fit = fit_of(*_held_out(*loaded_logs(command, request_of(command, {}), {})))
+    seconds = time.perf_counter() - begin
+    return SetFit(definition, fit, lambda: _repeated(folder, command, fit, definition), seconds)
+
+
+def _held_out(request: Request, logs: Logs) -> tuple[Request, Logs]:
+    """Return logs of which some are held out: where none are named, the last quarter of the longest."""
+    if logs.held_out:
+        return request, logs
+    k = logs.longest
+    rest, end = split(logs.fitted[k])
+    fitted = (*logs.fitted[:k], rest, *logs.fitted[k + 1 :])
+    return request, replace(logs, fitted=fitted, held_out={f"the last quarter of {logs.name(k)}": end})
+
+
+def _repeated(folder: Path, command: Identify, fit: Fit, definition: Definition) -> dict[str, MotionLog]:
+    """Return the logs that are fitted one by one, with the delay of the fit."""
+    if len(definition.every_repeat) < 2:
+        return {}
+    torque, first = fit.logs.fitted[0].torque, file_of(folder / definition.fit[0])
+    options = replace(read_options(command), delay=str(torque.delay), fallback=replace(torque, gain=1.0))
+    return {name: read_as(first, file_of(folder / name), options, fit.request).longest for name in definition.every_repeat}

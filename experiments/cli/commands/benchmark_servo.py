@@ -1,0 +1,99 @@
+"""A set of servos, as a benchmark identifies it: positions of held-out logs, simulated from their commands alone."""
+
+import time
+from collections.abc import Callable, Mapping
+from contextlib import chdir
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.benchmark.definition import FILE, IN_FOLDER, Definition
+from experiments.cli.app import parsed
+from experiments.cli.commands.servo_inputs import held_of, servos_of
+from experiments.cli.options.servo import IdentifyServo
+from experiments.errors import ExperimentError
+from experiments.results.summaries import finite
+from experiments.servo.identification import Servos, summary_of
+from experiments.servo.servo_text import verdicts
+from identify import Array
+from identify.servo import ServoFit
+from identify.servo.choice import FrictionChoice
+
+
+def servos_identified(folder: Path, definition: Definition, out: Path) -> tuple[dict[str, Any], Callable[[Path], None]]:
+    """Return the row of a set, and what writes the files of other tools into a folder: nothing."""
+    del out
+    if not definition.held_out and len(definition.fit) < 2:
+        raise ExperimentError(f"{FILE}: name a second log, or held_out: one alone says nothing of others")
+    begin = time.perf_counter()
+    with IN_FOLDER, chdir(folder):
+        command = _command(definition)
+        servos, others = servos_of(command)
+    assert others is not None
+    every = dict(servos.identified(command.friction, command.find, held_of(command, servos.links.joints)))
+    fits = {joint: found for joint, result in every.items() if isinstance(found := _fit(result), ServoFit)}
+    if not fits:
+        raise ExperimentError("; ".join(dict.fromkeys(map(str, every.values()))))
+    seconds = time.perf_counter() - begin
+    elsewhere = others.errors(fits)
+    row = {
+        "title": definition.title,
+        "joints": list(servos.links.joints),
+        "model": ", ".join(dict.fromkeys(fit.friction for fit in fits.values())),
+        "estimator": "output error",
+        "parameters": sum(len(fit.p) for fit in fits.values()),
+        "estimate": {joint: summary_of(fit) for joint, fit in fits.items()},
+        "seconds": seconds,
+        "logs": _logs(others, elsewhere, servos.links.joints),
+        "published": definition.published,
+        "notes": [f"{joint}: {why}" for joint, why in every.items() if isinstance(why, str)],
+        "verdict": None,
+        "verdicts": verdicts(fits, servos.errors(fits), elsewhere),
+        "repeats": {},
+        "free_run": _free_runs(others, fits, servos.links.joints),
+        "tools": {},
+    }
+    return row, _nothing
+
+
+def _nothing(folder: Path) -> None:
+    """Write no files: what other tools of servos read differs from tool to tool."""
+
+
+def _command(definition: Definition) -> IdentifyServo:
+    held_out = ["--validate", *definition.held_out] if definition.held_out else []
+    command = parsed(["servo", *definition.fit, *definition.words, *held_out])
+    if not isinstance(command, IdentifyServo) or command.log != tuple(map(Path, definition.fit)):
+        raise ExperimentError(f"{FILE}: options = {definition.options!r:.60} must be options of `idbench servo`, no logs")
+    return command
+
+
+def _fit(result: ServoFit | FrictionChoice | str) -> ServoFit | str:
+    return result.fit if isinstance(result, FrictionChoice) else result
+
+
+def _free_runs(servos: Servos, fits: Mapping[str, ServoFit], joints: tuple[str, ...]) -> list[dict[str, Any]]:
+    """Return the rms of the position error over the range of each joint, of each log, without spikes."""
+    found = []
+    runs = servos.runs_with(fits)
+    simulated = {joint: fit.simulate(runs[joint]) for joint, fit in fits.items()}
+    for k in range(len(servos.logs)):
+        nrmse = dict.fromkeys(joints, np.nan)
+        for joint, every in simulated.items():
+            run = runs[joint][k]
+            off = (run.q - every[k])[run.read_well]
+            span = float(np.ptp(run.q[run.read_well]))
+            nrmse[joint] = float(np.sqrt((off**2).mean())) / span if span > 0 else np.nan
+        found.append({"nrmse": [finite(x) for x in nrmse.values()]})
+    return found
+
+
+def _logs(servos: Servos, errors: Mapping[str, Array], joints: tuple[str, ...]) -> list[dict[str, Any]]:
+    """Return what the row says of each held-out log: the mean absolute error of the position of each joint [rad]."""
+    none = np.full(len(servos.logs), np.nan)
+    each = np.array([errors.get(joint, none) for joint in joints]).T
+    return [
+        {"title": servos.name(path), "position_error": [finite(x) for x in own], "samples_seen": 0}
+        for path, own in zip(servos.logs, each, strict=True)
+    ]
