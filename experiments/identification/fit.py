@@ -28,6 +28,7 @@ from identify import (
     attempt_each,
     encoder_steps,
 )
+from identify.estimators.settle import settled
 from identify.judge.friction_choice import FrictionChoice
 from identify.judge.lack_of_fit import Lack, lack_of_fit
 from identify.rows.rows import Rows
@@ -52,6 +53,9 @@ def fit(request: Request, logs: Logs) -> "Fit":
     if request.robot_model.laws.auto:
         with stage("laws of friction"):
             request, choice = chosen_friction(request, logs.fitted)
+        if logs.delay_sought and any(score.taken for score in choice.scores):
+            with stage("the delay of the torques"):
+                logs = logs.delayed(settled(request.problem(logs.fitted)).basis, request.processing)
     problem = request.problem(logs.fitted)
     (speeds, raised), hidden = suited_mask(problem), list[str]()
     if raised:

@@ -103,7 +103,7 @@ def with_held_out(loaded: Loaded, paths: Sequence[Path], options: ReadOptions, t
     Where nothing says what the torques of these mean, it is what those of the first log do.
     """
     known = loaded.read[0].channel  # as it was logged; its gain is of its own file
-    delay = str(known.delay) if options.delay else None
+    delay, sought = str(known.delay) if options.delay else None, options.delay == "estimate"
     options, held_out, said = replace(options, delay=delay, fallback=replace(known, gain=1.0)), {}, list[tuple[str, str]]()
     require_different(paths)
     for given in paths:
@@ -118,7 +118,7 @@ def with_held_out(loaded: Loaded, paths: Sequence[Path], options: ReadOptions, t
         if any(_within(one.longest, log) for log in loaded.logs()):
             raise ExperimentError(f"--validate {path} holds the motion that is identified: give another motion, or none")
         held_out[str(given)] = one.longest
-    return Logs(loaded.logs(), loaded.names, held_out, (*loaded.notes, *of_each(said)), truth)
+    return Logs(loaded.logs(), loaded.names, held_out, (*loaded.notes, *of_each(said)), truth, sought)
 
 
 def require_different(paths: Sequence[Path]) -> None:

@@ -1,9 +1,10 @@
 """The logs of an identification: those of the fit, those held out to judge it, and what was done to them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from identify import MotionLog
+from identify import Basis, Chain, IdentificationError, MotionLog
+from identify.judge.delay import DelayEstimate, estimate_delay
 from identify.rows.long_logs import is_long
 
 
@@ -23,6 +24,8 @@ class Logs:
         What was read, done and assumed.
     truth : mapping of str to float, optional
         The true parameters, where they are known.
+    delay_sought : bool
+        Whether the delay of the torques was estimated, and may be estimated again with more laws of friction.
     """
 
     fitted: tuple[MotionLog, ...]
@@ -30,6 +33,26 @@ class Logs:
     held_out: Mapping[str, MotionLog] | None = None
     notes: tuple[str, ...] = ()
     truth: Mapping[str, float] | None = None
+    delay_sought: bool = False
+
+    def delayed(self, basis: Basis, chain: Chain) -> "Logs":
+        """Return the logs with the delay that explains their torques best with other laws; as they are if there is none."""
+        found = dict[str, DelayEstimate]()
+        for meaning in dict.fromkeys(log.torque.meaning for log in self.fitted):
+            try:
+                found[meaning] = estimate_delay([log for log in self.fitted if log.torque.meaning == meaning], basis, chain)
+            except IdentificationError as error:
+                return replace(self, notes=(*self.notes, f"with the laws of friction that were chosen, {error}"))
+        said = ", ".join(f"{1e3 * each.delay:.4g} ms, sigma {1e3 * each.sigma:.2g} ms" for each in found.values())
+        first = next(iter(found.values()))
+        return replace(
+            self,
+            fitted=tuple(with_delay(log, found[log.torque.meaning]) for log in self.fitted),
+            held_out={
+                name: with_delay(log, found.get(log.torque.meaning, first)) for name, log in (self.held_out or {}).items()
+            },
+            notes=(*self.notes, f"torque delay with the laws of friction that were chosen: {said}"),
+        )
 
     @property
     def longest_name(self) -> str:
@@ -54,3 +77,8 @@ class Logs:
     def long(self) -> bool:
         """Whether they are too long for their rows to be kept."""
         return is_long(self.fitted)
+
+
+def with_delay(log: MotionLog, found: DelayEstimate) -> MotionLog:
+    """Return a log whose torques have a delay."""
+    return replace(log, torque=replace(log.torque, delay=found.delay))

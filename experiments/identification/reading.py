@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from experiments.errors import ExperimentError
+from experiments.identification.logs import with_delay
 from experiments.identification.read_options import ColumnOptions
 from experiments.identification.request import Request
 from experiments.option_types import Meaning
@@ -192,7 +193,7 @@ def with_delays(every: Sequence[ReadLog], request: Request) -> list[ReadLog]:
 
 
 def _delayed(read: ReadLog, found: DelayEstimate) -> ReadLog:
-    logs = tuple(replace(log, torque=replace(log.torque, delay=found.delay)) for log in read.logs)
+    logs = tuple(with_delay(log, found) for log in read.logs)
     sure = f"{1e3 * found.delay:.4g} ms, sigma {1e3 * found.sigma:.2g} ms (not in the sigmas above)"
     channel = replace(read.channel, delay=found.delay)
     return replace(read, logs=logs, channel=channel, notes=(*read.notes, f"torque delay estimated from the log: {sure}"))

@@ -1,5 +1,6 @@
 """A robot as identification sees it: a sum of column blocks."""
 
+from collections import Counter
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -47,13 +48,14 @@ class Basis:
 
     def __post_init__(self) -> None:
         every = [parameter for block in self.blocks for parameter in block.parameters(self.n)]
-        if twice := sorted({p.name for p in every if every.count(p) > 1}):
+        known = Counter(every)
+        if twice := sorted(p.name for p, count in known.items() if count > 1):
             raise SettingError(f"parameters {', '.join(twice)} come from two blocks: leave one of them out")
-        if unknown := [p.name for p in self.parameters if p not in every]:
+        if unknown := [p.name for p in self.parameters if p not in known]:
             raise SettingError(
                 f"no block has the parameters {', '.join(unknown)}; they have {', '.join(p.name for p in every)}"
             )
-        if twice := sorted({name for name in self.names if self.names.count(name) > 1}):
+        if twice := sorted(name for name, count in Counter(self.names).items() if count > 1):
             raise SettingError(f"two parameters are called {', '.join(twice)}: give one of them other letters")
 
     @cached_property
@@ -131,7 +133,7 @@ class Basis:
         rest = [parameter for parameter in self.parameters if parameter in nonlinear]
         return self.of(fixed), replace(self, held={}).of(rest)
 
-    @property
+    @cached_property
     def operating_point(self) -> dict[int, Array | float]:
         """Operating point of the nonlinear parameters, shape (...), by their places: their columns are derivatives there."""
         found = {parameter: value for block in self.blocks for parameter, value in block.operating_point(self.n).items()}
