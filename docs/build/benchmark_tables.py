@@ -58,6 +58,10 @@ def _rows() -> list[Row]:
     return found
 
 
+def _with_torques() -> list[Row]:
+    return [row for row in _rows() if row["percent"][OWN]]
+
+
 def overview() -> Iterator[str]:
     """Yield the table of the public sets."""
     head = [
@@ -75,13 +79,12 @@ def overview() -> Iterator[str]:
         [
             row["title"],
             str(row["joints"]),
-            f"{median(row['percent'][OWN]):.2g}",
-            f"{max(row['percent'][OWN]):.2g}",
-            f"{min(row['R2']):.3f}",
+            *(f"{of(row['percent'][OWN]):.2g}" if row["percent"][OWN] else "" for of in (median, max)),
+            f"{min(row['R2']):.3f}" if row["R2"] else "",
             f"{100 * row['agree']:.0f} %" if row["agree"] else "",
             "" if row["free_run"] is None else f"{row['free_run']:.2g}",
             f"{row['seconds'][OWN]:.0f}",
-            row["verdict"],
+            row["verdict"] or "",
         ]
         for row in _rows()
     )
@@ -90,7 +93,7 @@ def overview() -> Iterator[str]:
 
 def of_tools() -> Iterator[str]:
     """Yield errors of torque by tool, the median joint and the worst [%]."""
-    rows = _rows()
+    rows = _with_torques()
     head = ["set", *TOOLS.values()]
     yield from table(head, ([row["title"], *(_pair(row, tool) for tool in TOOLS)] for row in rows))
 
@@ -108,7 +111,7 @@ def _two(x: float) -> str:
 def seconds() -> Iterator[str]:
     """Yield the seconds of a fit by tool."""
     head = ["set", *TOOLS.values()]
-    rows = ([row["title"], *(f"{row['seconds'].get(tool, float('nan')):.2g}" for tool in TOOLS)] for row in _rows())
+    rows = ([row["title"], *(f"{row['seconds'].get(tool, float('nan')):.2g}" for tool in TOOLS)] for row in _with_torques())
     yield from table(head, rows)
 
 

@@ -19,6 +19,7 @@ from estimator_tables import compared, compared_in_birdys_shape
 from excitation_tables import coarse, criteria, foretold, motions, ranks
 from results import DOCS, RESULTS, Cell, Column, by_settings, cells, coverage, keep, table, typical
 from reversal_tables import reversals
+from simulated_tables import SIMULATED_TABLES
 
 sys.path.insert(0, str(DOCS.parent))
 PAGES = ("answers.md", "any-arm.md", "estimators.md", "excitation.md", "noise.md", "appendix.md", "benchmark.md")
@@ -167,6 +168,7 @@ TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "estimators-unfiltered": compared("unfiltered"),
     "estimators-puma560": compared_in_birdys_shape,
     **BENCHMARK_TABLES,
+    **SIMULATED_TABLES,
 }
 
 if __name__ == "__main__":

@@ -2,17 +2,22 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from experiments.cli import main
 from experiments.errors import ExperimentError
 from experiments.identification.friction_laws import FrictionLaws
 from identify import OfJoints
 from identify.basis import StribeckFriction
+from identify.files.log_file import write_log
 from sim.engine.simulation import simulate
-from sim.scenario.scenario_file import from_dict
+from sim.frictions import LoadDependent
+from sim.scenario.scenario_file import from_dict, load
+from sim.trajectories import RandomMoves
 
 JOINTS = ("hip", "knee")
 
@@ -145,3 +150,23 @@ def test_hysteresis_is_seen(tmp_path):
 
     found = identify(run.alone(), scara(), ExplicitModel())
     assert 0.3 < found.X[2] < 0.51
+
+
+@pytest.mark.thorough
+def test_the_delay_is_that_of_the_laws_that_were_chosen(tmp_path, capsys):
+    """Friction with load that is not in the model moves the delay by milliseconds; that in the model does not."""
+    plain, late = load("ideal"), 0.005
+    moves = RandomMoves(moves=12, durations=(0.8, 1.4), rest=0.2)
+    log = simulate(replace(plain, trajectory=moves, friction=LoadDependent(share=0.1), fs=250.0)).alone()
+    delayed = CubicSpline(log.t, log.tau)(np.maximum(log.t - late, log.t[0]))
+    write_log(replace(log, tau=delayed), tmp_path / "log.parquet")
+    words = ["identify", str(tmp_path / "log.parquet"), "--robot", "scara", "--torque-delay", "estimate", "--model", "explicit"]
+    assert main([*words, "--friction", "auto", "--json", "--no-rerun"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    first, then = (
+        float(re.search(rf"{start}: ([-+.\de]+) ms", " ".join(found["notes"]))[1]) / 1e3
+        for start in ("estimated from the log", "that were chosen")
+    )
+    assert found["torque"]["delay"] == pytest.approx(then, abs=1e-6)
+    assert abs(first + late) > 1e-3
+    assert abs(then + late) < 2e-4
