@@ -32,7 +32,7 @@ def row_of(made: SetFit, predicted: Callable[[Sequence[HeldOut]], list[Predicted
         "parameters": len(fit.basis.names),
         "estimate": _estimate(fit),
         "seconds": made.seconds,
-        "logs": [_log(one, fit) for one in judgement.on],
+        "logs": _logs(judgement.on, made),
         "published": definition.published,
         "notes": list(fit.logs.notes),
     }
@@ -57,6 +57,16 @@ def _estimate(fit: Fit) -> dict[str, list[Any]]:
         "sigma": [finite(x) for x in np.sqrt(np.diagonal(found.covariance))],
         "filed": [finite(filed[name]) if name in filed else None for name in fit.basis.names],
     }
+
+
+def _logs(on: Sequence[HeldOut | Unjudged], made: SetFit) -> list[dict[str, Any]]:
+    """Return what the row says of each log, with the samples of it that the fit has seen."""
+    found, names = [_log(one, made.fit) for one in on], list(made.fit.logs.held_out or {})
+    for name, count in made.seen().items():
+        for log, own in zip(found, names, strict=False):
+            if own == name and "samples_seen" in log:
+                log["samples_seen"] = max(log["samples_seen"], count)
+    return found
 
 
 def _log(one: HeldOut | Unjudged, fit: Fit) -> dict[str, Any]:

@@ -22,6 +22,8 @@ class SetFit:
         Its fit.
     repeated : callable
         Reads the logs that are fitted one by one, by name.
+    seen : callable
+        Counts samples that files of the fit have too, by the name of the held-out file, before any were resampled.
     seconds : float
         How long reading and fitting took.
     """
@@ -29,4 +31,5 @@ class SetFit:
     definition: Definition
     fit: Fit
     repeated: Callable[[], Mapping[str, MotionLog]]
+    seen: Callable[[], Mapping[str, int]]
     seconds: float

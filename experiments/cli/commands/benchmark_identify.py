@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 from contextlib import chdir
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,9 +20,10 @@ from experiments.cli.options.identify import Identify
 from experiments.errors import ExperimentError
 from experiments.identification.fit import Fit
 from experiments.identification.logs import Logs
-from experiments.identification.reading import file_of, read_as
+from experiments.identification.reading import ReadLog, file_of, read_as
 from experiments.identification.request import Request
 from identify import MotionLog
+from identify.judge.leaks import seen
 from identify.judge.validation import split
 
 
@@ -42,7 +43,8 @@ def _fitted(folder: Path, definition: Definition) -> SetFit:
         raise ExperimentError(f"{FILE}: options = {definition.options!r:.60} must be options of `idbench identify`, no logs")
     fit = fit_of(*_held_out(*loaded_logs(command, request_of(command, {}), {})))
     seconds = time.perf_counter() - begin
-    return SetFit(definition, fit, lambda: _repeated(folder, command, fit, definition), seconds)
+    again = _Again(folder, command, fit, definition)
+    return SetFit(definition, fit, again.repeated, again.seen, seconds)
 
 
 def _held_out(request: Request, logs: Logs) -> tuple[Request, Logs]:
@@ -55,10 +57,28 @@ def _held_out(request: Request, logs: Logs) -> tuple[Request, Logs]:
     return request, replace(logs, fitted=fitted, held_out={f"the last quarter of {logs.name(k)}": end})
 
 
-def _repeated(folder: Path, command: Identify, fit: Fit, definition: Definition) -> dict[str, MotionLog]:
-    """Return the logs that are fitted one by one, with the delay of the fit."""
-    if len(definition.every_repeat) < 2:
-        return {}
-    torque, first = fit.logs.fitted[0].torque, file_of(folder / definition.fit[0])
-    options = replace(read_options(command), delay=str(torque.delay), fallback=replace(torque, gain=1.0))
-    return {name: read_as(first, file_of(folder / name), options, fit.request).longest for name in definition.every_repeat}
+@dataclass(frozen=True)
+class _Again:
+    """Reads the files of a set again, as its fit did."""
+
+    folder: Path
+    command: Identify
+    fit: Fit
+    definition: Definition
+
+    def repeated(self) -> dict[str, MotionLog]:
+        """Return the logs that are fitted one by one, with the delay of the fit."""
+        names = self.definition.every_repeat
+        return {name: self._read(name).longest for name in names} if len(names) > 1 else {}
+
+    def seen(self) -> dict[str, int]:
+        """Return how many samples of each held-out file are in fitted ones, too."""
+        if not self.definition.held_out:
+            return {}
+        fitted = [self._read(name).columns for name in self.definition.fit]
+        return {name: seen(self._read(name).columns, fitted) for name in self.definition.held_out}
+
+    def _read(self, name: str) -> ReadLog:
+        torque, first = self.fit.logs.fitted[0].torque, file_of(self.folder / self.definition.fit[0])
+        options = replace(read_options(self.command), delay=str(torque.delay), fallback=replace(torque, gain=1.0))
+        return read_as(first, file_of(self.folder / name), options, self.fit.request)

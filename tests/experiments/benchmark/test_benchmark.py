@@ -93,6 +93,25 @@ def test_samples_that_the_fit_has_seen_are_counted(scara_set, scara_logs, tmp_pa
     assert "are also in the fitted logs" in capfd.readouterr().out
 
 
+def test_samples_are_counted_before_they_are_resampled(scara_set, scara_logs, tmp_path, monkeypatch):
+    """Files with gaps, whose samples are put on another clock: those of one are a part of the other."""
+    monkeypatch.chdir(tmp_path)
+    rng = np.random.default_rng(0)
+    for name, log in zip(("one", "two", "new"), (scara_logs[0], scara_logs[1], scara_logs[0]), strict=True):
+        kept = rng.random(log.samples) < 0.9
+        kept[: 0 if name != "new" else log.samples // 2] = False
+        rows = np.column_stack([log.t + rng.uniform(0, 1e-4, log.samples), log.q, log.tau])[kept]
+        head = "t,q1,q2,tau1,tau2"
+        np.savetxt(scara_set / f"{name}.csv", rows, delimiter=",", header=head, comments="")
+    text = (scara_set / "benchmark.toml").read_text().replace(".parquet", ".csv")
+    more = "--robot scara --torque held --torque-delay 0 --resample"
+    (scara_set / "benchmark.toml").write_text(text.replace("--robot scara", more))
+    assert main(["benchmark", "arm", "--out", "found"]) == 0
+    log = row_of(tmp_path / "found")["logs"][0]
+    # Nine tenths of the rows of each are kept, by chance: four fifths are in both.
+    assert log["samples_seen"] > 0.3 * scara_logs[0].samples
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
