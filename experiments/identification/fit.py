@@ -37,6 +37,9 @@ from identify.telling import stage
 NOTHING = 1e-12
 """Share of a torque's squares below which its variance is rounding."""
 
+TURNS = 3
+"""How often laws of friction and delay are found in turns, at most."""
+
 Outcomes = dict[str, Estimate | IdentificationError]
 """The estimate of every model, or why it has none."""
 
@@ -51,11 +54,7 @@ def fit(request: Request, logs: Logs) -> "Fit":
     """
     choice = None
     if request.robot_model.laws.auto:
-        with stage("laws of friction"):
-            request, choice = chosen_friction(request, logs.fitted)
-        if logs.delay_sought and any(score.taken for score in choice.scores):
-            with stage("the delay of the torques"):
-                logs = logs.delayed(settled(request.problem(logs.fitted)).basis, request.processing)
+        request, logs, choice = _chosen(request, logs)
     problem = request.problem(logs.fitted)
     (speeds, raised), hidden = suited_mask(problem), list[str]()
     if raised:
@@ -74,6 +73,23 @@ def fit(request: Request, logs: Logs) -> "Fit":
     if not found.estimates and isinstance(leading, IdentificationError):
         raise _with_its_cause(found, leading)
     return replace(found, choice=choice, hidden=tuple(hidden), raised=raised)
+
+
+def _chosen(request: Request, logs: Logs) -> tuple[Request, Logs, FrictionChoice]:
+    """Return a request with the laws of friction that suit the logs, and these with the delay that goes with the laws.
+
+    Friction that is not in the model moves the delay, and a delay that is off hides friction: both are found in turns.
+    """
+    for _ in range(TURNS):
+        with stage("laws of friction"):
+            chosen, choice = chosen_friction(request, logs.fitted)
+        if not logs.delay_sought or not any(score.taken for score in choice.scores):
+            break
+        with stage("the delay of the torques"):
+            logs, moved = logs.delayed(settled(chosen.problem(logs.fitted)).basis, request.processing)
+        if not moved:
+            break
+    return chosen, logs, choice
 
 
 def _with_its_cause(found: "Fit", error: IdentificationError) -> IdentificationError:

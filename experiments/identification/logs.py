@@ -7,6 +7,8 @@ from identify import Basis, Chain, IdentificationError, MotionLog
 from identify.judge.delay import DelayEstimate, estimate_delay
 from identify.rows.long_logs import is_long
 
+WITH_LAWS = "torque delay with the laws of friction that were chosen"
+
 
 @dataclass(frozen=True, eq=False)
 class Logs:
@@ -35,24 +37,34 @@ class Logs:
     truth: Mapping[str, float] | None = None
     delay_sought: bool = False
 
-    def delayed(self, basis: Basis, chain: Chain) -> "Logs":
-        """Return the logs with the delay that explains their torques best with other laws; as they are if there is none."""
+    def delayed(self, basis: Basis, chain: Chain) -> tuple["Logs", bool]:
+        """Return the logs with the delay that explains their torques best with other laws, and whether it moved by a sigma.
+
+        As they are if there is none.
+        """
         found = dict[str, DelayEstimate]()
         for meaning in dict.fromkeys(log.torque.meaning for log in self.fitted):
             try:
                 found[meaning] = estimate_delay([log for log in self.fitted if log.torque.meaning == meaning], basis, chain)
             except IdentificationError as error:
-                return replace(self, notes=(*self.notes, f"with the laws of friction that were chosen, {error}"))
+                return replace(self, notes=(*self._notes, f"{WITH_LAWS}: {error}")), False
         said = ", ".join(f"{1e3 * each.delay:.4g} ms, sigma {1e3 * each.sigma:.2g} ms" for each in found.values())
         first = next(iter(found.values()))
-        return replace(
+        moved = any(abs(log.torque.delay - (of := found[log.torque.meaning]).delay) > of.sigma for log in self.fitted)
+        delayed = replace(
             self,
             fitted=tuple(with_delay(log, found[log.torque.meaning]) for log in self.fitted),
             held_out={
                 name: with_delay(log, found.get(log.torque.meaning, first)) for name, log in (self.held_out or {}).items()
             },
-            notes=(*self.notes, f"torque delay with the laws of friction that were chosen: {said}"),
+            notes=(*self._notes, f"{WITH_LAWS}: {said}"),
         )
+        return delayed, moved
+
+    @property
+    def _notes(self) -> tuple[str, ...]:
+        """What was noted but for delays with other laws."""
+        return tuple(note for note in self.notes if not note.startswith(WITH_LAWS))
 
     @property
     def longest_name(self) -> str:
