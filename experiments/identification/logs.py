@@ -7,6 +7,9 @@ from identify import Basis, Chain, IdentificationError, MotionLog
 from identify.judge.delay import DelayEstimate, estimate_delay
 from identify.rows.long_logs import is_long
 
+LEAST = 0.05
+"""Share of a sample by which a delay must move to matter."""
+
 WITH_LAWS = "torque delay with the laws of friction that were chosen"
 
 
@@ -50,7 +53,7 @@ class Logs:
                 return replace(self, notes=(*self._notes, f"{WITH_LAWS}: {error}")), False
         said = ", ".join(f"{1e3 * each.delay:.4g} ms, sigma {1e3 * each.sigma:.2g} ms" for each in found.values())
         first = next(iter(found.values()))
-        moved = any(abs(log.torque.delay - (of := found[log.torque.meaning]).delay) > of.sigma for log in self.fitted)
+        moved = any(_moved(log, found[log.torque.meaning]) for log in self.fitted)
         delayed = replace(
             self,
             fitted=tuple(with_delay(log, found[log.torque.meaning]) for log in self.fitted),
@@ -89,6 +92,10 @@ class Logs:
     def long(self) -> bool:
         """Whether they are too long for their rows to be kept."""
         return is_long(self.fitted)
+
+
+def _moved(log: MotionLog, found: DelayEstimate) -> bool:
+    return abs(log.torque.delay - found.delay) > max(found.sigma, LEAST / log.fs)
 
 
 def with_delay(log: MotionLog, found: DelayEstimate) -> MotionLog:
