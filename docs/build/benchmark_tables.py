@@ -111,7 +111,7 @@ def _two(x: float) -> str:
 def seconds() -> Iterator[str]:
     """Yield the seconds of a fit by tool."""
     head = ["set", *TOOLS.values()]
-    rows = ([row["title"], *(f"{row['seconds'].get(tool, float('nan')):.2g}" for tool in TOOLS)] for row in _with_torques())
+    rows = ([row["title"], *(_two(row["seconds"].get(tool, float("nan"))) for tool in TOOLS)] for row in _with_torques())
     yield from table(head, rows)
 
 
