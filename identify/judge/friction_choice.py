@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
+from identify.basis.basis import Basis
 from identify.basis.block import AbstractBlock
 from identify.basis.friction.shape import ShapedFriction
 from identify.basis.friction.smooth_coulomb import TanhFriction
@@ -192,11 +194,22 @@ class _Choice:
         self, laws: Sequence[tuple[str, ...]], candidates: Mapping[str, AbstractBlock], gone: Sequence[str] = ()
     ) -> LawSearch:
         """Return the comparison of further laws, beside these with their own shapes, without some parameters."""
+        key = tuple(laws), tuple(gone)
+        if key not in self._settled:
+            self._settled[key] = settled(self.problem.with_basis(self._basis(laws, gone)))
+        return LawSearch(HeldOut.of(self._settled[key], candidates))
+
+    @cached_property
+    def _settled(self) -> dict[tuple[tuple[tuple[str, ...], ...], tuple[str, ...]], Problem]:
+        """Problems by the laws of each joint and what they are without: some are asked for several times."""
+        return {}
+
+    def _basis(self, laws: Sequence[tuple[str, ...]], gone: Sequence[str]) -> Basis:
         basis = self.problem.basis.without(*gone) if gone else self.problem.basis
         for name in dict.fromkeys(name for own in laws for name in own):
             joints = tuple(j for j, own in enumerate(laws) if name in own)
             basis = basis + OfJoints(self.candidates[name], joints)
-        return LawSearch(HeldOut.of(settled(self.problem.with_basis(basis)), candidates))
+        return basis
 
 
 def _worth(score: LawScore) -> bool:
