@@ -2,16 +2,22 @@
 
 import json
 import os
-from hashlib import file_digest
+from functools import cache
+from hashlib import file_digest, sha256
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import experiments
+import identify
+import sim
 from experiments.benchmark.definition import Definition
 from experiments.benchmark.tools import PREDICTED
 from experiments.errors import ExperimentError
 from identify.files.layout import LogLayout
+
+PACKAGES = (identify, sim, experiments)
 
 BESIDE = (".toml", ".urdf", ".xml")
 """What names of files end with that may say something of a set."""
@@ -41,7 +47,17 @@ def made_of_files(folder: Path, definition: Definition, out: Path) -> dict[str, 
     found = {os.path.relpath(path, folder): _digest(path) for path in files_of(folder, definition)}
     found |= {path.name: _digest(path) for path in sorted(out.glob(PREDICTED))}
     solver = "with Clarabel" if find_spec("clarabel") else "without Clarabel"
-    return {"idbench": version("idbench"), "consistent bodies": solver, **found}
+    return {"idbench": version("idbench"), "code": _code(), "consistent bodies": solver, **found}
+
+
+@cache
+def _code() -> str:
+    """Return a digest of what makes a row: between two releases it changes, too."""
+    found = sha256()
+    for package in PACKAGES:
+        for path in sorted(Path(package.__path__[0]).rglob("*.py")):
+            found.update(path.read_bytes())
+    return found.hexdigest()
 
 
 def _digest(path: Path) -> str:

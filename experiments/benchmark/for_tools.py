@@ -81,8 +81,7 @@ def prepared(log: MotionLog) -> dict[str, Array]:
 def own_torques(held_out: HeldOut) -> Array:
     """Return the torques that our own fit predicts at the samples of a log, shape (time, joint) [N m]."""
     fit, state = held_out.fit, held_out.problem.chain.signals(held_out.log).state
-    X = fit.estimates[fit.leading].X.copy()
-    X[list(fit.basis.operating_point)] = 0.0  # sizes of laws are those at their shapes
+    X = fit.estimates[fit.leading].X
     return combined(fit.basis.explicit(state), X, np.zeros(state.q.shape)).T
 
 

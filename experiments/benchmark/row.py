@@ -1,7 +1,8 @@
 """One set: its fit, judged on every held-out log, and beside it all that the protocol asks for."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from experiments.benchmark.free_runs import free_runs
 from experiments.benchmark.repeats import repeats
 from experiments.benchmark.set_fit import SetFit
-from experiments.benchmark.tools import Predicted, judged
+from experiments.benchmark.tools import judged
 from experiments.faults import is_told, reason
 from experiments.identification.fit import Fit
 from experiments.identification.held_out import HeldOut
@@ -19,8 +20,8 @@ from experiments.results.summaries import finite
 from identify.judge.leaks import seen
 
 
-def row_of(made: SetFit, predicted: Callable[[Sequence[HeldOut]], list[Predicted]]) -> dict[str, Any]:
-    """Return the row of a set; a part that fails has its reason in its place."""
+def row_of(made: SetFit, predicted: Mapping[str, Path]) -> dict[str, Any]:
+    """Return the row of a set, with what tools have predicted; a part that fails has its reason in its place."""
     fit, definition = made.fit, made.definition
     judgement, begin = judge(fit), time.perf_counter()
     there = [one for one in judgement.on if isinstance(one, HeldOut)]
@@ -41,8 +42,8 @@ def row_of(made: SetFit, predicted: Callable[[Sequence[HeldOut]], list[Predicted
     if definition.free_run:
         row["free_run"] = [_attempted(lambda: free_runs(one, fit.leading, definition.free_run)) for one in there]  # noqa: B023
     row["tools"] = {
-        tool.tool: _attempted(lambda: judged(there, tool))  # noqa: B023  # called at once
-        for tool in (predicted(there) if len(there) == len(judgement.on) else [])
+        tool: _attempted(lambda: judged(there, path))  # noqa: B023  # called at once
+        for tool, path in (predicted if len(there) == len(judgement.on) else {}).items()
     }
     row["seconds_of_judging"] = time.perf_counter() - begin
     return row

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, final
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -24,8 +25,6 @@ class Predicted:
 
     Parameters
     ----------
-    tool : str
-        Its name.
     torques : tuple of Array, each of shape (time, joint)
         Torques at the samples of each held-out log [N m].
     seconds : float
@@ -34,32 +33,40 @@ class Predicted:
         Its settings, and what else is to be known.
     """
 
-    tool: str
     torques: tuple[Array, ...]
     seconds: float
     note: str
 
 
-def predictions(folder: Path, count: int) -> list[Predicted]:
-    """Return what tools have left in the folder of a set's results; raise ExperimentError if a file is none.
+def predictions(folder: Path) -> dict[str, Path]:
+    """Return the files that tools have left in the folder of a set's results, by the names of the tools.
 
     A file `predicted-TOOL.npz` has `held_out1`, `held_out2`, ..., and `seconds` and `note` if it has them.
     """
-    found = []
-    for path in sorted(folder.glob(PREDICTED)):
-        try:
-            with np.load(path) as file:
-                torques = tuple(np.asarray(file[f"held_out{k + 1}"], dtype=float) for k in range(count))
-                seconds = float(file["seconds"]) if "seconds" in file else float("nan")
-                note = str(file["note"]) if "note" in file else ""
-        except (OSError, KeyError, ValueError) as error:
-            raise ExperimentError(f"{path} must have held_out1 to held_out{count}, torques of each log: {error}") from error
-        found.append(Predicted(path.stem.partition("-")[2], torques, seconds, note))
-    return found
+    return {path.stem.partition("-")[2]: path for path in sorted(folder.glob(PREDICTED))}
 
 
-def judged(held_out: Sequence[HeldOut], predicted: Predicted) -> dict[str, Any]:
-    """Return what a summary says of a tool: the residual torque of each log, on the rows on which ours is judged."""
+def _read(path: Path, count: int) -> Predicted:
+    """Return what a tool has predicted; raise ExperimentError if its file does not have it."""
+    try:
+        with np.load(path) as file:
+            torques = tuple(np.asarray(file[f"held_out{k + 1}"], dtype=float) for k in range(count))
+            seconds = float(file["seconds"]) if "seconds" in file else float("nan")
+            return Predicted(torques, seconds, str(file["note"]) if "note" in file else "")
+    except (OSError, KeyError, ValueError, TypeError, EOFError, BadZipFile) as error:
+        names = " and ".join(dict.fromkeys(("held_out1", f"held_out{count}")))
+        raise ExperimentError(f"{path.name} must have {names}, torques of each log: {error}") from error
+
+
+def judged(held_out: Sequence[HeldOut], path: Path) -> dict[str, Any]:
+    """Return what a summary says of a tool: the residual torque of each log, on the rows on which ours is judged.
+
+    Raises
+    ------
+    ExperimentError
+        If its file is none.
+    """
+    predicted = _read(path, len(held_out))
     return {
         "seconds": finite(predicted.seconds),
         "note": predicted.note,
@@ -69,8 +76,10 @@ def judged(held_out: Sequence[HeldOut], predicted: Predicted) -> dict[str, Any]:
 
 def _judged(held_out: HeldOut, tau: Array) -> dict[str, Any]:
     log = held_out.log
-    if tau.shape != log.tau.shape or not np.isfinite(tau).all():
-        return {"failure": f"torques of the shape {tau.shape}, of a log of {log.tau.shape}, or not all finite"}
+    if tau.shape != log.tau.shape:
+        return {"failure": f"torques of the shape {tau.shape}, of a log of {log.tau.shape}"}
+    if not np.isfinite(tau).all():
+        return {"failure": f"{np.count_nonzero(~np.isfinite(tau))} torques are not finite"}
     as_logged = at_times(log.t + acting(log.torque, log.fs), log.t, tau)
     left = replace(log, tau=log.tau * np.asarray(log.torque.gain) - as_logged, torque=replace(log.torque, gain=1.0))
     plain = held_out.fit.robot_model.plain.basis

@@ -84,4 +84,4 @@ class Written:
     def lost(self) -> dict[str, float]:
         """Standard parameters that have no place in the file, and their values."""
         known = standard_parameters(self.fit.robot_model.robot)
-        return {name: value for name, value in self.values.items() if name not in known}
+        return {name: value for name, value in self.values.items() if name not in known and value}

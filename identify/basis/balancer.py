@@ -46,6 +46,8 @@ class Balancer(AbstractConservativeBlock):
     def __post_init__(self) -> None:
         require_positive(a=self.a, b=self.b, kappa=self.kappa, volume=1.0 if self.volume is None else self.volume)
         require_finite(zero=self.zero)
+        if self.a == self.b:
+            raise SettingError(f"a = b = {self.a:g} m: the ends of a balancer do not meet")
         if self.volume is not None and self.volume <= (stroke := 2 * min(self.a, self.b)):
             raise SettingError(f"volume = {self.volume:g} m must be longer than the stroke of a whole turn, {stroke:g} m")
 

@@ -31,7 +31,7 @@ def identified(folder: Path, definition: Definition, out: Path) -> tuple[dict[st
     """Return the row of a set, and what writes the files of other tools into a folder."""
     with IN_FOLDER, chdir(folder):
         made = _fitted(folder, definition)
-    row = row_of(made, lambda held_out: predictions(out, len(held_out)))
+    row = row_of(made, predictions(out))
     return {**row, "tools_read": what_tools_read(made)}, partial(write_for_tools, made)
 
 

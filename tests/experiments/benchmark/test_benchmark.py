@@ -67,6 +67,27 @@ def test_torques_of_other_tools_are_judged_on_the_same_rows(scara_set, scara_log
     assert "shape" in tools["short"]["logs"][0]["failure"]
 
 
+@pytest.mark.parametrize("friction", ["standard", "standard+arctan"])
+def test_own_torques_are_written_and_judged_alike(scara_set, tmp_path, monkeypatch, friction):
+    """Also of laws that are linear about an estimate, whose columns have a part that is known."""
+    monkeypatch.chdir(tmp_path)
+    text = (scara_set / "benchmark.toml").read_text()
+    (scara_set / "benchmark.toml").write_text(text.replace("--robot scara", f"--robot scara --friction {friction}"))
+    assert main(["benchmark", "arm", "--out", "found"]) == 0
+    out = tmp_path / "found" / "arm"
+    np.savez(out / "predicted-own.npz", held_out1=np.load(out / "held_out1.npz")["idbench"])
+    (out / "predicted-text.npz").write_text("no arrays")
+    np.savez(out / "predicted-empty.npz", seconds=1.0)
+    assert main(["benchmark", "arm", "--out", "found"]) == 0
+    row = row_of(tmp_path / "found")
+    own, level = (np.array(row["logs"][0][name]) for name in ("torque_error_rms", "torque_rms"))
+    again = np.array(row["tools"]["own"]["logs"][0]["torque_error_rms"])
+    # Torques go to the instants when they act and back, through splines.
+    np.testing.assert_allclose(again, own, atol=2e-3 * level.min())
+    for tool in ("text", "empty"):
+        assert "must have held_out1" in row["tools"][tool]["failure"]
+
+
 def test_without_held_out_logs_the_last_quarter_is(scara_set, scara_logs, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = (scara_set / "benchmark.toml").read_text()
