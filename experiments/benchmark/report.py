@@ -1,6 +1,6 @@
 """The page of a benchmark: one HTML file that needs no other."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -11,13 +11,14 @@ from experiments.reports.html import rendered, svg
 from experiments.style import JOINTS
 
 
-def report(rows: Sequence[Row]) -> str:
-    """Return the page of some rows."""
+def report(rows: Sequence[Row], failures: Mapping[str, str]) -> str:
+    """Return the page of some rows, and why other sets have none."""
     return rendered(
         "experiments.benchmark",
         "report.html.j2",
         heads=[head.replace("\n", " ") for head in HEADS],
         overview=list(overview(rows)),
+        failures=failures,
         figure=svg(errors_figure(rows)) if any(measure_of(row) is TORQUE for row in rows) else "",
         sets=[
             {

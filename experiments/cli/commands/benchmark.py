@@ -47,11 +47,12 @@ def benchmark(options: Benchmark) -> None:
             _show(page, {name: rows[name] for name in sets if name in rows})
         with whole.complete() as hidden:
             write_summary(hidden / "summary.json", page.found)
-        with Attempts(f"the table is printed, and in {out}", whole) as attempts:
+        there = "the table is printed, and in" if page.found["rows"] else "what failed is in"
+        with Attempts(f"{there} {out}", whole) as attempts:
             for name, made in rows.items():
                 if isinstance(made, str):
                     attempts.failed(name, made)
-            attempts.file("report.html", lambda: report(page.found["rows"]))
+            attempts.file("report.html", lambda: report(page.found["rows"], page.found["failures"]))
             page.print(Text(f"written to {out}: open {out / 'report.html'}"), soft_wrap=True)
 
 

@@ -167,6 +167,7 @@ def test_one_set_that_fails_leaves_the_others(scara_set, tmp_path, monkeypatch, 
     assert "broken" in captured.err
     assert row_of(tmp_path / "found")["verdict"] == "good"
     assert json.loads((tmp_path / "found" / "summary.json").read_text())["failures"].keys() == {"broken"}
+    assert "No row of broken" in (tmp_path / "found" / "report.html").read_text()
 
 
 def test_folders_that_are_no_sets_are_named(tmp_path, monkeypatch, complaint):
