@@ -70,16 +70,19 @@ async def state_of(port, address):
             pass
         return found["result"]
 
-    await call(1, "Page.navigate", url=address)
     end, number = time.monotonic() + PATIENCE, 2
     expression = "document.querySelector('[data-recording]')?.dataset.state ?? ''"
-    while time.monotonic() < end:
-        state = (await call(number, "Runtime.evaluate", expression=expression))["result"].get("value")
-        if state:
-            return state
-        number += 1
-        await asyncio.sleep(0.5)
-    return "late"
+    try:
+        await call(1, "Page.navigate", url=address)
+        while time.monotonic() < end:
+            state = (await call(number, "Runtime.evaluate", expression=expression))["result"].get("value")
+            if state:
+                return state
+            number += 1
+            await asyncio.sleep(0.5)
+        return "late"
+    finally:
+        browser.close()  # or it warns when it is collected, in the middle of another test
 
 
 def test_a_recording_opens_in_the_page(page, tmp_path):
