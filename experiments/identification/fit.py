@@ -7,7 +7,7 @@ from typing import Any, Self, final
 import numpy as np
 
 from experiments.identification.consistent_estimate import made_consistent
-from experiments.identification.friction_choice import chosen_friction
+from experiments.identification.friction_choice import chosen_in_turns
 from experiments.identification.lack import advice_on_lack
 from experiments.identification.logs import Logs
 from experiments.identification.request import Request
@@ -28,17 +28,12 @@ from identify import (
     attempt_each,
     encoder_steps,
 )
-from identify.estimators.settle import settled
 from identify.judge.friction_choice import FrictionChoice
 from identify.judge.lack_of_fit import Lack, lack_of_fit
 from identify.rows.rows import Rows
-from identify.telling import stage
 
 NOTHING = 1e-12
 """Share of a torque's squares below which its variance is rounding."""
-
-TURNS = 3
-"""How often laws of friction and delay are found in turns, at most."""
 
 Outcomes = dict[str, Estimate | IdentificationError]
 """The estimate of every model, or why it has none."""
@@ -54,7 +49,7 @@ def fit(request: Request, logs: Logs) -> "Fit":
     """
     choice = None
     if request.robot_model.laws.auto:
-        request, logs, choice = _chosen(request, logs)
+        request, logs, choice = chosen_in_turns(request, logs)
     problem = request.problem(logs.fitted)
     (speeds, raised), hidden = suited_mask(problem), list[str]()
     if raised:
@@ -73,23 +68,6 @@ def fit(request: Request, logs: Logs) -> "Fit":
     if not found.estimates and isinstance(leading, IdentificationError):
         raise _with_its_cause(found, leading)
     return replace(found, choice=choice, hidden=tuple(hidden), raised=raised)
-
-
-def _chosen(request: Request, logs: Logs) -> tuple[Request, Logs, FrictionChoice]:
-    """Return a request with the laws of friction that suit the logs, and these with the delay that goes with the laws.
-
-    Friction that is not in the model moves the delay, and a delay that is off hides friction: both are found in turns.
-    """
-    for _ in range(TURNS):
-        with stage("laws of friction"):
-            chosen, choice = chosen_friction(request, logs.fitted)
-        if not logs.delay_sought or not any(score.taken for score in choice.scores):
-            break
-        with stage("the delay of the torques"):
-            logs, moved = logs.delayed(settled(chosen.problem(logs.fitted)).basis, request.processing)
-        if not moved:
-            break
-    return chosen, logs, choice
 
 
 def _with_its_cause(found: "Fit", error: IdentificationError) -> IdentificationError:

@@ -6,12 +6,18 @@ from math import isfinite
 from typing import Any
 
 from experiments.identification.friction_laws import COMPARED, law_of
+from experiments.identification.logs import Logs
 from experiments.identification.request import Request
 from identify import MotionLog, Problem
 from identify.blame import blamed
+from identify.estimators.settle import settled
 from identify.judge.friction_choice import FrictionChoice, choose_friction
 from identify.models.explicit import ExplicitModel
 from identify.signals.masks import NoMask
+from identify.telling import stage
+
+TURNS = 3
+"""How often laws of friction and delay are found in turns, at most."""
 
 
 def chosen_friction(request: Request, logs: tuple[MotionLog, ...], most: int | None = None) -> tuple[Request, FrictionChoice]:
@@ -32,6 +38,23 @@ def chosen_friction(request: Request, logs: tuple[MotionLog, ...], most: int | N
         robot_model.asked, friction=robot_model.laws.chosen(choice.laws, choice.idle).texts(robot_model.robot.joints)
     )
     return replace(request, robot_model=replace(robot_model, asked=asked)), choice
+
+
+def chosen_in_turns(request: Request, logs: Logs) -> tuple[Request, Logs, FrictionChoice]:
+    """Return a request with the laws of friction that suit the logs, and these with the delay that goes with the laws.
+
+    Friction that is not in the model moves the delay, and a delay that is off hides friction: both are found in turns.
+    """
+    for _ in range(TURNS):
+        with stage("laws of friction"):
+            chosen, choice = chosen_friction(request, logs.fitted)
+        if not logs.delay_sought or not any(score.taken for score in choice.scores):
+            break
+        with stage("the delay of the torques"):
+            logs, moved = logs.delayed(settled(chosen.problem(logs.fitted)).basis, request.processing)
+        if not moved:
+            break
+    return chosen, logs, choice
 
 
 def words(choice: FrictionChoice, laws: Sequence[Sequence[str]], joints: Sequence[str]) -> list[str]:
