@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from experiments.cli import main as idbench
+from idbench.experiments.cli import main as idbench
 
 warnings.filterwarnings("ignore")  # the viewer's client is declared unstable; our pin holds it
 

@@ -5,8 +5,8 @@ import tempfile
 import traceback
 from pathlib import Path
 
-from experiments.control import shortened
-from experiments.errors import ExperimentError
+from idbench.experiments.control import shortened
+from idbench.experiments.errors import ExperimentError
 
 REPORT = "fault.txt"
 """Name of the file of tracebacks in a results folder."""
@@ -15,7 +15,7 @@ REPORT = "fault.txt"
 def is_told(error: BaseException) -> bool:
     """Return whether an error says itself what is wrong and what to try; packages that are not loaded have raised none."""
     roots: list[type] = [ExperimentError, OSError, MemoryError]
-    for module, name in (("identify.errors", "IdentificationError"), ("sim.errors", "BenchError")):
+    for module, name in (("idbench.identify.errors", "IdentificationError"), ("idbench.sim.errors", "BenchError")):
         if module in sys.modules:
             roots.append(getattr(sys.modules[module], name))
     return isinstance(error, tuple(roots))

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from experiments.excite.excitation import EXCITATIONS
-from identify import (
+from idbench.experiments.excite.excitation import EXCITATIONS
+from idbench.identify import (
     ALIGNMENTS,
     BLOCKS,
     CHAINS,
@@ -14,8 +14,8 @@ from identify import (
     OPERATORS,
     PREFILTERS,
 )
-from identify.plugins import PluginTable, Table
-from sim.scenario.scenario_file import KINDS
+from idbench.identify.plugins import PluginTable, Table
+from idbench.sim.scenario.scenario_file import KINDS
 
 TABLES: tuple[Table[Any], ...] = (
     BLOCKS,

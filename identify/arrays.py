@@ -6,7 +6,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from identify.errors import SettingError
+from idbench.identify.errors import SettingError
 
 Array: TypeAlias = npt.NDArray[np.float64]
 

@@ -8,12 +8,12 @@ from typing import TypeVar
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.errors import PluginError
+from idbench.identify.arrays import Array
+from idbench.identify.errors import PluginError
 
 T = TypeVar("T")
 
-OURS = ("identify", "sim", "models", "experiments")
+OURS = ("idbench",)
 """Packages whose mistakes are not those of a plug-in."""
 
 LIBRARIES = frozenset({"numpy", "scipy", "mujoco", "pyarrow", "ruckig", "pydantic", "clarabel"}) | sys.stdlib_module_names

@@ -8,8 +8,8 @@ from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from typing import Generic, TypeVar
 
-from identify.blame import is_mistake
-from identify.errors import PluginError, UnknownNameError
+from idbench.identify.blame import is_mistake
+from idbench.identify.errors import PluginError, UnknownNameError
 
 T = TypeVar("T")
 

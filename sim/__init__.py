@@ -1,6 +1,6 @@
 """The simulation: robots, trajectories and the logs that a robot would record. The only place for MuJoCo and ruckig.
 
-from sim import load_robot, load_scenario, run
+from idbench.sim import load_robot, load_scenario, run
 
 simulated = run(load_scenario("quantization"), seeds=range(3))  # .log, and the true .q, .qd, .tau
 """
@@ -9,23 +9,23 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sim.engine.run import Run as Run
-    from sim.engine.simulation import simulate as run
-    from sim.robot.robot import Robot as Robot
-    from sim.robot.tree import kinematic_tree as kinematic_tree
-    from sim.scenario.scenario import Scenario as Scenario
-    from sim.scenario.scenario_file import load as load_scenario
+    from idbench.sim.engine.run import Run as Run
+    from idbench.sim.engine.simulation import simulate as run
+    from idbench.sim.robot.robot import Robot as Robot
+    from idbench.sim.robot.tree import kinematic_tree as kinematic_tree
+    from idbench.sim.scenario.scenario import Scenario as Scenario
+    from idbench.sim.scenario.scenario_file import load as load_scenario
 
     load_robot = Robot.load
 
 PLACES = {
-    "Run": ("sim.engine.run", "Run"),
-    "run": ("sim.engine.simulation", "simulate"),
-    "Robot": ("sim.robot.robot", "Robot"),
-    "load_robot": ("sim.robot.robot", "Robot.load"),
-    "kinematic_tree": ("sim.robot.tree", "kinematic_tree"),
-    "Scenario": ("sim.scenario.scenario", "Scenario"),
-    "load_scenario": ("sim.scenario.scenario_file", "load"),
+    "Run": ("idbench.sim.engine.run", "Run"),
+    "run": ("idbench.sim.engine.simulation", "simulate"),
+    "Robot": ("idbench.sim.robot.robot", "Robot"),
+    "load_robot": ("idbench.sim.robot.robot", "Robot.load"),
+    "kinematic_tree": ("idbench.sim.robot.tree", "kinematic_tree"),
+    "Scenario": ("idbench.sim.scenario.scenario", "Scenario"),
+    "load_scenario": ("idbench.sim.scenario.scenario_file", "load"),
 }
 """Where the names of this package are: MuJoCo is loaded when one is first asked for, not with every module beside it."""
 

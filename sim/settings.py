@@ -13,8 +13,8 @@ import numpy.typing as npt
 from pydantic import AllowInfNan, BeforeValidator, ConfigDict, Field, Strict, ValidationError
 from pydantic.dataclasses import dataclass
 
-from identify.plugins import did_you_mean
-from sim.errors import ScenarioError
+from idbench.identify.plugins import did_you_mean
+from idbench.sim.errors import ScenarioError
 
 C = TypeVar("C", bound=type)
 

@@ -35,11 +35,11 @@ if (worker := os.environ.get("PYTEST_XDIST_WORKER")) and hasattr(os, "sched_seta
 import numpy as np
 import pytest
 
-from experiments.paper.table1 import CHAINS_COMPARED, SCENARIO, Table1
-from identify import MotionLog
-from sim.engine.ideal_log import ideal_log
-from sim.robot.robot import Robot
-from sim.scenario.scenario_file import load
+from idbench.experiments.paper.table1 import CHAINS_COMPARED, SCENARIO, Table1
+from idbench.identify import MotionLog
+from idbench.sim.engine.ideal_log import ideal_log
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.scenario_file import load
 
 X = np.array([3.5, 0.05, 0.5, 0.06, 0.12, 0.005, 0.01, 0.1])
 """The paper's supposed true values (section 7.2), typed here and nowhere else: ZZR1 Fv1 Fs1 ZZ2 LMX2 LMY2 Fv2 Fs2."""

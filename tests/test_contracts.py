@@ -2,10 +2,10 @@
 
 import pytest
 
-from experiments.contracts.contract import Example
-from experiments.contracts.contracts import CONTRACTS, kept
-from experiments.plugin_tables import TABLES
-from identify import BLOCKS, CHAINS, MODELS, Basis, identify, scara
+from idbench.experiments.contracts.contract import Example
+from idbench.experiments.contracts.contracts import CONTRACTS, kept
+from idbench.experiments.plugin_tables import TABLES
+from idbench.identify import BLOCKS, CHAINS, MODELS, Basis, identify, scara
 
 EVERY = [f"{table.point}/{name}" for table in TABLES for name in table.builtin]
 

@@ -6,17 +6,17 @@ from importlib import import_module
 import pytest
 
 EXAMPLES = {
-    "identify.data.motion_log": "MotionLog.at_times",
-    "identify.files.log_file": "read_log",
-    "identify.basis.tree_basis": "tree_basis",
-    "identify.parameters.base_parameters": "BaseParameters.of",
-    "identify.parameters.scara": "scara",
-    "identify.estimators.identification": "identify",
-    "sim.robot.robot": "Robot.load",
-    "sim.robot.tree": "kinematic_tree",
-    "sim.scenario.scenario_file": "load",
-    "sim.engine.run": "Run.truth",
-    "sim.engine.simulation": "simulate",
+    "idbench.identify.data.motion_log": "MotionLog.at_times",
+    "idbench.identify.files.log_file": "read_log",
+    "idbench.identify.basis.tree_basis": "tree_basis",
+    "idbench.identify.parameters.base_parameters": "BaseParameters.of",
+    "idbench.identify.parameters.scara": "scara",
+    "idbench.identify.estimators.identification": "identify",
+    "idbench.sim.robot.robot": "Robot.load",
+    "idbench.sim.robot.tree": "kinematic_tree",
+    "idbench.sim.scenario.scenario_file": "load",
+    "idbench.sim.engine.run": "Run.truth",
+    "idbench.sim.engine.simulation": "simulate",
 }
 """What people call from Python, by its module."""
 

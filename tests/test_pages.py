@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import pytest
 
-from identify.files.log_file import write_log
-from sim.engine import simulate
-from sim.scenario.scenario_file import load
+from idbench.identify.files.log_file import write_log
+from idbench.sim.engine import simulate
+from idbench.sim.scenario.scenario_file import load
 
 
 @pytest.fixture(scope="module")

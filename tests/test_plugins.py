@@ -8,8 +8,8 @@ import textwrap
 import numpy as np
 import pytest
 
-from identify import ESTIMATORS, AbstractEstimator, PluginError, UnknownNameError
-from identify.plugins import PluginTable
+from idbench.identify import ESTIMATORS, AbstractEstimator, PluginError, UnknownNameError
+from idbench.identify.plugins import PluginTable
 
 
 def blocks(root, language):
@@ -48,7 +48,7 @@ def readme_package(tmp_path, root):
 
 
 def test_the_readmes_package_is_listed(readme_package, monkeypatch):
-    listed = python("from experiments.cli import main; main(['list'])", readme_package, monkeypatch)
+    listed = python("from idbench.experiments.cli import main; main(['list'])", readme_package, monkeypatch)
     assert re.search(r"drag\s+Drag that grows with the square of the velocity", listed)
     assert re.search(r"plain-TLS\s+Least squares that allows for noise in W", listed)
 
@@ -59,9 +59,9 @@ def test_the_readmes_friction_is_identified_by_all_models_with_its_estimator(rea
     out = python(
         """
         import numpy as np
-        from experiments.paper.table1 import SCENARIO, Table1
-        from identify import BLOCKS, ESTIMATORS, MODELS, MotionLog, identify, scara
-        from sim.scenario.scenario_file import load
+        from idbench.experiments.paper.table1 import SCENARIO, Table1
+        from idbench.identify import BLOCKS, ESTIMATORS, MODELS, MotionLog, identify, scara
+        from idbench.sim.scenario.scenario_file import load
         table = Table1(load(SCENARIO), ("idbench",))
         log, qd = table.log, table.reference.qd
         dragged = MotionLog(log.fs, log.q, log.tau + [0.03, 0.004] * qd * abs(qd), log.torque)
@@ -81,9 +81,9 @@ def test_the_readmes_estimator_identifies_every_run_by_itself(readme_package, mo
     out = python(
         """
         import numpy as np
-        from experiments.paper.table1 import SCENARIO, Table1
-        from identify import ESTIMATORS, ExplicitModel, MotionLog, identify, scara
-        from sim.scenario.scenario_file import load
+        from idbench.experiments.paper.table1 import SCENARIO, Table1
+        from idbench.identify import ESTIMATORS, ExplicitModel, MotionLog, identify, scara
+        from idbench.sim.scenario.scenario_file import load
         log = Table1(load(SCENARIO), ()).log
         noise = np.random.default_rng(1).normal(size=(3, *log.tau.shape)) * [[[0.0]], [[1.0]], [[2.0]]]
         noisy = MotionLog(log.fs, np.broadcast_to(log.q, noise.shape), log.tau + noise, log.torque)
@@ -159,5 +159,5 @@ def test_names_that_are_taken_are_told(tmp_path, monkeypatch):
 
 def test_conflicts_are_listed(tmp_path, monkeypatch):
     install(tmp_path, "thief", "class Own: pass\n", "[idbench.estimators]\nOLS = thief:Own\n")
-    listed = python("from experiments.cli import main; main(['list'])", tmp_path, monkeypatch)
+    listed = python("from idbench.experiments.cli import main; main(['list'])", tmp_path, monkeypatch)
     assert "warning: estimators plug-in OLS is built in, thief (thief:Own) of the same name is not used" in listed

@@ -7,8 +7,8 @@ import sys
 import numpy as np
 import pytest
 
-from experiments.cli import main
-from identify import MODELS, MotionLog, TorqueChannel, identify_each
+from idbench.experiments.cli import main
+from idbench.identify import MODELS, MotionLog, TorqueChannel, identify_each
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +55,7 @@ def test_every_file_it_links_to_is_there(root):
 
 
 def test_every_plugin_is_in_its_table(root):
-    from experiments.plugin_tables import TABLES
+    from idbench.experiments.plugin_tables import TABLES
 
     page = (root / "docs" / "plugins.md").read_text()
     for table in TABLES:
@@ -64,7 +64,7 @@ def test_every_plugin_is_in_its_table(root):
 
 
 def test_the_causes_in_the_docs_are_those_computed(root, table1):
-    from experiments.paper.causes import causes
+    from idbench.experiments.paper.causes import causes
 
     text = (root / "docs" / "appendix.md").read_text()
     for name, worst in causes(table1):

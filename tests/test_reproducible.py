@@ -13,8 +13,8 @@ CODE = """
 import hashlib, os, sys
 if sys.argv[1] == "1":
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
-from experiments.paper.table1 import SCENARIO, Table1
-from sim.scenario.scenario_file import load
+from idbench.experiments.paper.table1 import SCENARIO, Table1
+from idbench.sim.scenario.scenario_file import load
 from dataclasses import replace
 table = Table1(replace(load(SCENARIO), fs=1000.0), ("paper", "idbench"))
 digest = hashlib.sha256(table.log.tau.tobytes())

@@ -37,7 +37,7 @@ def page(root, tmp_path_factory):
     shutil.copy(root / "docs" / "assets" / "recording.js", folder / "assets")
     for name in ("widget.js", "re_viewer_bg.wasm"):
         (folder / "viewer" / name).symlink_to(viewer / name)
-    code = "from experiments.cli import entry; entry()"
+    code = "from idbench.experiments.cli import entry; entry()"
     for words in (["run", "ideal", "--out", "run"], ["view", "run", "--save", "recordings/short.rrd"]):
         subprocess.run([sys.executable, "-c", code, *words], cwd=folder, check=True, capture_output=True)
     recording = '<div id="short" data-recording="recordings/short.rrd"><p><img alt="a picture"></p></div>'

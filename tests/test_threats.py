@@ -8,9 +8,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from experiments.cli import main
-from identify import ESTIMATORS, LogError
-from identify.files.reading import read_columns
+from idbench.experiments.cli import main
+from idbench.identify import ESTIMATORS, LogError
+from idbench.identify.files.reading import read_columns
 
 DEEP = 100_000
 
@@ -76,7 +76,7 @@ def test_a_parquet_file_of_terabytes_in_kilobytes_is_refused_before_it_is_read(t
     table = pa.table({name: np.zeros(rows) for name in ("t", "q1", "tau1")})
     pq.write_table(table, tmp_path / "bomb.parquet", compression="zstd")
     assert (tmp_path / "bomb.parquet").stat().st_size < 10_000
-    monkeypatch.setattr("identify.files.room.memory", lambda: 1e-3)
+    monkeypatch.setattr("idbench.identify.files.room.memory", lambda: 1e-3)
     with pytest.raises(
         LogError, match=r"holds 2e\+05 samples of 3 columns: reading them takes 0.0144 GB, and there are 0.001 GB"
     ):
@@ -92,7 +92,7 @@ def test_columns_that_a_log_does_not_have_are_not_read(tmp_path, monkeypatch):
         "quality": ["good"] * 50,
     }
     pq.write_table(pa.table(columns), tmp_path / "log.parquet")
-    monkeypatch.setattr("identify.files.room.memory", lambda: 1.1 * 3 * 50 * 8 * 3e-9)
+    monkeypatch.setattr("idbench.identify.files.room.memory", lambda: 1.1 * 3 * 50 * 8 * 3e-9)
     assert len(read_columns(tmp_path / "log.parquet").t) == 50
     pq.write_table(pa.table(columns | {"q1": ["0.0"] * 50}), tmp_path / "words.parquet")
     with pytest.raises(LogError, match="column q1 holds string, not numbers"):
@@ -109,7 +109,7 @@ def test_a_plugin_named_like_a_built_in_one_is_not_used(tmp_path, monkeypatch, c
     monkeypatch.delattr(ESTIMATORS, "_found", raising=False)
     ESTIMATORS.__dict__.pop("_found", None)
     try:
-        assert ESTIMATORS.create("GLS").__class__.__module__.startswith("identify.")
+        assert ESTIMATORS.create("GLS").__class__.__module__.startswith("idbench.identify.")
         assert any("GLS is built in, thief (thief:GLS) of the same name is not used" in line for line in ESTIMATORS.conflicts)
     finally:
         ESTIMATORS.__dict__.pop("_found", None)
@@ -131,7 +131,7 @@ def test_a_scenario_of_0_1_0_is_told_what_to_change(tmp_path, complaint):
 
 def test_servers_are_reached_from_this_machine_alone(monkeypatch):
     """Every server is started with the loopback address, and no code binds another."""
-    from experiments.recording import viewers
+    from idbench.experiments.recording import viewers
 
     started = []
     monkeypatch.setattr(viewers.subprocess, "Popen", lambda words, **_: started.append(words) or _Ended())
@@ -170,7 +170,7 @@ def test_no_file_is_unpickled(root):
 
 def test_the_summary_is_json_without_surprises(tmp_path):
     """NaN has no place in it: other readers stop there."""
-    from experiments.results.summaries import write_summary
+    from idbench.experiments.results.summaries import write_summary
 
     with pytest.raises(ValueError, match="not JSON compliant"):
         write_summary(tmp_path / "summary.json", {"x": float("nan")})

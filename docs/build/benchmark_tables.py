@@ -35,7 +35,7 @@ def keep_benchmark(folder: Path) -> None:
 
 
 def _kept(row: Row) -> Row:
-    from experiments.benchmark.tables import free_run, share, worst_R2
+    from idbench.experiments.benchmark.tables import free_run, share, worst_R2
 
     tools = {OWN: (row["logs"], row["seconds"])}
     tools |= {tool: (found["logs"], found["seconds"]) for tool, found in row["tools"].items() if "logs" in found}
@@ -124,7 +124,7 @@ BENCHMARK_TABLES = {
 if __name__ == "__main__":
     from tables import DOCS, filled
 
-    from experiments.benchmark.report import errors_figure
+    from idbench.experiments.benchmark.report import errors_figure
 
     keep_benchmark(Path(sys.argv[1]))
     every = [json.loads(path.read_text()) for path in sorted(Path(sys.argv[1]).glob("*/summary.json"))]

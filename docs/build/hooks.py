@@ -67,7 +67,7 @@ def _summary(text: str) -> str:
 
 
 def _help(name: str) -> str:
-    code = "import sys; from experiments.cli import entry; entry()"
+    code = "import sys; from idbench.experiments.cli import entry; entry()"
     plain = os.environ | {"COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb"}
     done = subprocess.run(
         [sys.executable, "-c", code, name, "--help-all"], cwd=ROOT, env=plain, capture_output=True, check=True
@@ -77,9 +77,9 @@ def _help(name: str) -> str:
 
 def settings() -> Iterator[str]:
     """Yield every setting of a scenario, with its unit and what it is by default."""
-    from sim.scenario.scenario import Scenario
-    from sim.scenario.scenario_file import KINDS
-    from sim.settings import fields_of
+    from idbench.sim.scenario.scenario import Scenario
+    from idbench.sim.scenario.scenario_file import KINDS
+    from idbench.sim.settings import fields_of
 
     yield "# Settings of a scenario\n"
     yield "A scenario is a TOML file. `idbench new scenario mine` writes one with all of this in it.\n"
@@ -97,7 +97,7 @@ def settings() -> Iterator[str]:
 
 
 def _limits() -> Iterator[str]:
-    from sim.limits.motion_limits import KeepOut, MotionLimits
+    from idbench.sim.limits.motion_limits import KeepOut, MotionLimits
 
     yield "\n## limits.toml\n\nWhat a motion of `idbench excite` must keep (`--limits`).\n"
     yield from _table(MotionLimits)
@@ -106,7 +106,7 @@ def _limits() -> Iterator[str]:
 
 
 def _table(cls: type) -> Iterator[str]:
-    from sim.settings import description, fields_of
+    from idbench.sim.settings import description, fields_of
 
     if not fields_of(cls):
         yield "It has no settings."
@@ -124,7 +124,7 @@ def _shown(value: Any) -> str:
 
 def package(name: str) -> Iterator[str]:
     """Yield the public names of a package, those of one kind together."""
-    import identify
+    from idbench import identify
 
     named = {key: value for key, value in vars(identify).items() if not key.startswith("_")}
     public = [key for key, value in named.items() if not isinstance(value, ModuleType)]
@@ -146,26 +146,26 @@ def package(name: str) -> Iterator[str]:
 
 def simulator() -> Iterator[str]:
     """Yield what of the simulator other programs use."""
-    yield "# sim\n\nThe virtual robot: `from sim import load_robot, load_scenario, run, Robot, kinematic_tree`.\n"
+    yield "# sim\n\nThe virtual robot: `from idbench.sim import load_robot, load_scenario, run, Robot, kinematic_tree`.\n"
     yield "\n".join(
         f"::: {name}\n"
         for name in (
-            "sim.engine.simulation.simulate",
-            "sim.limits.clearance.Clearance",
-            "sim.engine.run.Run",
-            "sim.engine.watch.Watch",
-            "sim.engine.ideal_log.ideal_log",
-            "sim.robot.robot.Robot",
-            "sim.robot.tree.kinematic_tree",
-            "sim.scenario.scenario.Scenario",
-            "sim.scenario.scenario_file.load",
-            "sim.scenario.scenario_file.to_toml",
-            "sim.controllers.controller.AbstractController",
-            "sim.controllers.controller.AbstractLaw",
-            "sim.drives.drive.AbstractDrive",
-            "sim.drives.drive.AbstractAmplifier",
-            "sim.encoders.encoder.AbstractEncoder",
-            "sim.frictions.friction_law.AbstractFrictionLaw",
-            "sim.trajectories.trajectory.AbstractTrajectory",
+            "idbench.sim.engine.simulation.simulate",
+            "idbench.sim.limits.clearance.Clearance",
+            "idbench.sim.engine.run.Run",
+            "idbench.sim.engine.watch.Watch",
+            "idbench.sim.engine.ideal_log.ideal_log",
+            "idbench.sim.robot.robot.Robot",
+            "idbench.sim.robot.tree.kinematic_tree",
+            "idbench.sim.scenario.scenario.Scenario",
+            "idbench.sim.scenario.scenario_file.load",
+            "idbench.sim.scenario.scenario_file.to_toml",
+            "idbench.sim.controllers.controller.AbstractController",
+            "idbench.sim.controllers.controller.AbstractLaw",
+            "idbench.sim.drives.drive.AbstractDrive",
+            "idbench.sim.drives.drive.AbstractAmplifier",
+            "idbench.sim.encoders.encoder.AbstractEncoder",
+            "idbench.sim.frictions.friction_law.AbstractFrictionLaw",
+            "idbench.sim.trajectories.trajectory.AbstractTrajectory",
         )
     )

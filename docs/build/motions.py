@@ -19,14 +19,14 @@ from scipy.stats import spearmanr
 DOCS = Path(__file__).absolute().parent.parent
 sys.path.insert(0, str(DOCS.parent))
 
-from experiments.excite.design import Design  # noqa: E402
-from experiments.excite.excited import Excited  # noqa: E402
-from identify.design.criteria import CRITERIA as CRITERIA_OF_W  # noqa: E402
-from identify.design.criteria import sigmas_of  # noqa: E402
-from sim.encoders import IncrementalEncoder  # noqa: E402
-from sim.limits.motion_limits import MotionLimits  # noqa: E402
-from sim.scenario.measurement import TorqueMeasurement  # noqa: E402
-from sim.scenario.scenario_file import FOLDER, load, to_dict  # noqa: E402
+from idbench.experiments.excite.design import Design  # noqa: E402
+from idbench.experiments.excite.excited import Excited  # noqa: E402
+from idbench.identify.design.criteria import CRITERIA as CRITERIA_OF_W  # noqa: E402
+from idbench.identify.design.criteria import sigmas_of  # noqa: E402
+from idbench.sim.encoders import IncrementalEncoder  # noqa: E402
+from idbench.sim.limits.motion_limits import MotionLimits  # noqa: E402
+from idbench.sim.scenario.measurement import TorqueMeasurement  # noqa: E402
+from idbench.sim.scenario.scenario_file import FOLDER, load, to_dict  # noqa: E402
 
 PREDICTED = DOCS / "results" / "excitation-motions.json"
 RANKS = DOCS / "results" / "excitation-ranks.json"

@@ -42,14 +42,14 @@ def _short_panda() -> str:
     """Return a scenario of twelve moves: a recording that loads in a browser in some seconds."""
     from dataclasses import replace
 
-    from sim.scenario.scenario_file import load, to_toml
+    from idbench.sim.scenario.scenario_file import load, to_toml
 
     arm = load("arm")
     return to_toml(replace(arm, name="panda", robot="panda", trajectory=replace(arm.trajectory, moves=12)))
 
 
 def _idbench(words: list[str], folder: Path) -> None:
-    code = "from experiments.cli import entry; entry()"
+    code = "from idbench.experiments.cli import entry; entry()"
     path = os.environ | {"PYTHONPATH": str(DOCS.parent)}
     done = subprocess.run(
         [sys.executable, "-c", code, *words], cwd=folder, env=path, capture_output=True, check=False, text=True

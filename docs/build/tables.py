@@ -102,7 +102,7 @@ def _causes(form: str) -> Callable[[], Iterator[str]]:
     """Return what makes the table of Table 2's causes, of one model."""
 
     def made() -> Iterator[str]:
-        from experiments.text import percent
+        from idbench.experiments.text import percent
 
         found = json.loads((RESULTS / "table2.json").read_text())
         causes = found["attribution_percent"].items()

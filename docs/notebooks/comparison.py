@@ -5,8 +5,8 @@ Three models of one robot, identified from the same noise-free log. This noteboo
 It needs idbench and, for the last cell, rerun's notebook viewer (`uv pip install "rerun-sdk[notebook]"`).
 """
 
-from experiments.paper.table1 import CHAINS_COMPARED, SCENARIO, Table1
-from sim.scenario.scenario_file import load
+from idbench.experiments.paper.table1 import CHAINS_COMPARED, SCENARIO, Table1
+from idbench.sim.scenario.scenario_file import load
 
 table = Table1(load(SCENARIO), CHAINS_COMPARED)
 log = table.log
@@ -42,7 +42,7 @@ A 14-bit encoder counts. Its counts are differentiated twice, and that noise rea
 GLS knows how it grows with frequency; ordinary least squares (OLS) does not.
 """
 
-from identify import ESTIMATORS, MODELS, MotionLog, identify, scara
+from idbench.identify import ESTIMATORS, MODELS, MotionLog, identify, scara
 
 step = 2 * np.pi / 2**14
 counted = MotionLog(log.fs, np.round(log.q / step) * step, log.tau, log.torque)
@@ -61,10 +61,10 @@ on the command line `idbench table1` and `idbench view` do the same.
 
 from pathlib import Path
 
-from experiments.recording.notebook import notebook_viewer
-from experiments.recording.table1_recording import record_table1
-from experiments.results.folder import ResultsFolder
-from experiments.results.streams import write_streams
+from idbench.experiments.recording.notebook import notebook_viewer
+from idbench.experiments.recording.table1_recording import record_table1
+from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.results.streams import write_streams
 
 folder = ResultsFolder(Path("comparison"), "table1", command="notebook comparison")
 with folder.held():

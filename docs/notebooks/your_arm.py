@@ -5,8 +5,8 @@ From a robot's file and a log to parameters, a verdict, and a look at the residu
 first two cells. As it stands it simulates a PUMA 560, so that the truth is known.
 """
 
-from sim.robot.robot import Robot
-from sim.robot.tree import kinematic_tree
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.tree import kinematic_tree
 
 robot = Robot.load("puma560")  # or the path of an MJCF or URDF file
 tree = kinematic_tree(robot)
@@ -21,8 +21,8 @@ held for a period. Of a file: `read_log(Path("log.csv"), TorqueChannel("held", d
 
 from dataclasses import replace
 
-from sim.engine import simulate
-from sim.scenario.scenario_file import load
+from idbench.sim.engine import simulate
+from idbench.sim.scenario.scenario_file import load
 
 scenario = replace(load("arm"), robot="puma560", fs=500.0)
 scenario = replace(scenario, trajectory=replace(scenario.trajectory, moves=15))
@@ -38,7 +38,7 @@ print(
 Not all ten parameters of every link are identifiable. *Base parameters* are their identifiable combinations.
 """
 
-from identify import BaseParameters, tree_basis
+from idbench.identify import BaseParameters, tree_basis
 
 base = BaseParameters.of(tree, tree_basis(tree))
 print(f"{len(base.names)} base parameters; one of them: {base.names[3]} = {base.grouping(3)}")
@@ -49,7 +49,7 @@ print(f"{len(base.names)} base parameters; one of them: {base.names[3]} = {base.
 `GLS` weighs every row by the noise that encoders and torques give it. The noise is found in the log.
 """
 
-from identify import ExplicitModel, GeneralizedLeastSquares, identify
+from idbench.identify import ExplicitModel, GeneralizedLeastSquares, identify
 
 estimate = identify(log, base.basis, ExplicitModel(), estimator=GeneralizedLeastSquares())
 weak = [name for name, share in zip(estimate.names, estimate.paper_sigma_percent) if share > 20]
@@ -65,7 +65,7 @@ behind rotors of 0.2 kg m².
 Validate it on held-out data: three quarters of the log are fitted, the last quarter is predicted.
 """
 
-from identify import Problem, split, validate
+from idbench.identify import Problem, split, validate
 
 first, last = split(log)
 fitted = identify(first, base.basis, ExplicitModel(), estimator=GeneralizedLeastSquares())

@@ -7,9 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
-from experiments.errors import ExperimentError
-from sim.errors import ScenarioError
-from sim.settings import NotNegative, make, settings
+from idbench.experiments.errors import ExperimentError
+from idbench.sim.errors import ScenarioError
+from idbench.sim.settings import NotNegative, make, settings
 
 FILE = "benchmark.toml"
 """What states the set of a folder."""

@@ -9,13 +9,11 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import experiments
-import identify
-import sim
-from experiments.benchmark.definition import Definition
-from experiments.benchmark.tools import PREDICTED
-from experiments.errors import ExperimentError
-from identify.files.layout import LogLayout
+from idbench import experiments, identify, sim
+from idbench.experiments.benchmark.definition import Definition
+from idbench.experiments.benchmark.tools import PREDICTED
+from idbench.experiments.errors import ExperimentError
+from idbench.identify.files.layout import LogLayout
 
 PACKAGES = (identify, sim, experiments)
 

@@ -8,13 +8,13 @@ from xml.etree import ElementTree
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from experiments.benchmark.set_fit import SetFit
-from experiments.identification.held_out import HeldOut
-from identify import Array, MotionLog, TorqueChannel
-from identify.arrays import combined
-from identify.rows.long_logs import manageable
-from sim.robot.tree import standard_parameters
-from sim.robot.write_urdf import urdf_text
+from idbench.experiments.benchmark.set_fit import SetFit
+from idbench.experiments.identification.held_out import HeldOut
+from idbench.identify import Array, MotionLog, TorqueChannel
+from idbench.identify.arrays import combined
+from idbench.identify.rows.long_logs import manageable
+from idbench.sim.robot.tree import standard_parameters
+from idbench.sim.robot.write_urdf import urdf_text
 
 
 def what_tools_read(made: SetFit) -> dict[str, Any]:

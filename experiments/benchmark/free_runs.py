@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.identification.held_out import HeldOut
-from experiments.results.summaries import finite
-from sim.engine.free_run import free_run
+from idbench.experiments.identification.held_out import HeldOut
+from idbench.experiments.results.summaries import finite
+from idbench.sim.engine.free_run import free_run
 
 
 def free_runs(held_out: HeldOut, model: str, length: float) -> dict[str, Any]:

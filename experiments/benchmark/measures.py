@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from identify import Array
+from idbench.identify import Array
 
 Row = Mapping[str, Any]
 

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from experiments.identification.fit import Fit, fit
-from experiments.identification.logs import Logs
-from experiments.identification.request import Request
-from experiments.style import SIGMAS
-from identify import Estimate, IdentificationError, MotionLog
+from idbench.experiments.identification.fit import Fit, fit
+from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.request import Request
+from idbench.experiments.style import SIGMAS
+from idbench.identify import Estimate, IdentificationError, MotionLog
 
 
 class Repeats(NamedTuple):

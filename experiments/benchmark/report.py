@@ -5,16 +5,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from experiments.benchmark.measures import TORQUE, Row, measure_of
-from experiments.benchmark.tables import HEADS, of_tools, overview, remarks, shares
-from experiments.reports.html import rendered, svg
-from experiments.style import JOINTS
+from idbench.experiments.benchmark.measures import TORQUE, Row, measure_of
+from idbench.experiments.benchmark.tables import HEADS, of_tools, overview, remarks, shares
+from idbench.experiments.reports.html import rendered, svg
+from idbench.experiments.style import JOINTS
 
 
 def report(rows: Sequence[Row], failures: Mapping[str, str]) -> str:
     """Return the page of some rows, and why other sets have none."""
     return rendered(
-        "experiments.benchmark",
+        "idbench.experiments.benchmark",
         "report.html.j2",
         heads=[head.replace("\n", " ") for head in HEADS],
         overview=list(overview(rows)),

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from experiments.benchmark.free_runs import free_runs
-from experiments.benchmark.repeats import repeats
-from experiments.benchmark.set_fit import SetFit
-from experiments.benchmark.tools import judged
-from experiments.faults import is_told, reason
-from experiments.identification.fit import Fit
-from experiments.identification.held_out import HeldOut
-from experiments.identification.judgement import Unjudged, judge
-from experiments.identification.verdict import WORDS
-from experiments.results.summaries import finite
-from identify.judge.leaks import seen
+from idbench.experiments.benchmark.free_runs import free_runs
+from idbench.experiments.benchmark.repeats import repeats
+from idbench.experiments.benchmark.set_fit import SetFit
+from idbench.experiments.benchmark.tools import judged
+from idbench.experiments.faults import is_told, reason
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.held_out import HeldOut
+from idbench.experiments.identification.judgement import Unjudged, judge
+from idbench.experiments.identification.verdict import WORDS
+from idbench.experiments.results.summaries import finite
+from idbench.identify.judge.leaks import seen
 
 
 def row_of(made: SetFit, predicted: Mapping[str, Path]) -> dict[str, Any]:

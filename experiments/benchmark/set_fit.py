@@ -4,9 +4,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import final
 
-from experiments.benchmark.definition import Definition
-from experiments.identification.fit import Fit
-from identify import MotionLog
+from idbench.experiments.benchmark.definition import Definition
+from idbench.experiments.identification.fit import Fit
+from idbench.identify import MotionLog
 
 
 @final

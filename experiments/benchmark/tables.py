@@ -6,9 +6,9 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
-from experiments.benchmark.measures import TORQUE, Row, measure_of, of_logs, pooled
-from experiments.text import new_table, percentage, print_table
-from identify import Array
+from idbench.experiments.benchmark.measures import TORQUE, Row, measure_of, of_logs, pooled
+from idbench.experiments.text import new_table, percentage, print_table
+from idbench.identify import Array
 
 OWN = "idbench"
 """What our own row is called beside those of other tools."""

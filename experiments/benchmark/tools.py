@@ -8,11 +8,11 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from experiments.benchmark.for_tools import acting, at_times
-from experiments.errors import ExperimentError
-from experiments.identification.held_out import HeldOut
-from experiments.results.summaries import finite
-from identify import Array, Problem, validate
+from idbench.experiments.benchmark.for_tools import acting, at_times
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.held_out import HeldOut
+from idbench.experiments.results.summaries import finite
+from idbench.identify import Array, Problem, validate
 
 PREDICTED = "predicted-*.npz"
 """Names of the files of other tools, in the folder of a set's results."""

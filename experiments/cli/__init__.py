@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import NoReturn
 
-from experiments.cli.interruption import importing
+from idbench.experiments.cli.interruption import importing
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit code: 0, 2 for wrong input, 130 when interrupted."""
     with importing():
-        import experiments.cli.options  # noqa: F401  # all commands register
-        from experiments.cli.app import run
+        import idbench.experiments.cli.options  # noqa: F401  # all commands register
+        from idbench.experiments.cli.app import run
     return run(args)
 
 

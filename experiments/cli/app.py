@@ -7,10 +7,10 @@ from contextlib import suppress
 
 from tyro.extras import SubcommandApp
 
-from experiments.cli.interruption import INTERRUPTED, Notice, TerminatedError, importing, noticing, terminating
-from experiments.control import visible
-from experiments.errors import ExperimentError
-from experiments.faults import is_told, reason, report
+from idbench.experiments.cli.interruption import INTERRUPTED, Notice, TerminatedError, importing, noticing, terminating
+from idbench.experiments.control import visible
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.faults import is_told, reason, report
 
 DESCRIPTION = "A MuJoCo testbench for the dynamic identification of robots."
 
@@ -88,8 +88,8 @@ def _require_memory() -> None:
 
 def parsed(words: list[str]) -> Callable[[], None] | None:
     """Return the command that words name, with its options, or None if they asked for its help, which is shown."""
-    from experiments.cli.help_text import show_help, without_short
-    from experiments.cli.wrong_words import refused, require_command, require_once
+    from idbench.experiments.cli.help_text import show_help, without_short
+    from idbench.experiments.cli.wrong_words import refused, require_command, require_once
 
     require_command(words, COMMANDS)
     if show_help(words, COMMANDS):
@@ -132,7 +132,7 @@ def _version() -> str:
 
 
 def _print(text: str) -> None:
-    from experiments.cli.page import new_page
+    from idbench.experiments.cli.page import new_page
 
     page = new_page()
     page.print(text)

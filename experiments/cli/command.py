@@ -3,7 +3,7 @@
 from importlib import import_module
 from typing import ClassVar
 
-from experiments.cli.interruption import importing
+from idbench.experiments.cli.interruption import importing
 
 
 class Command:
@@ -12,7 +12,7 @@ class Command:
     Parameters
     ----------
     action : str
-        File of `experiments.cli.commands` and function, as in log:show_log; it receives the options.
+        File of `idbench.experiments.cli.commands` and function, as in log:show_log; it receives the options.
     """
 
     action: ClassVar[str] = ""
@@ -24,5 +24,5 @@ class Command:
         """Do the work."""
         module, _, name = self.action.partition(":")
         with importing():
-            function = getattr(import_module(f"experiments.cli.commands.{module}"), name)
+            function = getattr(import_module(f"idbench.experiments.cli.commands.{module}"), name)
         function(self)

@@ -11,8 +11,8 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.text import Text
 
-from experiments.control import visible
-from experiments.errors import ExperimentError
+from idbench.experiments.control import visible
+from idbench.experiments.errors import ExperimentError
 
 WIDTH = 144
 """Characters of a line where no terminal says how many it has."""

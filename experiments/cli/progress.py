@@ -25,7 +25,7 @@ def stages_of(what: str) -> Iterator[Told]:
 
     What `identify` works at in the block is shown, too: model, estimator, iteration.
     """
-    from identify.telling import listening
+    from idbench.identify.telling import listening
 
     console = Console(stderr=True)
     with _bar(console, what) if console.is_terminal else _lines(console, what) as told, listening(told):

@@ -5,12 +5,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from experiments.cli.page import Page
-from experiments.results.attempts import Attempts
-from experiments.results.folder import ResultsFolder
-from experiments.results.summaries import write_summary
-from sim.scenario.scenario import Scenario
-from sim.scenario.scenario_file import to_toml
+from idbench.experiments.cli.page import Page
+from idbench.experiments.results.attempts import Attempts
+from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.results.summaries import write_summary
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.scenario.scenario_file import to_toml
 
 Files = Mapping[str, Callable[[Path], object]]
 """What writes the files of an experiment, by their names."""

@@ -10,7 +10,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from tyro import _errors as parser  # private: tyro has no other way to say what is wrong in words of one's own
 
-from experiments.errors import ExperimentError
+from idbench.experiments.errors import ExperimentError
 
 KINDS: Mapping[type, str] = {int: "a whole number", float: "a number"}
 """What options take, in words."""
@@ -86,7 +86,7 @@ def _unknown(word: str, name: str, commands: Mapping[str, type]) -> str:
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """Return the nearest known word as a question, as `identify.plugins` does, which loads NumPy."""
+    """Return the nearest known word as a question, as `idbench.identify.plugins` does, which loads NumPy."""
     near = get_close_matches(word.lower(), list(known), 1, CLOSE)
     return f" (did you mean {near[0]!r}?)" if near else ""
 

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from experiments.errors import ExperimentError
-from experiments.identification.robot_model import RobotModel
-from experiments.identification.simulators import RobotPlant, ScenarioLoop
-from experiments.paper.table1 import SCENARIO, Table1
-from identify import Array, MotionLog, Simulation
-from identify.blame import is_mistake
-from sim.engine.run import Run
-from sim.engine.simulation import simulate
-from sim.robot.robot import Robot
-from sim.scenario.scenario_file import load
-from sim.trajectories import RandomMoves, Reference
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.identification.simulators import RobotPlant, ScenarioLoop
+from idbench.experiments.paper.table1 import SCENARIO, Table1
+from idbench.identify import Array, MotionLog, Simulation
+from idbench.identify.blame import is_mistake
+from idbench.sim.engine.run import Run
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.scenario_file import load
+from idbench.sim.trajectories import RandomMoves, Reference
 
 FS = 100.0
 """Sampling frequency of the examples [Hz]."""

@@ -4,13 +4,13 @@ import importlib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from experiments.contracts import identification_contracts as identification
-from experiments.contracts import simulation_contracts as simulation
-from experiments.contracts.contract import Clause, Example, checked
-from experiments.errors import ExperimentError
-from experiments.plugin_tables import TABLES
-from identify.blame import is_mistake
-from identify.plugins import Table, did_you_mean
+from idbench.experiments.contracts import identification_contracts as identification
+from idbench.experiments.contracts import simulation_contracts as simulation
+from idbench.experiments.contracts.contract import Clause, Example, checked
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.plugin_tables import TABLES
+from idbench.identify.blame import is_mistake
+from idbench.identify.plugins import Table, did_you_mean
 
 CONTRACTS: Mapping[str, tuple[Clause, ...]] = {
     "blocks": (

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from experiments.contracts.contract import FS, Example, require, require_equal, untouched
-from identify import (
+from idbench.experiments.contracts.contract import FS, Example, require, require_equal, untouched
+from idbench.identify import (
     AbstractEstimator,
     Array,
     ExplicitModel,
@@ -20,8 +20,8 @@ from identify import (
     identify,
     scara,
 )
-from identify.rows.grid import Grid
-from identify.rows.rows import Rows
+from idbench.identify.rows.grid import Grid
+from idbench.identify.rows.rows import Rows
 
 SMALL = 1e-30
 """Of complex steps: what they find is exact."""

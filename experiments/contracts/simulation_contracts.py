@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from experiments.contracts.contract import FS, RUNS, Example, require, require_equal
-from sim.controllers import Task
-from sim.engine.plant import Plant
-from sim.robot.robot import Robot
-from sim.scenario.scenario import Physics
+from idbench.experiments.contracts.contract import FS, RUNS, Example, require, require_equal
+from idbench.sim.controllers import Task
+from idbench.sim.engine.plant import Plant
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.scenario import Physics
 
 COUNT = 2 * np.pi / 2**16
 """Step of the encoders by default [rad]."""

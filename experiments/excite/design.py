@@ -6,24 +6,24 @@ from functools import cached_property
 
 import numpy as np
 
-from experiments.errors import ExperimentError
-from experiments.excite.excitation import EXCITATIONS, AbstractExcitation
-from experiments.excite.limit_use import FS, Inspector, LimitUse
-from experiments.excite.planning import plan_for
-from experiments.identification.parameters import Parameters
-from experiments.identification.robot_model import RobotModel
-from identify import CHAINS, Array, MotionLog, NoiseLevels
-from identify.data.limits import Limits
-from identify.design.criteria import CRITERIA, AbstractCriterion, LogSigma
-from identify.design.plan import Plan
-from identify.design.predicted import predicted_information
-from identify.plugins import did_you_mean
-from sim.limits.clearance import Clearance
-from sim.limits.motion_limits import BOX, CLEARANCE, FLOOR, MotionLimits, home_of, limits_of, surroundings
-from sim.scenario.scenario import Scenario
-from sim.trajectories.approach import approach
-from sim.trajectories.reference import Reference
-from sim.trajectories.trajectory import AbstractTrajectory
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.excite.excitation import EXCITATIONS, AbstractExcitation
+from idbench.experiments.excite.limit_use import FS, Inspector, LimitUse
+from idbench.experiments.excite.planning import plan_for
+from idbench.experiments.identification.parameters import Parameters
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.identify import CHAINS, Array, MotionLog, NoiseLevels
+from idbench.identify.data.limits import Limits
+from idbench.identify.design.criteria import CRITERIA, AbstractCriterion, LogSigma
+from idbench.identify.design.plan import Plan
+from idbench.identify.design.predicted import predicted_information
+from idbench.identify.plugins import did_you_mean
+from idbench.sim.limits.clearance import Clearance
+from idbench.sim.limits.motion_limits import BOX, CLEARANCE, FLOOR, MotionLimits, home_of, limits_of, surroundings
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.trajectories.approach import approach
+from idbench.sim.trajectories.reference import Reference
+from idbench.sim.trajectories.trajectory import AbstractTrajectory
 
 SIGMA, DETERMINANT = "sigma", "determinant"
 """What is minimised by default, and what that begins with."""

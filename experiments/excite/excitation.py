@@ -6,14 +6,14 @@ from typing import final
 
 import numpy as np
 
-from experiments.errors import ExperimentError
-from identify.arrays import Array
-from identify.design.greedy import Greedy
-from identify.design.plan import Plan
-from identify.design.shapes import Shapes
-from identify.plugins import PluginTable
-from sim.trajectories import Fourier, Quintic
-from sim.trajectories.trajectory import AbstractTrajectory
+from idbench.experiments.errors import ExperimentError
+from idbench.identify.arrays import Array
+from idbench.identify.design.greedy import Greedy
+from idbench.identify.design.plan import Plan
+from idbench.identify.design.shapes import Shapes
+from idbench.identify.plugins import PluginTable
+from idbench.sim.trajectories import Fourier, Quintic
+from idbench.sim.trajectories.trajectory import AbstractTrajectory
 
 FEWEST = 3
 """Moves that lead back."""

@@ -8,19 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from experiments.errors import ExperimentError
-from experiments.excite.design import Design
-from experiments.excite.excitation import REST
-from experiments.excite.limit_use import FS, LimitUse
-from experiments.excite.stages import searched
-from experiments.identification.robot_model import absolute
-from identify import Array
-from identify.design.criteria import sigmas_of
-from sim.engine.simulation import Progress
-from sim.limits.motion_limits import floor_of
-from sim.scenario.scenario import Scenario
-from sim.scenario.scenario_file import to_dict
-from sim.trajectories.reference import Reference
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.excite.design import Design
+from idbench.experiments.excite.excitation import REST
+from idbench.experiments.excite.limit_use import FS, LimitUse
+from idbench.experiments.excite.stages import searched
+from idbench.experiments.identification.robot_model import absolute
+from idbench.identify import Array
+from idbench.identify.design.criteria import sigmas_of
+from idbench.sim.engine.simulation import Progress
+from idbench.sim.limits.motion_limits import floor_of
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.scenario.scenario_file import to_dict
+from idbench.sim.trajectories.reference import Reference
 
 BINDING = 0.9
 """Share of a limit from which on it counts as active."""

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.basis.basis import Basis
-from identify.data.limits import Limits
-from identify.parameters.base_parameters import columns_at
-from sim.limits.clearance import Clearance, Touch
-from sim.limits.motion_limits import MotionLimits
-from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
-from sim.robot.robot import Robot
-from sim.trajectories.reference import Reference
+from idbench.identify.arrays import Array
+from idbench.identify.basis.basis import Basis
+from idbench.identify.data.limits import Limits
+from idbench.identify.parameters.base_parameters import columns_at
+from idbench.sim.limits.clearance import Clearance, Touch
+from idbench.sim.limits.motion_limits import MotionLimits
+from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
+from idbench.sim.robot.robot import Robot
+from idbench.sim.trajectories.reference import Reference
 
 FS = 1000.0
 """Frequency [Hz] at which limits are looked at."""

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.excite.excited import Excited
+from idbench.experiments.excite.excited import Excited
 
 PARTS = "part: 0 the way from home to the start, 1 the motion, with its rest at both ends, 2 the way back"
 """What stands in the first line."""

@@ -5,15 +5,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from experiments.errors import ExperimentError
-from identify import Array, FirLowPass, NoiseLevels
-from identify.design.information import Information
-from identify.design.plan import Plan
-from identify.noise.linearization import slopes
-from identify.parameters.base_parameters import random_states
+from idbench.experiments.errors import ExperimentError
+from idbench.identify import Array, FirLowPass, NoiseLevels
+from idbench.identify.design.information import Information
+from idbench.identify.design.plan import Plan
+from idbench.identify.noise.linearization import slopes
+from idbench.identify.parameters.base_parameters import random_states
 
 if TYPE_CHECKING:
-    from experiments.excite.design import Design
+    from idbench.experiments.excite.design import Design
 
 STATES, LEAST = 12.0, 8.0
 """States for each period of the highest frequency, and least states a second."""

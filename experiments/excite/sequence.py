@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from experiments.excite.design import Design
-from experiments.excite.excited import Excited
-from identify import Array, Estimate, ExplicitModel, MotionLog, brisk_shares, identify
-from sim.engine.simulation import Progress, simulate
+from idbench.experiments.excite.design import Design
+from idbench.experiments.excite.excited import Excited
+from idbench.identify import Array, Estimate, ExplicitModel, MotionLog, brisk_shares, identify
+from idbench.sim.engine.simulation import Progress, simulate
 
 ENOUGH = 0.1
 """Weight of a parameter that is known well enough."""

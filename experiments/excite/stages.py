@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from experiments.excite.design import SIGMA, Design
-from experiments.excite.limit_use import LimitUse
-from identify import Array
-from identify.data.limits import Limits
-from identify.design.plan import POWER, Plan
-from identify.design.search import Search
+from idbench.experiments.excite.design import SIGMA, Design
+from idbench.experiments.excite.limit_use import LimitUse
+from idbench.identify import Array
+from idbench.identify.data.limits import Limits
+from idbench.identify.design.plan import POWER, Plan
+from idbench.identify.design.search import Search
 
 STARTS, BASINS = 5, 12
 """Least starts of the search, and starts times joints: few joints take little time."""

@@ -5,9 +5,9 @@ from importlib.metadata import version
 
 import numpy as np
 
-from experiments.identification.fit import Fit
-from identify import Parameter
-from identify.data.kinematics import INERTIAL
+from idbench.experiments.identification.fit import Fit
+from idbench.identify import Parameter
+from idbench.identify.data.kinematics import INERTIAL
 
 ABOUT = (
     "tau = D(q, qd, qdd) X: X are `parameters`, each the sum of standard parameters in `made_of`. D has the columns of the "

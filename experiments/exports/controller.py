@@ -5,10 +5,10 @@ from importlib.resources import files
 from pathlib import Path
 from pprint import pformat
 
-from experiments.exports.friction_terms import lines_of
-from experiments.exports.standard import require_known, standard_of
-from experiments.identification.fit import Fit
-from identify.data.kinematics import INERTIAL, Joint
+from idbench.experiments.exports.friction_terms import lines_of
+from idbench.experiments.exports.standard import require_known, standard_of
+from idbench.experiments.identification.fit import Fit
+from idbench.identify.data.kinematics import INERTIAL, Joint
 
 
 def python_text(fit: Fit, model: str, target: Path) -> str:
@@ -23,7 +23,7 @@ def python_text(fit: Fit, model: str, target: Path) -> str:
     tree, values = fit.robot_model.tree, standard_of(fit, model)
     n = tree.n
     each = {x: [values.get(f"{x}{j + 1}", 0.0) for j in range(n)] for x in ("Ia", "Fv", "Fs", "off")}
-    text = files("experiments.exports").joinpath("inverse_dynamics.py.txt").read_text(encoding="utf-8")
+    text = files("idbench.experiments.exports").joinpath("inverse_dynamics.py.txt").read_text(encoding="utf-8")
     words = {
         "{laws}": "".join(f"    {line}\n" for line in lines_of(fit, values)),
         "{name}": tree.name,

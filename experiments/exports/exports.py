@@ -3,13 +3,13 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from experiments.exports.base_json import json_text
-from experiments.exports.controller import python_text
-from experiments.exports.standard import require_known
-from experiments.identification.consistent_robot import Written
-from experiments.identification.fit import Fit
-from experiments.identification.robot_model import RobotModel
-from sim.robot.rewrite import rewritten
+from idbench.experiments.exports.base_json import json_text
+from idbench.experiments.exports.controller import python_text
+from idbench.experiments.exports.standard import require_known
+from idbench.experiments.identification.consistent_robot import Written
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.sim.robot.rewrite import rewritten
 
 Exported = tuple[str, list[str]]
 """A file's text, and what is to be known of it."""
@@ -26,7 +26,7 @@ def mjcf(fit: Fit, model: str, path: Path) -> Exported:
 
 def urdf(fit: Fit, model: str, path: Path) -> Exported:
     """Return the robot as URDF with the parameters."""
-    from sim.robot.write_urdf import urdf_text
+    from idbench.sim.robot.write_urdf import urdf_text
 
     written, robot_model = Written(fit, model), fit.robot_model
     drives = [p.name for p in robot_model.grouping.standard.parameters if p.kind in ("rotor inertia", "stiffness")]

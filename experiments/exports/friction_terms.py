@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.identification.fit import Fit
-from identify import AbstractBlock, ShapedFriction
-from identify.basis import LoadFriction
-from identify.basis.of_joints import inner_of
+from idbench.experiments.identification.fit import Fit
+from idbench.identify import AbstractBlock, ShapedFriction
+from idbench.identify.basis import LoadFriction
+from idbench.identify.basis.of_joints import inner_of
 
 TERMS: Mapping[str, tuple[str, Mapping[str, str]]] = {
     "Fva": ("np.abs(qd)", {}),

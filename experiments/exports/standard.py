@@ -4,14 +4,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from experiments.errors import ExperimentError
-from experiments.exports.friction_terms import TERMS
-from experiments.identification.fit import Fit
-from experiments.identification.robot_model import RobotModel
-from identify.basis.parameter import BODY
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.exports.friction_terms import TERMS
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.identify.basis.parameter import BODY
 
 if TYPE_CHECKING:
-    from identify import Array
+    from idbench.identify import Array
 
 KNOWN = ("Ia", "Fv", "Fs", "off", *TERMS, *(letters for _, settings in TERMS.values() for letters in settings.values()))
 """Letters of the laws that a controller's function has, beside the links."""

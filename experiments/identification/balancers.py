@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import fields
 
-from experiments.errors import ExperimentError
-from experiments.identification.friction_laws import joint_of
-from identify import KinematicTree, SettingError
-from identify.basis import Balancer
-from identify.plugins import did_you_mean
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.friction_laws import joint_of
+from idbench.identify import KinematicTree, SettingError
+from idbench.identify.basis import Balancer
+from idbench.identify.plugins import did_you_mean
 
 OPTION = "--balancer"
 GEOMETRY = tuple(field.name for field in fields(Balancer) if field.name != "joint")

@@ -7,10 +7,10 @@ from typing import final
 
 import numpy as np
 
-from identify import Array
-from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
-from sim.robot.robot import Robot
-from sim.trajectories import Reference
+from idbench.identify import Array
+from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
+from idbench.sim.robot.robot import Robot
+from idbench.sim.trajectories import Reference
 
 ROUNDING = 1e-12
 """Torques below this share of the total are rounding."""

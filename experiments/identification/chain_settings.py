@@ -6,9 +6,19 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from experiments.errors import ExperimentError
-from identify import ALIGNMENTS, CHAINS, DIFFERENTIATORS, MASKS, OPERATORS, PREFILTERS, Chain, IdentificationError, SettingError
-from identify.plugins import Table, did_you_mean
+from idbench.experiments.errors import ExperimentError
+from idbench.identify import (
+    ALIGNMENTS,
+    CHAINS,
+    DIFFERENTIATORS,
+    MASKS,
+    OPERATORS,
+    PREFILTERS,
+    Chain,
+    IdentificationError,
+    SettingError,
+)
+from idbench.identify.plugins import Table, did_you_mean
 
 STAGES: dict[str, Table[Any]] = {
     "prefilter": PREFILTERS,

@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator
 
-from experiments.identification.judgement import Judgement
-from experiments.identification.lack import advice_on_lack
-from experiments.identification.log_warnings import unusable, warnings_of_log
-from experiments.identification.remedies import Remedies, delay_advice
-from experiments.identification.warnings import (
+from idbench.experiments.identification.judgement import Judgement
+from idbench.experiments.identification.lack import advice_on_lack
+from idbench.experiments.identification.log_warnings import unusable, warnings_of_log
+from idbench.experiments.identification.remedies import Remedies, delay_advice
+from idbench.experiments.identification.warnings import (
     DELAY,
     FILE,
     LOG,

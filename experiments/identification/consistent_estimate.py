@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from experiments.identification.robot_model import RobotModel
-from identify import Array, Consistent, Estimate, consistent_parameters
-from identify.parameters.consistent import NEAR
-from identify.parameters.priors import Prior
-from sim.robot.tree import standard_parameters
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.identify import Array, Consistent, Estimate, consistent_parameters
+from idbench.identify.parameters.consistent import NEAR
+from idbench.identify.parameters.priors import Prior
+from idbench.sim.robot.tree import standard_parameters
 
 SURE = 0.1
 """Sigma of what was left out, as a share of the least of the others."""

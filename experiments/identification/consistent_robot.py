@@ -6,13 +6,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import final
 
-from experiments.identification.consistent_estimate import consistent_of
-from experiments.identification.fit import Fit
-from identify import Consistent
-from identify.basis.parameter import FRICTION
-from sim.robot.rewrite import compiled, rewritten
-from sim.robot.robot import Robot
-from sim.robot.tree import standard_parameters
+from idbench.experiments.identification.consistent_estimate import consistent_of
+from idbench.experiments.identification.fit import Fit
+from idbench.identify import Consistent
+from idbench.identify.basis.parameter import FRICTION
+from idbench.sim.robot.rewrite import compiled, rewritten
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.tree import standard_parameters
 
 SIGMAS = 3.0
 """Departures from the estimate beyond this many sigma are messages."""

@@ -6,15 +6,15 @@ from typing import Any, Self, final
 
 import numpy as np
 
-from experiments.identification.consistent_estimate import made_consistent
-from experiments.identification.friction_choice import chosen_in_turns
-from experiments.identification.lack import advice_on_lack
-from experiments.identification.logs import Logs
-from experiments.identification.request import Request
-from experiments.identification.robot_model import RobotModel
-from experiments.identification.suited_mask import masked_laws, suited_mask
-from experiments.results.summaries import finite, summarize
-from identify import (
+from idbench.experiments.identification.consistent_estimate import made_consistent
+from idbench.experiments.identification.friction_choice import chosen_in_turns
+from idbench.experiments.identification.lack import advice_on_lack
+from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.identification.suited_mask import masked_laws, suited_mask
+from idbench.experiments.results.summaries import finite, summarize
+from idbench.identify import (
     ESTIMATORS,
     MODELS,
     AbstractEstimator,
@@ -28,9 +28,9 @@ from identify import (
     attempt_each,
     encoder_steps,
 )
-from identify.judge.friction_choice import FrictionChoice
-from identify.judge.lack_of_fit import Lack, lack_of_fit
-from identify.rows.rows import Rows
+from idbench.identify.judge.friction_choice import FrictionChoice
+from idbench.identify.judge.lack_of_fit import Lack, lack_of_fit
+from idbench.identify.rows.rows import Rows
 
 NOTHING = 1e-12
 """Share of a torque's squares below which its variance is rounding."""

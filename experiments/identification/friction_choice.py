@@ -5,16 +5,16 @@ from dataclasses import asdict, replace
 from math import isfinite
 from typing import Any
 
-from experiments.identification.friction_laws import COMPARED, law_of
-from experiments.identification.logs import Logs
-from experiments.identification.request import Request
-from identify import MotionLog, Problem
-from identify.blame import blamed
-from identify.estimators.settle import settled
-from identify.judge.friction_choice import FrictionChoice, choose_friction
-from identify.models.explicit import ExplicitModel
-from identify.signals.masks import NoMask
-from identify.telling import stage
+from idbench.experiments.identification.friction_laws import COMPARED, law_of
+from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.request import Request
+from idbench.identify import MotionLog, Problem
+from idbench.identify.blame import blamed
+from idbench.identify.estimators.settle import settled
+from idbench.identify.judge.friction_choice import FrictionChoice, choose_friction
+from idbench.identify.models.explicit import ExplicitModel
+from idbench.identify.signals.masks import NoMask
+from idbench.identify.telling import stage
 
 TURNS = 3
 """How often laws of friction and delay are found in turns, at most."""

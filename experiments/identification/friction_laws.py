@@ -5,9 +5,9 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 from itertools import chain
 from typing import Any, final
 
-from experiments.errors import ExperimentError
-from identify import BLOCKS, AbstractBlock, AbstractJointLaw, Array, OfJoints, UnknownNameError
-from identify.plugins import did_you_mean
+from idbench.experiments.errors import ExperimentError
+from idbench.identify import BLOCKS, AbstractBlock, AbstractJointLaw, Array, OfJoints, UnknownNameError
+from idbench.identify.plugins import did_you_mean
 
 AUTO = "auto"
 """The laws are those that predict motion best that was not fitted."""

@@ -8,17 +8,17 @@ from typing import Any, final
 
 import numpy as np
 
-from experiments.identification.consistent_robot import Written
-from experiments.identification.fit import Fit, fit
-from experiments.identification.verdict import Verdict
-from experiments.results.summaries import finite
-from identify import Array, Basis, IdentificationError, MotionLog, Problem, State, Validation, split, validate
-from identify.arrays import combined
-from identify.basis.parameter import FRICTION, NOT_NEGATIVE, Parameter
-from identify.rows.long_logs import manageable
-from sim.engine.replay import Replay, replay
-from sim.errors import BenchError
-from sim.robot.robot import Robot
+from idbench.experiments.identification.consistent_robot import Written
+from idbench.experiments.identification.fit import Fit, fit
+from idbench.experiments.identification.verdict import Verdict
+from idbench.experiments.results.summaries import finite
+from idbench.identify import Array, Basis, IdentificationError, MotionLog, Problem, State, Validation, split, validate
+from idbench.identify.arrays import combined
+from idbench.identify.basis.parameter import FRICTION, NOT_NEGATIVE, Parameter
+from idbench.identify.rows.long_logs import manageable
+from idbench.sim.engine.replay import Replay, replay
+from idbench.sim.errors import BenchError
+from idbench.sim.robot.robot import Robot
 
 BANDWIDTH = 5.0
 """Of the loop that holds the simulated robot to the log [rad/s]: weak, so that errors of the model show."""

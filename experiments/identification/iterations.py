@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.identification.fit import Fit
-from identify import Estimate, InstrumentalVariables, WeightedLeastSquares, noise_in_rows
-from identify import estimate as identified_by
-from identify.judge.noise_in_rows import LEVEL
+from idbench.experiments.identification.fit import Fit
+from idbench.identify import Estimate, InstrumentalVariables, WeightedLeastSquares, noise_in_rows
+from idbench.identify import estimate as identified_by
+from idbench.identify.judge.noise_in_rows import LEVEL
 
 FAR = 5.0
 """Difference from least squares, in sigma, that is not chance."""

@@ -4,10 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, final
 
-from experiments.faults import is_told, reason, trace
-from experiments.identification.fit import Fit
-from experiments.identification.held_out import HeldOut, on_last_quarter, on_log
-from experiments.identification.verdict import WORDS
+from idbench.experiments.faults import is_told, reason, trace
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.held_out import HeldOut, on_last_quarter, on_log
+from idbench.experiments.identification.verdict import WORDS
 
 
 @final

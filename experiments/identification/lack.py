@@ -2,10 +2,10 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from experiments.identification.friction_laws import said
-from experiments.identification.robot_model import RobotModel
-from experiments.text import probability
-from identify.judge.lack_of_fit import WRONG, Lack
+from idbench.experiments.identification.friction_laws import said
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.text import probability
+from idbench.identify.judge.lack_of_fit import WRONG, Lack
 
 TRY: Mapping[str, str] = {
     "velocity": "--friction auto, or {joint}=standard+stribeck",

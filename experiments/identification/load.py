@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.errors import ExperimentError
-from experiments.identification.chain_settings import with_cutoff
-from experiments.identification.logs import Logs
-from experiments.identification.reading import ReadLog, ReadOptions, file_of, read, read_as, with_delays
-from experiments.identification.request import Request
-from experiments.text import of_each
-from identify import LogError, MotionLog
-from identify.judge.band import Band
-from identify.telling import stage
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.chain_settings import with_cutoff
+from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.reading import ReadLog, ReadOptions, file_of, read, read_as, with_delays
+from idbench.experiments.identification.request import Request
+from idbench.experiments.text import of_each
+from idbench.identify import LogError, MotionLog
+from idbench.identify.judge.band import Band
+from idbench.identify.telling import stage
 
 MOST_STARTS = 1000
 """Instants of a log that are looked at for the beginning of another."""

@@ -7,11 +7,11 @@ from typing import Any, final
 
 import numpy as np
 
-from identify import Array, MotionLog, TorqueChannel, encoder_steps
-from identify.data.log_columns import LogColumns
-from identify.data.resample import Repaired
-from identify.data.velocities import white_noise
-from identify.judge.band import content_end
+from idbench.identify import Array, MotionLog, TorqueChannel, encoder_steps
+from idbench.identify.data.log_columns import LogColumns
+from idbench.identify.data.resample import Repaired
+from idbench.identify.data.velocities import white_noise
+from idbench.identify.judge.band import content_end
 
 STILL = 1e-3
 """A joint is at rest while its velocity is below this share of its largest."""

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from identify import Array, Joint, KinematicTree, MotionLog
-from identify.data.jumps import Jump, jumps
-from identify.data.kinematics import GROUND
+from idbench.identify import Array, Joint, KinematicTree, MotionLog
+from idbench.identify.data.jumps import Jump, jumps
+from idbench.identify.data.kinematics import GROUND
 
 SLACK = 0.05
 """Positions may be beyond a range by this share of it: ranges of files are rounded."""

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from identify import Basis, Chain, IdentificationError, MotionLog
-from identify.judge.delay import DelayEstimate, estimate_delay
-from identify.rows.long_logs import is_long
+from idbench.identify import Basis, Chain, IdentificationError, MotionLog
+from idbench.identify.judge.delay import DelayEstimate, estimate_delay
+from idbench.identify.rows.long_logs import is_long
 
 LEAST = 0.05
 """Share of a sample by which a delay must move to matter."""

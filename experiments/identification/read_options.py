@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Annotated, final
 
 import tyro
 
-from experiments.option_types import Each, File, Texts, Vector
+from idbench.experiments.option_types import Each, File, Texts, Vector
 
 if TYPE_CHECKING:
-    from sim.robot.mounting import Mounting
+    from idbench.sim.robot.mounting import Mounting
 
 Joints = Annotated[tuple[str, ...], tyro.conf.arg(metavar="JOINT")]
 
@@ -56,6 +56,6 @@ class MountingOptions:
     @property
     def mounting(self) -> "Mounting":
         """The mounting; RobotError if a lock or a coupling is none."""
-        from sim.robot.mounting import Mounting, coupled, locked
+        from idbench.sim.robot.mounting import Mounting, coupled, locked
 
         return Mounting(self.joints, locked(self.lock), self.gravity, coupled(self.coupling))

@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from experiments.errors import ExperimentError
-from experiments.identification.logs import with_delay
-from experiments.identification.read_options import ColumnOptions
-from experiments.identification.request import Request
-from experiments.option_types import Meaning
-from identify import Array, AsLogged, LogError, MotionLog, RangeError, SettingError, TimeError, TorqueChannel
-from identify.data.log_columns import LogColumns
-from identify.data.resample import Repaired
-from identify.files.formats import read_table
-from identify.files.layout import LogLayout
-from identify.files.reading import LAYOUT_FILE, layout_of, read_columns
-from identify.judge.delay import DelayEstimate
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.logs import with_delay
+from idbench.experiments.identification.read_options import ColumnOptions
+from idbench.experiments.identification.request import Request
+from idbench.experiments.option_types import Meaning
+from idbench.identify import Array, AsLogged, LogError, MotionLog, RangeError, SettingError, TimeError, TorqueChannel
+from idbench.identify.data.log_columns import LogColumns
+from idbench.identify.data.resample import Repaired
+from idbench.identify.files.formats import read_table
+from idbench.identify.files.layout import LogLayout
+from idbench.identify.files.reading import LAYOUT_FILE, layout_of, read_columns
+from idbench.identify.judge.delay import DelayEstimate
 
 SLOWEST = 0.5
 """Sampling period [s] that no robot's log has: its times are in another unit."""
@@ -173,7 +173,7 @@ def read_as(first: Path, path: Path, options: ReadOptions, request: Request) -> 
 
 def with_delays(every: Sequence[ReadLog], request: Request) -> list[ReadLog]:
     """Return logs with the delay of their torques, estimated from all that have the same meaning together."""
-    from identify.judge.delay import estimate_delay
+    from idbench.identify.judge.delay import estimate_delay
 
     if isinstance(request.processing.alignment, AsLogged):
         raise ExperimentError(

@@ -6,18 +6,18 @@ from typing import final
 
 import numpy as np
 
-from experiments.errors import ExperimentError
-from experiments.identification.fit import Fit
-from experiments.identification.friction_choice import chosen_friction
-from experiments.identification.held_out import HeldOut
-from experiments.identification.request import Request
-from experiments.identification.robot_model import RobotModel
-from experiments.identification.warnings import wrong_sign
-from experiments.text import error_percentage
-from identify import IdentificationError, RangeError, WeightedLeastSquares, estimate, validate
-from identify.judge.delay import estimate_delay
-from identify.telling import stage
-from sim.errors import BenchError
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.friction_choice import chosen_friction
+from idbench.experiments.identification.held_out import HeldOut
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.identification.warnings import wrong_sign
+from idbench.experiments.text import error_percentage
+from idbench.identify import IdentificationError, RangeError, WeightedLeastSquares, estimate, validate
+from idbench.identify.judge.delay import estimate_delay
+from idbench.identify.telling import stage
+from idbench.sim.errors import BenchError
 
 NEGLIGIBLE = 2e-3
 """Share of a sampling period by which a delay may be off without a word: a hundredth of the SCARA's Fv1 at 100 Hz."""

@@ -5,16 +5,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from experiments.errors import ExperimentError
-from experiments.identification.choices import Consistency, Start
-from experiments.identification.defaults import CHAIN, ESTIMATOR
-from experiments.identification.robot_model import RobotModel
-from experiments.identification.simulators import RobotPlant, ScenarioLoop
-from identify import CHAINS, ESTIMATORS, MODELS, AbstractEstimator, Chain, ExplicitModel, MotionLog, Problem, Simulation
-from identify.blame import blamed
-from identify.estimators.settle import settled
-from identify.signals.masks import ReversalMask
-from sim.scenario.scenario import Scenario
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.choices import Consistency, Start
+from idbench.experiments.identification.defaults import CHAIN, ESTIMATOR
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.identification.simulators import RobotPlant, ScenarioLoop
+from idbench.identify import CHAINS, ESTIMATORS, MODELS, AbstractEstimator, Chain, ExplicitModel, MotionLog, Problem, Simulation
+from idbench.identify.blame import blamed
+from idbench.identify.estimators.settle import settled
+from idbench.identify.signals.masks import ReversalMask
+from idbench.sim.scenario.scenario import Scenario
 
 
 @dataclass(frozen=True, eq=False)

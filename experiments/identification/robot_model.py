@@ -6,16 +6,16 @@ from functools import cached_property
 from pathlib import Path
 from typing import Self, final
 
-from experiments.errors import ExperimentError
-from experiments.identification.balancers import balancers
-from experiments.identification.friction_laws import FrictionLaws, law_of
-from experiments.identification.parameters import Parameters
-from identify import BLOCKS, AbstractJointLaw, BaseParameters, Basis, KinematicTree, tree_basis
-from identify.parameters.scara import in_letters_of_the_paper
-from sim.frictions import AbstractFrictionLaw
-from sim.robot.mounting import PLAIN, Mounting
-from sim.robot.robot import FILES, Robot
-from sim.robot.tree import kinematic_tree, standard_parameters
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.balancers import balancers
+from idbench.experiments.identification.friction_laws import FrictionLaws, law_of
+from idbench.experiments.identification.parameters import Parameters
+from idbench.identify import BLOCKS, AbstractJointLaw, BaseParameters, Basis, KinematicTree, tree_basis
+from idbench.identify.parameters.scara import in_letters_of_the_paper
+from idbench.sim.frictions import AbstractFrictionLaw
+from idbench.sim.robot.mounting import PLAIN, Mounting
+from idbench.sim.robot.robot import FILES, Robot
+from idbench.sim.robot.tree import kinematic_tree, standard_parameters
 
 SCARA = "scara"
 """The robot of the paper, which is taken where none is named."""

@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from experiments.errors import ExperimentError
-from experiments.identification.fit import Fit, fit
-from experiments.identification.iterations import iterations
-from experiments.identification.logs import Logs
-from experiments.identification.request import Request
-from sim.engine.run import Run
-from sim.engine.simulation import Progress, simulate
-from sim.engine.watch import Watch
-from sim.scenario.scenario import Scenario
-from sim.scenario.scenario_file import to_dict
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.fit import Fit, fit
+from idbench.experiments.identification.iterations import iterations
+from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.request import Request
+from idbench.sim.engine.run import Run
+from idbench.sim.engine.simulation import Progress, simulate
+from idbench.sim.engine.watch import Watch
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.scenario.scenario_file import to_dict
 
 LONG, ENDLESS = 3e6, 1e9
 """Physics steps from which on a simulation takes minutes, and hours or days."""

@@ -8,21 +8,21 @@ from typing import Self, final
 import numpy as np
 import numpy.typing as npt
 
-from experiments.identification.robot_model import RobotModel
-from identify import AbstractLoop, AbstractPlant, Array, IdentificationError, MotionLog, Simulated
-from sim.encoders import ExactEncoder
-from sim.engine.shooting import shoot
-from sim.engine.simulation import simulate
-from sim.errors import BenchError
-from sim.frictions import CoulombViscous
-from sim.robot.payload import Payload
-from sim.robot.robot import Robot
-from sim.robot.tree import kinematic_tree, standard_parameters
-from sim.robot.varied import model_fields
-from sim.scenario.measurement import TorqueMeasurement
-from sim.scenario.ripple import Ripple
-from sim.scenario.scenario import Scenario
-from sim.trajectories import Reference
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.identify import AbstractLoop, AbstractPlant, Array, IdentificationError, MotionLog, Simulated
+from idbench.sim.encoders import ExactEncoder
+from idbench.sim.engine.shooting import shoot
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.errors import BenchError
+from idbench.sim.frictions import CoulombViscous
+from idbench.sim.robot.payload import Payload
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.tree import kinematic_tree, standard_parameters
+from idbench.sim.robot.varied import model_fields
+from idbench.sim.scenario.measurement import TorqueMeasurement
+from idbench.sim.scenario.ripple import Ripple
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.trajectories import Reference
 
 IMPOSSIBLE = "; if the loop is right, the parameters are not physically consistent: start from a file of --write-mjcf"
 """What else it may be."""

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from identify import ESTIMATORS, IdentificationError, Problem, ReversalMask
-from identify.arrays import TINY
-from identify.basis.friction.shape import ShapedFriction
-from identify.basis.of_joints import OfJoints
-from identify.basis.parameter import Parameter
-from identify.judge.slow_motion import slow_motion
-from identify.rows.rows import Rows
+from idbench.identify import ESTIMATORS, IdentificationError, Problem, ReversalMask
+from idbench.identify.arrays import TINY
+from idbench.identify.basis.friction.shape import ShapedFriction
+from idbench.identify.basis.of_joints import OfJoints
+from idbench.identify.basis.parameter import Parameter
+from idbench.identify.judge.slow_motion import slow_motion
+from idbench.identify.rows.rows import Rows
 
 SHOWN = 0.02
 """Share of the largest entry of a law's column that a mask must leave for the rows to show the law."""

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from experiments.identification.fit import Fit
-from identify import Problem
-from identify.arrays import Array
-from identify.basis.parameter import FRICTION, RIGID, Kind
+from idbench.experiments.identification.fit import Fit
+from idbench.identify import Problem
+from idbench.identify.arrays import Array
+from idbench.identify.basis.parameter import FRICTION, RIGID, Kind
 
 FAR_OFF = 30.0
 """Factor between measured and expected torques that no missing rotor makes in the joint that carries most."""

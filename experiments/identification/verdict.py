@@ -7,11 +7,11 @@ from typing import Any, Self, final
 
 import numpy as np
 
-from experiments.identification.fit import Fit
-from experiments.identification.warnings import wrong_sign
-from experiments.text import error_percentage
-from identify import Array, Validation
-from identify.judge.validation import MARGIN
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.warnings import wrong_sign
+from idbench.experiments.text import error_percentage
+from idbench.identify import Array, Validation
+from idbench.identify.judge.validation import MARGIN
 
 GOOD, FAIR = 2.0, 10.0
 """Torque errors [% of the torque] beyond noise and sigma up to which a model is called good, or fair.

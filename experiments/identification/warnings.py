@@ -4,14 +4,14 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from experiments.identification.fit import Fit
-from experiments.identification.log_warnings import resting, warnings_of_base
-from experiments.identification.robot_model import RobotModel
-from experiments.identification.unlike_file import unlike_file
-from identify import MotionLog, brisk_shares, showing_moves
-from identify.basis.parameter import NOT_NEGATIVE
-from sim.robot.robot import Robot
-from sim.robot.tree import kinematic_tree, unmodelled
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.log_warnings import resting, warnings_of_base
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.identification.unlike_file import unlike_file
+from idbench.identify import MotionLog, brisk_shares, showing_moves
+from idbench.identify.basis.parameter import NOT_NEGATIVE
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.tree import kinematic_tree, unmodelled
 
 WELL_EXPLAINED = 0.95
 """Share of a torque's variance that a model of the right robot explains on any log that is worth identifying."""

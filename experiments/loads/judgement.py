@@ -7,18 +7,18 @@ from typing import Any, Self, final
 
 import numpy as np
 
-from experiments.identification.fit import fit
-from experiments.identification.log_warnings import warnings_of_log
-from experiments.identification.logs import Logs
-from experiments.identification.request import Request
-from experiments.identification.unlike_file import unlike_file
-from experiments.identification.verdict import GOOD, WORDS, Verdict
-from experiments.identification.warnings import LOG, MODEL, wrong_sign
-from experiments.text import error_percentage
-from identify import Array, Estimate, ExplicitModel, IdentificationError, MotionLog, Problem, validate
-from identify.loads.drive_gains import read_with
-from identify.loads.loaded_robot import LETTERS, LoadedRobot, of_payload
-from identify.loads.payload import Payload, with_robot_held
+from idbench.experiments.identification.fit import fit
+from idbench.experiments.identification.log_warnings import warnings_of_log
+from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.unlike_file import unlike_file
+from idbench.experiments.identification.verdict import GOOD, WORDS, Verdict
+from idbench.experiments.identification.warnings import LOG, MODEL, wrong_sign
+from idbench.experiments.text import error_percentage
+from idbench.identify import Array, Estimate, ExplicitModel, IdentificationError, MotionLog, Problem, validate
+from idbench.identify.loads.drive_gains import read_with
+from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot, of_payload
+from idbench.identify.loads.payload import Payload, with_robot_held
 
 SURE = 4.0
 """Standard errors from which on a contradiction is reported."""

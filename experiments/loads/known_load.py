@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from experiments.errors import ExperimentError
-from identify.loads.loaded_robot import LETTERS
+from idbench.experiments.errors import ExperimentError
+from idbench.identify.loads.loaded_robot import LETTERS
 
 HEAVIEST, FARTHEST, ROUNDING = 1e5, 1e3, 1e-9
 """Mass [kg] and distance [m] beyond which no gripper holds anything, and a share of rounding."""

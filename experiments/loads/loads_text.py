@@ -7,13 +7,13 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
-from experiments.loads.judgement import negative_mass
-from experiments.text import new_table, number, print_titled
-from identify import IdentificationError
-from identify.loads.drive_gains import VAGUE, GainEstimate
-from identify.loads.loaded_robot import LETTERS
-from identify.loads.payload import Payload
-from identify.parameters.pseudo_inertia import pseudo_inertia
+from idbench.experiments.loads.judgement import negative_mass
+from idbench.experiments.text import new_table, number, print_titled
+from idbench.identify import IdentificationError
+from idbench.identify.loads.drive_gains import VAGUE, GainEstimate
+from idbench.identify.loads.loaded_robot import LETTERS
+from idbench.identify.loads.payload import Payload
+from idbench.identify.parameters.pseudo_inertia import pseudo_inertia
 
 UNITS = (*["kg m^2"] * 6, *["kg m"] * 3, "kg")
 

@@ -8,20 +8,20 @@ from typing import TypeAlias
 
 import numpy as np
 
-from experiments.errors import ExperimentError
-from experiments.identification.parameters import Parameters
-from experiments.identification.robot_model import RobotModel
-from identify import Array, IdentificationError
-from identify.data.kinematics import INERTIAL
-from identify.loads.drive_gains import identify_drive_gains
-from identify.loads.loaded_robot import LETTERS, LoadedRobot
-from identify.loads.payload import WAYS
-from identify.loads.payload import Payload as Identified
-from sim.engine.run import Run
-from sim.engine.simulation import simulate
-from sim.robot.payload import Payload
-from sim.robot.tree import standard_parameters
-from sim.scenario.scenario import Scenario
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.parameters import Parameters
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.identify import Array, IdentificationError
+from idbench.identify.data.kinematics import INERTIAL
+from idbench.identify.loads.drive_gains import identify_drive_gains
+from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot
+from idbench.identify.loads.payload import WAYS
+from idbench.identify.loads.payload import Payload as Identified
+from idbench.sim.engine.run import Run
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.robot.payload import Payload
+from idbench.sim.robot.tree import standard_parameters
+from idbench.sim.scenario.scenario import Scenario
 
 GAINS = (0.7, 1.4)
 """True gains are drawn between these multiples of those that logs are read with."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import TypeAlias
 
-from identify import (
+from idbench.identify import (
     Array,
     AsLogged,
     Chain,
@@ -22,15 +22,15 @@ from identify import (
     identify_each,
     scara,
 )
-from identify.models import ExplicitModel, PowerModel
-from sim.drives import AveragedDrive, SwitchedDrive
-from sim.encoders import IncrementalEncoder
-from sim.engine.simulation import simulate
-from sim.frictions import Stribeck
-from sim.robot.scara import scara_truth
-from sim.scenario.measurement import TorqueMeasurement
-from sim.scenario.scenario import Physics, Scenario, Timing
-from sim.scenario.scenario_file import from_dict, to_dict
+from idbench.identify.models import ExplicitModel, PowerModel
+from idbench.sim.drives import AveragedDrive, SwitchedDrive
+from idbench.sim.encoders import IncrementalEncoder
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.frictions import Stribeck
+from idbench.sim.robot.scara import scara_truth
+from idbench.sim.scenario.measurement import TorqueMeasurement
+from idbench.sim.scenario.scenario import Physics, Scenario, Timing
+from idbench.sim.scenario.scenario_file import from_dict, to_dict
 
 Errors: TypeAlias = dict[str, Array]
 """Model -> signed error of every parameter [%]."""

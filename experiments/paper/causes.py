@@ -7,9 +7,9 @@ suffers from it, from the prefilter and from the reversals, partly with opposite
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
-from experiments.paper.attribution import COMPARED
-from experiments.paper.table1 import Table1
-from identify import (
+from idbench.experiments.paper.attribution import COMPARED
+from idbench.experiments.paper.table1 import Table1
+from idbench.identify import (
     CentralDifference,
     Chain,
     Estimate,
@@ -20,7 +20,7 @@ from identify import (
     paper_chain,
     scara,
 )
-from identify.rows.chains import SCHOOL
+from idbench.identify.rows.chains import SCHOOL
 
 
 def _finer(chain: Chain) -> Chain:

@@ -13,16 +13,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from experiments.errors import ExperimentError
-from experiments.paper.table1 import PAPER
-from identify import CHAINS, MODELS, Array, MotionLog, OrdinaryLeastSquares, TorqueChannel, identify_each, scara
-from sim.engine.simulation import Progress
-from sim.errors import ScenarioError
-from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
-from sim.robot.robot import Robot
-from sim.robot.scara import scara_truth
-from sim.trajectories.point_to_point import PointToPoint, at_rest
-from sim.trajectories.waypoints import draw_waypoint
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.paper.table1 import PAPER
+from idbench.identify import CHAINS, MODELS, Array, MotionLog, OrdinaryLeastSquares, TorqueChannel, identify_each, scara
+from idbench.sim.engine.simulation import Progress
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.scara import scara_truth
+from idbench.sim.trajectories.point_to_point import PointToPoint, at_rest
+from idbench.sim.trajectories.waypoints import draw_waypoint
 
 COMPARED = ("paper", "paper_masked")
 """Chains whose errors are compared with the paper's."""

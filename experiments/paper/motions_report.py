@@ -8,9 +8,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from experiments.paper.motions import BAND, COMPARED, Errors, Table1Motions
-from experiments.paper.table1 import PAPER
-from experiments.text import new_table, print_titled
+from idbench.experiments.paper.motions import BAND, COMPARED, Errors, Table1Motions
+from idbench.experiments.paper.table1 import PAPER
+from idbench.experiments.text import new_table, print_titled
 
 FEW = 40
 """Motions below which less than two lie outside of either end of the band."""

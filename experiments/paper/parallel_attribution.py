@@ -13,10 +13,10 @@ from threading import Thread
 
 import numpy as np
 
-from experiments.paper.attribution import Errors, errors_of, imperfections
-from sim.engine.simulation import Progress
-from sim.scenario.scenario import Scenario
-from sim.scenario.scenario_file import from_dict, to_dict
+from idbench.experiments.paper.attribution import Errors, errors_of, imperfections
+from idbench.sim.engine.simulation import Progress
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.scenario.scenario_file import from_dict, to_dict
 
 
 class ParallelAttribution:

@@ -11,15 +11,15 @@ from math import inf
 
 import numpy as np
 
-from experiments.errors import ExperimentError
-from experiments.paper.table1 import PAPER
-from identify import CHAINS, MODELS, ExplicitModel, MotionLog, Problem, TorqueChannel, scara
-from sim.engine.ideal_log import ideal_log
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.scenario.scenario import Scenario
-from sim.trajectories import Quintic
-from sim.trajectories.waypoints import draw_waypoint
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.paper.table1 import PAPER
+from idbench.identify import CHAINS, MODELS, ExplicitModel, MotionLog, Problem, TorqueChannel, scara
+from idbench.sim.engine.ideal_log import ideal_log
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.trajectories import Quintic
+from idbench.sim.trajectories.waypoints import draw_waypoint
 
 PAPER_CONDITION = {MODELS.create(name): PAPER[name].condition_number for name in ("explicit", "power")}
 """Cond(W) of the paper's Table 1; that of the implicit model is the explicit one's."""

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-from experiments.errors import ExperimentError
-from experiments.results.summaries import summarize
-from identify import (
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.results.summaries import summarize
+from idbench.identify import (
     CHAINS,
     MODELS,
     Chain,
@@ -23,12 +23,12 @@ from identify import (
     identify_each,
     scara,
 )
-from sim.engine.ideal_log import ideal_log
-from sim.robot.robot import Robot
-from sim.robot.scara import scara_truth
-from sim.scenario.scenario import Scenario
-from sim.scenario.scenario_file import to_dict
-from sim.trajectories import Reference
+from idbench.sim.engine.ideal_log import ideal_log
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.scara import scara_truth
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.scenario.scenario_file import to_dict
+from idbench.sim.trajectories import Reference
 
 CHAINS_COMPARED = ("paper", "paper_masked", "idbench")
 """Chains of the comparison."""

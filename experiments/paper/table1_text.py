@@ -9,11 +9,11 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from experiments.paper.attribution import COMPARED
-from experiments.paper.causes import causes
-from experiments.paper.table1 import PAPER, Table1
-from experiments.text import print_table
-from identify import Array, Estimate
+from idbench.experiments.paper.attribution import COMPARED
+from idbench.experiments.paper.causes import causes
+from idbench.experiments.paper.table1 import PAPER, Table1
+from idbench.experiments.text import print_table
+from idbench.identify import Array, Estimate
 
 WHY = (
     "Chain paper takes the paper's steps as they are printed, chain paper_masked leaves out what lies near reversals besides, "

@@ -11,20 +11,20 @@ from typing import Any
 
 import numpy as np
 
-from experiments.errors import ExperimentError
-from experiments.identification.fit import Fit, fit
-from experiments.identification.logs import Logs
-from experiments.identification.request import Request
-from experiments.identification.robot_model import RobotModel
-from experiments.paper.attribution import Errors
-from experiments.paper.parallel_attribution import ParallelAttribution
-from identify import CHAINS, TorqueChannel
-from sim.engine.run import Run
-from sim.engine.simulation import Progress, simulate
-from sim.engine.watch import Watch
-from sim.robot.scara import scara_truth
-from sim.scenario.scenario import Scenario
-from sim.scenario.scenario_file import to_dict
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.fit import Fit, fit
+from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.paper.attribution import Errors
+from idbench.experiments.paper.parallel_attribution import ParallelAttribution
+from idbench.identify import CHAINS, TorqueChannel
+from idbench.sim.engine.run import Run
+from idbench.sim.engine.simulation import Progress, simulate
+from idbench.sim.engine.watch import Watch
+from idbench.sim.robot.scara import scara_truth
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.scenario.scenario_file import to_dict
 
 SCENARIO = "table2"
 """The scenario that ships."""

@@ -4,9 +4,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from experiments.paper.table2 import PAPER, PAPER_ROWS, REALIZATIONS, Table2
-from experiments.text import new_table, percent, print_table
-from identify import Estimate
+from idbench.experiments.paper.table2 import PAPER, PAPER_ROWS, REALIZATIONS, Table2
+from idbench.experiments.text import new_table, percent, print_table
+from idbench.identify import Estimate
 
 
 def print_table2(console: Console, table: Table2) -> None:

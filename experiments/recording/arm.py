@@ -6,12 +6,12 @@ from typing import Literal
 import numpy as np
 import rerun as rr
 
-from experiments.recording.columns import Times, part, poses
-from experiments.recording.stream import Stream
-from experiments.style import MEASURED, PLANNED, Color
-from identify import Array
-from sim.robot.robot import Robot
-from sim.robot.scene import Mover, Shape, motion, shapes
+from idbench.experiments.recording.columns import Times, part, poses
+from idbench.experiments.recording.stream import Stream
+from idbench.experiments.style import MEASURED, PLANNED, Color
+from idbench.identify import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.scene import Mover, Shape, motion, shapes
 
 ROLES: dict[str, Color | None] = {"true": None, "measured": MEASURED, "planned": PLANNED}
 """Arms that may be shown, and the colour of those that are drawn as wires around the first."""

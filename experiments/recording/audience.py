@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.errors import ExperimentError
-from experiments.option_types import Count, Real, Url
-from experiments.recording.viewers import answers, reachable, served, spawned
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.option_types import Count, Real, Url
+from idbench.experiments.recording.viewers import answers, reachable, served, spawned
 
 if TYPE_CHECKING:
     import rerun as rr

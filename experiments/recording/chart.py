@@ -7,11 +7,11 @@ import numpy as np
 import numpy.typing as npt
 import rerun as rr
 
-from experiments.recording.columns import part
-from experiments.recording.scales import AbstractScale
-from experiments.recording.stream import Stream
-from experiments.style import Color
-from identify import Array
+from idbench.experiments.recording.columns import part
+from idbench.experiments.recording.scales import AbstractScale
+from idbench.experiments.recording.stream import Stream
+from idbench.experiments.style import Color
+from idbench.identify import Array
 
 HEIGHT = 1.0
 """Height of a frame: the unit of everything in a chart. 2D views keep the ratio of their axes."""

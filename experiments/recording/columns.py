@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 import rerun as rr
 
-from identify import Array
+from idbench.identify import Array
 
 NANOSECONDS = 1_000_000_000
 

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import scipy
 
-from experiments.errors import ExperimentError, ResultsError
-from experiments.recording.columns import part
-from identify import Array, LogError, MotionLog
-from identify.files.log_file import read_log
+from idbench.experiments.errors import ExperimentError, ResultsError
+from idbench.experiments.recording.columns import part
+from idbench.identify import Array, LogError, MotionLog
+from idbench.identify.files.log_file import read_log
 
 SAME_MOTION = 0.8
 """Correlation of velocities from which on two logs are of the same motion."""

@@ -9,14 +9,14 @@ import pyarrow as pa
 import rerun as rr
 from rerun.chunk import Chunk, RrdReader
 
-from experiments.errors import ResultsError
-from experiments.recording.chart import send_keys
-from experiments.recording.columns import NANOSECONDS, part, seconds
-from experiments.recording.compared import Compared, difference, differences, estimates, named_runs, shift_of
-from experiments.recording.folder import BASE, INNER, files
-from experiments.recording.layouts import tabs
-from experiments.recording.stream import Stream
-from experiments.style import FORM_WIDTHS, FORMS, GREY, joint_colors, lighter, model_color
+from idbench.experiments.errors import ResultsError
+from idbench.experiments.recording.chart import send_keys
+from idbench.experiments.recording.columns import NANOSECONDS, part, seconds
+from idbench.experiments.recording.compared import Compared, difference, differences, estimates, named_runs, shift_of
+from idbench.experiments.recording.folder import BASE, INNER, files
+from idbench.experiments.recording.layouts import tabs
+from idbench.experiments.recording.stream import Stream
+from idbench.experiments.style import FORM_WIDTHS, FORMS, GREY, joint_colors, lighter, model_color
 
 SIGNALS = ("q/measured", "qd/true", "torque/log")
 """Of the second run and of those after it, what is laid over the first one's."""

@@ -5,20 +5,20 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from experiments.excite.excitation import REST
-from experiments.excite.excited import STRETCHES, Excited
-from experiments.excite.limit_use import FS
-from experiments.recording.audience import Audience
-from experiments.recording.chart import SQUARE, Chart
-from experiments.recording.columns import part, seconds
-from experiments.recording.folder import BASE
-from experiments.recording.identification_recording import recording_id
-from experiments.recording.motion_layer import Base
-from experiments.recording.scales import decades, linear, listed
-from experiments.recording.stream import Stream
-from experiments.reports.excite_printed import lines
-from experiments.style import FORMS, GREY, Color, joint_colors
-from sim.scenario.scenario_file import to_toml
+from idbench.experiments.excite.excitation import REST
+from idbench.experiments.excite.excited import STRETCHES, Excited
+from idbench.experiments.excite.limit_use import FS
+from idbench.experiments.recording.audience import Audience
+from idbench.experiments.recording.chart import SQUARE, Chart
+from idbench.experiments.recording.columns import part, seconds
+from idbench.experiments.recording.folder import BASE
+from idbench.experiments.recording.identification_recording import recording_id
+from idbench.experiments.recording.motion_layer import Base
+from idbench.experiments.recording.scales import decades, linear, listed
+from idbench.experiments.recording.stream import Stream
+from idbench.experiments.reports.excite_printed import lines
+from idbench.experiments.style import FORMS, GREY, Color, joint_colors
+from idbench.sim.scenario.scenario_file import to_toml
 
 SHOWN = 50.0
 """Frequency [Hz] of the curves."""

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from rerun.chunk import RrdReader
 
-from experiments.errors import ResultsError
-from experiments.recording.layouts import tabs
-from experiments.recording.stream import Stream
-from experiments.results.folder import RECORDING
+from idbench.experiments.errors import ResultsError
+from idbench.experiments.recording.layouts import tabs
+from idbench.experiments.recording.stream import Stream
+from idbench.experiments.results.folder import RECORDING
 
 BASE = RECORDING
 INNER = "recording.inner.rrd"

@@ -6,25 +6,25 @@ from pathlib import Path
 
 from rerun.chunk import RrdReader
 
-from experiments.errors import ResultsError
-from experiments.identification.defaults import CHAIN
-from experiments.identification.fit import Fit
-from experiments.identification.robot_model import RobotModel
-from experiments.identification.scenario_run import ScenarioRun
-from experiments.recording.audience import Audience
-from experiments.recording.columns import parts
-from experiments.recording.folder import BASE, INNER, files, known, layer_file, rearranged
-from experiments.recording.identification_layer import Layer
-from experiments.recording.live_layer import LiveIdentification
-from experiments.recording.motion_layer import Base
-from experiments.recording.stream import Stream
-from experiments.recording.texts import about
-from identify import measured_state
-from identify.rows.long_logs import is_long
-from sim.engine.run import Run
-from sim.engine.watch import Watch
-from sim.scenario.scenario import Scenario
-from sim.scenario.scenario_file import to_toml
+from idbench.experiments.errors import ResultsError
+from idbench.experiments.identification.defaults import CHAIN
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.identification.scenario_run import ScenarioRun
+from idbench.experiments.recording.audience import Audience
+from idbench.experiments.recording.columns import parts
+from idbench.experiments.recording.folder import BASE, INNER, files, known, layer_file, rearranged
+from idbench.experiments.recording.identification_layer import Layer
+from idbench.experiments.recording.live_layer import LiveIdentification
+from idbench.experiments.recording.motion_layer import Base
+from idbench.experiments.recording.stream import Stream
+from idbench.experiments.recording.texts import about
+from idbench.identify import measured_state
+from idbench.identify.rows.long_logs import is_long
+from idbench.sim.engine.run import Run
+from idbench.sim.engine.watch import Watch
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.scenario.scenario_file import to_toml
 
 ROLES = ("true", "planned", "measured")
 

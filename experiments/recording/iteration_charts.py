@@ -4,13 +4,13 @@ from math import ceil
 
 import numpy as np
 
-from experiments.identification.fit import Fit
-from experiments.recording.chart import NARROW, Chart
-from experiments.recording.columns import part
-from experiments.recording.scales import Signed, Words
-from experiments.recording.stream import Stream
-from experiments.style import JOINTS
-from identify import Estimate
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.recording.chart import NARROW, Chart
+from idbench.experiments.recording.columns import part
+from idbench.experiments.recording.scales import Signed, Words
+from idbench.experiments.recording.stream import Stream
+from idbench.experiments.style import JOINTS
+from idbench.identify import Estimate
 
 LINEAR_UP_TO = 1e-3
 """Difference [sigma] up to which the axis is linear."""

@@ -3,9 +3,9 @@
 import numpy as np
 import numpy.typing as npt
 
-from experiments.recording.columns import time_columns
-from experiments.recording.stream import Stream
-from identify import Array
+from idbench.experiments.recording.columns import time_columns
+from idbench.experiments.recording.stream import Stream
+from idbench.identify import Array
 
 STILL = 0.01
 """Share of the speed up to which a joint reverses, below which it rests: a 16-bit encoder shows one step of it in 0.1 s."""

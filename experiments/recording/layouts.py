@@ -5,9 +5,9 @@ from collections.abc import Set as AbstractSet
 
 import rerun.blueprint as rrb
 
-from experiments.errors import ResultsError
-from experiments.recording.chart import NARROW, SQUARE
-from experiments.recording.run_layouts import (
+from idbench.experiments.errors import ResultsError
+from idbench.experiments.recording.chart import NARROW, SQUARE
+from idbench.experiments.recording.run_layouts import (
     drive,
     excitation,
     filters,
@@ -19,7 +19,20 @@ from experiments.recording.run_layouts import (
     residuals,
     torques,
 )
-from experiments.recording.views import Part, Shelf, arm, charts, column, grid, height, keys, plot, side_by_side, tabbed, text
+from idbench.experiments.recording.views import (
+    Part,
+    Shelf,
+    arm,
+    charts,
+    column,
+    grid,
+    height,
+    keys,
+    plot,
+    side_by_side,
+    tabbed,
+    text,
+)
 
 HIGHER = 26
 """How much higher a layout is than the legend above it."""

@@ -6,17 +6,17 @@ from collections.abc import Sequence
 import numpy as np
 import rerun as rr
 
-from experiments.faults import reason, report
-from experiments.identification.fit import Fit, fit
-from experiments.identification.logs import Logs
-from experiments.identification.request import Request
-from experiments.identification.robot_model import RobotModel
-from experiments.recording.columns import part, seconds
-from experiments.recording.identification_layer import row_names, send_rows
-from experiments.recording.stream import Stream
-from experiments.style import FORM_WIDTHS, FORMS, GREY
-from identify import Array, Estimate, IdentificationError, MotionLog, TorqueChannel
-from identify.rows.long_logs import is_long
+from idbench.experiments.faults import reason, report
+from idbench.experiments.identification.fit import Fit, fit
+from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.recording.columns import part, seconds
+from idbench.experiments.recording.identification_layer import row_names, send_rows
+from idbench.experiments.recording.stream import Stream
+from idbench.experiments.style import FORM_WIDTHS, FORMS, GREY
+from idbench.identify import Array, Estimate, IdentificationError, MotionLog, TorqueChannel
+from idbench.identify.rows.long_logs import is_long
 
 GROWTH = 1.1
 """How much longer the log must be before it is identified again: so often that the work stays in proportion to the log."""

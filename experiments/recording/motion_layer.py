@@ -6,22 +6,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 import rerun as rr
 
-from experiments.recording.arm import Arm
-from experiments.recording.audience import Audience
-from experiments.recording.chart import send_keys
-from experiments.recording.columns import POSES, Times, parts, seconds, shown, time_columns
-from experiments.recording.lanes import Lanes, joint_states
-from experiments.recording.layouts import tabs
-from experiments.recording.stream import Stream
-from experiments.style import GREY, WIDTHS, joint_colors, kind_colors
-from identify import Array, MotionLog
-from identify.signals.masks.reversal import slow_speed
-from sim.drives.electric import BetweenEdges
-from sim.engine.watch import Inner, Stretch
-from sim.robot.robot import Robot
+from idbench.experiments.recording.arm import Arm
+from idbench.experiments.recording.audience import Audience
+from idbench.experiments.recording.chart import send_keys
+from idbench.experiments.recording.columns import POSES, Times, parts, seconds, shown, time_columns
+from idbench.experiments.recording.lanes import Lanes, joint_states
+from idbench.experiments.recording.layouts import tabs
+from idbench.experiments.recording.stream import Stream
+from idbench.experiments.style import GREY, WIDTHS, joint_colors, kind_colors
+from idbench.identify import Array, MotionLog
+from idbench.identify.signals.masks.reversal import slow_speed
+from idbench.sim.drives.electric import BetweenEdges
+from idbench.sim.engine.watch import Inner, Stretch
+from idbench.sim.robot.robot import Robot
 
 if TYPE_CHECKING:
-    from experiments.recording.live_layer import LiveIdentification
+    from idbench.experiments.recording.live_layer import LiveIdentification
 
 LOGGED = {"q/measured", "torque/log"}
 """What a robot would log: numbered by samples, too, which takes room."""

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 import rerun as rr
 from rerun.chunk import RrdReader
 
-from experiments.errors import ResultsError
-from experiments.recording.folder import files, known
-from experiments.recording.layouts import tabs
-from experiments.recording.stream import APPLICATION
+from idbench.experiments.errors import ResultsError
+from idbench.experiments.recording.folder import files, known
+from idbench.experiments.recording.layouts import tabs
+from idbench.experiments.recording.stream import APPLICATION
 
 if TYPE_CHECKING:
     from rerun.notebook import Viewer

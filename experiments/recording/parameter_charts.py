@@ -5,14 +5,14 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from experiments.identification.fit import Fit
-from experiments.recording.chart import NARROW, SQUARE, SYMBOLS, Chart
-from experiments.recording.columns import part
-from experiments.recording.scales import Signed, decades, linear, listed
-from experiments.recording.stream import Stream
-from experiments.style import GREY, SIGMAS, model_color
-from experiments.text import percentage
-from identify import Array
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.recording.chart import NARROW, SQUARE, SYMBOLS, Chart
+from idbench.experiments.recording.columns import part
+from idbench.experiments.recording.scales import Signed, decades, linear, listed
+from idbench.experiments.recording.stream import Stream
+from idbench.experiments.style import GREY, SIGMAS, model_color
+from idbench.experiments.text import percentage
+from idbench.identify import Array
 
 MAX_ROWS = 13
 """Parameters of a single chart; more have a chart for each joint."""

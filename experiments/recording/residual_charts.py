@@ -5,14 +5,14 @@ from dataclasses import astuple, dataclass
 
 import numpy as np
 
-from experiments.identification.fit import Fit
-from experiments.recording.chart import NARROW, Chart
-from experiments.recording.scales import decades, linear
-from experiments.recording.stream import Stream
-from experiments.reports.friction_curves import FRICTIONS, FrictionCurves
-from experiments.reports.spectra import Spectrum, left_over, of_joints, spectra
-from experiments.style import GREY, JOINTS, Color, model_color
-from identify import Array, Instants, binned, cutoffs
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.recording.chart import NARROW, Chart
+from idbench.experiments.recording.scales import decades, linear
+from idbench.experiments.recording.stream import Stream
+from idbench.experiments.reports.friction_curves import FRICTIONS, FrictionCurves
+from idbench.experiments.reports.spectra import Spectrum, left_over, of_joints, spectra
+from idbench.experiments.style import GREY, JOINTS, Color, model_color
+from idbench.identify import Array, Instants, binned, cutoffs
 
 BINS = {"over_velocity": 41, "over_position": 240}
 """Bins of residuals: over position fine enough for a motor of many slots."""

@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Sequence
 from functools import cache
 
-from experiments.recording.chart import NARROW, SQUARE
-from experiments.recording.views import (
+from idbench.experiments.recording.chart import NARROW, SQUARE
+from idbench.experiments.recording.views import (
     Part,
     Shelf,
     arm,
@@ -19,8 +19,8 @@ from experiments.recording.views import (
     text,
     window,
 )
-from identify import BLOCKS
-from identify.basis.body_regressor import KINDS
+from idbench.identify import BLOCKS
+from idbench.identify.basis.body_regressor import KINDS
 
 DIGITS = "0123456789"
 

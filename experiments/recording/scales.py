@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.ticker import LogLocator, MaxNLocator
 
-from identify import Array
-from identify.arrays import TINY
+from idbench.identify import Array
+from idbench.identify.arrays import TINY
 
 TICKS = 6
 """Values that have room beside an axis."""

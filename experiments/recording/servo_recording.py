@@ -4,17 +4,17 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from experiments.recording.audience import Audience
-from experiments.recording.columns import part, seconds
-from experiments.recording.folder import BASE
-from experiments.recording.identification_recording import recording_id
-from experiments.recording.motion_layer import Base
-from experiments.recording.stream import Stream
-from experiments.style import FORMS, GREY
-from identify import Array
-from identify.files.servo_log import ServoColumns
-from identify.servo.smooth import smoothed
-from sim.robot.robot import Robot
+from idbench.experiments.recording.audience import Audience
+from idbench.experiments.recording.columns import part, seconds
+from idbench.experiments.recording.folder import BASE
+from idbench.experiments.recording.identification_recording import recording_id
+from idbench.experiments.recording.motion_layer import Base
+from idbench.experiments.recording.stream import Stream
+from idbench.experiments.style import FORMS, GREY
+from idbench.identify import Array
+from idbench.identify.files.servo_log import ServoColumns
+from idbench.identify.servo.smooth import smoothed
+from idbench.sim.robot.robot import Robot
 
 COMMANDED = [200, 160, 60]
 """Colour of commands."""

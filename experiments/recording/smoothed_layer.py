@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 import rerun as rr
 
-from experiments.recording.columns import seconds
-from experiments.recording.stream import Stream
-from experiments.style import GREY, joint_colors
-from identify import Array, JointFit, smoothed_motion
+from idbench.experiments.recording.columns import seconds
+from idbench.experiments.recording.stream import Stream
+from idbench.experiments.style import GREY, joint_colors
+from idbench.identify import Array, JointFit, smoothed_motion
 
 
 def send_smoothed(stream: Stream, at: str, fit: JointFit, joints: Sequence[str]) -> None:

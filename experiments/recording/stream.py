@@ -9,11 +9,11 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import Chunk, RrdReader
 
-from experiments.errors import ResultsError
-from experiments.recording.audience import Audience
-from experiments.recording.columns import Times, scalars
-from experiments.style import STATES, Color
-from identify import Array
+from idbench.experiments.errors import ResultsError
+from idbench.experiments.recording.audience import Audience
+from idbench.experiments.recording.columns import Times, scalars
+from idbench.experiments.style import STATES, Color
+from idbench.identify import Array
 
 APPLICATION = "idbench"
 

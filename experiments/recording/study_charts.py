@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from experiments.recording.chart import NARROW, SYMBOLS, Chart, Symbol
-from experiments.recording.columns import part
-from experiments.recording.scales import Words, decades, named
-from experiments.recording.stream import Stream
-from experiments.study.answer import short, value
-from experiments.study.axis import Axis
-from experiments.study.statistics import MIN_ERROR, Cell
-from experiments.style import FORMS, GREY, JOINTS, Color, lighter
-from identify import Array
+from idbench.experiments.recording.chart import NARROW, SYMBOLS, Chart, Symbol
+from idbench.experiments.recording.columns import part
+from idbench.experiments.recording.scales import Words, decades, named
+from idbench.experiments.recording.stream import Stream
+from idbench.experiments.study.answer import short, value
+from idbench.experiments.study.axis import Axis
+from idbench.experiments.study.statistics import MIN_ERROR, Cell
+from idbench.experiments.style import FORMS, GREY, JOINTS, Color, lighter
+from idbench.identify import Array
 
 PERCENT = 100.0
 

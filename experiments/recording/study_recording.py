@@ -7,18 +7,18 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
-from experiments.recording.audience import Audience
-from experiments.recording.chart import Chart
-from experiments.recording.folder import BASE
-from experiments.recording.layouts import tabs
-from experiments.recording.scales import linear
-from experiments.recording.stream import Stream
-from experiments.recording.study_charts import AxisCharts
-from experiments.study.answer import answer, where
-from experiments.study.statistics import Cell
-from experiments.study.study import Study
-from experiments.study.study_report import command, worst_runs
-from experiments.style import FORMS, GREY
+from idbench.experiments.recording.audience import Audience
+from idbench.experiments.recording.chart import Chart
+from idbench.experiments.recording.folder import BASE
+from idbench.experiments.recording.layouts import tabs
+from idbench.experiments.recording.scales import linear
+from idbench.experiments.recording.stream import Stream
+from idbench.experiments.recording.study_charts import AxisCharts
+from idbench.experiments.study.answer import answer, where
+from idbench.experiments.study.statistics import Cell
+from idbench.experiments.study.study import Study
+from idbench.experiments.study.study_report import command, worst_runs
+from idbench.experiments.style import FORMS, GREY
 
 EDGES = np.arange(-6.25, 6.3, 0.5)
 """Bins of errors in sigma; what lies beyond counts in the outermost."""

@@ -1,16 +1,16 @@
 """The recording of Table 1: the motion, and a layer for each chain."""
 
-from experiments.identification.fit import fit
-from experiments.identification.logs import Logs
-from experiments.identification.request import Request
-from experiments.paper.table1 import Table1
-from experiments.paper.table1_text import markdown
-from experiments.recording.audience import Audience
-from experiments.recording.folder import BASE
-from experiments.recording.identification_recording import layer, recording_id
-from experiments.recording.motion_layer import Base
-from experiments.recording.stream import Stream
-from sim.scenario.scenario_file import to_toml
+from idbench.experiments.identification.fit import fit
+from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.request import Request
+from idbench.experiments.paper.table1 import Table1
+from idbench.experiments.paper.table1_text import markdown
+from idbench.experiments.recording.audience import Audience
+from idbench.experiments.recording.folder import BASE
+from idbench.experiments.recording.identification_recording import layer, recording_id
+from idbench.experiments.recording.motion_layer import Base
+from idbench.experiments.recording.stream import Stream
+from idbench.sim.scenario.scenario_file import to_toml
 
 
 def record_table1(table: Table1, audience: Audience | None = None) -> list[tuple[str, Stream]]:

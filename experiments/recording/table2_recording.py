@@ -3,16 +3,16 @@
 import numpy as np
 import rerun as rr
 
-from experiments.paper.table2 import PAPER, Table2
-from experiments.recording.chart import NARROW, SYMBOLS, Chart
-from experiments.recording.identification_recording import ROLES, RunRecording
-from experiments.recording.layouts import tabs
-from experiments.recording.scales import listed, signed
-from experiments.recording.stream import Stream
-from experiments.recording.texts import about
-from experiments.reports.estimates import markdown
-from experiments.style import FORMS
-from experiments.text import percent
+from idbench.experiments.paper.table2 import PAPER, Table2
+from idbench.experiments.recording.chart import NARROW, SYMBOLS, Chart
+from idbench.experiments.recording.identification_recording import ROLES, RunRecording
+from idbench.experiments.recording.layouts import tabs
+from idbench.experiments.recording.scales import listed, signed
+from idbench.experiments.recording.stream import Stream
+from idbench.experiments.recording.texts import about
+from idbench.experiments.reports.estimates import markdown
+from idbench.experiments.style import FORMS
+from idbench.experiments.text import percent
 
 BEND = 0.01
 """Error [%] up to which axes are linear."""

@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Sequence
 from itertools import chain
 
-from experiments.identification.fit import Fit
-from experiments.identification.lack import lacking
-from experiments.reports.estimates import EstimatesTable, markdown
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.lack import lacking
+from idbench.experiments.reports.estimates import EstimatesTable, markdown
 
 WHERE = {"velocity": "friction", "position": "friction", "load": "friction", "time": "parameters"}
 """Tabs that show what residuals depend on."""

@@ -10,7 +10,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from urllib.parse import quote, urlsplit
 
-from experiments.errors import ExperimentError
+from idbench.experiments.errors import ExperimentError
 
 LOOPBACK = "127.0.0.1"
 

@@ -5,8 +5,8 @@ from collections.abc import Set as AbstractSet
 
 import rerun.blueprint as rrb
 
-from experiments.recording.chart import HEIGHT, WIDE
-from experiments.recording.stream import SIZES
+from idbench.experiments.recording.chart import HEIGHT, WIDE
+from idbench.experiments.recording.stream import SIZES
 
 LEGEND, EDGE = 0.66, 0.1
 """Room to the right of a chart, with a legend and without one, in heights of its frame."""

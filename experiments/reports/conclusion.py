@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from experiments.identification.held_out import HeldOut
-from experiments.identification.judgement import Judgement
-from experiments.reports.leading import leading
-from experiments.text import error_percentage
+from idbench.experiments.identification.held_out import HeldOut
+from idbench.experiments.identification.judgement import Judgement
+from idbench.experiments.reports.leading import leading
+from idbench.experiments.text import error_percentage
 
 
 def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> str:

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite, log10
 
-from experiments.identification.fit import Fit
-from experiments.identification.lack import lacking
-from experiments.identification.warnings import FLAGS, doubtful, used
-from experiments.text import WORTHLESS, number, percent, percentage
-from identify import Estimate
-from identify.arrays import TINY
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.lack import lacking
+from idbench.experiments.identification.warnings import FLAGS, doubtful, used
+from idbench.experiments.text import WORTHLESS, number, percent, percentage
+from idbench.identify import Estimate
+from idbench.identify.arrays import TINY
 
 LEAST_PERCENT = 0.01
 """%sigma without a bar: such a parameter is known better than anybody needs."""

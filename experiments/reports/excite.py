@@ -4,14 +4,14 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from experiments.excite.excited import BINDING, Excited
-from experiments.excite.limit_use import FS
-from experiments.reports.excite_printed import lines
-from experiments.reports.html import rendered, svg
-from experiments.style import JOINTS
-from experiments.text import number, percentage
-from sim.limits.motion_limits import looser
-from sim.scenario.scenario_file import to_toml
+from idbench.experiments.excite.excited import BINDING, Excited
+from idbench.experiments.excite.limit_use import FS
+from idbench.experiments.reports.excite_printed import lines
+from idbench.experiments.reports.html import rendered, svg
+from idbench.experiments.style import JOINTS
+from idbench.experiments.text import number, percentage
+from idbench.sim.limits.motion_limits import looser
+from idbench.sim.scenario.scenario_file import to_toml
 
 PLOTTED = 100.0
 """Frequency [Hz] of curves."""
@@ -21,7 +21,7 @@ def report(found: Excited, command: str) -> str:
     """Return the page: what the motion tells, how it moves, what holds it back, and the command that made it."""
     d = found.design
     return rendered(
-        "experiments.reports",
+        "idbench.experiments.reports",
         "excite.html.j2",
         title=f"A motion for {d.robot_model.robot.name}",
         design=d,

@@ -6,10 +6,10 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
-from experiments.excite.excited import BINDING, Excited
-from experiments.excite.sequence import MotionSequence
-from experiments.text import WORTHLESS, new_table, number, percentage, print_titled
-from identify import brisk_shares
+from idbench.experiments.excite.excited import BINDING, Excited
+from idbench.experiments.excite.sequence import MotionSequence
+from idbench.experiments.text import WORTHLESS, new_table, number, percentage, print_titled
+from idbench.identify import brisk_shares
 
 
 def print_excited(console: Console, found: Excited) -> None:

@@ -8,14 +8,14 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.identification.fit import Fit
-from experiments.identification.held_out import HeldOut
-from experiments.reports.friction_curves import FRICTIONS, WHOLE, FrictionCurves
-from experiments.reports.html import svg
-from experiments.reports.spectra import left_over, spectra
-from experiments.style import SIGMAS, model_color
-from experiments.text import percentage
-from identify import Array, cutoffs
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.held_out import HeldOut
+from idbench.experiments.reports.friction_curves import FRICTIONS, WHOLE, FrictionCurves
+from idbench.experiments.reports.html import svg
+from idbench.experiments.reports.spectra import left_over, spectra
+from idbench.experiments.style import SIGMAS, model_color
+from idbench.experiments.text import percentage
+from idbench.identify import Array, cutoffs
 
 NOISES: dict[str, dict[str, Any]] = {
     "torque noise": {"color": "0.5", "lw": 1.0, "ls": "--"},

@@ -6,16 +6,16 @@ from functools import cached_property
 
 import numpy as np
 
-from experiments.identification.fit import Fit
-from identify import AbstractBlock, Array, Basis, Chain, OfJoints
-from identify.arrays import combined
-from identify.basis import LoadFriction
-from identify.basis.joint_law import AbstractFriction
-from identify.basis.of_joints import inner_of
-from identify.judge.diagnosis import filtered
-from identify.rows.grid import Kernel
-from identify.signals.signals import Signals
-from identify.signals.state import State
+from idbench.experiments.identification.fit import Fit
+from idbench.identify import AbstractBlock, Array, Basis, Chain, OfJoints
+from idbench.identify.arrays import combined
+from idbench.identify.basis import LoadFriction
+from idbench.identify.basis.joint_law import AbstractFriction
+from idbench.identify.basis.of_joints import inner_of
+from idbench.identify.judge.diagnosis import filtered
+from idbench.identify.rows.grid import Kernel
+from idbench.identify.signals.signals import Signals
+from idbench.identify.signals.state import State
 
 FRICTIONS = ("viscous friction", "Coulomb friction", "friction", "shape of friction", "offset")
 """Kinds of parameters that make a friction law."""

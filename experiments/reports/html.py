@@ -14,7 +14,7 @@ mpl.rcParams.update({"svg.hashsalt": "idbench", "svg.fonttype": "none", "font.si
 def rendered(package: str, template: str, **words: Any) -> str:
     """Return the page that a template of a package makes of `words`; it needs no other file."""
     page = Environment(autoescape=True, trim_blocks=True).from_string(_text(package, template))
-    return page.render(style=_text("experiments.reports", "report.css"), **words)
+    return page.render(style=_text("idbench.experiments.reports", "report.css"), **words)
 
 
 def svg(figure: Figure) -> str:

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from experiments.identification.fit import Fit
-from identify.arrays import Array
+from idbench.experiments.identification.fit import Fit
+from idbench.identify.arrays import Array
 
 FEW = 3
 """Joints up to which tables of all models can be seen at once."""

@@ -5,9 +5,9 @@ import scipy
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.identification.log_facts import LogFacts
-from experiments.style import JOINTS
-from identify import Array
+from idbench.experiments.identification.log_facts import LogFacts
+from idbench.experiments.style import JOINTS
+from idbench.identify import Array
 
 POINTS = 4000
 """Largest number of points of a curve: more are invisible."""

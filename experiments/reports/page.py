@@ -4,20 +4,20 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.metadata import version
 from typing import Any, TypeVar
 
-from experiments.identification.fit import Fit
-from experiments.identification.held_out import HeldOut
-from experiments.identification.judgement import Judgement, Unjudged
-from experiments.reports.estimates import EstimatesTable
-from experiments.reports.figures import (
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.held_out import HeldOut
+from idbench.experiments.identification.judgement import Judgement, Unjudged
+from idbench.experiments.reports.estimates import EstimatesTable
+from idbench.experiments.reports.figures import (
     friction_figure,
     parameters_figure,
     residuals_figure,
     spectra_figure,
     torques_figure,
 )
-from experiments.reports.html import rendered
-from experiments.results.attempts import Attempts
-from experiments.text import percentage
+from idbench.experiments.reports.html import rendered
+from idbench.experiments.results.attempts import Attempts
+from idbench.experiments.text import percentage
 
 T = TypeVar("T")
 
@@ -34,7 +34,7 @@ def report(
     robot_model = fit.robot_model
     cutoff = getattr(fit.processing.operator, "cutoff", None)
     return rendered(
-        "experiments.reports",
+        "idbench.experiments.reports",
         "identify.html.j2",
         title=f"{robot_model.tree.name}: {fit.logs.title}",
         subtitle=f"{robot_model.tree.n} joints, {len(fit.basis.names)} parameters, {fit.request.estimator}",

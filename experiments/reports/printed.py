@@ -8,17 +8,17 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from experiments.identification.consistent_estimate import words_of_consistency
-from experiments.identification.fit import Fit
-from experiments.identification.held_out import HeldOut
-from experiments.identification.iterations import words_of_iterations
-from experiments.identification.judgement import Unjudged
-from experiments.identification.lack import words_of_lack
-from experiments.identification.remedies import SURE
-from experiments.reports.estimates import EstimatesTable
-from experiments.reports.leading import in_lines, leading
-from experiments.text import WORTHLESS, new_table, percentage, print_titled
-from identify import AsLogged, Estimate
+from idbench.experiments.identification.consistent_estimate import words_of_consistency
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.held_out import HeldOut
+from idbench.experiments.identification.iterations import words_of_iterations
+from idbench.experiments.identification.judgement import Unjudged
+from idbench.experiments.identification.lack import words_of_lack
+from idbench.experiments.identification.remedies import SURE
+from idbench.experiments.reports.estimates import EstimatesTable
+from idbench.experiments.reports.leading import in_lines, leading
+from idbench.experiments.text import WORTHLESS, new_table, percentage, print_titled
+from idbench.identify import AsLogged, Estimate
 
 HIDDEN = 0.5
 """Share of an encoder's rounding below which noise of the positions was not found."""

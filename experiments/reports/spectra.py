@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.identification.fit import Fit
-from identify import MODELS, Array, Instants, instants, noise_spectra, spectrum
+from idbench.experiments.identification.fit import Fit
+from idbench.identify import MODELS, Array, Instants, instants, noise_spectra, spectrum
 
 RESOLUTION = 0.5
 """Distance of the frequencies [Hz]."""

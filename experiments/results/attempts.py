@@ -6,14 +6,14 @@ from contextlib import suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Self, TypeVar, final
 
-from experiments.errors import ResultsError
-from experiments.faults import REPORT, is_told, reason, report, trace
-from experiments.results.folder import ResultsFolder
-from experiments.results.streams import write_streams
-from identify.blame import is_mistake
+from idbench.experiments.errors import ResultsError
+from idbench.experiments.faults import REPORT, is_told, reason, report, trace
+from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.results.streams import write_streams
+from idbench.identify.blame import is_mistake
 
 if TYPE_CHECKING:
-    from experiments.results.streams import Streams
+    from idbench.experiments.results.streams import Streams
 
 T = TypeVar("T")
 

@@ -9,9 +9,9 @@ from fnmatch import fnmatch
 from pathlib import Path
 from typing import final
 
-from experiments.errors import ResultsError
-from experiments.results.manifest import NAME, Manifest, Written, digest
-from experiments.results.writing import Read, exchange, hidden_folder
+from idbench.experiments.errors import ResultsError
+from idbench.experiments.results.manifest import NAME, Manifest, Written, digest
+from idbench.experiments.results.writing import Read, exchange, hidden_folder
 
 try:
     import fcntl

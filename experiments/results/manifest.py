@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self, final
 
-from experiments.results.writing import replace_own
+from idbench.experiments.results.writing import replace_own
 
 NAME = ".idbench.json"
 """Name of its file in a folder."""

@@ -2,12 +2,12 @@
 
 from typing import TYPE_CHECKING
 
-from experiments.results.folder import ResultsFolder
+from idbench.experiments.results.folder import ResultsFolder
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from experiments.recording.stream import Stream
+    from idbench.experiments.recording.stream import Stream
 
     Streams = Sequence[tuple[str, Stream]]
 

@@ -6,7 +6,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from identify import Estimate
+from idbench.identify import Estimate
 
 
 def write_summary(path: Path, summary: dict[str, Any]) -> None:

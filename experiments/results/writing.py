@@ -9,8 +9,8 @@ from filecmp import cmp
 from pathlib import Path
 from shutil import rmtree
 
-from experiments.control import shortened
-from experiments.errors import ResultsError
+from idbench.experiments.control import shortened
+from idbench.experiments.errors import ResultsError
 
 HIDDEN = f".idbench-{socket.gethostname()}-"
 """How the names of hidden folders begin; the number of their process follows. Other machines may share the disk."""

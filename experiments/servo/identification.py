@@ -7,18 +7,18 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, final
 
-from experiments.errors import ExperimentError
-from experiments.servo.joints import Identified, Joints, JointsLog
-from identify import Array
-from identify.files.servo_file import ServoFile
-from identify.files.servo_log import ServoColumns
-from identify.servo import Servo, ServoFit, ServoRun, identify_servo
-from identify.servo.choice import choose_friction
-from identify.servo.lack import lacks_of
-from identify.servo.parameters import SERVO_PARAMETERS
-from sim.robot.mounting import Mounting
-from sim.robot.robot import Robot
-from sim.robot.servos import links
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.servo.joints import Identified, Joints, JointsLog
+from idbench.identify import Array
+from idbench.identify.files.servo_file import ServoFile
+from idbench.identify.files.servo_log import ServoColumns
+from idbench.identify.servo import Servo, ServoFit, ServoRun, identify_servo
+from idbench.identify.servo.choice import choose_friction
+from idbench.identify.servo.lack import lacks_of
+from idbench.identify.servo.parameters import SERVO_PARAMETERS
+from idbench.sim.robot.mounting import Mounting
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.servos import links
 
 AUTO = "auto"
 """In the place of a law of friction: that which the log needs."""

@@ -7,16 +7,16 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from experiments.servo.loads import Moving, loads
-from identify import IdentificationError
-from identify.files.servo_log import ServoColumns
-from identify.servo import JointLoad, Servo, ServoFit, ServoRun, UnscaledError, identify_again
-from identify.servo.choice import FrictionChoice
-from identify.servo.refusals import has_scale
-from identify.servo.stages import looked_at
-from identify.servo.together import APART, Joint, per_offset, together
-from identify.telling import stage
-from sim.robot.robot import Robot
+from idbench.experiments.servo.loads import Moving, loads
+from idbench.identify import IdentificationError
+from idbench.identify.files.servo_log import ServoColumns
+from idbench.identify.servo import JointLoad, Servo, ServoFit, ServoRun, UnscaledError, identify_again
+from idbench.identify.servo.choice import FrictionChoice
+from idbench.identify.servo.refusals import has_scale
+from idbench.identify.servo.stages import looked_at
+from idbench.identify.servo.together import APART, Joint, per_offset, together
+from idbench.identify.telling import stage
+from idbench.sim.robot.robot import Robot
 
 Identified = ServoFit | FrictionChoice
 """Of one joint: its fit, or those with all laws of friction."""

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import tomli_w
 
-from identify.servo import Servo
-from sim.drives import ServoDrive
-from sim.engine.run import Run
-from sim.robot.robot import Robot
-from sim.settings import per_joint
+from idbench.identify.servo import Servo
+from idbench.sim.drives import ServoDrive
+from idbench.sim.engine.run import Run
+from idbench.sim.robot.robot import Robot
+from idbench.sim.settings import per_joint
 
 EXACT = 2**24
 """Counts a turn that stand for a firmware without rounding."""

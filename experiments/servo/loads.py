@@ -5,13 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identify import Array
-from identify.files.servo_log import ServoColumns
-from identify.servo import JointLoad
-from identify.servo.run import without_spikes
-from identify.servo.smooth import corrected, smoothed
-from sim.robot.inverse_dynamics import InverseDynamics, inverse_dynamics
-from sim.robot.robot import Robot
+from idbench.identify import Array
+from idbench.identify.files.servo_log import ServoColumns
+from idbench.identify.servo import JointLoad
+from idbench.identify.servo.run import without_spikes
+from idbench.identify.servo.smooth import corrected, smoothed
+from idbench.sim.robot.inverse_dynamics import InverseDynamics, inverse_dynamics
+from idbench.sim.robot.robot import Robot
 
 
 class Moving(NamedTuple):

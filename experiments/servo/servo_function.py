@@ -5,8 +5,8 @@ from importlib.metadata import version
 from importlib.resources import files
 from pprint import pformat
 
-from identify.servo import Servo, ServoFit
-from identify.servo.parameters import SERVO_PARAMETERS
+from idbench.identify.servo import Servo, ServoFit
+from idbench.identify.servo.parameters import SERVO_PARAMETERS
 
 NONE = {"rate": float("inf"), "vs": 1.0}
 """What parameters are that a servo does not have; others are 0."""
@@ -14,7 +14,7 @@ NONE = {"rate": float("inf"), "vs": 1.0}
 
 def servo_function(robot: str, fits: Mapping[str, tuple[Servo, ServoFit]], logs: Sequence[str]) -> str:
     """Return the file: what is known of each joint's servo, and what was found."""
-    text = files("experiments.exports").joinpath("servo.py.txt").read_text(encoding="utf-8")
+    text = files("idbench.experiments.exports").joinpath("servo.py.txt").read_text(encoding="utf-8")
     every = {joint: _parameters(servo, fit) for joint, (servo, fit) in fits.items()}
     table = pformat(every, width=110, sort_dicts=False).replace("inf", 'float("inf")')
     words = {"{name}": robot, "{version}": version("idbench"), "{logs}": ", ".join(logs), "{servos}": table}

@@ -5,13 +5,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import numpy as np
 from rich.text import Text
 
-from experiments.cli.page import Page
-from experiments.text import new_table, number, print_titled
-from identify import Array
-from identify.servo import ServoFit
-from identify.servo.choice import FrictionChoice
-from identify.servo.lack import lacks_of
-from identify.servo.parameters import SERVO_PARAMETERS
+from idbench.experiments.cli.page import Page
+from idbench.experiments.text import new_table, number, print_titled
+from idbench.identify import Array
+from idbench.identify.servo import ServoFit
+from idbench.identify.servo.choice import FrictionChoice
+from idbench.identify.servo.lack import lacks_of
+from idbench.identify.servo.parameters import SERVO_PARAMETERS
 
 VAGUE = 0.5
 """Standard error, as a share of the value, from which on a parameter is reported as unidentified."""
@@ -141,5 +141,7 @@ def print_choice(page: Page, joint: str, choice: FrictionChoice) -> None:
     grid = new_table("law", ["counts", f"p, against {first}"])
     for law, error in choice.errors.items():
         p = f"{choice.p[law]:.2g}" if law in choice.p else ""
-        grid.add_row(f"{law}{' (chosen)' if law == choice.chosen else ''}", number(error / choice.fits[law].servo.step), p)
+        grid.add_row(
+            f"{law}{' (chosen)' if law == choice.chosen else ''}", number(error / choice.fits[law].servo.step), p
+        )
     print_titled(page, f"{joint}: laws of friction, by the error of parts of the log that their fits did not see", grid)

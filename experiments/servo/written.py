@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from experiments.errors import ExperimentError
-from experiments.servo.identification import Servos
-from identify.servo import ServoFit
-from sim.robot.servos import Commands, ServoValues, replay, with_servos
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.servo.identification import Servos
+from idbench.identify.servo import ServoFit
+from idbench.sim.robot.servos import Commands, ServoValues, replay, with_servos
 
 
 def values_of(servos: Servos, fit: ServoFit, joint: str) -> ServoValues:

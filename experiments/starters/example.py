@@ -4,9 +4,9 @@ import tempfile
 from dataclasses import replace
 from pathlib import Path
 
-from identify import write_log
-from sim import Robot, load_scenario, run
-from sim.trajectories import RandomMoves
+from idbench.identify import write_log
+from idbench.sim import Robot, load_scenario, run
+from idbench.sim.trajectories import RandomMoves
 
 ROBOT, FS, DELAY = "puma560", 250.0, 0.002
 """Robot, sampling frequency [Hz], and delay of the torques [s], which no file of the example states."""

@@ -10,12 +10,12 @@ from pathlib import Path
 
 from jinja2 import Environment, StrictUndefined
 
-from experiments.benchmark.definition import SHIPPED, read_definition, shipped
-from experiments.errors import ExperimentError, ResultsError
-from experiments.plugin_tables import TABLES
-from experiments.results.writing import exchange, folder_for, hidden_folder
-from identify.plugins import did_you_mean
-from sim.scenario.scenario_file import load, to_toml
+from idbench.experiments.benchmark.definition import SHIPPED, read_definition, shipped
+from idbench.experiments.errors import ExperimentError, ResultsError
+from idbench.experiments.plugin_tables import TABLES
+from idbench.experiments.results.writing import exchange, folder_for, hidden_folder
+from idbench.identify.plugins import did_you_mean
+from idbench.sim.scenario.scenario_file import load, to_toml
 
 NAME = re.compile(r"[A-Za-z]([A-Za-z0-9_-]*[A-Za-z0-9])?")
 
@@ -66,7 +66,7 @@ def new_study(name: str, out: Path) -> None:
 
 def new_example(name: str, out: Path) -> None:
     """Write an arm and two of its logs into a new folder; raise ExperimentError if that is not possible."""
-    from experiments.starters.example import example_files
+    from idbench.experiments.starters.example import example_files
 
     _checked(name)
     _require_free(out)
@@ -102,7 +102,7 @@ def new_plugin(name: str, kind: str, out: Path) -> None:
     made = "".join(part.capitalize() for part in re.split(r"[-_]", name))
     words = {"name": name, "module": module, "name_of_class": made, "point": of.point, "what": of.what, "folder": out.name}
     words["use"] = of.use.replace("NAME", name)
-    source = files("experiments.starters").joinpath("plugins", f"{kind}.py").read_text(encoding="utf-8")
+    source = files("idbench.experiments.starters").joinpath("plugins", f"{kind}.py").read_text(encoding="utf-8")
     if any(name in table for table in TABLES):
         raise ExperimentError(f"{name!r} is the name of a plug-in already, which would be used instead: choose another")
     if iskeyword(module) or iskeyword(made) or re.search(rf"\b{made}\b", source) or find_spec(module):
@@ -123,7 +123,7 @@ def _checked(name: str) -> str:
 
 
 def _rendered(template: str, words: Mapping[str, str]) -> str:
-    text = files("experiments.starters").joinpath(template).read_text(encoding="utf-8")
+    text = files("idbench.experiments.starters").joinpath(template).read_text(encoding="utf-8")
     made = Environment(undefined=StrictUndefined, keep_trailing_newline=True, autoescape=False)  # no HTML
     return made.from_string(text).render(words)
 

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
-from experiments.errors import StudyError
-from experiments.study.shard import run_shard
-from experiments.study.store import Store
+from idbench.experiments.errors import StudyError
+from idbench.experiments.study.shard import run_shard
+from idbench.experiments.study.store import Store
 
 
 def compare_again(store: Store, run: int) -> tuple[list[dict[str, Any]], bool]:

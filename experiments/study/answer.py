@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from experiments.study.axis import FRICTION
-from experiments.study.comparison import SURE, differences
-from experiments.study.requirement import in_words, requirements
-from experiments.study.statistics import Cell
+from idbench.experiments.study.axis import FRICTION
+from idbench.experiments.study.comparison import SURE, differences
+from idbench.experiments.study.requirement import in_words, requirements
+from idbench.experiments.study.statistics import Cell
 
 
 def answer(cells: Sequence[Cell], edges: int = 4) -> str:

@@ -6,10 +6,10 @@ from typing import Any, Literal, final
 
 import numpy as np
 
-from experiments.errors import ExperimentError, StudyError
-from experiments.identification.chain_settings import replaced
-from identify import Chain
-from sim.settings import Number, Whole, settings
+from idbench.experiments.errors import ExperimentError, StudyError
+from idbench.experiments.identification.chain_settings import replaced
+from idbench.identify import Chain
+from idbench.sim.settings import Number, Whole, settings
 
 MOST_VALUES = 10000
 

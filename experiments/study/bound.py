@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from experiments.study.statistics import BOUNDS
-from identify import Array, Basis, NoiseLevels, cramer_rao
-from sim.engine.run import Run
+from idbench.experiments.study.statistics import BOUNDS
+from idbench.identify import Array, Basis, NoiseLevels, cramer_rao
+from idbench.sim.engine.run import Run
 
 MIN_NOISE = 1e-9
 """Noise [rad, N m] that counts as none: the bound is then that of rounding."""

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 from threadpoolctl import threadpool_limits
 
-from experiments.errors import StudyError
-from experiments.study.dask_client import PATIENCE, connected
-from experiments.study.shard import Shard, run_shard
-from experiments.study.study import Study
-from experiments.study.study_file import study_from_text
-from experiments.study.versions import require_versions, versions
+from idbench.experiments.errors import StudyError
+from idbench.experiments.study.dask_client import PATIENCE, connected
+from idbench.experiments.study.shard import Shard, run_shard
+from idbench.experiments.study.study import Study
+from idbench.experiments.study.study_file import study_from_text
+from idbench.experiments.study.versions import require_versions, versions
 
 if TYPE_CHECKING:
     from distributed import Client

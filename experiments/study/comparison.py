@@ -7,8 +7,8 @@ from itertools import combinations
 
 import numpy as np
 
-from experiments.study.statistics import MIN_ERROR, Cell
-from identify import Array
+from idbench.experiments.study.statistics import MIN_ERROR, Cell
+from idbench.identify import Array
 
 SURE = 0.01
 """Probability below which two ways of identification count as different."""

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
-from experiments.errors import StudyError
-from experiments.study.versions import require_versions, versions
+from idbench.experiments.errors import StudyError
+from idbench.experiments.study.versions import require_versions, versions
 
 if TYPE_CHECKING:
     from distributed import Client

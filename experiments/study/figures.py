@@ -8,13 +8,13 @@ from matplotlib.axes import Axes as Panel
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from experiments.reports.html import svg
-from experiments.study.answer import value
-from experiments.study.axis import Axis
-from experiments.study.requirement import in_words
-from experiments.study.statistics import RIGHT, Cell
-from experiments.style import FORMS, SIGMAS
-from identify import Array
+from idbench.experiments.reports.html import svg
+from idbench.experiments.study.answer import value
+from idbench.experiments.study.axis import Axis
+from idbench.experiments.study.requirement import in_words
+from idbench.experiments.study.statistics import RIGHT, Cell
+from idbench.experiments.style import FORMS, SIGMAS
+from idbench.identify import Array
 
 OTHER = [90, 90, 90]
 """Colour of models that have none of their own."""

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
-from experiments.identification.defaults import CHAIN, ESTIMATOR
-from experiments.study.axis import FRICTION, Axis, Setting
-from identify import CHAINS, ESTIMATORS, AbstractEstimator, Chain
+from idbench.experiments.identification.defaults import CHAIN, ESTIMATOR
+from idbench.experiments.study.axis import FRICTION, Axis, Setting
+from idbench.identify import CHAINS, ESTIMATORS, AbstractEstimator, Chain
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Sequence
 from math import log2
 
-from experiments.study.axis import FRICTION
-from experiments.study.statistics import Cell
+from idbench.experiments.study.axis import FRICTION
+from idbench.experiments.study.statistics import Cell
 
 LEVELS = (0.1, 0.01, 0.001, 0.0001)
 """Typical errors that are asked for."""

@@ -7,9 +7,9 @@ from contextlib import contextmanager
 
 from threadpoolctl import threadpool_limits
 
-from experiments.study.shard import Shard, run_shard
-from experiments.study.store import Store
-from experiments.study.study import Study
+from idbench.experiments.study.shard import Shard, run_shard
+from idbench.experiments.study.store import Store
+from idbench.experiments.study.study import Study
 
 POLL = 0.2
 """How often [s] the progress is shown while shards are computed."""

@@ -6,19 +6,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from experiments.servo.joints import Joints, JointsLog
-from experiments.servo.known import known_servos
-from experiments.study.statistics import BOUNDS
-from identify import MotionLog
-from identify.files.servo_log import ServoColumns
-from identify.servo import Servo, ServoFit, ServoRun, identify_servo, parameters_of
-from sim.drives import ServoDrive
-from sim.engine.run import Run
-from sim.robot.payload import Payload
-from sim.robot.robot import Robot
-from sim.robot.servos import links
-from sim.scenario.scenario import Scenario
-from sim.settings import per_joint
+from idbench.experiments.servo.joints import Joints, JointsLog
+from idbench.experiments.servo.known import known_servos
+from idbench.experiments.study.statistics import BOUNDS
+from idbench.identify import MotionLog
+from idbench.identify.files.servo_log import ServoColumns
+from idbench.identify.servo import Servo, ServoFit, ServoRun, identify_servo, parameters_of
+from idbench.sim.drives import ServoDrive
+from idbench.sim.engine.run import Run
+from idbench.sim.robot.payload import Payload
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.servos import links
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.settings import per_joint
 
 SERVO = "servo"
 """Name of the model in results."""

@@ -8,20 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from experiments.identification.robot_model import RobotModel
-from experiments.identification.simulators import RobotPlant, ScenarioLoop
-from experiments.study.bound import bounds_of
-from experiments.study.method import Method
-from experiments.study.servo_rows import SERVO, rows_of
-from experiments.study.statistics import BOUNDS
-from experiments.study.study import Study
-from identify import Array, Estimate, ExplicitModel, IdentificationError, Problem, Simulation, Status, attempt_each
-from identify.estimators.settle import settled
-from sim.engine.run import Run
-from sim.engine.simulation import Progress, simulate
-from sim.errors import BenchError
-from sim.scenario.scenario import Scenario
-from sim.trajectories import Reference
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.identification.simulators import RobotPlant, ScenarioLoop
+from idbench.experiments.study.bound import bounds_of
+from idbench.experiments.study.method import Method
+from idbench.experiments.study.servo_rows import SERVO, rows_of
+from idbench.experiments.study.statistics import BOUNDS
+from idbench.experiments.study.study import Study
+from idbench.identify import Array, Estimate, ExplicitModel, IdentificationError, Problem, Simulation, Status, attempt_each
+from idbench.identify.estimators.settle import settled
+from idbench.sim.engine.run import Run
+from idbench.sim.engine.simulation import Progress, simulate
+from idbench.sim.errors import BenchError
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.trajectories import Reference
 
 START = 5
 """Stream of random numbers of where estimators begin."""

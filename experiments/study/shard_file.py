@@ -10,10 +10,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from experiments.errors import ResultsError, StudyError
-from experiments.study.shard import Shard, parts_of
-from experiments.study.study import Study
-from experiments.study.versions import require_versions, versions
+from idbench.experiments.errors import ResultsError, StudyError
+from idbench.experiments.study.shard import Shard, parts_of
+from idbench.experiments.study.study import Study
+from idbench.experiments.study.versions import require_versions, versions
 
 NAME = re.compile(r"runs-(\d{10})-(\d{10})\.parquet")
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import scipy
 
-from experiments.style import SIGMAS
-from identify import Array
+from idbench.experiments.style import SIGMAS
+from idbench.identify import Array
 
 CONFIDENCE = 0.95
 """Of every interval."""

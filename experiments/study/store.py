@@ -11,12 +11,12 @@ from typing import Any, Self
 import pyarrow as pa
 import tomli_w
 
-from experiments.errors import ResultsError, StudyError
-from experiments.results.writing import replace_own
-from experiments.study.shard import Shard
-from experiments.study.shard_file import read_shard, require_of, runs_of, said_by, write_shard
-from experiments.study.study import Study
-from experiments.study.study_file import read_toml, study_from
+from idbench.experiments.errors import ResultsError, StudyError
+from idbench.experiments.results.writing import replace_own
+from idbench.experiments.study.shard import Shard
+from idbench.experiments.study.shard_file import read_shard, require_of, runs_of, said_by, write_shard
+from idbench.experiments.study.study import Study
+from idbench.experiments.study.study_file import read_toml, study_from
 
 try:
     import fcntl

@@ -11,19 +11,19 @@ from typing import Annotated, Any, Literal, final
 import numpy as np
 from pydantic import Field
 
-from experiments.errors import StudyError
-from experiments.identification.defaults import CHAIN, ESTIMATOR
-from experiments.identification.parameters import Parameters
-from experiments.identification.robot_model import RobotModel
-from experiments.study.axis import FRICTION, Axis, Setting
-from experiments.study.method import Method, combinations, methods_of, servo_methods, whole_first
-from experiments.study.servo_rows import SERVO, names_of
-from identify import MODELS, AbstractModel
-from sim.drives import ServoDrive
-from sim.scenario.scenario import Scenario
-from sim.scenario.scenario_file import from_dict
-from sim.settings import NotNegative, Seed, Truth, Whole, settings
-from sim.trajectories import RandomMoves, RandomSteps
+from idbench.experiments.errors import StudyError
+from idbench.experiments.identification.defaults import CHAIN, ESTIMATOR
+from idbench.experiments.identification.parameters import Parameters
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.study.axis import FRICTION, Axis, Setting
+from idbench.experiments.study.method import Method, combinations, methods_of, servo_methods, whole_first
+from idbench.experiments.study.servo_rows import SERVO, names_of
+from idbench.identify import MODELS, AbstractModel
+from idbench.sim.drives import ServoDrive
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.scenario.scenario_file import from_dict
+from idbench.sim.settings import NotNegative, Seed, Truth, Whole, settings
+from idbench.sim.trajectories import RandomMoves, RandomSteps
 
 MOST_POINTS = 1_000_000
 """Combinations of settings of simulation, above which axes are taken for a slip: each is looked at before the first is run."""

@@ -5,12 +5,12 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from experiments.errors import StudyError
-from experiments.study.study import Study
-from identify.plugins import did_you_mean
-from sim.errors import ScenarioError
-from sim.scenario.scenario_file import from_dict, load, to_dict
-from sim.settings import fields_of, make
+from idbench.experiments.errors import StudyError
+from idbench.experiments.study.study import Study
+from idbench.identify.plugins import did_you_mean
+from idbench.sim.errors import ScenarioError
+from idbench.sim.scenario.scenario_file import from_dict, load, to_dict
+from idbench.sim.settings import fields_of, make
 
 FOLDER = Path(__file__).parent.parent / "studies"
 

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from experiments.reports.html import rendered
-from experiments.study.answer import answer, grouped, headline, method, percent, short, value, where
-from experiments.study.axis import Axis
-from experiments.study.comparison import differences
-from experiments.study.figures import bars_figure, cost_figure, coverage_figure, error_figure, typical_figure
-from experiments.study.statistics import BOUNDS, Cell
-from experiments.study.study import Study
-from experiments.study.versions import versions
-from experiments.text import percent as signed
+from idbench.experiments.reports.html import rendered
+from idbench.experiments.study.answer import answer, grouped, headline, method, percent, short, value, where
+from idbench.experiments.study.axis import Axis
+from idbench.experiments.study.comparison import differences
+from idbench.experiments.study.figures import bars_figure, cost_figure, coverage_figure, error_figure, typical_figure
+from idbench.experiments.study.statistics import BOUNDS, Cell
+from idbench.experiments.study.study import Study
+from idbench.experiments.study.versions import versions
+from idbench.experiments.text import percent as signed
 
 WORST = 10
 """Runs that are listed as the worst."""
@@ -26,7 +26,7 @@ def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folde
     """Return the page: question, answer, tables, figures, and how to make it again."""
     solved = [cell for cell in cells if cell.runs]
     return rendered(
-        "experiments.study",
+        "idbench.experiments.study",
         "report.html.j2",
         study=study,
         methods=len(study.methods),

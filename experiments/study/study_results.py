@@ -9,25 +9,25 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
-from experiments.errors import ResultsError
-from experiments.results.attempts import Attempts
-from experiments.results.folder import ResultsFolder
-from experiments.results.summaries import write_summary
-from experiments.study.answer import answer, method, percent, settings_of, short, value
-from experiments.study.axis import FRICTION
-from experiments.study.shard_file import arrays
-from experiments.study.statistics import BOUNDS, Cell, cells
-from experiments.study.store import Store
-from experiments.study.study_report import report
-from experiments.study.versions import versions
-from experiments.text import new_table, print_table
+from idbench.experiments.errors import ResultsError
+from idbench.experiments.results.attempts import Attempts
+from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.results.summaries import write_summary
+from idbench.experiments.study.answer import answer, method, percent, settings_of, short, value
+from idbench.experiments.study.axis import FRICTION
+from idbench.experiments.study.shard_file import arrays
+from idbench.experiments.study.statistics import BOUNDS, Cell, cells
+from idbench.experiments.study.store import Store
+from idbench.experiments.study.study_report import report
+from idbench.experiments.study.versions import versions
+from idbench.experiments.text import new_table, print_table
 
 MOST_REASONS = 3
 """Reasons of failures that are printed; the report has all."""
 
 if TYPE_CHECKING:
-    from experiments.cli.page import Page
-    from experiments.recording.study_recording import StudyRecording
+    from idbench.experiments.cli.page import Page
+    from idbench.experiments.recording.study_recording import StudyRecording
 
 
 def write_results(page: "Page", store: Store, folder: ResultsFolder, recording: "StudyRecording | None") -> None:

@@ -3,7 +3,7 @@
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
-from experiments.errors import StudyError
+from idbench.experiments.errors import StudyError
 
 MADE_BY = ("idbench", "mujoco", "numpy", "scipy", "ruckig")
 

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import final
 
-from identify.basis.block import AbstractConservativeBlock, BlockColumns
-from identify.basis.parameter import Parameter
-from identify.signals.state import State
+from idbench.identify.basis.block import AbstractConservativeBlock, BlockColumns
+from idbench.identify.basis.parameter import Parameter
+from idbench.identify.signals.state import State
 
 
 @final

@@ -8,12 +8,12 @@ from typing import Self, final
 
 import numpy as np
 
-from identify.arrays import HELD, Array, Columns
-from identify.basis.block import AbstractBlock, Narrowing
-from identify.basis.parameter import Kind, Parameter
-from identify.blame import expect
-from identify.errors import PluginError, SettingError
-from identify.signals.state import State
+from idbench.identify.arrays import HELD, Array, Columns
+from idbench.identify.basis.block import AbstractBlock, Narrowing
+from idbench.identify.basis.parameter import Kind, Parameter
+from idbench.identify.blame import expect
+from idbench.identify.errors import PluginError, SettingError
+from idbench.identify.signals.state import State
 
 
 @final

@@ -4,12 +4,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Set
 from typing import TYPE_CHECKING, Protocol, TypeAlias, final, runtime_checkable
 
-from identify.arrays import Array
-from identify.basis.parameter import Parameter
-from identify.signals.state import State
+from idbench.identify.arrays import Array
+from idbench.identify.basis.parameter import Parameter
+from idbench.identify.signals.state import State
 
 if TYPE_CHECKING:
-    from identify.basis.basis import Basis
+    from idbench.identify.basis.basis import Basis
 
 BlockColumns: TypeAlias = Mapping[tuple[int, Parameter], Array]
 """Columns of a block that are not identically zero: (row of an instant, parameter) -> signal (..., time)."""

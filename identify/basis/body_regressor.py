@@ -2,10 +2,10 @@
 
 from typing import NamedTuple, Self
 
-from identify.basis.parameter import Kind
-from identify.basis.terms import ZERO, Matrix, Term, Vector, add, cross, dot, minus, plus, scaled, times
-from identify.basis.twists import Twist
-from identify.data.kinematics import INERTIAL
+from idbench.identify.basis.parameter import Kind
+from idbench.identify.basis.terms import ZERO, Matrix, Term, Vector, add, cross, dot, minus, plus, scaled, times
+from idbench.identify.basis.twists import Twist
+from idbench.identify.data.kinematics import INERTIAL
 
 MX, M = INERTIAL.index("MX"), INERTIAL.index("M")
 

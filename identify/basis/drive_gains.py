@@ -6,11 +6,11 @@ from typing import Self, final
 
 import numpy as np
 
-from identify.arrays import Array, combined
-from identify.basis.basis import Basis
-from identify.basis.joint_law import AbstractJointLaw
-from identify.basis.parameter import Kind, Parameter
-from identify.signals.state import State
+from idbench.identify.arrays import Array, combined
+from idbench.identify.basis.basis import Basis
+from idbench.identify.basis.joint_law import AbstractJointLaw
+from idbench.identify.basis.parameter import Kind, Parameter
+from idbench.identify.signals.state import State
 
 
 @final

@@ -6,12 +6,12 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.basis.block import AbstractBlock, BlockColumns
-from identify.basis.parameter import Kind, Parameter
-from identify.blame import expect
-from identify.errors import SettingError
-from identify.signals.state import State
+from idbench.identify.arrays import Array
+from idbench.identify.basis.block import AbstractBlock, BlockColumns
+from idbench.identify.basis.parameter import Kind, Parameter
+from idbench.identify.blame import expect
+from idbench.identify.errors import SettingError
+from idbench.identify.signals.state import State
 
 
 class AbstractJointLaw(AbstractBlock):

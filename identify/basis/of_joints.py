@@ -4,13 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Self, final
 
-from identify.arrays import Array
-from identify.basis.block import AbstractBlock, BlockColumns
-from identify.basis.parameter import Parameter
-from identify.signals.state import State
+from idbench.identify.arrays import Array
+from idbench.identify.basis.block import AbstractBlock, BlockColumns
+from idbench.identify.basis.parameter import Parameter
+from idbench.identify.signals.state import State
 
 if TYPE_CHECKING:
-    from identify.basis.basis import Basis
+    from idbench.identify.basis.basis import Basis
 
 
 @final

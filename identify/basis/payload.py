@@ -7,12 +7,12 @@ from typing import Self, final
 
 import numpy as np
 
-from identify.basis.block import AbstractConservativeBlock, BlockColumns
-from identify.basis.parameter import Parameter
-from identify.basis.tree_links import TreeLinks
-from identify.data.kinematics import KinematicTree
-from identify.errors import SettingError
-from identify.signals.state import State
+from idbench.identify.basis.block import AbstractConservativeBlock, BlockColumns
+from idbench.identify.basis.parameter import Parameter
+from idbench.identify.basis.tree_links import TreeLinks
+from idbench.identify.data.kinematics import KinematicTree
+from idbench.identify.errors import SettingError
+from idbench.identify.signals.state import State
 
 HELD_SHARE = "payload"
 """Condition of a log: the share of the payload that is held, 0 without and 1 with it."""

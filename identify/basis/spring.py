@@ -5,11 +5,11 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.basis.block import AbstractConservativeBlock, BlockColumns
-from identify.basis.parameter import Parameter
-from identify.errors import SettingError
-from identify.signals.state import State
+from idbench.identify.arrays import Array
+from idbench.identify.basis.block import AbstractConservativeBlock, BlockColumns
+from idbench.identify.basis.parameter import Parameter
+from idbench.identify.errors import SettingError
+from idbench.identify.signals.state import State
 
 
 @final

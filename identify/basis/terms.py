@@ -5,7 +5,7 @@ Axes of robots are mostly parallel to those of their frames, so that most compon
 
 from typing import NamedTuple, TypeAlias
 
-from identify.arrays import Array
+from idbench.identify.arrays import Array
 
 Term: TypeAlias = Array | float
 """A signal (..., time), or what it is at all times."""

@@ -4,18 +4,18 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from identify.basis.armature import Armature
-from identify.basis.basis import Basis
-from identify.basis.block import AbstractBlock
-from identify.basis.coupled import Coupled
-from identify.basis.friction.coulomb import CoulombFriction
-from identify.basis.friction.tied import TiedFriction
-from identify.basis.friction.viscous import ViscousFriction
-from identify.basis.joint_law import AbstractFriction
-from identify.basis.of_joints import OfJoints
-from identify.basis.spring import Spring
-from identify.basis.tree_links import TreeLinks
-from identify.data.kinematics import KinematicTree
+from idbench.identify.basis.armature import Armature
+from idbench.identify.basis.basis import Basis
+from idbench.identify.basis.block import AbstractBlock
+from idbench.identify.basis.coupled import Coupled
+from idbench.identify.basis.friction.coulomb import CoulombFriction
+from idbench.identify.basis.friction.tied import TiedFriction
+from idbench.identify.basis.friction.viscous import ViscousFriction
+from idbench.identify.basis.joint_law import AbstractFriction
+from idbench.identify.basis.of_joints import OfJoints
+from idbench.identify.basis.spring import Spring
+from idbench.identify.basis.tree_links import TreeLinks
+from idbench.identify.data.kinematics import KinematicTree
 
 
 def tree_basis(tree: KinematicTree, laws: tuple[AbstractBlock, ...] = (ViscousFriction(), CoulombFriction())) -> Basis:
@@ -28,8 +28,8 @@ def tree_basis(tree: KinematicTree, laws: tuple[AbstractBlock, ...] = (ViscousFr
 
     Examples
     --------
-    >>> from identify import BaseParameters, tree_basis
-    >>> from sim import kinematic_tree, load_robot
+    >>> from idbench.identify import BaseParameters, tree_basis
+    >>> from idbench.sim import kinematic_tree, load_robot
     >>> tree = kinematic_tree(load_robot("scara"))
     >>> basis = tree_basis(tree)
     >>> len(basis.names), BaseParameters.of(tree, basis).names

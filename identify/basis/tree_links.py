@@ -7,14 +7,14 @@ from typing import Self, TypeAlias, final
 
 import numpy as np
 
-from identify.basis.block import AbstractConservativeBlock, BlockColumns
-from identify.basis.body_regressor import KINDS, Wrench, energy
-from identify.basis.parameter import Parameter
-from identify.basis.terms import Term, is_zero, minus
-from identify.basis.twists import Twists
-from identify.data.kinematics import KinematicTree
-from identify.errors import SettingError
-from identify.signals.state import State
+from idbench.identify.basis.block import AbstractConservativeBlock, BlockColumns
+from idbench.identify.basis.body_regressor import KINDS, Wrench, energy
+from idbench.identify.basis.parameter import Parameter
+from idbench.identify.basis.terms import Term, is_zero, minus
+from idbench.identify.basis.twists import Twists
+from idbench.identify.data.kinematics import KinematicTree
+from idbench.identify.errors import SettingError
+from idbench.identify.signals.state import State
 
 Pairs: TypeAlias = tuple[tuple[int, int], ...]
 

@@ -7,7 +7,7 @@ from weakref import proxy
 
 import numpy as np
 
-from identify.basis.terms import (
+from idbench.identify.basis.terms import (
     ZERO,
     Term,
     Vector,
@@ -21,8 +21,8 @@ from identify.basis.terms import (
     transposed,
     vector,
 )
-from identify.data.kinematics import GROUND, Joint, KinematicTree
-from identify.signals.state import State
+from idbench.identify.data.kinematics import GROUND, Joint, KinematicTree
+from idbench.identify.signals.state import State
 
 
 class Twist(NamedTuple):

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from identify.arrays import Array
-from identify.data.log_columns import LogColumns
-from identify.errors import LogError
+from idbench.identify.arrays import Array
+from idbench.identify.data.log_columns import LogColumns
+from idbench.identify.errors import LogError
 
 LONGEST = 0.05
 """Time [s] without a row beyond which a log is cut: what a robot does meanwhile nobody knows."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from identify.arrays import Array
+from idbench.identify.arrays import Array
 
 OFF = 0.05
 """Share of a step by which a difference of positions may miss a whole number of steps: files are rounded."""

@@ -5,8 +5,8 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.data.encoder_step import encoder_steps
+from idbench.identify.arrays import Array
+from idbench.identify.data.encoder_step import encoder_steps
 
 COMMON = 0.99
 """Share of the steps from one sample to the next that are below what is usual: those above may be the fastest of a motion."""

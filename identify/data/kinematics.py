@@ -6,8 +6,8 @@ from typing import Literal, final, get_args
 import numpy as np
 import numpy.typing as npt
 
-from identify.arrays import Array, frozen
-from identify.errors import KinematicsError
+from idbench.identify.arrays import Array, frozen
+from idbench.identify.errors import KinematicsError
 
 Kind = Literal["hinge", "slide"]
 

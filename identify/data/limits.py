@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identify.arrays import Array, frozen
-from identify.errors import SettingError
+from idbench.identify.arrays import Array, frozen
+from idbench.identify.errors import SettingError
 
 MIN_LIMIT = 1e-6
 """Limits below this are a slip."""

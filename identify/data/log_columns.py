@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
-from identify.arrays import Array
-from identify.data.motion_log import TorqueChannel
-from identify.errors import LogError
+from idbench.identify.arrays import Array
+from idbench.identify.data.motion_log import TorqueChannel
+from idbench.identify.errors import LogError
 
 
 @dataclass(frozen=True, eq=False)

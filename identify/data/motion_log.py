@@ -7,8 +7,8 @@ from typing import Literal, Self, get_args
 import numpy as np
 import numpy.typing as npt
 
-from identify.arrays import Array, frozen
-from identify.errors import LogError, SettingError, TimeError, require_finite, require_positive
+from idbench.identify.arrays import Array, frozen
+from idbench.identify.errors import LogError, SettingError, TimeError, require_finite, require_positive
 
 Meaning = Literal["instantaneous", "held", "averaged"]
 
@@ -175,7 +175,7 @@ class MotionLog:
         Examples
         --------
         >>> import numpy as np
-        >>> from identify import MotionLog, TorqueChannel
+        >>> from idbench.identify import MotionLog, TorqueChannel
         >>> t = np.arange(100) / 250.0
         >>> log = MotionLog.at_times(t, np.zeros((100, 2)), np.zeros((100, 2)), TorqueChannel("instantaneous"))
         >>> round(log.fs), log.n, log.samples

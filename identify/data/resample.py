@@ -7,12 +7,12 @@ from typing import Self
 import numpy as np
 import scipy
 
-from identify.arrays import Array
-from identify.data.clock import Clock, torque_stretches
-from identify.data.log_columns import LogColumns
-from identify.data.motion_log import MotionLog, TorqueChannel
-from identify.data.velocities import Velocities
-from identify.errors import LogError, require_positive
+from idbench.identify.arrays import Array
+from idbench.identify.data.clock import Clock, torque_stretches
+from idbench.identify.data.log_columns import LogColumns
+from idbench.identify.data.motion_log import MotionLog, TorqueChannel
+from idbench.identify.data.velocities import Velocities
+from idbench.identify.errors import LogError, require_positive
 
 MOST_SAMPLES = 1e8
 """Samples above which a frequency is taken for a slip."""

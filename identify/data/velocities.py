@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from identify.arrays import Array
+from idbench.identify.arrays import Array
 
 BAND = 5.0
 """Frequency [Hz] up to which velocities are compared with differences."""

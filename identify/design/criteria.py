@@ -7,7 +7,7 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from identify.arrays import Array
+from idbench.identify.arrays import Array
 
 SINGULAR = 1e-13
 """Share of the largest eigenvalue, of scaled information, below which a direction counts as not told."""

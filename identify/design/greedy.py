@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.data.limits import Limits
-from identify.design.information import Information
-from identify.design.shapes import quintic
+from idbench.identify.arrays import Array
+from idbench.identify.data.limits import Limits
+from idbench.identify.design.information import Information
+from idbench.identify.design.shapes import quintic
 
 POOL = 200
 """Moves to choose from, each time."""

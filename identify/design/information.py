@@ -7,12 +7,12 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from identify.arrays import HELD, Array
-from identify.basis.basis import Basis
-from identify.basis.parameter import FRICTION
-from identify.noise.linearization import observation
-from identify.noise.propagation import NoiseLevels
-from identify.signals.state import State
+from idbench.identify.arrays import HELD, Array
+from idbench.identify.basis.basis import Basis
+from idbench.identify.basis.parameter import FRICTION
+from idbench.identify.noise.linearization import observation
+from idbench.identify.noise.propagation import NoiseLevels
+from idbench.identify.signals.state import State
 
 SLOW, TURNING = 0.1, 0.06
 """Speed [rad/s] below which a joint's rows count little, and time [s] about its reversals: masks leave them out."""

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.data.limits import Limits
-from identify.design.criteria import AbstractCriterion
-from identify.design.information import Information
-from identify.design.shapes import Shapes
+from idbench.identify.arrays import Array
+from idbench.identify.data.limits import Limits
+from idbench.identify.design.criteria import AbstractCriterion
+from idbench.identify.design.information import Information
+from idbench.identify.design.shapes import Shapes
 
 POWER = 64.0
 """Of the norm that stands for the largest of many values, and is smooth; less is smoother, and further below the limits."""

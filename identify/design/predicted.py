@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.basis.basis import Basis
-from identify.data.motion_log import MotionLog
-from identify.models.explicit import ExplicitModel
-from identify.noise.linearization import Linearization
-from identify.noise.noisy_rows import NoisyRows
-from identify.noise.propagation import NoiseLevels
-from identify.rows.chain import Chain
+from idbench.identify.arrays import Array
+from idbench.identify.basis.basis import Basis
+from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.models.explicit import ExplicitModel
+from idbench.identify.noise.linearization import Linearization
+from idbench.identify.noise.noisy_rows import NoisyRows
+from idbench.identify.noise.propagation import NoiseLevels
+from idbench.identify.rows.chain import Chain
 
 
 def predicted_information(log: MotionLog, basis: Basis, X: Array, levels: NoiseLevels, chain: Chain) -> Array:

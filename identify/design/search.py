@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import scipy
 
-from identify.arrays import Array
-from identify.design.plan import Plan
+from idbench.identify.arrays import Array
+from idbench.identify.design.plan import Plan
 
 MEMORY = 20
 """Steps that L-BFGS remembers."""

@@ -5,8 +5,8 @@ from typing import Self
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.errors import SettingError
+from idbench.identify.arrays import Array
+from idbench.identify.errors import SettingError
 
 ORDERS = 4
 """Position, velocity, acceleration, jerk."""

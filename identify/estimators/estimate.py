@@ -8,15 +8,15 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from identify.arrays import Array, frozen
-from identify.errors import PluginError
-from identify.estimators.likelihood.joint_fit import JointFit
-from identify.estimators.problem import Problem
-from identify.estimators.propagated import bias_covariance, excess, noise_covariance
-from identify.estimators.solution import AbstractSolution, Given, OfWeightedRows
-from identify.noise.propagation import NoiseLevels
-from identify.rows.factors import Factor, Fit, Status
-from identify.rows.rows import Rows
+from idbench.identify.arrays import Array, frozen
+from idbench.identify.errors import PluginError
+from idbench.identify.estimators.likelihood.joint_fit import JointFit
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.estimators.propagated import bias_covariance, excess, noise_covariance
+from idbench.identify.estimators.solution import AbstractSolution, Given, OfWeightedRows
+from idbench.identify.noise.propagation import NoiseLevels
+from idbench.identify.rows.factors import Factor, Fit, Status
+from idbench.identify.rows.rows import Rows
 
 
 @dataclass(frozen=True, eq=False, repr=False)

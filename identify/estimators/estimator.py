@@ -5,11 +5,11 @@ from typing import ClassVar, Literal, final, get_args
 
 import numpy as np
 
-from identify.blame import expect
-from identify.errors import IdentificationError, PluginError
-from identify.estimators.estimate import Estimate
-from identify.estimators.problem import Problem
-from identify.rows.factors import Status
+from idbench.identify.blame import expect
+from idbench.identify.errors import IdentificationError, PluginError
+from idbench.identify.estimators.estimate import Estimate
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.rows.factors import Status
 
 Need = Literal["factors", "rows", "logs", "loop", "plant"]
 

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from identify.data.motion_log import MotionLog
-from identify.errors import LogError
+from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.errors import LogError
 
 ROUNDING = 1e-9
 """Share by which frequencies may differ that are the same: of a file they are the mean of its steps."""

@@ -2,22 +2,22 @@
 
 from collections.abc import Mapping, Sequence
 
-from identify.basis.basis import Basis
-from identify.blame import blamed
-from identify.data.motion_log import MotionLog
-from identify.errors import IdentificationError
-from identify.estimators.estimate import Estimate
-from identify.estimators.estimator import AbstractEstimator
-from identify.estimators.least_squares.generalized_least_squares import GeneralizedLeastSquares
-from identify.estimators.problem import Problem
-from identify.estimators.settle import settled
-from identify.estimators.simulator import Simulation
-from identify.models.explicit import ExplicitModel
-from identify.models.model import AbstractModel
-from identify.one_thread import one_thread
-from identify.rows.chain import Chain
-from identify.rows.chains import idbench_chain
-from identify.telling import stage
+from idbench.identify.basis.basis import Basis
+from idbench.identify.blame import blamed
+from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.errors import IdentificationError
+from idbench.identify.estimators.estimate import Estimate
+from idbench.identify.estimators.estimator import AbstractEstimator
+from idbench.identify.estimators.least_squares.generalized_least_squares import GeneralizedLeastSquares
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.estimators.settle import settled
+from idbench.identify.estimators.simulator import Simulation
+from idbench.identify.models.explicit import ExplicitModel
+from idbench.identify.models.model import AbstractModel
+from idbench.identify.one_thread import one_thread
+from idbench.identify.rows.chain import Chain
+from idbench.identify.rows.chains import idbench_chain
+from idbench.identify.telling import stage
 
 
 def identify(
@@ -61,8 +61,8 @@ def identify(
 
     Examples
     --------
-    >>> from identify import MODELS, identify, scara
-    >>> from sim import load_scenario, run
+    >>> from idbench.identify import MODELS, identify, scara
+    >>> from idbench.sim import load_scenario, run
     >>> log = run(load_scenario("ideal")).alone()
     >>> estimate = identify(log, scara(), MODELS.create("explicit"))
     >>> estimate.names[0], round(float(estimate.X[0]), 3), bool(estimate.standard_errors[0] < 1e-3)
@@ -87,8 +87,8 @@ def identify_each(
 
     Examples
     --------
-    >>> from identify import MODELS, identify_each, scara
-    >>> from sim import load_scenario, run
+    >>> from idbench.identify import MODELS, identify_each, scara
+    >>> from idbench.sim import load_scenario, run
     >>> log = run(load_scenario("ideal")).alone()
     >>> models = {name: MODELS.create(name) for name in ("explicit", "power")}
     >>> [round(float(each.X[2]), 2) for each in identify_each(log, scara(), models).values()]

@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.noise.covariance import BandedCovariance
-from identify.noise.linearization import Linearization
-from identify.noise.noisy_rows import NoisyRows
-from identify.noise.row_weights import friction_bias, reciprocal_root
-from identify.noise.unbiased import unbiased, with_more_noise
-from identify.noise.whitening import Whitening
-from identify.rows.rows import Rows
-from identify.signals.signals import Signals
+from idbench.identify.arrays import Array
+from idbench.identify.noise.covariance import BandedCovariance
+from idbench.identify.noise.linearization import Linearization
+from idbench.identify.noise.noisy_rows import NoisyRows
+from idbench.identify.noise.row_weights import friction_bias, reciprocal_root
+from idbench.identify.noise.unbiased import unbiased, with_more_noise
+from idbench.identify.noise.whitening import Whitening
+from idbench.identify.rows.rows import Rows
+from idbench.identify.signals.signals import Signals
 
 if TYPE_CHECKING:
     from weakref import ref
 
-    from identify.estimators.problem import Problem
+    from idbench.identify.estimators.problem import Problem
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.data.motion_log import MotionLog
-from identify.estimators.log_rows import LogRows
-from identify.rows.chain import Chain
-from identify.rows.factors import Factor, triangular
-from identify.rows.long_logs import piece_of
+from idbench.identify.arrays import Array
+from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.estimators.log_rows import LogRows
+from idbench.identify.rows.chain import Chain
+from idbench.identify.rows.factors import Factor, triangular
+from idbench.identify.rows.long_logs import piece_of
 
 MOVED = 0.02
 """Sigma by which what noise adds to W may move an estimate of long logs for it to be left there."""

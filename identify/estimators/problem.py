@@ -8,26 +8,26 @@ from weakref import ref
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.basis.basis import Basis
-from identify.data.motion_log import MotionLog
-from identify.errors import IdentificationError, LogError
-from identify.estimators.given_logs import require_logs, same_form
-from identify.estimators.log_rows import LogRows
-from identify.estimators.long_problem import Piece, bias_counts, pieces
-from identify.estimators.simulator import Simulation
-from identify.models.explicit import ExplicitModel
-from identify.models.model import AbstractModel
-from identify.noise.propagation import NoiseLevels
-from identify.noise.repeats import repeats
-from identify.noise.restricted_likelihood import likely, likely_levels
-from identify.noise.row_weights import floor_of, reciprocal_root
-from identify.noise.spectral_levels import position_noise, spectral_levels
-from identify.rows.chain import Chain
-from identify.rows.factors import Factors, Fit, triangular
-from identify.rows.long_logs import is_long
-from identify.rows.rows import Rows
-from identify.signals.signals import Signals
+from idbench.identify.arrays import Array
+from idbench.identify.basis.basis import Basis
+from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.errors import IdentificationError, LogError
+from idbench.identify.estimators.given_logs import require_logs, same_form
+from idbench.identify.estimators.log_rows import LogRows
+from idbench.identify.estimators.long_problem import Piece, bias_counts, pieces
+from idbench.identify.estimators.simulator import Simulation
+from idbench.identify.models.explicit import ExplicitModel
+from idbench.identify.models.model import AbstractModel
+from idbench.identify.noise.propagation import NoiseLevels
+from idbench.identify.noise.repeats import repeats
+from idbench.identify.noise.restricted_likelihood import likely, likely_levels
+from idbench.identify.noise.row_weights import floor_of, reciprocal_root
+from idbench.identify.noise.spectral_levels import position_noise, spectral_levels
+from idbench.identify.rows.chain import Chain
+from idbench.identify.rows.factors import Factors, Fit, triangular
+from idbench.identify.rows.long_logs import is_long
+from idbench.identify.rows.rows import Rows
+from idbench.identify.signals.signals import Signals
 
 Weights = Literal["measured", "own"]
 Reduced = TypeVar("Reduced")

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.estimators.problem import Problem
+from idbench.identify.arrays import Array
+from idbench.identify.estimators.problem import Problem
 
 
 def noise_covariance(problem: Problem, influence: Sequence[Array]) -> Array:

@@ -8,16 +8,16 @@ from typing import Any, final
 
 import numpy as np
 
-from identify.arrays import TINY, Array
-from identify.basis.basis import Basis
-from identify.basis.friction.shape import ShapedFriction, with_settings
-from identify.basis.joint_law import AbstractFriction, AbstractJointLaw
-from identify.basis.of_joints import OfJoints
-from identify.basis.parameter import Kind, Parameter
-from identify.estimators.problem import Problem
-from identify.rows.factors import Factors, Status
-from identify.rows.rows import Rows
-from identify.signals.state import State
+from idbench.identify.arrays import TINY, Array
+from idbench.identify.basis.basis import Basis
+from idbench.identify.basis.friction.shape import ShapedFriction, with_settings
+from idbench.identify.basis.joint_law import AbstractFriction, AbstractJointLaw
+from idbench.identify.basis.of_joints import OfJoints
+from idbench.identify.basis.parameter import Kind, Parameter
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.rows.factors import Factors, Status
+from idbench.identify.rows.rows import Rows
+from idbench.identify.signals.state import State
 
 ROUNDS = 30
 """At most; most laws take five."""

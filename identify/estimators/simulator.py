@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from identify.arrays import Array
-from identify.data.motion_log import MotionLog
+from idbench.identify.arrays import Array
+from idbench.identify.data.motion_log import MotionLog
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,8 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.estimators.log_rows import LogRows
+from idbench.identify.arrays import Array
+from idbench.identify.estimators.log_rows import LogRows
 
 
 class AbstractSolution(ABC):

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import scipy
 
-from identify.arrays import Array
-from identify.errors import LogError
-from identify.files.room import require_room
-from identify.files.table import LogTable
+from idbench.identify.arrays import Array
+from idbench.identify.errors import LogError
+from idbench.identify.files.room import require_room
+from idbench.identify.files.table import LogTable
 
 BROKEN = (MemoryError, ValueError, EOFError, KeyError, TypeError, zipfile.BadZipFile, zlib.error, OSError)
 """What readers raise of files that are none of theirs."""

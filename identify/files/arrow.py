@@ -9,10 +9,10 @@ from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.errors import LogError
-from identify.files.room import require_room
-from identify.files.table import LogTable
+from idbench.identify.arrays import Array
+from idbench.identify.errors import LogError
+from idbench.identify.files.room import require_room
+from idbench.identify.files.table import LogTable
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -4,11 +4,11 @@ import stat
 from collections.abc import Callable
 from pathlib import Path
 
-from identify.errors import LogError
-from identify.files.arrays import read_matlab, read_numpy
-from identify.files.arrow import read_parquet, read_text
-from identify.files.ros_bag import read_bag
-from identify.files.table import LogTable
+from idbench.identify.errors import LogError
+from idbench.identify.files.arrays import read_matlab, read_numpy
+from idbench.identify.files.arrow import read_parquet, read_text
+from idbench.identify.files.ros_bag import read_bag
+from idbench.identify.files.table import LogTable
 
 TEXT = (".csv", ".txt", ".tsv", ".dat")
 """What names of text files end with."""

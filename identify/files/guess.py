@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.errors import LogError
-from identify.files.formats import read_table
-from identify.files.guess_units import with_units
-from identify.files.layout import LogLayout, Source
-from identify.files.table import LogTable
+from idbench.identify.arrays import Array
+from idbench.identify.errors import LogError
+from idbench.identify.files.formats import read_table
+from idbench.identify.files.guess_units import with_units
+from idbench.identify.files.layout import LogLayout, Source
+from idbench.identify.files.table import LogTable
 
 WORDS = {
     "t": "t time timestamp timestamps stamp stamps clock zeit sec secs seconds elapsed",

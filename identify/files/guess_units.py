@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.files.layout import LogLayout, Source
-from identify.files.table import LogTable
-from identify.files.units import SI, factor, named_unit
+from idbench.identify.arrays import Array
+from idbench.identify.files.layout import LogLayout, Source
+from idbench.identify.files.table import LogTable
+from idbench.identify.files.units import SI, factor, named_unit
 
 CURRENTS = ("current", "currents", "cur", "amps")
 

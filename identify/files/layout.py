@@ -10,9 +10,9 @@ from typing import Any, Self
 
 import numpy as np
 
-from identify.data.motion_log import TorqueChannel
-from identify.errors import IdentificationError, LogError
-from identify.files.units import SI, factor
+from idbench.identify.data.motion_log import TorqueChannel
+from idbench.identify.errors import IdentificationError, LogError
+from idbench.identify.files.units import SI, factor
 
 QUANTITIES = ("t", "q", "qd", "tau", "temperature")
 """What columns may be."""

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from identify.data.motion_log import MotionLog, TorqueChannel
-from identify.errors import LogError
-from identify.files.arrow import TORQUE, arrow
-from identify.files.reading import read_columns
+from idbench.identify.data.motion_log import MotionLog, TorqueChannel
+from idbench.identify.errors import LogError
+from idbench.identify.files.arrow import TORQUE, arrow
+from idbench.identify.files.reading import read_columns
 
 CSV = ".csv"
 """What the name of a CSV file ends with."""
@@ -83,7 +83,7 @@ def read_log(path: Path | str, torque: TorqueChannel | None = None, joints: Sequ
     --------
     >>> import tempfile
     >>> import numpy as np
-    >>> from identify import MotionLog, TorqueChannel, read_log, write_log
+    >>> from idbench.identify import MotionLog, TorqueChannel, read_log, write_log
     >>> log = MotionLog(100.0, np.zeros((50, 2)), np.zeros((50, 2)), TorqueChannel("held", delay=0.002))
     >>> path = tempfile.mkdtemp() + "/log.parquet"
     >>> write_log(log, path)

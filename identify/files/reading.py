@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.data.log_columns import LogColumns
-from identify.data.motion_log import TorqueChannel
-from identify.errors import LogError
-from identify.files.formats import read_table
-from identify.files.guess import guess
-from identify.files.layout import LAYOUT, LogLayout, Source, matching
-from identify.files.table import LogTable
-from identify.files.units import SI, needs_gain
+from idbench.identify.arrays import Array
+from idbench.identify.data.log_columns import LogColumns
+from idbench.identify.data.motion_log import TorqueChannel
+from idbench.identify.errors import LogError
+from idbench.identify.files.formats import read_table
+from idbench.identify.files.guess import guess
+from idbench.identify.files.layout import LAYOUT, LogLayout, Source, matching
+from idbench.identify.files.table import LogTable
+from idbench.identify.files.units import SI, needs_gain
 
 CLOCKS = 1e6
 """Times [s] beyond this are those of a calendar: logs count from their beginning."""

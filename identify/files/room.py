@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from identify.errors import LogError
+from idbench.identify.errors import LogError
 
 COPIES = 3
 """How often the values of a log are in memory at once while it is read and turned into SI."""

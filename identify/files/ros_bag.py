@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.errors import LogError
-from identify.files.table import LogTable
+from idbench.identify.arrays import Array
+from idbench.identify.errors import LogError
+from idbench.identify.files.table import LogTable
 
 Columns = tuple[dict[str, Array], dict[str, tuple[str, ...]]]
 """Columns of one topic, and the names of their entries."""

@@ -9,9 +9,9 @@ from typing import Any, final
 
 import numpy as np
 
-from identify.errors import IdentificationError, SettingError
-from identify.plugins import did_you_mean
-from identify.servo.servo import PUBLISHED, Servo
+from idbench.identify.errors import IdentificationError, SettingError
+from idbench.identify.plugins import did_you_mean
+from idbench.identify.servo.servo import PUBLISHED, Servo
 
 GAIN_UNITS = {"1/rad": 1.0, "1/deg": 180 / np.pi, "1/count": 0.0}
 """Units of a gain, duty per unit of kp and of error, and what makes 1/rad of it; counts depend on the encoder."""

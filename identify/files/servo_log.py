@@ -7,12 +7,12 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.errors import LogError, SettingError
-from identify.files.formats import read_table
-from identify.files.layout import matching
-from identify.files.table import LogTable
-from identify.files.units import factor
+from idbench.identify.arrays import Array
+from idbench.identify.errors import LogError, SettingError
+from idbench.identify.files.formats import read_table
+from idbench.identify.files.layout import matching
+from idbench.identify.files.table import LogTable
+from idbench.identify.files.units import factor
 
 QUANTITIES = {"t": "t", "q": "q", "command": "q", "on": "", "voltage": ""}
 """What columns may be, and whose units they have."""

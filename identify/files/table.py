@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from identify.arrays import Array
-from identify.errors import LogError
+from idbench.identify.arrays import Array
+from idbench.identify.errors import LogError
 
 
 @dataclass(frozen=True, eq=False)

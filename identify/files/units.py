@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-from identify.errors import SettingError
+from idbench.identify.errors import SettingError
 
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 POSITIONS = {"rad": 1.0, "deg": np.pi / 180, "mrad": 1e-3, "rev": 2 * np.pi, "m": 1.0, "cm": 1e-2, "mm": 1e-3}

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from identify.arrays import Array
-from identify.data.motion_log import MotionLog
+from idbench.identify.arrays import Array
+from idbench.identify.data.motion_log import MotionLog
 
 ENOUGH = 4
 """Instants for each parameter below which a fit starves."""

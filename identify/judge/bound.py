@@ -5,13 +5,13 @@ from typing import Any, Self
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.basis.basis import Basis
-from identify.estimators.likelihood.cells import GAUSS, hermite
-from identify.estimators.likelihood.joint_fit import MASK, UNKNOWN
-from identify.estimators.likelihood.jumps import CREEP
-from identify.noise.linearization import friction_jumps, observation, slopes
-from identify.noise.propagation import NoiseLevels
+from idbench.identify.arrays import Array
+from idbench.identify.basis.basis import Basis
+from idbench.identify.estimators.likelihood.cells import GAUSS, hermite
+from idbench.identify.estimators.likelihood.joint_fit import MASK, UNKNOWN
+from idbench.identify.estimators.likelihood.jumps import CREEP
+from idbench.identify.noise.linearization import friction_jumps, observation, slopes
+from idbench.identify.noise.propagation import NoiseLevels
 
 AT_REST = 1e-3
 """Share of a joint's rms speed below which it counts as at rest: a simulated contact creeps."""

@@ -7,16 +7,16 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from identify.arrays import TINY, Array
-from identify.basis.basis import Basis
-from identify.data.motion_log import MotionLog
-from identify.errors import LogError, RangeError, SettingError
-from identify.estimators.problem import Problem
-from identify.models.explicit import ExplicitModel
-from identify.rows.chain import Chain
-from identify.rows.chains import idbench_chain
-from identify.rows.long_logs import manageable
-from identify.rows.rows import Rows
+from idbench.identify.arrays import TINY, Array
+from idbench.identify.basis.basis import Basis
+from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.errors import LogError, RangeError, SettingError
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.models.explicit import ExplicitModel
+from idbench.identify.rows.chain import Chain
+from idbench.identify.rows.chains import idbench_chain
+from idbench.identify.rows.long_logs import manageable
+from idbench.identify.rows.rows import Rows
 
 RANGE = (-0.02, 0.05)
 """Delays [s] that are looked at: a filtered measurement is late by some milliseconds, a slow controller by some tens."""

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from identify.arrays import Array
-from identify.basis.basis import Basis
-from identify.data.motion_log import MotionLog
-from identify.models.equations import Equations
-from identify.models.model import AbstractModel
-from identify.rows.chain import Chain
-from identify.rows.grid import Kernel
-from identify.signals.signals import Signals
-from identify.signals.state import State
+from idbench.identify.arrays import Array
+from idbench.identify.basis.basis import Basis
+from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.models.equations import Equations
+from idbench.identify.models.model import AbstractModel
+from idbench.identify.rows.chain import Chain
+from idbench.identify.rows.grid import Kernel
+from idbench.identify.signals.signals import Signals
+from idbench.identify.signals.state import State
 
 HALF = 0.5
 """A filter's cut-off is where its gain has fallen to this share: -6 dB."""

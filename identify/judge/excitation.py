@@ -6,11 +6,11 @@ from itertools import combinations
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.basis.basis import Basis
-from identify.data.kinematics import KinematicTree
-from identify.parameters.base_parameters import BaseParameters, columns_at, random_states
-from identify.rows.factors import NOT_SHOWN
+from idbench.identify.arrays import Array
+from idbench.identify.basis.basis import Basis
+from idbench.identify.data.kinematics import KinematicTree
+from idbench.identify.parameters.base_parameters import BaseParameters, columns_at, random_states
+from idbench.identify.rows.factors import NOT_SHOWN
 
 ENOUGH = 0.2
 """Share of what a parameter adds of its own to the torques while all joints move, from which some of them will do."""

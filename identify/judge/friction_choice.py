@@ -6,16 +6,16 @@ from functools import cached_property
 
 import numpy as np
 
-from identify.basis.basis import Basis
-from identify.basis.block import AbstractBlock
-from identify.basis.friction.shape import ShapedFriction
-from identify.basis.friction.smooth_coulomb import TanhFriction
-from identify.basis.of_joints import OfJoints
-from identify.estimators.problem import Problem
-from identify.estimators.settle import settled
-from identify.judge.held_out import HeldOut
-from identify.judge.law_score import LawScore, LawSearch, gain
-from identify.signals.masks import NoMask
+from idbench.identify.basis.basis import Basis
+from idbench.identify.basis.block import AbstractBlock
+from idbench.identify.basis.friction.shape import ShapedFriction
+from idbench.identify.basis.friction.smooth_coulomb import TanhFriction
+from idbench.identify.basis.of_joints import OfJoints
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.estimators.settle import settled
+from idbench.identify.judge.held_out import HeldOut
+from idbench.identify.judge.law_score import LawScore, LawSearch, gain
+from idbench.identify.signals.masks import NoMask
 
 SURE = 1.5
 """A law is taken when what it gains is this many times the standard deviation of that over the stretches."""

@@ -7,14 +7,14 @@ from itertools import pairwise, product
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.basis.block import AbstractBlock
-from identify.basis.friction.shape import ShapedFriction
-from identify.basis.joint_law import AbstractFriction
-from identify.basis.of_joints import OfJoints
-from identify.estimators.problem import Problem
-from identify.estimators.settle import Candidates
-from identify.rows.factors import Status
+from idbench.identify.arrays import Array
+from idbench.identify.basis.block import AbstractBlock
+from idbench.identify.basis.friction.shape import ShapedFriction
+from idbench.identify.basis.joint_law import AbstractFriction
+from idbench.identify.basis.of_joints import OfJoints
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.estimators.settle import Candidates
+from idbench.identify.rows.factors import Status
 
 GRID = 32
 """Values of each unknown shape of a law that are compared."""

@@ -5,12 +5,12 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.estimators.problem import Problem
-from identify.models.explicit import ExplicitModel
-from identify.rows.row_map import RowMap
-from identify.signals.masks import NoMask, ReversalMask
-from identify.signals.masks.mask import AbstractMask
+from idbench.identify.arrays import Array
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.models.explicit import ExplicitModel
+from idbench.identify.rows.row_map import RowMap
+from idbench.identify.signals.masks import NoMask, ReversalMask
+from idbench.identify.signals.masks.mask import AbstractMask
 
 FEW = 0.1
 """Share of the sum of an operator's weights, by size, that their sum must be for rows to say what a constant becomes."""

@@ -7,13 +7,13 @@ from typing import final
 import numpy as np
 import scipy
 
-from identify.arrays import Array
-from identify.errors import IdentificationError
-from identify.estimators.log_rows import LogRows
-from identify.estimators.problem import Problem
-from identify.models.explicit import ExplicitModel
-from identify.rows.rows import Rows
-from identify.signals.signals import Signals
+from idbench.identify.arrays import Array
+from idbench.identify.errors import IdentificationError
+from idbench.identify.estimators.log_rows import LogRows
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.models.explicit import ExplicitModel
+from idbench.identify.rows.rows import Rows
+from idbench.identify.signals.signals import Signals
 
 BINS = 8
 """Stretches of equal numbers of instants into which each joint's motion is cut: fewer miss a bump, more need longer logs."""

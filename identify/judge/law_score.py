@@ -5,8 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.judge.held_out import FOLDS, TINY, HeldOut, sigma_squares, solved, squares
+from idbench.identify.arrays import Array
+from idbench.identify.judge.held_out import FOLDS, TINY, HeldOut, sigma_squares, solved, squares
 
 EXCUSED = 2.0
 """Squares at speeds above those of a fit that sigma makes, in multiples of what it makes on average, are no fault of a law."""

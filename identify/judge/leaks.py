@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from identify.data.log_columns import LogColumns
-from identify.data.motion_log import MotionLog
+from idbench.identify.data.log_columns import LogColumns
+from idbench.identify.data.motion_log import MotionLog
 
 
 def seen(held_out: MotionLog | LogColumns, fitted: Sequence[MotionLog | LogColumns]) -> int:

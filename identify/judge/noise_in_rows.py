@@ -6,11 +6,11 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from identify.arrays import Array
-from identify.estimators.estimate import Estimate
-from identify.estimators.propagated import noise_covariance
-from identify.estimators.simulating.row_products import Kinds, with_weights
-from identify.estimators.solution import Given
+from idbench.identify.arrays import Array
+from idbench.identify.estimators.estimate import Estimate
+from idbench.identify.estimators.propagated import noise_covariance
+from idbench.identify.estimators.simulating.row_products import Kinds, with_weights
+from idbench.identify.estimators.solution import Given
 
 TELLING = 1e-6
 """Variance of a direction of the difference, over the largest, below which it is rounding."""

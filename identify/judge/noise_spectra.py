@@ -3,9 +3,9 @@
 import numpy as np
 import scipy
 
-from identify.arrays import Array
-from identify.estimators.problem import Problem
-from identify.noise.propagation import NoiseLevels
+from idbench.identify.arrays import Array
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.noise.propagation import NoiseLevels
 
 EVERY = 50.0
 """Frequency of the instants over which the robot's slopes are averaged [Hz]."""

@@ -3,12 +3,12 @@
 import numpy as np
 import scipy
 
-from identify.arrays import Array
-from identify.data.motion_log import MotionLog
-from identify.judge.diagnosis import Instants
-from identify.noise.two_levels import two_levels
-from identify.rows.chain import Chain
-from identify.signals.signals import Signals
+from idbench.identify.arrays import Array
+from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.judge.diagnosis import Instants
+from idbench.identify.noise.two_levels import two_levels
+from idbench.identify.rows.chain import Chain
+from idbench.identify.signals.signals import Signals
 
 RESOLUTION = 0.5
 """Distance of the frequencies that are looked at [Hz]."""

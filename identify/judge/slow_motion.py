@@ -5,10 +5,10 @@ from itertools import pairwise
 import numpy as np
 import scipy
 
-from identify.arrays import Array
-from identify.estimators.problem import Problem
-from identify.rows.rows import Rows
-from identify.signals.masks.reversal import slow_speed
+from idbench.identify.arrays import Array
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.rows.rows import Rows
+from idbench.identify.signals.masks.reversal import slow_speed
 
 BANDS = np.array([1.0, 2.0, 3.0, 4.0])
 """Ends of the bands of speeds that are looked at, in multiples of what the mask takes: a fifth of the rms speed at most."""

@@ -8,17 +8,17 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from identify.arrays import Array
-from identify.data.motion_log import MotionLog
-from identify.errors import LogError
-from identify.estimators.problem import Problem
-from identify.judge.diagnosis import instants
-from identify.judge.judged_rows import as_judged, shares
-from identify.judge.row_noise import row_noise
-from identify.models.explicit import ExplicitModel
-from identify.noise.propagation import torque_paths
-from identify.rows.operators import AbstractOperator
-from identify.rows.rows import Rows
+from idbench.identify.arrays import Array
+from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.errors import LogError
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.judge.diagnosis import instants
+from idbench.identify.judge.judged_rows import as_judged, shares
+from idbench.identify.judge.row_noise import row_noise
+from idbench.identify.models.explicit import ExplicitModel
+from idbench.identify.noise.propagation import torque_paths
+from idbench.identify.rows.operators import AbstractOperator
+from idbench.identify.rows.rows import Rows
 
 LAGS = 10
 """Rows over which residuals are compared with themselves."""

@@ -6,22 +6,22 @@ from functools import cached_property
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.basis.basis import Basis
-from identify.basis.payload import HELD_SHARE, PayloadLink
-from identify.data.kinematics import INERTIAL, KinematicTree
-from identify.data.motion_log import MotionLog
-from identify.errors import LogError, SettingError
-from identify.estimators.estimate import Estimate
-from identify.estimators.estimator import AbstractEstimator
-from identify.estimators.identification import estimate
-from identify.estimators.least_squares.generalized_least_squares import GeneralizedLeastSquares
-from identify.estimators.problem import Problem
-from identify.estimators.settle import settled
-from identify.models.explicit import ExplicitModel
-from identify.parameters.base_parameters import BaseParameters
-from identify.rows.chain import Chain
-from identify.rows.chains import idbench_chain
+from idbench.identify.arrays import Array
+from idbench.identify.basis.basis import Basis
+from idbench.identify.basis.payload import HELD_SHARE, PayloadLink
+from idbench.identify.data.kinematics import INERTIAL, KinematicTree
+from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.errors import LogError, SettingError
+from idbench.identify.estimators.estimate import Estimate
+from idbench.identify.estimators.estimator import AbstractEstimator
+from idbench.identify.estimators.identification import estimate
+from idbench.identify.estimators.least_squares.generalized_least_squares import GeneralizedLeastSquares
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.estimators.settle import settled
+from idbench.identify.models.explicit import ExplicitModel
+from idbench.identify.parameters.base_parameters import BaseParameters
+from idbench.identify.rows.chain import Chain
+from idbench.identify.rows.chains import idbench_chain
 
 LETTERS = tuple(f"{letters}L" for letters in INERTIAL)
 """Names of the parameters of a payload: inertia about the origin of the link's frame, first moments, mass."""

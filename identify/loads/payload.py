@@ -10,15 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from identify.arrays import Array
-from identify.data.kinematics import INERTIAL
-from identify.data.motion_log import MotionLog
-from identify.errors import IdentificationError, LogError
-from identify.estimators.estimate import Estimate
-from identify.estimators.problem import Problem
-from identify.loads.loaded_robot import LETTERS, LoadedRobot, marked, of_payload
-from identify.models.explicit import ExplicitModel
-from identify.parameters.pseudo_inertia import inertial, pseudo_inertia
+from idbench.identify.arrays import Array
+from idbench.identify.data.kinematics import INERTIAL
+from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.errors import IdentificationError, LogError
+from idbench.identify.estimators.estimate import Estimate
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot, marked, of_payload
+from idbench.identify.models.explicit import ExplicitModel
+from idbench.identify.parameters.pseudo_inertia import inertial, pseudo_inertia
 
 REPEATED = 0.05
 """Rms distance of two motions [rad or m] up to which they count as one that was repeated."""

@@ -1,11 +1,11 @@
 """Identification models, and their table."""
 
-from identify.models.equations import Equations as Equations
-from identify.models.explicit import ExplicitModel as ExplicitModel
-from identify.models.implicit import ImplicitModel as ImplicitModel
-from identify.models.model import AbstractModel as AbstractModel
-from identify.models.power import PowerModel as PowerModel
-from identify.plugins import Table
+from idbench.identify.models.equations import Equations as Equations
+from idbench.identify.models.explicit import ExplicitModel as ExplicitModel
+from idbench.identify.models.implicit import ImplicitModel as ImplicitModel
+from idbench.identify.models.model import AbstractModel as AbstractModel
+from idbench.identify.models.power import PowerModel as PowerModel
+from idbench.identify.plugins import Table
 
 MODELS: Table[AbstractModel] = Table(
     "models",

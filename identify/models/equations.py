@@ -5,8 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
-from identify.arrays import HELD, Array, Columns, Multipliers, combined
-from identify.signals.signals import Signals
+from idbench.identify.arrays import HELD, Array, Columns, Multipliers, combined
+from idbench.identify.signals.signals import Signals
 
 
 @dataclass(frozen=True, eq=False)

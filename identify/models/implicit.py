@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from typing import final
 
-from identify.arrays import Columns, Multipliers
-from identify.basis.basis import Basis
-from identify.models.model import AbstractModel, each_joint
-from identify.signals.state import State
+from idbench.identify.arrays import Columns, Multipliers
+from idbench.identify.basis.basis import Basis
+from idbench.identify.models.model import AbstractModel, each_joint
+from idbench.identify.signals.state import State
 
 
 @final

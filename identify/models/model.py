@@ -5,12 +5,12 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Columns, Multipliers
-from identify.basis.basis import Basis
-from identify.blame import expect
-from identify.models.equations import Equations
-from identify.signals.signals import Signals
-from identify.signals.state import State
+from idbench.identify.arrays import Columns, Multipliers
+from idbench.identify.basis.basis import Basis
+from idbench.identify.blame import expect
+from idbench.identify.models.equations import Equations
+from idbench.identify.signals.signals import Signals
+from idbench.identify.signals.state import State
 
 
 class AbstractModel(ABC):

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import blas, lapack
 
-from identify.arrays import Array
-from identify.errors import IdentificationError
+from idbench.identify.arrays import Array
+from idbench.identify.errors import IdentificationError
 
 BLOCK, TOGETHER = 64, 32
 """Unknowns that are solved for at once, at least, and blocks that are copied at once."""

@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
-from identify.arrays import Array
-from identify.noise.band_matrix import Band
-from identify.rows.grid import Grid, windowed
+from idbench.identify.arrays import Array
+from idbench.identify.noise.band_matrix import Band
+from idbench.identify.rows.grid import Grid, windowed
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,13 +8,13 @@ from itertools import chain
 import numpy as np
 import numpy.typing as npt
 
-from identify.arrays import Array
-from identify.noise.band_matrix import Band
-from identify.noise.covariance import BandedCovariance
-from identify.noise.linearization import Linearization
-from identify.noise.propagation import NoiseLevels, Paths, position_paths, torque_paths
-from identify.noise.whitening import Whitening
-from identify.rows.row_map import RowMap
+from idbench.identify.arrays import Array
+from idbench.identify.noise.band_matrix import Band
+from idbench.identify.noise.covariance import BandedCovariance
+from idbench.identify.noise.linearization import Linearization
+from idbench.identify.noise.propagation import NoiseLevels, Paths, position_paths, torque_paths
+from idbench.identify.noise.whitening import Whitening
+from idbench.identify.rows.row_map import RowMap
 
 SEEN = 0.05
 """Share of a row's variance that the mask must leave: of the edge of a mask alone, variance and model are not known well."""

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 import scipy
 
-from identify.arrays import Array
-from identify.data.motion_log import MotionLog
+from idbench.identify.arrays import Array
+from idbench.identify.data.motion_log import MotionLog
 
 OVERLAP = 0.1
 """Share of a log that must lie over itself for what it says of a lag to count."""

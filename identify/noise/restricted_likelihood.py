@@ -11,12 +11,12 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from identify.arrays import Array
-from identify.noise.band_matrix import Band, Cholesky
-from identify.noise.noisy_rows import NoisyRows
-from identify.noise.propagation import NoiseLevels
-from identify.rows.factors import Factor, triangular
-from identify.rows.rows import Rows
+from idbench.identify.arrays import Array
+from idbench.identify.noise.band_matrix import Band, Cholesky
+from idbench.identify.noise.noisy_rows import NoisyRows
+from idbench.identify.noise.propagation import NoiseLevels
+from idbench.identify.rows.factors import Factor, triangular
+from idbench.identify.rows.rows import Rows
 
 ROUNDS, SETTLED = 20, 0.01
 """Rounds at most, and change, in all that the levels make of the rows, at which they count as found."""

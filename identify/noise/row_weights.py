@@ -6,11 +6,11 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from identify.arrays import Array, combined
-from identify.models.model import AbstractModel
-from identify.noise.linearization import Linearization, smoothed
-from identify.noise.two_levels import two_levels
-from identify.rows.row_map import RowMap
+from idbench.identify.arrays import Array, combined
+from idbench.identify.models.model import AbstractModel
+from idbench.identify.noise.linearization import Linearization, smoothed
+from idbench.identify.noise.two_levels import two_levels
+from idbench.identify.rows.row_map import RowMap
 
 MIN_RATIO, MAX_RATIO = 0.01, 10.0
 """Range of b/a: residuals of some hundred rows do not show less, and more is as good as equal weights."""

@@ -5,16 +5,16 @@ from math import comb
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.data.velocities import ORDER
-from identify.noise.covariance import BandedCovariance
-from identify.noise.noisy_rows import NoisyRows
-from identify.noise.propagation import NoiseLevels
-from identify.noise.two_levels import two_levels
-from identify.rows.factors import Factors, Fit, Status
-from identify.rows.rows import Rows
-from identify.signals.signals import Signals
-from identify.signals.stencils import slide
+from idbench.identify.arrays import Array
+from idbench.identify.data.velocities import ORDER
+from idbench.identify.noise.covariance import BandedCovariance
+from idbench.identify.noise.noisy_rows import NoisyRows
+from idbench.identify.noise.propagation import NoiseLevels
+from idbench.identify.noise.two_levels import two_levels
+from idbench.identify.rows.factors import Factors, Fit, Status
+from idbench.identify.rows.rows import Rows
+from idbench.identify.signals.signals import Signals
+from idbench.identify.signals.stencils import slide
 
 NEGLIGIBLE = 1e-4
 """Share of the squared residuals below which noise of the positions counts as none: it makes 0.005 % of sigma."""

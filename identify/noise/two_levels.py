@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from identify.arrays import Array
+from idbench.identify.arrays import Array
 
 ROUNDS = 6
 

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.noise.linearization import smoothed
-from identify.rows.rows import Rows
-from identify.signals.signals import Signals
+from idbench.identify.arrays import Array
+from idbench.identify.noise.linearization import smoothed
+from idbench.identify.rows.rows import Rows
+from idbench.identify.signals.signals import Signals
 
 SURE = 4.0
 """Speed over the noise of the velocity at which a joint is certain to move the way it seems to."""

@@ -6,8 +6,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from identify.arrays import Array
-from identify.noise.band_matrix import Band, Cholesky
+from idbench.identify.arrays import Array
+from idbench.identify.noise.band_matrix import Band, Cholesky
 
 
 @dataclass(frozen=True, eq=False)

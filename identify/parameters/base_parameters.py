@@ -7,11 +7,11 @@ from typing import Self, final
 
 import numpy as np
 
-from identify.arrays import HELD, Array
-from identify.basis.basis import Basis
-from identify.basis.parameter import FRICTION, Parameter
-from identify.data.kinematics import KinematicTree
-from identify.signals.state import State
+from idbench.identify.arrays import HELD, Array
+from idbench.identify.basis.basis import Basis
+from idbench.identify.basis.parameter import FRICTION, Parameter
+from idbench.identify.data.kinematics import KinematicTree
+from idbench.identify.signals.state import State
 
 STATES = 56
 """Random states for each joint: four for each of its fourteen standard parameters, with a rotor and three laws of friction."""
@@ -73,8 +73,8 @@ class BaseParameters:
 
         Examples
         --------
-        >>> from identify import BaseParameters, tree_basis
-        >>> from sim import kinematic_tree, load_robot
+        >>> from idbench.identify import BaseParameters, tree_basis
+        >>> from idbench.sim import kinematic_tree, load_robot
         >>> tree = kinematic_tree(load_robot("scara"))
         >>> BaseParameters.of(tree, tree_basis(tree)).groupings["ZZR1"]
         'ZZ1 + Ia1 + 0.25 M2'

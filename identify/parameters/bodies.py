@@ -5,11 +5,11 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.basis.parameter import NOT_NEGATIVE, Parameter
-from identify.data.kinematics import INERTIAL
-from identify.errors import IdentificationError
-from identify.parameters.pseudo_inertia import PSEUDO, inertial, pseudo_inertia
+from idbench.identify.arrays import Array
+from idbench.identify.basis.parameter import NOT_NEGATIVE, Parameter
+from idbench.identify.data.kinematics import INERTIAL
+from idbench.identify.errors import IdentificationError
+from idbench.identify.parameters.pseudo_inertia import PSEUDO, inertial, pseudo_inertia
 
 MARGIN = 1e-6
 """Smallest eigenvalue of a link's pseudo-inertia, as a share of the given one: a body with some extent in every direction."""

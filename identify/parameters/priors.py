@@ -6,8 +6,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.parameters.pseudo_inertia import PSEUDO
+from idbench.identify.arrays import Array
+from idbench.identify.parameters.pseudo_inertia import PSEUDO
 
 Prior = Literal["pullback", "entropic"]
 """Distance to the given model: constant pull-back, tr((S0^-1 dS)^2), or entropic, 2 (tr(S0^-1 S) - ln det(S0^-1 S) - 4), of

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.data.kinematics import INERTIAL
+from idbench.identify.arrays import Array
+from idbench.identify.data.kinematics import INERTIAL
 
 
 def pseudo_inertia(values: Array) -> Array:

@@ -5,11 +5,11 @@ from functools import cache
 
 import numpy as np
 
-from identify.basis.basis import Basis
-from identify.basis.parameter import Parameter
-from identify.basis.tree_basis import tree_basis
-from identify.data.kinematics import GROUND, Joint, KinematicTree
-from identify.parameters.base_parameters import BaseParameters
+from idbench.identify.basis.basis import Basis
+from idbench.identify.basis.parameter import Parameter
+from idbench.identify.basis.tree_basis import tree_basis
+from idbench.identify.data.kinematics import GROUND, Joint, KinematicTree
+from idbench.identify.parameters.base_parameters import BaseParameters
 
 JOINTS = 2
 
@@ -24,7 +24,7 @@ def scara() -> Basis:
 
     Examples
     --------
-    >>> from identify import Offset, scara
+    >>> from idbench.identify import Offset, scara
     >>> (scara() + Offset()).names[-2:]
     ('off1', 'off2')
     """

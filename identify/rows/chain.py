@@ -6,18 +6,18 @@ from typing import final
 
 import numpy as np
 
-from identify.basis.basis import Basis
-from identify.data.motion_log import MotionLog, TorqueChannel
-from identify.errors import LogError, SettingError, require_not_negative
-from identify.models.model import AbstractModel
-from identify.rows.grid import Grid
-from identify.rows.operators.operator import AbstractOperator
-from identify.rows.rows import Rows
-from identify.signals.differentiators.differentiator import AbstractDifferentiator
-from identify.signals.masks.mask import AbstractMask
-from identify.signals.prefilters.prefilter import AbstractPrefilter
-from identify.signals.signals import Signals
-from identify.signals.torques.torque import AbstractAlignment
+from idbench.identify.basis.basis import Basis
+from idbench.identify.data.motion_log import MotionLog, TorqueChannel
+from idbench.identify.errors import LogError, SettingError, require_not_negative
+from idbench.identify.models.model import AbstractModel
+from idbench.identify.rows.grid import Grid
+from idbench.identify.rows.operators.operator import AbstractOperator
+from idbench.identify.rows.rows import Rows
+from idbench.identify.signals.differentiators.differentiator import AbstractDifferentiator
+from idbench.identify.signals.masks.mask import AbstractMask
+from idbench.identify.signals.prefilters.prefilter import AbstractPrefilter
+from idbench.identify.signals.signals import Signals
+from idbench.identify.signals.torques.torque import AbstractAlignment
 
 
 @final

@@ -2,13 +2,13 @@
 
 from dataclasses import replace
 
-from identify.plugins import Table
-from identify.rows.chain import Chain
-from identify.rows.operators import FirLowPass, IirLowPass, Samples
-from identify.signals.differentiators import CentralDifference
-from identify.signals.masks import NoMask, ReversalMask
-from identify.signals.prefilters import ButterworthPrefilter, NoPrefilter
-from identify.signals.torques import AsLogged, ByChannel
+from idbench.identify.plugins import Table
+from idbench.identify.rows.chain import Chain
+from idbench.identify.rows.operators import FirLowPass, IirLowPass, Samples
+from idbench.identify.signals.differentiators import CentralDifference
+from idbench.identify.signals.masks import NoMask, ReversalMask
+from idbench.identify.signals.prefilters import ButterworthPrefilter, NoPrefilter
+from idbench.identify.signals.torques import AsLogged, ByChannel
 
 SCHOOL = 0.1
 """Speed [rad/s] up to which the paper's school leaves the SCARA's instants out."""

@@ -9,8 +9,8 @@ from typing import NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from identify.arrays import Array
-from identify.errors import ExcitationError, IdentificationError
+from idbench.identify.arrays import Array
+from idbench.identify.errors import ExcitationError, IdentificationError
 
 NOT_SHOWN = 1e-6
 """A direction of the parameters, in columns scaled to unit length, is not shown when its singular value is below this share of

@@ -5,8 +5,8 @@ from math import ceil
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.errors import LogError
+from idbench.identify.arrays import Array
+from idbench.identify.errors import LogError
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from identify.data.motion_log import MotionLog
+from idbench.identify.data.motion_log import MotionLog
 
 PIECE = 6e5
 """Samples times joints squared of a piece: columns grow with the joints squared, and take some 100 MB."""

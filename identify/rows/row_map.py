@@ -5,9 +5,9 @@ from typing import Protocol, Self
 
 import numpy as np
 
-from identify.arrays import Array, Multipliers
-from identify.rows.grid import Grid, Kernel
-from identify.signals.signals import Signals
+from idbench.identify.arrays import Array, Multipliers
+from idbench.identify.rows.grid import Grid, Kernel
+from idbench.identify.signals.signals import Signals
 
 
 class Window(Protocol):

@@ -8,11 +8,11 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from identify.arrays import HELD, Array
-from identify.errors import LogError, SettingError
-from identify.models.equations import Equations
-from identify.rows.factors import Factors
-from identify.rows.row_map import RowMap, in_order
+from idbench.identify.arrays import HELD, Array
+from idbench.identify.errors import LogError, SettingError
+from idbench.identify.models.equations import Equations
+from idbench.identify.rows.factors import Factors
+from idbench.identify.rows.row_map import RowMap, in_order
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,16 +7,16 @@ from typing import final
 import numpy as np
 from scipy.stats import wilcoxon
 
-from identify.arrays import Array
-from identify.errors import IdentificationError
-from identify.servo.fit import ServoFit
-from identify.servo.friction import SERVO_FRICTIONS, SIMPLER
-from identify.servo.left_out import left_out, stretches
-from identify.servo.parameters import parameters_of
-from identify.servo.refusals import UnscaledError, require_scale
-from identify.servo.run import ServoRun
-from identify.servo.servo import Servo
-from identify.servo.stages import Stages
+from idbench.identify.arrays import Array
+from idbench.identify.errors import IdentificationError
+from idbench.identify.servo.fit import ServoFit
+from idbench.identify.servo.friction import SERVO_FRICTIONS, SIMPLER
+from idbench.identify.servo.left_out import left_out, stretches
+from idbench.identify.servo.parameters import parameters_of
+from idbench.identify.servo.refusals import UnscaledError, require_scale
+from idbench.identify.servo.run import ServoRun
+from idbench.identify.servo.servo import Servo
+from idbench.identify.servo.stages import Stages
 
 LEVEL = 0.05
 """p value, of all comparisons together, below which a law is better."""
@@ -56,7 +56,7 @@ class FrictionChoice:
 def choose_friction(
     servo: Servo, runs: Sequence[ServoRun], more: Sequence[str] = (), held: dict[str, float] | None = None
 ) -> FrictionChoice:
-    """Return the laws of friction compared, each by parts of the log that its fit did not see (see `identify.servo.left_out`).
+    """Return the laws of friction compared, each by parts of the log that its fit did not see (see `left_out`).
 
     Laws are taken from the simplest on; a further one replaces the one before if it predicts the parts better and Wilcoxon's
     signed-rank test over them says that this is no chance, at a level of 5 % over all tests (Bonferroni).

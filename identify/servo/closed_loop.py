@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 import numpy.typing as npt
 
-from identify.arrays import Array
-from identify.servo.run import ServoRun
-from identify.servo.servo import Servo
+from idbench.identify.arrays import Array
+from idbench.identify.servo.run import ServoRun
+from idbench.identify.servo.servo import Servo
 
 if TYPE_CHECKING:
-    from identify.servo.step import Law
+    from idbench.identify.servo.servo_step import Law
 
 IN_COUNTS = 0.1
 """How far from a whole count a position may be written, as a share of it, and still be one."""
@@ -24,7 +24,7 @@ WAY = 6
 
 @final
 class ServoLoop:
-    """Runs of one kind of servo, to be simulated with any parameters (see `identify.servo.step`).
+    """Runs of one kind of servo, to be simulated with any parameters (see `idbench.identify.servo.servo_step`).
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class ServoLoop:
 
         `ahead`, shape (lane, run) or less, is where runs begin, beyond the position that was measured [rad].
         """
-        from identify.servo.step import Law  # its compiler takes longer than many a command
+        from idbench.identify.servo.servo_step import Law  # its compiler takes longer than many a command
 
         lanes = max(np.size(x) for x in p.values())
         every = {name: np.broadcast_to(np.asarray(x, dtype=np.float64), (lanes,)).tolist() for name, x in p.items()}
@@ -69,7 +69,7 @@ class ServoLoop:
 
     def _simulate_run(self, k: int, laws: "Sequence[Law]", ahead: Sequence[float], out: Array) -> None:
         """Write the positions of a run into `out`, shape (lane, sample)."""
-        from identify.servo.step import Firmware, at_samples, motion
+        from idbench.identify.servo.servo_step import Firmware, at_samples, motion
 
         servo, (before, share), (q, speed) = self.servo, self._places[k], self._begin[k]
         firmware = Firmware(servo.gain * self.runs[k].kp, servo.duty_limit, servo.step)
@@ -85,7 +85,7 @@ class ServoLoop:
         return before, x - before
 
     def _track(self, run: ServoRun) -> tuple[Array, ...]:
-        from identify.servo.step import Track
+        from idbench.identify.servo.servo_step import Track
 
         t = np.arange(int(np.ceil((run.t[-1] - run.t[0]) / self.h)) + 2) * self.h
         place = np.maximum(np.searchsorted(run.t - run.t[0], t + 1e-9, side="right") - 1, 0)

@@ -7,13 +7,13 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.servo.closed_loop import ServoLoop
-from identify.servo.excitation import Excitation
-from identify.servo.left_out import LeftOut, left_out, stretches
-from identify.servo.run import ServoRun
-from identify.servo.search import Found
-from identify.servo.servo import Servo
+from idbench.identify.arrays import Array
+from idbench.identify.servo.closed_loop import ServoLoop
+from idbench.identify.servo.excitation import Excitation
+from idbench.identify.servo.left_out import LeftOut, left_out, stretches
+from idbench.identify.servo.run import ServoRun
+from idbench.identify.servo.search import Found
+from idbench.identify.servo.servo import Servo
 
 CLUSTERS = 2
 """Clusters per parameter: where there are fewer runs, or pieces of them, these are cut into stretches of time."""
@@ -46,7 +46,7 @@ class ServoFit:
         How many times larger the objective is at least with half as much again, or two thirds, of the torque per volt, and with
         all others as that needs them: near 1 where no known load sets the scale of the torques.
     of_all : Array, shape (p, p), optional
-        Covariance of the free parameters, where it contains errors of other joints (see `identify.servo.together`).
+        Covariance of the free parameters, where it contains errors of other joints (see `idbench.identify.servo.together`).
     """
 
     servo: Servo

@@ -1,4 +1,4 @@
-"""Friction of servos: six published laws, and one of the gear (`identify.servo.step` has their formulas)."""
+"""Friction of servos: six published laws, and one of the gear (`idbench.identify.servo.servo_step` has their formulas)."""
 
 from collections.abc import Mapping
 
@@ -24,7 +24,7 @@ def simpler(law: str) -> list[str]:
 
     Examples
     --------
-    >>> from identify.servo.friction import simpler
+    >>> from idbench.identify.servo.friction import simpler
     >>> simpler("load-stribeck")
     ['coulomb', 'load']
     """

@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 
-from identify.servo.fit import ServoFit
-from identify.servo.friction import simpler
-from identify.servo.parameters import parameters_of
-from identify.servo.run import ServoRun
-from identify.servo.servo import Servo
-from identify.servo.stages import Stages
+from idbench.identify.servo.fit import ServoFit
+from idbench.identify.servo.friction import simpler
+from idbench.identify.servo.parameters import parameters_of
+from idbench.identify.servo.run import ServoRun
+from idbench.identify.servo.servo import Servo
+from idbench.identify.servo.stages import Stages
 
 
 def identify_servo(

@@ -4,8 +4,8 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.servo.fit import ServoFit
+from idbench.identify.arrays import Array
+from idbench.identify.servo.fit import ServoFit
 
 MIN_SHARE = 0.01
 """Share of the samples from which on what a joint is doing is judged."""

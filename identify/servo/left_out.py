@@ -5,9 +5,9 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.servo.closed_loop import ServoLoop
-from identify.servo.search import Found
+from idbench.identify.arrays import Array
+from idbench.identify.servo.closed_loop import ServoLoop
+from idbench.identify.servo.search import Found
 
 UNCORRELATED = 0.05
 """Correlation of residuals below which stretches of time are taken as independent."""

@@ -5,8 +5,8 @@ from typing import Self, final
 
 import numpy as np
 
-from identify.arrays import Array, frozen
-from identify.errors import SettingError, require_positive
+from idbench.identify.arrays import Array, frozen
+from idbench.identify.errors import SettingError, require_positive
 
 G = 9.81
 """Gravity of a pendulum on a bench [m/s^2]."""
@@ -48,7 +48,7 @@ class JointLoad:
 
         Examples
         --------
-        >>> from identify.servo import JointLoad
+        >>> from idbench.identify.servo import JointLoad
         >>> round(float(JointLoad.pendulum(0.5, 0.1).sine), 4)
         0.4905
         """

@@ -5,9 +5,9 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.errors import SettingError
-from identify.servo.friction import SERVO_FRICTIONS
+from idbench.identify.arrays import Array
+from idbench.identify.errors import SettingError
+from idbench.identify.servo.friction import SERVO_FRICTIONS
 
 
 @final

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.servo.load import JointLoad
-from identify.servo.run import MIN_SAMPLES, ServoRun
+from idbench.identify.arrays import Array
+from idbench.identify.servo.load import JointLoad
+from idbench.identify.servo.run import MIN_SAMPLES, ServoRun
 
 REST = 0.1
 """How long joint and command have stood still where a run is cut [s], beside the delay of the command."""

@@ -5,9 +5,9 @@ from typing import Self
 
 import numpy as np
 
-from identify.errors import ExcitationError, IdentificationError, SettingError
-from identify.servo.fit import ServoFit
-from identify.servo.parameters import SERVO_PARAMETERS
+from idbench.identify.errors import ExcitationError, IdentificationError, SettingError
+from idbench.identify.servo.fit import ServoFit
+from idbench.identify.servo.parameters import SERVO_PARAMETERS
 
 TORQUES = ("a", "b", "Ia", "Fs", "Fv", "Fst", "Fo")
 """Parameters that scale together where no known load sets the scale."""

@@ -5,10 +5,10 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.servo.run import ServoRun
-from identify.servo.servo import Servo
-from identify.servo.smooth import CUTOFF, low_passed
+from idbench.identify.arrays import Array
+from idbench.identify.servo.run import ServoRun
+from idbench.identify.servo.servo import Servo
+from idbench.identify.servo.smooth import CUTOFF, low_passed
 
 DELAYS = np.array([*np.arange(0.0, 0.0601, 0.005), 0.08, 0.1, 0.13, 0.16, 0.2, 0.25])
 """Delays of the command that are tried [s]."""
@@ -100,7 +100,7 @@ class _Uniform:
 
     def driven(self, servo: Servo, rate: float) -> Array:
         """Return the columns of a and of the offset for each delay, shape (time, delay, 2)."""
-        from identify.servo.step import targets
+        from idbench.identify.servo.servo_step import targets
 
         run = self.run
         target = targets(np.interp(self._t, run.t, run.command), rate, self.T)

@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import median_filter
 
-from identify.arrays import Array, frozen
-from identify.errors import LogError, require_positive
-from identify.servo.load import JointLoad
+from idbench.identify.arrays import Array, frozen
+from idbench.identify.errors import LogError, require_positive
+from idbench.identify.servo.load import JointLoad
 
 MIN_SAMPLES = 20
 """Samples that a run must have."""

@@ -11,9 +11,9 @@ from typing import final
 import numpy as np
 from scipy.special import ndtri
 
-from identify.arrays import Array
-from identify.servo.closed_loop import ServoLoop
-from identify.servo.parameters import SERVO_PARAMETERS, limits_of, step_of
+from idbench.identify.arrays import Array
+from idbench.identify.servo.closed_loop import ServoLoop
+from idbench.identify.servo.parameters import SERVO_PARAMETERS, limits_of, step_of
 
 DAMPINGS = 10.0 ** np.arange(-2.0, 4.0)
 """Marquardt's parameter, as multiples of the last one that helped."""

@@ -5,7 +5,7 @@ from typing import final
 
 import numpy as np
 
-from identify.errors import SettingError, require_positive
+from idbench.identify.errors import SettingError, require_positive
 
 PUBLISHED: dict[str, tuple[float, float, int]] = {
     "STS3215": (0.166, 0.97, 4096),

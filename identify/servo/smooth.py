@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from identify.arrays import Array
+from idbench.identify.arrays import Array
 
 CUTOFF = 1 / 12
 """Cut-off of the low-pass, as a share of the sampling frequency: motion lies below, differentiated counts above."""

@@ -5,20 +5,20 @@ from typing import Self, final
 
 import numpy as np
 
-from identify.errors import ExcitationError, IdentificationError
-from identify.one_thread import one_thread
-from identify.servo.closed_loop import ServoLoop, count_of
-from identify.servo.excitation import Excitation
-from identify.servo.fit import ServoFit
-from identify.servo.friction import SERVO_FRICTIONS, first_of
-from identify.servo.parameters import FURTHER, SERVO_PARAMETERS, parameters_of
-from identify.servo.pieces import pieces
-from identify.servo.refusals import require_explained, require_possible, require_scale
-from identify.servo.rows import ServoRows
-from identify.servo.run import ServoRun
-from identify.servo.search import Search
-from identify.servo.servo import Servo
-from identify.servo.valleys import Valleys
+from idbench.identify.errors import ExcitationError, IdentificationError
+from idbench.identify.one_thread import one_thread
+from idbench.identify.servo.closed_loop import ServoLoop, count_of
+from idbench.identify.servo.excitation import Excitation
+from idbench.identify.servo.fit import ServoFit
+from idbench.identify.servo.friction import SERVO_FRICTIONS, first_of
+from idbench.identify.servo.parameters import FURTHER, SERVO_PARAMETERS, parameters_of
+from idbench.identify.servo.pieces import pieces
+from idbench.identify.servo.refusals import require_explained, require_possible, require_scale
+from idbench.identify.servo.rows import ServoRows
+from idbench.identify.servo.run import ServoRun
+from idbench.identify.servo.search import Search
+from idbench.identify.servo.servo import Servo
+from idbench.identify.servo.valleys import Valleys
 
 TRIED = 48
 """Starts of the rows that are simulated."""

@@ -6,12 +6,12 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.one_thread import one_thread
-from identify.servo.closed_loop import ServoLoop
-from identify.servo.fit import ServoFit
-from identify.servo.parameters import limits_of
-from identify.servo.run import ServoRun
+from idbench.identify.arrays import Array
+from idbench.identify.one_thread import one_thread
+from idbench.identify.servo.closed_loop import ServoLoop
+from idbench.identify.servo.fit import ServoFit
+from idbench.identify.servo.parameters import limits_of
+from idbench.identify.servo.run import ServoRun
 
 APART = 0.01
 """By how much an offset is changed to see what that does to other joints [rad]."""

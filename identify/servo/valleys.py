@@ -6,10 +6,10 @@ from typing import final
 
 import numpy as np
 
-from identify.servo.closed_loop import ServoLoop
-from identify.servo.excitation import Excitation
-from identify.servo.refusals import OTHER_SCALE, TORQUES
-from identify.servo.search import SETTLED, Found, Search
+from idbench.identify.servo.closed_loop import ServoLoop
+from idbench.identify.servo.excitation import Excitation
+from idbench.identify.servo.refusals import OTHER_SCALE, TORQUES
+from idbench.identify.servo.search import SETTLED, Found, Search
 
 SHAKEN = 2
 """Times that a search leaves its valley for others, at most."""

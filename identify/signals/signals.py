@@ -6,15 +6,15 @@ from math import ceil
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.blame import expect
-from identify.data.motion_log import MotionLog
-from identify.errors import PluginError
-from identify.signals.differentiators.differentiator import AbstractDifferentiator
-from identify.signals.masks.mask import AbstractMask
-from identify.signals.prefilters.prefilter import AbstractPrefilter
-from identify.signals.state import State
-from identify.signals.torques.torque import AbstractAlignment, Torque
+from idbench.identify.arrays import Array
+from idbench.identify.blame import expect
+from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.errors import PluginError
+from idbench.identify.signals.differentiators.differentiator import AbstractDifferentiator
+from idbench.identify.signals.masks.mask import AbstractMask
+from idbench.identify.signals.prefilters.prefilter import AbstractPrefilter
+from idbench.identify.signals.state import State
+from idbench.identify.signals.torques.torque import AbstractAlignment, Torque
 
 
 @dataclass(frozen=True, eq=False)

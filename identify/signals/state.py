@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Self, TypeVar
 
-from identify.arrays import Array
-from identify.errors import LogError
+from idbench.identify.arrays import Array
+from idbench.identify.errors import LogError
 
 T = TypeVar("T")
 

@@ -9,7 +9,7 @@ from math import floor
 import numpy as np
 import scipy
 
-from identify.arrays import Array
+from idbench.identify.arrays import Array
 
 REACH = 4
 """Samples to either side from which a value between two samples is interpolated: a polynomial of degree 7."""

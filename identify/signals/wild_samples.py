@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from identify.arrays import Array
+from idbench.identify.arrays import Array
 
 WILD = 6.0
 """Standard deviations, from a quantile of the absolute differences, beyond which a sample is wild."""

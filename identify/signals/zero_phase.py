@@ -5,8 +5,8 @@ from functools import lru_cache
 import numpy as np
 import scipy
 
-from identify.arrays import Array, frozen
-from identify.errors import LogError
+from idbench.identify.arrays import Array, frozen
+from idbench.identify.errors import LogError
 
 SETTLED = 0.01
 """A recursive filter remembers for ever; it counts as settled when its slowest mode has decayed to this share."""

@@ -8,11 +8,11 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from sim.drives.drive import Commanded
-from sim.robot.inverse_dynamics import InverseDynamics, inverse_dynamics
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.trajectories import Reference
+from idbench.sim.drives.drive import Commanded
+from idbench.sim.robot.inverse_dynamics import InverseDynamics, inverse_dynamics
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.trajectories import Reference
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,9 +4,9 @@ from typing import final
 
 import numpy as np
 
-from sim.controllers.controller import AbstractController, AbstractLaw, Error, Task
-from sim.robot.motors import Array
-from sim.settings import EachPositive, Positive, per_joint, settings
+from idbench.sim.controllers.controller import AbstractController, AbstractLaw, Error, Task
+from idbench.sim.robot.motors import Array
+from idbench.sim.settings import EachPositive, Positive, per_joint, settings
 
 
 @final

@@ -2,10 +2,10 @@
 
 from typing import ClassVar, final
 
-from sim.controllers.controller import AbstractController, AbstractLaw, Task
-from sim.drives.drive import Commanded, every
-from sim.robot.motors import Array
-from sim.settings import settings
+from idbench.sim.controllers.controller import AbstractController, AbstractLaw, Task
+from idbench.sim.drives.drive import Commanded, every
+from idbench.sim.robot.motors import Array
+from idbench.sim.settings import settings
 
 
 @final

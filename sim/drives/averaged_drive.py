@@ -4,12 +4,12 @@ from typing import final
 
 import numpy as np
 
-from sim.drives.drive import AbstractAmplifier, AbstractDrive, Trace, every
-from sim.drives.electric import Electric
-from sim.errors import ScenarioError
-from sim.robot.motors import Array, Motors
-from sim.robot.robot import Robot
-from sim.settings import EachPositiveOrNone, Positive, per_joint, settings
+from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, Trace, every
+from idbench.sim.drives.electric import Electric
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.motors import Array, Motors
+from idbench.sim.robot.robot import Robot
+from idbench.sim.settings import EachPositiveOrNone, Positive, per_joint, settings
 
 Limit = EachPositiveOrNone
 

@@ -6,9 +6,9 @@ from typing import ClassVar, Literal
 import mujoco
 import numpy as np
 
-from sim.drives.electric import BetweenEdges, Electric
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
+from idbench.sim.drives.electric import BetweenEdges, Electric
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
 
 Trace = tuple[Array, ...]
 

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from sim.robot.motors import Array
+from idbench.sim.robot.motors import Array
 
 
 class BetweenEdges(NamedTuple):

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.drives.passages import TabulatedPassages
+from idbench.sim.drives.passages import TabulatedPassages
 
 
 class Loop(NamedTuple):

@@ -5,9 +5,9 @@ from functools import cached_property
 
 import numpy as np
 
-from sim.drives.pwm import Modulator, Pieces, pieces
-from sim.drives.winding import Passage, Winding, pass_period, step_by_step, straight
-from sim.robot.motors import Array
+from idbench.sim.drives.pwm import Modulator, Pieces, pieces
+from idbench.sim.drives.winding import Passage, Winding, pass_period, step_by_step, straight
+from idbench.sim.robot.motors import Array
 
 MAX_VALUES = 20_000
 """Values of the modulation index beyond which no table is made."""

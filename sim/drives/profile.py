@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sim.robot.motors import Array
+from idbench.sim.robot.motors import Array
 
 
 def within(x: Array, limit: float | Array) -> Array:

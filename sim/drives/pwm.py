@@ -5,7 +5,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from sim.robot.motors import Array
+from idbench.sim.robot.motors import Array
 
 Modulation = Literal["unipolar", "bipolar", "sign_magnitude"]
 

@@ -6,14 +6,14 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
-from sim.drives.drive import AbstractAmplifier, AbstractDrive, Commanded, Trace, every
-from sim.drives.electric import Electric
-from sim.drives.profile import Profile, within
-from sim.errors import ScenarioError
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.robot.servos import SHARP_FRICTION
-from sim.settings import (
+from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, Commanded, Trace, every
+from idbench.sim.drives.electric import Electric
+from idbench.sim.drives.profile import Profile, within
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.servos import SHARP_FRICTION
+from idbench.sim.settings import (
     EachNotNegative,
     EachNotNegativeOrNone,
     EachPositive,
@@ -35,7 +35,7 @@ class ServoDrive(AbstractDrive):
     """Position-controlled joint: duty = clip(gain kp (q_s - q - lead qd), limit), V duty = R i + K qd, torque = K i.
 
     q_s follows the command within a rate and an acceleration. R and K are those behind the gear: kt = ke = K. Firmware runs as
-    fast as the physics. With backlash, rotor and link are two bodies (see `sim.engine.geared_plant`).
+    fast as the physics. With backlash, rotor and link are two bodies (see `idbench.sim.engine.geared_plant`).
     """
 
     commands: ClassVar[Commanded] = "position"

@@ -5,17 +5,17 @@ from typing import Annotated, final
 import numpy as np
 from pydantic import Field
 
-from sim.drives.averaged_drive import limits
-from sim.drives.drive import AbstractAmplifier, AbstractDrive, Trace, every
-from sim.drives.electric import BetweenEdges, Electric
-from sim.drives.one_winding import Loop, OneWinding
-from sim.drives.passages import TabulatedPassages, passages
-from sim.drives.pwm import Modulation, Modulator, pieces
-from sim.drives.winding import Winding, stretches
-from sim.errors import ScenarioError
-from sim.robot.motors import Array, Motors
-from sim.robot.robot import Robot
-from sim.settings import EachPositiveOrNone, NotNegative, Number, Positive, Share, settings
+from idbench.sim.drives.averaged_drive import limits
+from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, Trace, every
+from idbench.sim.drives.electric import BetweenEdges, Electric
+from idbench.sim.drives.one_winding import Loop, OneWinding
+from idbench.sim.drives.passages import TabulatedPassages, passages
+from idbench.sim.drives.pwm import Modulation, Modulator, pieces
+from idbench.sim.drives.winding import Winding, stretches
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.motors import Array, Motors
+from idbench.sim.robot.robot import Robot
+from idbench.sim.settings import EachPositiveOrNone, NotNegative, Number, Positive, Share, settings
 
 FEW = 8
 """Windings up to which they are faster one by one than in arrays."""

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from sim.drives.pwm import Modulator, Pattern, Pieces, pieces
-from sim.robot.motors import Array
+from idbench.sim.drives.pwm import Modulator, Pattern, Pieces, pieces
+from idbench.sim.robot.motors import Array
 
 
 class Winding(NamedTuple):

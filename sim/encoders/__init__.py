@@ -1,10 +1,10 @@
 """Encoders, and their table."""
 
-from identify.plugins import PluginTable
-from sim.encoders.encoder import AbstractEncoder as AbstractEncoder
-from sim.encoders.encoder import AbstractReader as AbstractReader
-from sim.encoders.exact_encoder import ExactEncoder as ExactEncoder
-from sim.encoders.incremental_encoder import IncrementalEncoder as IncrementalEncoder
+from idbench.identify.plugins import PluginTable
+from idbench.sim.encoders.encoder import AbstractEncoder as AbstractEncoder
+from idbench.sim.encoders.encoder import AbstractReader as AbstractReader
+from idbench.sim.encoders.exact_encoder import ExactEncoder as ExactEncoder
+from idbench.sim.encoders.incremental_encoder import IncrementalEncoder as IncrementalEncoder
 
 ENCODERS: PluginTable[AbstractEncoder] = PluginTable(
     "encoders",

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sim.errors import ScenarioError
-from sim.robot.motors import Array
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.motors import Array
 
 
 class AbstractReader(ABC):

@@ -5,9 +5,9 @@ from typing import final
 
 import numpy as np
 
-from sim.encoders.encoder import AbstractEncoder, AbstractReader
-from sim.robot.motors import Array
-from sim.settings import settings
+from idbench.sim.encoders.encoder import AbstractEncoder, AbstractReader
+from idbench.sim.robot.motors import Array
+from idbench.sim.settings import settings
 
 
 @final

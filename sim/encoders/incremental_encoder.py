@@ -5,10 +5,10 @@ from typing import Literal, final
 
 import numpy as np
 
-from sim.encoders.encoder import AbstractEncoder, AbstractReader
-from sim.errors import ScenarioError
-from sim.robot.motors import Array
-from sim.settings import EachCount, NotNegative, Share, per_joint, settings
+from idbench.sim.encoders.encoder import AbstractEncoder, AbstractReader
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.motors import Array
+from idbench.sim.settings import EachCount, NotNegative, Share, per_joint, settings
 
 
 @final

@@ -1,4 +1,4 @@
 """Simulating a scenario: robot, drives, encoders and controller in closed loop."""
 
-from sim.engine.simulation import Progress as Progress
-from sim.engine.simulation import simulate as simulate
+from idbench.sim.engine.simulation import Progress as Progress
+from idbench.sim.engine.simulation import simulate as simulate

@@ -7,26 +7,26 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from identify.blame import expect
-from identify.data.motion_log import MotionLog
-from identify.errors import PluginError
-from sim.controllers.controller import AbstractLaw, Task
-from sim.drives.drive import AbstractAmplifier, every
-from sim.encoders.encoder import AbstractReader
-from sim.engine.clock import Clock
-from sim.engine.failures import Failures
-from sim.engine.geared_plant import plant_of
-from sim.engine.history import History
-from sim.engine.run import Run
-from sim.engine.watch import Step, Watcher
-from sim.errors import ScenarioError
-from sim.frictions.friction_law import AbstractContact
-from sim.robot.inverse_dynamics import InverseDynamics
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.scenario.measurement import CurrentSensor
-from sim.scenario.scenario import Scenario
-from sim.trajectories import Reference
+from idbench.identify.blame import expect
+from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.errors import PluginError
+from idbench.sim.controllers.controller import AbstractLaw, Task
+from idbench.sim.drives.drive import AbstractAmplifier, every
+from idbench.sim.encoders.encoder import AbstractReader
+from idbench.sim.engine.clock import Clock
+from idbench.sim.engine.failures import Failures
+from idbench.sim.engine.geared_plant import plant_of
+from idbench.sim.engine.history import History
+from idbench.sim.engine.run import Run
+from idbench.sim.engine.watch import Step, Watcher
+from idbench.sim.errors import ScenarioError
+from idbench.sim.frictions.friction_law import AbstractContact
+from idbench.sim.robot.inverse_dynamics import InverseDynamics
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.measurement import CurrentSensor
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.trajectories import Reference
 
 T = TypeVar("T")
 

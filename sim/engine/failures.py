@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.trajectories import Reference
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.trajectories import Reference
 
 TURN = 2 * np.pi
 """How far [rad] a hinge without range may be from where its motion goes: one turn."""

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from identify.data.motion_log import MotionLog
-from sim.engine.plant import Plant
-from sim.engine.replay import mean_torques, physics_steps
-from sim.errors import ScenarioError
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.scenario.scenario import Physics
+from idbench.identify.data.motion_log import MotionLog
+from idbench.sim.engine.plant import Plant
+from idbench.sim.engine.replay import mean_torques, physics_steps
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.scenario import Physics
 
 
 def free_run(robot: Robot, log: MotionLog, qd: Array, length: float) -> tuple[Array, Array]:

@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 from mujoco.batch import Batch
 
-from sim.engine.plant import ALL, Plant
-from sim.errors import ScenarioError
-from sim.robot.motors import Array
-from sim.robot.play import with_play
-from sim.robot.robot import Robot
-from sim.scenario.scenario import Scenario
+from idbench.sim.engine.plant import ALL, Plant
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.play import with_play
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.scenario import Scenario
 
 ROTOR, GAP = slice(0, None, 2), slice(1, None, 2)
 """Degrees of freedom: the rotor's behind the gear, and the link's relative to it."""

@@ -1,10 +1,10 @@
 """Ideal data, as in section 7.2 of the paper: what filters and differences do, and nothing else."""
 
-from identify.data.motion_log import MotionLog, TorqueChannel
-from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
-from sim.robot.robot import Robot
-from sim.trajectories import Reference
-from sim.trajectories.trajectory import require_in_range
+from idbench.identify.data.motion_log import MotionLog, TorqueChannel
+from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
+from idbench.sim.robot.robot import Robot
+from idbench.sim.trajectories import Reference
+from idbench.sim.trajectories.trajectory import require_in_range
 
 
 def ideal_log(robot: Robot, reference: Reference) -> MotionLog:

@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 from mujoco.batch import Batch, SimulationError
 
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.robot.varied import VariedRobots, vary_fields
-from sim.scenario.scenario import Physics
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.varied import VariedRobots, vary_fields
+from idbench.sim.scenario.scenario import Physics
 
 ALL = slice(None)
 

@@ -5,15 +5,15 @@ from typing import final
 
 import numpy as np
 
-from identify.data.motion_log import MotionLog
-from sim.engine.failures import Bounds
-from sim.engine.plant import Plant
-from sim.errors import ScenarioError
-from sim.robot.inverse_dynamics import BLOCK, InverseDynamics
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.scenario.scenario import Physics
-from sim.trajectories import Reference
+from idbench.identify.data.motion_log import MotionLog
+from idbench.sim.engine.failures import Bounds
+from idbench.sim.engine.plant import Plant
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.inverse_dynamics import BLOCK, InverseDynamics
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.scenario import Physics
+from idbench.sim.trajectories import Reference
 
 
 @final

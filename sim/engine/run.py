@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from identify.data.motion_log import MotionLog
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.robot.tree import standard_parameters
-from sim.scenario.scenario import Scenario
-from sim.trajectories import Reference
+from idbench.identify.data.motion_log import MotionLog
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.tree import standard_parameters
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.trajectories import Reference
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class Run:
 
         Examples
         --------
-        >>> from sim import load_scenario, run
+        >>> from idbench.sim import load_scenario, run
         >>> run(load_scenario("ideal")).truth["Fs1"]
         0.5
         """

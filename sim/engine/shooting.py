@@ -5,12 +5,12 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from identify.data.motion_log import MotionLog
-from sim.engine.plant import Plant
-from sim.engine.replay import mean_torques, physics_steps
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.scenario.scenario import Physics
+from idbench.identify.data.motion_log import MotionLog
+from idbench.sim.engine.plant import Plant
+from idbench.sim.engine.replay import mean_torques, physics_steps
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.scenario import Physics
 
 STEP = 0.002
 """Longest physics step [s]: of half a second nothing is lost by it."""

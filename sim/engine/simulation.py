@@ -6,15 +6,15 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from identify.blame import blamed
-from sim.engine.bench import NOISE, Bench, generators
-from sim.engine.run import Run
-from sim.engine.watch import Watch, Watcher
-from sim.errors import ScenarioError
-from sim.robot.robot import Robot
-from sim.scenario.scenario import Scenario
-from sim.trajectories import Reference
-from sim.trajectories.approach import approach
+from idbench.identify.blame import blamed
+from idbench.sim.engine.bench import NOISE, Bench, generators
+from idbench.sim.engine.run import Run
+from idbench.sim.engine.watch import Watch, Watcher
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.trajectories import Reference
+from idbench.sim.trajectories.approach import approach
 
 Progress = Callable[[float], None]
 """Receives the share of a run that is done."""
@@ -64,7 +64,7 @@ def simulate(  # noqa: PLR0913  # all but two by their names
 
     Examples
     --------
-    >>> from sim import load_scenario, run
+    >>> from idbench.sim import load_scenario, run
     >>> simulated = run(load_scenario("ideal"), seeds=range(2))
     >>> simulated.log.q.shape, simulated.alone(1).q.shape
     ((2, 4600, 2), (4600, 2))

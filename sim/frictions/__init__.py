@@ -1,15 +1,15 @@
 """Frictions, and their table."""
 
-from identify.plugins import PluginTable
-from sim.frictions.asymmetric import Asymmetric as Asymmetric
-from sim.frictions.coulomb_law import CoulombViscous as CoulombViscous
-from sim.frictions.dahl import Dahl as Dahl
-from sim.frictions.friction_law import AbstractContact as AbstractContact
-from sim.frictions.friction_law import AbstractFrictionLaw as AbstractFrictionLaw
-from sim.frictions.load import LoadDependent as LoadDependent
-from sim.frictions.lugre import LuGre as LuGre
-from sim.frictions.stribeck import Stribeck as Stribeck
-from sim.frictions.temperature import Warming as Warming
+from idbench.identify.plugins import PluginTable
+from idbench.sim.frictions.asymmetric import Asymmetric as Asymmetric
+from idbench.sim.frictions.coulomb_law import CoulombViscous as CoulombViscous
+from idbench.sim.frictions.dahl import Dahl as Dahl
+from idbench.sim.frictions.friction_law import AbstractContact as AbstractContact
+from idbench.sim.frictions.friction_law import AbstractFrictionLaw as AbstractFrictionLaw
+from idbench.sim.frictions.load import LoadDependent as LoadDependent
+from idbench.sim.frictions.lugre import LuGre as LuGre
+from idbench.sim.frictions.stribeck import Stribeck as Stribeck
+from idbench.sim.frictions.temperature import Warming as Warming
 
 FRICTIONS: PluginTable[AbstractFrictionLaw] = PluginTable(
     "frictions",

@@ -5,10 +5,10 @@ from typing import final
 import numpy as np
 from mujoco.batch import Batch
 
-from sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.settings import EachNotNegativeOrNone, EachNumber, Positive, per_joint, settings
+from idbench.sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.settings import EachNotNegativeOrNone, EachNumber, Positive, per_joint, settings
 
 
 @final

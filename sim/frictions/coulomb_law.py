@@ -4,9 +4,9 @@ from typing import final
 
 from mujoco.batch import Batch
 
-from sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
-from sim.robot.motors import Array
-from sim.settings import EachNotNegativeOrNone, settings
+from idbench.sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
+from idbench.sim.robot.motors import Array
+from idbench.sim.settings import EachNotNegativeOrNone, settings
 
 
 @final

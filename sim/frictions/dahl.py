@@ -4,10 +4,10 @@ from typing import final
 
 from mujoco.batch import Batch
 
-from sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
-from sim.frictions.lugre import LuGre
-from sim.robot.motors import Array
-from sim.settings import EachNotNegativeOrNone, Positive, settings
+from idbench.sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
+from idbench.sim.frictions.lugre import LuGre
+from idbench.sim.robot.motors import Array
+from idbench.sim.settings import EachNotNegativeOrNone, Positive, settings
 
 
 @final

@@ -6,9 +6,9 @@ from typing import final
 import mujoco
 from mujoco.batch import Batch
 
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.settings import EachNotNegativeOrNone, per_joint
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.settings import EachNotNegativeOrNone, per_joint
 
 
 class AbstractContact(ABC):

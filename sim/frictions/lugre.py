@@ -6,10 +6,10 @@ import numpy as np
 from mujoco.batch import Batch
 from pydantic import Field
 
-from sim.errors import ScenarioError
-from sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
-from sim.robot.motors import Array
-from sim.settings import EachNotNegativeOrNone, Number, Positive, settings
+from idbench.sim.errors import ScenarioError
+from idbench.sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
+from idbench.sim.robot.motors import Array
+from idbench.sim.settings import EachNotNegativeOrNone, Number, Positive, settings
 
 
 @final

@@ -6,10 +6,10 @@ import numpy as np
 from mujoco.batch import Batch
 from pydantic import Field
 
-from sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.settings import EachNotNegativeOrNone, Number, Positive, settings
+from idbench.sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.settings import EachNotNegativeOrNone, Number, Positive, settings
 
 
 @final

@@ -8,9 +8,9 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.robot.scene import body_name
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.scene import body_name
 
 ALWAYS = 100
 """Random postures: pairs that are too near in all of them are made so, and are left out."""

@@ -9,12 +9,12 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
-from identify.data.limits import Limits
-from identify.plugins import did_you_mean
-from sim.errors import ScenarioError
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.settings import EachPositiveOrNone, Number, Positive, Share, make, per_joint, settings
+from idbench.identify.data.limits import Limits
+from idbench.identify.plugins import did_you_mean
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.settings import EachPositiveOrNone, Number, Positive, Share, make, per_joint, settings
 
 Point = tuple[Number, Number, Number]
 

@@ -1,3 +1,3 @@
 """Robots: MJCF and URDF files, their motors, payloads and dynamics."""
 
-from sim.robot.robot import Robot as Robot
+from idbench.sim.robot.robot import Robot as Robot

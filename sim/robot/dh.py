@@ -8,9 +8,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from sim.errors import RobotError
-from sim.robot.motors import Array
-from sim.robot.urdf import SIZE, SMALL
+from idbench.sim.errors import RobotError
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.urdf import SIZE, SMALL
 
 TABLE = ".toml"
 """What the name of such a file ends with."""

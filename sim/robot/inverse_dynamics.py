@@ -7,9 +7,9 @@ import numpy.typing as npt
 from mujoco import mjtStage
 from mujoco.batch import Batch
 
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.robot.varied import vary_fields
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.varied import vary_fields
 
 BLOCK = 8192
 """States evaluated together: bounds the memory of long trajectories."""

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import mujoco
 
-from sim.robot.urdf import SIZE, SMALL
+from idbench.sim.robot.urdf import SIZE, SMALL
 
 
 def without_missing_meshes(spec: mujoco.MjSpec, folder: Path) -> list[str]:

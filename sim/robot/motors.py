@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from sim.errors import RobotError
+from idbench.sim.errors import RobotError
 
 Array = npt.NDArray[np.float64]
 

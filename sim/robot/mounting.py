@@ -8,9 +8,9 @@ from typing import final
 import mujoco
 import numpy as np
 
-from identify.plugins import did_you_mean
-from sim.errors import RobotError
-from sim.robot.motors import Array
+from idbench.identify.plugins import did_you_mean
+from idbench.sim.errors import RobotError
+from idbench.sim.robot.motors import Array
 
 
 @final

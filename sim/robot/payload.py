@@ -6,8 +6,8 @@ from typing import Annotated, final
 import mujoco
 from pydantic import Field
 
-from sim.errors import ScenarioError
-from sim.settings import NotNegative, Number, settings
+from idbench.sim.errors import ScenarioError
+from idbench.sim.settings import NotNegative, Number, settings
 
 
 @final

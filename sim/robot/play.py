@@ -2,8 +2,8 @@
 
 import mujoco
 
-from sim.errors import RobotError
-from sim.robot.motors import Array
+from idbench.sim.errors import RobotError
+from idbench.sim.robot.motors import Array
 
 HARD = (0.95, 0.999, 1e-4, 0.5, 2.0)
 """MuJoCo's solimp of the ends: hard from 0.1 mrad on."""

@@ -10,14 +10,14 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from identify.data.kinematics import INERTIAL
-from sim.errors import RobotError
-from sim.robot.dh import TABLE
-from sim.robot.meshes import without_missing_meshes
-from sim.robot.motors import Array
-from sim.robot.mounting import PLAIN, Mounting
-from sim.robot.robot import Robot
-from sim.robot.tree import kinematic_tree, standard_parameters
+from idbench.identify.data.kinematics import INERTIAL
+from idbench.sim.errors import RobotError
+from idbench.sim.robot.dh import TABLE
+from idbench.sim.robot.meshes import without_missing_meshes
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.mounting import PLAIN, Mounting
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.tree import kinematic_tree, standard_parameters
 
 ROUNDING = 1e-9
 """Share of the largest parameter by which those of the compiled file may differ from what was written into it."""
@@ -39,7 +39,7 @@ def rewritten(name: str, standard: Values, folder: Path | None = None, mounting:
     name : str
         Name of a robot that ships, or path of its file.
     standard : mapping of str to float
-        Values by the names that `sim.robot.tree.standard_parameters` gives; those that it leaves out stay.
+        Values by the names that `idbench.sim.robot.tree.standard_parameters` gives; those that it leaves out stay.
     folder : Path, optional
         Where it will be written, so that it finds its meshes; by default where the file of the robot is.
     mounting : Mounting, optional

@@ -14,13 +14,13 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-import models
-from identify.plugins import did_you_mean
-from sim.errors import BenchError, RobotError
-from sim.robot.dh import TABLE, from_table
-from sim.robot.meshes import without_missing_meshes
-from sim.robot.motors import Array, Motors
-from sim.robot.urdf import SMALL, from_urdf
+from idbench import models
+from idbench.identify.plugins import did_you_mean
+from idbench.sim.errors import BenchError, RobotError
+from idbench.sim.robot.dh import TABLE, from_table
+from idbench.sim.robot.meshes import without_missing_meshes
+from idbench.sim.robot.motors import Array, Motors
+from idbench.sim.robot.urdf import SMALL, from_urdf
 
 _log = mujoco.MjLogConfig.get()
 _log.logto_console = _log.logto_file = False  # what it warns of is checked and reported by the bench
@@ -74,7 +74,7 @@ class Robot:
 
         Examples
         --------
-        >>> from sim import load_robot
+        >>> from idbench.sim import load_robot
         >>> load_robot("scara").joints
         ('joint1', 'joint2')
         """

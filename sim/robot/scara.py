@@ -3,10 +3,10 @@
 import mujoco
 import numpy as np
 
-from sim.errors import RobotError
-from sim.robot.inverse_dynamics import inverse_dynamics
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
+from idbench.sim.errors import RobotError
+from idbench.sim.robot.inverse_dynamics import inverse_dynamics
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
 
 
 def scara_truth(robot: Robot) -> dict[str, float]:

@@ -9,8 +9,8 @@ import numpy.typing as npt
 from mujoco import mjtStage
 from mujoco.batch import Batch
 
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
 
 Kind = Literal["sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh"]
 

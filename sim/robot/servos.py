@@ -10,13 +10,13 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from sim.errors import RobotError
-from sim.robot.motors import Array
-from sim.robot.mounting import PLAIN, Mounting
-from sim.robot.payload import Payload
-from sim.robot.play import HARD
-from sim.robot.rewrite import compiled, rewritten
-from sim.robot.robot import Robot
+from idbench.sim.errors import RobotError
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.mounting import PLAIN, Mounting
+from idbench.sim.robot.payload import Payload
+from idbench.sim.robot.play import HARD
+from idbench.sim.robot.rewrite import compiled, rewritten
+from idbench.sim.robot.robot import Robot
 
 STEP = 5e-4
 """Physics step of a written file [s]. Implicit damping makes inertias b STEP larger: 3 % of the armature of a small servo."""

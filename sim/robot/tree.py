@@ -5,10 +5,10 @@ from collections.abc import Iterator, Sequence
 import mujoco
 import numpy as np
 
-from identify.data.kinematics import GROUND, INERTIAL, Coupling, Joint, KinematicTree
-from sim.errors import RobotError
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
+from idbench.identify.data.kinematics import GROUND, INERTIAL, Coupling, Joint, KinematicTree
+from idbench.sim.errors import RobotError
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
 
 
 def kinematic_tree(robot: Robot, couplings: Sequence[str] = ()) -> KinematicTree:
@@ -24,7 +24,7 @@ def kinematic_tree(robot: Robot, couplings: Sequence[str] = ()) -> KinematicTree
 
     Examples
     --------
-    >>> from sim import kinematic_tree, load_robot
+    >>> from idbench.sim import kinematic_tree, load_robot
     >>> [joint.kind for joint in kinematic_tree(load_robot("scara")).joints]
     ['hinge', 'hinge']
     """
@@ -90,7 +90,7 @@ def standard_parameters(robot: Robot) -> dict[str, float]:
     """Return the true standard parameters: ten a link, armature, viscous and Coulomb friction of every joint.
 
     Inertias and first moments [kg m^2, kg m] are about the origin of the frame of the body that a joint moves, in its axes,
-    with all bodies that are welded to it; see `identify.tree_basis` for the names.
+    with all bodies that are welded to it; see `idbench.identify.tree_basis` for the names.
     """
     model = robot.model
     found: dict[str, float] = {}

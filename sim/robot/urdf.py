@@ -6,8 +6,8 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 
-from sim.errors import RobotError
-from sim.robot.motors import Array
+from idbench.sim.errors import RobotError
+from idbench.sim.robot.motors import Array
 
 SMALL = 1e-3
 """Mass [kg] of a moving link to which its file gives none: identification needs its place alone."""

@@ -8,11 +8,11 @@ import numpy as np
 import numpy.typing as npt
 from mujoco.batch import Batch
 
-from identify.data.kinematics import INERTIAL
-from sim.errors import RobotError, ScenarioError
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.robot.tree import TENDON, fixed_tendons, tendon_name
+from idbench.identify.data.kinematics import INERTIAL
+from idbench.sim.errors import RobotError, ScenarioError
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.tree import TENDON, fixed_tendons, tendon_name
 
 DRIVE = {"Ia": "dof_armature", "Fv": "dof_damping", "Fs": "dof_frictionloss", "K": "jnt_stiffness"}
 """Letters of the parameters of a drive, and MuJoCo's fields of them."""

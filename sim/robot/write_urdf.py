@@ -5,10 +5,10 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from identify.data.kinematics import INERTIAL, KinematicTree
-from sim.robot.motors import Array
-from sim.robot.mounting import Mounting
-from sim.robot.robot import Robot
+from idbench.identify.data.kinematics import INERTIAL, KinematicTree
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.mounting import Mounting
+from idbench.sim.robot.robot import Robot
 
 UNLIMITED = 1e6
 """What stands for no limit, where a URDF must have one."""

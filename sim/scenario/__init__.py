@@ -1,5 +1,5 @@
 """What is simulated: the settings of a scenario, and its file."""
 
-from sim.scenario.scenario import Physics as Physics
-from sim.scenario.scenario import Scenario as Scenario
-from sim.scenario.scenario import Timing as Timing
+from idbench.sim.scenario.scenario import Physics as Physics
+from idbench.sim.scenario.scenario import Scenario as Scenario
+from idbench.sim.scenario.scenario import Timing as Timing

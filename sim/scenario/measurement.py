@@ -5,10 +5,10 @@ from typing import Literal, final
 
 import numpy as np
 
-from identify.data.motion_log import TorqueChannel
-from sim.errors import ScenarioError
-from sim.robot.motors import Array
-from sim.settings import EachNotNegative, EachNumber, EachShareError, Positive, per_joint, settings
+from idbench.identify.data.motion_log import TorqueChannel
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.motors import Array
+from idbench.sim.settings import EachNotNegative, EachNumber, EachShareError, Positive, per_joint, settings
 
 
 @final

@@ -7,10 +7,10 @@ from typing import Annotated, final
 import numpy as np
 from pydantic import Field
 
-from sim.errors import ScenarioError
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.settings import EachCount, EachNotNegative, NotNegative, Number, per_joint, settings
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.settings import EachCount, EachNotNegative, NotNegative, Number, per_joint, settings
 
 Harmonics = Annotated[tuple[Number, ...], Field(min_length=1)]
 

@@ -4,18 +4,18 @@ from typing import Annotated, Literal, final
 
 from pydantic import Field
 
-from identify.data.motion_log import TorqueChannel
-from sim.controllers import AbstractController, PDFeedforward
-from sim.drives import AbstractDrive, IdealDrive
-from sim.encoders import AbstractEncoder, ExactEncoder
-from sim.errors import ScenarioError
-from sim.frictions import AbstractFrictionLaw, CoulombViscous
-from sim.robot.payload import Payload
-from sim.robot.robot import Robot
-from sim.scenario.measurement import TorqueMeasurement
-from sim.scenario.ripple import Ripple
-from sim.settings import NotNegative, Number, Positive, Seed, settings
-from sim.trajectories import AbstractTrajectory, Quintic
+from idbench.identify.data.motion_log import TorqueChannel
+from idbench.sim.controllers import AbstractController, PDFeedforward
+from idbench.sim.drives import AbstractDrive, IdealDrive
+from idbench.sim.encoders import AbstractEncoder, ExactEncoder
+from idbench.sim.errors import ScenarioError
+from idbench.sim.frictions import AbstractFrictionLaw, CoulombViscous
+from idbench.sim.robot.payload import Payload
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.measurement import TorqueMeasurement
+from idbench.sim.scenario.ripple import Ripple
+from idbench.sim.settings import NotNegative, Number, Positive, Seed, settings
+from idbench.sim.trajectories import AbstractTrajectory, Quintic
 
 
 @final

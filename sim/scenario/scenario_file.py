@@ -8,15 +8,15 @@ from typing import Any
 
 import tomli_w
 
-from identify.plugins import PluginTable, did_you_mean
-from sim.controllers import CONTROLLERS
-from sim.drives import DRIVES
-from sim.encoders import ENCODERS
-from sim.errors import ScenarioError
-from sim.frictions import FRICTIONS
-from sim.scenario.scenario import Scenario
-from sim.settings import description, for_all_joints, limits, make
-from sim.trajectories import TRAJECTORIES
+from idbench.identify.plugins import PluginTable, did_you_mean
+from idbench.sim.controllers import CONTROLLERS
+from idbench.sim.drives import DRIVES
+from idbench.sim.encoders import ENCODERS
+from idbench.sim.errors import ScenarioError
+from idbench.sim.frictions import FRICTIONS
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.settings import description, for_all_joints, limits, make
+from idbench.sim.trajectories import TRAJECTORIES
 
 LONGEST = 1500
 """Letters from which on a table comes after the others."""
@@ -60,7 +60,7 @@ def load(name: str) -> Scenario:
 
     Examples
     --------
-    >>> from sim import load_scenario
+    >>> from idbench.sim import load_scenario
     >>> load_scenario("quantization").encoder.lines
     (4096,)
     """

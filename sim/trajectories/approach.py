@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.trajectories.reference import Reference
-from sim.trajectories.time_optimal import JerkLimited
-from sim.trajectories.trajectory import require_in_range
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.trajectories.reference import Reference
+from idbench.sim.trajectories.time_optimal import JerkLimited
+from idbench.sim.trajectories.trajectory import require_in_range
 
 VELOCITY, ACCELERATION, JERK = 1.0, 5.0, 50.0
 """Limits of a gentle move [rad/s, rad/s^2, rad/s^3]."""

@@ -6,13 +6,13 @@ from typing import Annotated, final
 import numpy as np
 from pydantic import Field
 
-from sim.errors import ScenarioError
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.settings import NotNegative, Number, Positions, Positive, Whole, settings
-from sim.trajectories.point_to_point import at_rest
-from sim.trajectories.reference import AbstractMotion, Reference
-from sim.trajectories.trajectory import AbstractTrajectory
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.settings import NotNegative, Number, Positions, Positive, Whole, settings
+from idbench.sim.trajectories.point_to_point import at_rest
+from idbench.sim.trajectories.reference import AbstractMotion, Reference
+from idbench.sim.trajectories.trajectory import AbstractTrajectory
 
 STILL = 1e-6
 """Speed, and acceleration, at the ends of a period, as a share of the largest, that counts as rest."""

@@ -4,11 +4,11 @@ from typing import final
 
 import numpy as np
 
-from sim.errors import ScenarioError
-from sim.robot.robot import Robot
-from sim.settings import NotNegative, Positions, Positive, settings
-from sim.trajectories.point_to_point import PointToPoint, at_rest
-from sim.trajectories.trajectory import AbstractTrajectory
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.robot import Robot
+from idbench.sim.settings import NotNegative, Positions, Positive, settings
+from idbench.sim.trajectories.point_to_point import PointToPoint, at_rest
+from idbench.sim.trajectories.trajectory import AbstractTrajectory
 
 
 @final

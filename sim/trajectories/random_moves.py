@@ -5,13 +5,13 @@ from typing import Annotated, final
 import numpy as np
 from pydantic import Field
 
-from sim.errors import ScenarioError
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.settings import EachPositive, NotNegative, Positive, Seed, Whole, per_joint, settings
-from sim.trajectories.point_to_point import PEAK_VELOCITY, PointToPoint, at_rest
-from sim.trajectories.trajectory import AbstractTrajectory
-from sim.trajectories.waypoints import draw_waypoint
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.settings import EachPositive, NotNegative, Positive, Seed, Whole, per_joint, settings
+from idbench.sim.trajectories.point_to_point import PEAK_VELOCITY, PointToPoint, at_rest
+from idbench.sim.trajectories.trajectory import AbstractTrajectory
+from idbench.sim.trajectories.waypoints import draw_waypoint
 
 
 @final

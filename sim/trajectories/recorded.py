@@ -9,12 +9,12 @@ import numpy as np
 import scipy
 from pydantic import AfterValidator
 
-from sim.errors import ScenarioError
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.settings import Positive, settings
-from sim.trajectories.reference import AbstractMotion, Reference
-from sim.trajectories.trajectory import AbstractTrajectory
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.settings import Positive, settings
+from idbench.sim.trajectories.reference import AbstractMotion, Reference
+from idbench.sim.trajectories.trajectory import AbstractTrajectory
 
 DEGREE = 5
 """Degree of the spline through positions: its acceleration is smooth, too."""

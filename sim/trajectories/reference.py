@@ -6,7 +6,7 @@ from typing import final
 
 import numpy as np
 
-from sim.robot.motors import Array
+from idbench.sim.robot.motors import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,15 +7,15 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from sim.errors import ScenarioError
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.settings import NotNegative, Positive, Seed, Share, Truth, Whole, settings
-from sim.trajectories.point_to_point import PointToPoint
-from sim.trajectories.random_moves import room
-from sim.trajectories.reference import AbstractMotion, Reference
-from sim.trajectories.trajectory import AbstractTrajectory
-from sim.trajectories.waypoints import draw_waypoint
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.settings import NotNegative, Positive, Seed, Share, Truth, Whole, settings
+from idbench.sim.trajectories.point_to_point import PointToPoint
+from idbench.sim.trajectories.random_moves import room
+from idbench.sim.trajectories.reference import AbstractMotion, Reference
+from idbench.sim.trajectories.trajectory import AbstractTrajectory
+from idbench.sim.trajectories.waypoints import draw_waypoint
 
 
 @final

@@ -7,12 +7,12 @@ from typing import Self, final
 import numpy as np
 from ruckig import InputParameter, Result, Ruckig, RuckigError, Trajectory
 
-from sim.errors import ScenarioError
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.settings import EachPositive, NotNegative, Positions, per_joint, settings
-from sim.trajectories.reference import AbstractMotion, Reference
-from sim.trajectories.trajectory import AbstractTrajectory
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.settings import EachPositive, NotNegative, Positions, per_joint, settings
+from idbench.sim.trajectories.reference import AbstractMotion, Reference
+from idbench.sim.trajectories.trajectory import AbstractTrajectory
 
 
 @dataclass(frozen=True, eq=False)

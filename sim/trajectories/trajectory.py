@@ -5,11 +5,11 @@ from typing import final
 
 import numpy as np
 
-from identify.blame import blamed, expect_kind
-from sim.errors import ScenarioError
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.trajectories.reference import AbstractMotion, Reference
+from idbench.identify.blame import blamed, expect_kind
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.trajectories.reference import AbstractMotion, Reference
 
 MOST_SAMPLES = 1e8
 """Samples of a joint above which a motion is taken for a slip: 0.8 GB."""

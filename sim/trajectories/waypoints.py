@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from sim.errors import ScenarioError
-from sim.robot.motors import Array
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.motors import Array
 
 DRAWS = 10000
 """Draws of all joints, and then of single ones, after which no waypoint is believed to exist."""

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from identify import (
+from idbench.identify import (
     ESTIMATORS,
     MODELS,
     BaseParameters,
@@ -23,10 +23,10 @@ from identify import (
     identify_each,
     tree_basis,
 )
-from sim.engine.ideal_log import ideal_log
-from sim.robot.robot import Robot
-from sim.robot.tree import kinematic_tree
-from sim.trajectories import RandomMoves
+from idbench.sim.engine.ideal_log import ideal_log
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.tree import kinematic_tree
+from idbench.sim.trajectories import RandomMoves
 
 SAMPLES, ROUNDS = 4000, 7
 

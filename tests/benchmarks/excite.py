@@ -16,11 +16,11 @@ from functools import partial
 
 import numpy as np
 
-from experiments.excite.design import Design
-from experiments.excite.excited import Excited
-from sim.encoders import IncrementalEncoder
-from sim.scenario.measurement import TorqueMeasurement
-from sim.scenario.scenario_file import load
+from idbench.experiments.excite.design import Design
+from idbench.experiments.excite.excited import Excited
+from idbench.sim.encoders import IncrementalEncoder
+from idbench.sim.scenario.measurement import TorqueMeasurement
+from idbench.sim.scenario.scenario_file import load
 
 TIMES = 20
 """Repetitions of short work."""

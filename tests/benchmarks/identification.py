@@ -11,9 +11,9 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 
-from experiments.paper.table1 import SCENARIO, Table1
-from identify import CHAINS, ESTIMATORS, MODELS, Chain, MotionLog, identify_each, scara
-from sim.scenario.scenario_file import load
+from idbench.experiments.paper.table1 import SCENARIO, Table1
+from idbench.identify import CHAINS, ESTIMATORS, MODELS, Chain, MotionLog, identify_each, scara
+from idbench.sim.scenario.scenario_file import load
 
 SAMPLES, RUNS = 4000, 60
 

@@ -14,8 +14,8 @@ import mujoco
 import numpy as np
 from mujoco import sysid
 
-import models
-from identify import (
+from idbench import models
+from idbench.identify import (
     Array,
     ExplicitModel,
     GeneralizedLeastSquares,
@@ -25,10 +25,10 @@ from identify import (
     identify,
     scara,
 )
-from sim.encoders import IncrementalEncoder
-from sim.engine.simulation import simulate
-from sim.robot.scara import scara_truth
-from sim.scenario.scenario_file import load
+from idbench.sim.encoders import IncrementalEncoder
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.robot.scara import scara_truth
+from idbench.sim.scenario.scenario_file import load
 
 STEP, WINDOW, GUESS = 0.002, 2.0, 0.7
 NAMES = ("ZZR1", "Fv1", "Fs1", "ZZ2", "LMX2", "LMY2", "Fv2", "Fs2")

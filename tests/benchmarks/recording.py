@@ -16,19 +16,19 @@ from pathlib import Path
 
 import rerun as rr
 
-from experiments.identification.request import Request
-from experiments.identification.scenario_run import ScenarioRun
-from experiments.recording.audience import Audience
-from experiments.recording.identification_recording import RunRecording
-from experiments.recording.motion_layer import Base
-from experiments.recording.viewers import served
-from experiments.results.folder import ResultsFolder
-from experiments.results.streams import write_streams
-from identify import MotionLog
-from sim.engine.simulation import simulate
-from sim.engine.watch import Inner, Stretch, Watch
-from sim.scenario.scenario import Scenario
-from sim.scenario.scenario_file import from_dict, load
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.scenario_run import ScenarioRun
+from idbench.experiments.recording.audience import Audience
+from idbench.experiments.recording.identification_recording import RunRecording
+from idbench.experiments.recording.motion_layer import Base
+from idbench.experiments.recording.viewers import served
+from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.results.streams import write_streams
+from idbench.identify import MotionLog
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.engine.watch import Inner, Stretch, Watch
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.scenario.scenario_file import from_dict, load
 
 TIMES = 7
 """Repetitions."""

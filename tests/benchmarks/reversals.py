@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from identify import (
+from idbench.identify import (
     MODELS,
     GeneralizedLeastSquares,
     MaximumLikelihood,

@@ -21,7 +21,7 @@ from time import perf_counter
 import numpy as np
 from scipy.stats import wilcoxon
 
-from identify.servo import JointLoad, Servo, ServoRun, UnscaledError, identify_servo
+from idbench.identify.servo import JointLoad, Servo, ServoRun, UnscaledError, identify_servo
 
 SERVO = Servo(0.166, supply=12.0, duty_limit=0.97)
 LAWS = ("load", "coulomb", "stribeck", "load-stribeck", "directional", "quadratic", "gear", "gear+lead", "gear+backlash")

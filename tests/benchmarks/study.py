@@ -17,15 +17,15 @@ from pathlib import Path
 import mujoco
 from mujoco.batch import Batch
 
-from experiments.cli.page import new_page
-from experiments.recording.study_recording import StudyRecording
-from experiments.results.folder import ResultsFolder
-from experiments.study.cluster import cluster_pool
-from experiments.study.run_study import local_pool, run_missing
-from experiments.study.store import Store
-from experiments.study.study import Study
-from experiments.study.study_file import study_from
-from experiments.study.study_results import write_results
+from idbench.experiments.cli.page import new_page
+from idbench.experiments.recording.study_recording import StudyRecording
+from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.study.cluster import cluster_pool
+from idbench.experiments.study.run_study import local_pool, run_missing
+from idbench.experiments.study.store import Store
+from idbench.experiments.study.study import Study
+from idbench.experiments.study.study_file import study_from
+from idbench.experiments.study.study_results import write_results
 
 RUNS = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
 MOVES = int(sys.argv[2]) if len(sys.argv) > 2 else 29

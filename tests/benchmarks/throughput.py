@@ -14,12 +14,12 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from sim.drives import AbstractDrive, AveragedDrive, IdealDrive, SwitchedDrive
-from sim.encoders import IncrementalEncoder
-from sim.engine.simulation import simulate
-from sim.scenario.scenario import Scenario
-from sim.scenario.scenario_file import load
-from sim.trajectories import RandomMoves
+from idbench.sim.drives import AbstractDrive, AveragedDrive, IdealDrive, SwitchedDrive
+from idbench.sim.encoders import IncrementalEncoder
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.scenario.scenario_file import load
+from idbench.sim.trajectories import RandomMoves
 
 NSIM, RUNS = 64, 7
 MOVES = RandomMoves(moves=3, durations=(1.3, 1.3), rest=0.1, seed=3)

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.cli import main
-from identify import MotionLog
-from identify.files.log_file import read_log, write_log
-from sim.engine.simulation import simulate
-from sim.robot.inverse_dynamics import inverse_dynamics
-from sim.robot.robot import Robot
-from sim.scenario.scenario_file import load, to_toml
+from idbench.experiments.cli import main
+from idbench.identify import MotionLog
+from idbench.identify.files.log_file import read_log, write_log
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.robot.inverse_dynamics import inverse_dynamics
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.scenario_file import load, to_toml
 
 
 @pytest.fixture

@@ -5,17 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.identification.consistent_robot import Written
-from experiments.identification.fit import fit
-from experiments.identification.held_out import on_log
-from experiments.identification.logs import Logs
-from experiments.identification.request import Request
-from experiments.identification.robot_model import RobotModel
-from identify import MODELS
-from sim.engine.simulation import simulate
-from sim.robot.robot import Robot
-from sim.robot.tree import standard_parameters
-from sim.scenario.scenario_file import load
+from idbench.experiments.identification.consistent_robot import Written
+from idbench.experiments.identification.fit import fit
+from idbench.experiments.identification.held_out import on_log
+from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.identify import MODELS
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.tree import standard_parameters
+from idbench.sim.scenario.scenario_file import load
 
 pytestmark = pytest.mark.thorough
 

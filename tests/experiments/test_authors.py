@@ -6,8 +6,8 @@ import tomllib
 
 import pytest
 
-from experiments.cli import main
-from experiments.starters.starters import KINDS
+from idbench.experiments.cli import main
+from idbench.experiments.starters.starters import KINDS
 
 
 @pytest.fixture
@@ -54,7 +54,7 @@ def test_a_scenario_and_a_study_are_begun_that_run(here, capsys):
 BROKEN = '''
 from dataclasses import dataclass
 import numpy as np
-from identify import AbstractFriction
+from idbench.identify import AbstractFriction
 
 @dataclass(frozen=True)
 class Half(AbstractFriction):

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from experiments.cli import main
+from idbench.experiments.cli import main
 
 ARM = """<mujoco><compiler angle="radian"/><worldbody>{anchor}<body pos="0 0 1">
 <joint name="hip" axis="0 1 0" damping="1"/><geom type="capsule" fromto="0 0 0 0.5 0 0" size="0.05"/>{eye}

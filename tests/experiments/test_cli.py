@@ -4,11 +4,11 @@ import json
 
 import pytest
 
-from experiments.cli import main
-from experiments.paper.table1 import SCENARIO
-from experiments.results.manifest import NAME as MANIFEST
-from identify.files.log_file import read_log
-from sim.scenario.scenario_file import from_dict, load
+from idbench.experiments.cli import main
+from idbench.experiments.paper.table1 import SCENARIO
+from idbench.experiments.results.manifest import NAME as MANIFEST
+from idbench.identify.files.log_file import read_log
+from idbench.sim.scenario.scenario_file import from_dict, load
 
 
 def test_table1_prints_and_writes_everything(out, capsys):
@@ -97,7 +97,7 @@ def test_version(capsys):
 
 
 def test_a_reader_that_goes_away_is_no_error(tmp_path, start):
-    code = "import sys; from experiments.cli import main; sys.exit(main(['list']))"
+    code = "import sys; from idbench.experiments.cli import main; sys.exit(main(['list']))"
     process = start("-c", code, cwd=tmp_path)
     process.stdout.close()
     assert process.stderr.read() == ""

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-import experiments.recording.table1_recording
-from experiments.cli import main
-from experiments.cli.interruption import noticing
-from experiments.results.manifest import NAME as MANIFEST
+import idbench.experiments.recording.table1_recording
+from idbench.experiments.cli import main
+from idbench.experiments.cli.interruption import noticing
+from idbench.experiments.results.manifest import NAME as MANIFEST
 
 KEPT = ["log.parquet", "summary.json"]
 """What is there before anything is shown."""
@@ -25,7 +25,7 @@ def test_interruption_of_a_view_is_quiet_and_loses_no_result(out, capfd, monkeyp
     def interrupted(*args):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(experiments.recording.table1_recording, "record_table1", interrupted)
+    monkeypatch.setattr(idbench.experiments.recording.table1_recording, "record_table1", interrupted)
     assert main(["table1", "--out", str(out)]) == 130
     printed = capfd.readouterr()
     assert "interrupted" in printed.err
@@ -37,15 +37,15 @@ def test_interruption_of_the_work_leaves_nothing(out, capfd, monkeypatch):
     def interrupted(*args):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("experiments.cli.commands.paper.print_table1", interrupted)
+    monkeypatch.setattr("idbench.experiments.cli.commands.paper.print_table1", interrupted)
     assert main(["table1", "--out", str(out)]) == 130
     assert not list(out.parent.iterdir())
 
 
 def test_a_real_interrupt_ends_the_process_without_a_traceback(tmp_path, start):
     """Ctrl-C at some instant of a long search."""
-    code = "import sys; from experiments.paper.search import Search; from experiments import cli\n"
-    code += "from experiments.cli.commands import paper\n"
+    code = "import sys; from idbench.experiments.paper.search import Search; from idbench.experiments import cli\n"
+    code += "from idbench.experiments.cli.commands import paper\n"
     code += "paper.Search = lambda seed: print('searching') or Search(seed=seed, tolerance=0.0, rounds=10**6)\n"
     code += "sys.exit(cli.main(['table1', '--seed', '1', '--out', 'results']))"
     process = start("-uc", code, cwd=tmp_path)
@@ -84,8 +84,8 @@ def test_an_interrupt_that_comes_out_as_another_error_is_one(tmp_path, start):
     """As of a module that is loaded late, and half loaded."""
     code = """if True:
         import sys, time
-        from experiments import cli
-        from experiments.cli.commands import paper
+        from idbench.experiments import cli
+        from idbench.experiments.cli.commands import paper
         def half_loaded(seed):
             print("searching")
             try:
@@ -113,7 +113,7 @@ def test_an_interrupt_while_a_module_is_loaded_is_as_quiet(tmp_path, module, sta
                     print("loading", flush=True)
                     time.sleep(30)
         sys.meta_path.insert(0, Slow())
-        from experiments.cli import main
+        from idbench.experiments.cli import main
         sys.exit(main(["table1", "--out", "x"]))
     """
     process = start("-c", code, cwd=tmp_path)
@@ -128,7 +128,7 @@ def test_an_interrupt_while_a_module_is_loaded_is_as_quiet(tmp_path, module, sta
 @pytest.mark.thorough
 def test_termination_leaves_nothing_half_written(tmp_path, start):
     """SIGTERM while the recording is written: the hidden folder goes, what was complete stays."""
-    code = "import sys; from experiments import cli; import experiments.recording.table1_recording as r\n"
+    code = "import sys; from idbench.experiments import cli; import idbench.experiments.recording.table1_recording as r\n"
     code += "def slow(*args): print('recording', flush=True); import time; time.sleep(600)\n"
     code += "r.record_table1 = slow\nsys.exit(cli.main(['table1', '--out', 'results']))"
     process = start("-uc", code, cwd=tmp_path)
@@ -143,7 +143,7 @@ def test_termination_leaves_nothing_half_written(tmp_path, start):
 def test_a_full_disk_is_one_line_and_what_has_room_is_kept(tmp_path, size, kept):
     """Too small for the log, and for the recording alone: no file may grow beyond `size` bytes. What was found is printed."""
     code = f"import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size}))\n"
-    code += "from experiments.cli import main; sys.exit(main(['table1', '--out', 'results']))"
+    code += "from idbench.experiments.cli import main; sys.exit(main(['table1', '--out', 'results']))"
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1
@@ -157,7 +157,7 @@ def test_a_failure_of_a_view_is_one_line_and_the_rest_is_there(out, monkeypatch,
     def full(*args):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(experiments.recording.table1_recording, "record_table1", full)
+    monkeypatch.setattr(idbench.experiments.recording.table1_recording, "record_table1", full)
     assert "the recording: No space left on device; what was found is printed, and in" in complaint("table1", "--out", str(out))
     assert listed(out) == KEPT
     assert list(out.parent.iterdir()) == [out]
@@ -170,7 +170,7 @@ def test_results_that_cannot_be_written_leave_the_earlier_ones_whole(out, monkey
     def full(*args):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("experiments.cli.saving.write_summary", full)
+    monkeypatch.setattr("idbench.experiments.cli.saving.write_summary", full)
     assert "No space left on device" in complaint("table1", "--no-rerun", "--out", str(out))
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
 
@@ -180,7 +180,7 @@ def test_results_that_cannot_be_written_leave_the_earlier_ones_whole(out, monkey
 def test_output_that_cannot_be_written_is_told_and_results_stay(command, tmp_path):
     if not Path("/dev/full").exists():
         pytest.skip("no device that is always full")
-    code = f"import sys; from experiments.cli import main; sys.exit(main([{command!r}]))"
+    code = f"import sys; from idbench.experiments.cli import main; sys.exit(main([{command!r}]))"
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(
             [sys.executable, "-c", code], cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True, check=False

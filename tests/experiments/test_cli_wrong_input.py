@@ -5,9 +5,9 @@ import sys
 import pytest
 import tomli_w
 
-from experiments.cli import main
-from experiments.paper.table1 import SCENARIO
-from sim.scenario.scenario_file import load, to_dict
+from idbench.experiments.cli import main
+from idbench.experiments.paper.table1 import SCENARIO
+from idbench.sim.scenario.scenario_file import load, to_dict
 
 
 def test_an_unknown_chain_lists_the_known_and_leaves_nothing(out, complaint):

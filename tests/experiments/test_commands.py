@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 import tomli_w
 
-from experiments.cli import main
-from experiments.cli.options.identify import Identify
-from experiments.paper import table2
-from experiments.paper.attribution import imperfections
-from experiments.paper.table2 import PAPER, Table2
-from experiments.results.manifest import NAME as MANIFEST
-from identify.files.log_file import read_log
-from sim.drives import AveragedDrive
-from sim.scenario.scenario_file import from_dict, load, names, to_dict, to_toml
-from sim.trajectories import Quintic, RandomMoves
+from idbench.experiments.cli import main
+from idbench.experiments.cli.options.identify import Identify
+from idbench.experiments.paper import table2
+from idbench.experiments.paper.attribution import imperfections
+from idbench.experiments.paper.table2 import PAPER, Table2
+from idbench.experiments.results.manifest import NAME as MANIFEST
+from idbench.identify.files.log_file import read_log
+from idbench.sim.drives import AveragedDrive
+from idbench.sim.scenario.scenario_file import from_dict, load, names, to_dict, to_toml
+from idbench.sim.trajectories import Quintic, RandomMoves
 
 SHORT = RandomMoves(moves=3, rest=0.6)
 
@@ -222,7 +222,7 @@ def test_table2_on_a_short_motion(tmp_path, capsys, monkeypatch):
     path, out = tmp_path / "twin.toml", tmp_path / "out"
     path.write_text(to_toml(scenario))
     few = [i for i in imperfections(scenario) if i.name in ("nothing", "hold, not given", "gain error of 2 %")]
-    monkeypatch.setattr("experiments.paper.parallel_attribution.imperfections", lambda _: few)
+    monkeypatch.setattr("idbench.experiments.paper.parallel_attribution.imperfections", lambda _: few)
     assert main(["table2", "--scenario", str(path), "--out", str(out)]) == 0
     printed = capsys.readouterr().out
     assert "explicit model, 2 realizations" in printed

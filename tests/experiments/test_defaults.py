@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from experiments.identification.defaults import CHAIN, ESTIMATOR
-from identify import CHAINS, ESTIMATORS, MODELS, identify, scara
+from idbench.experiments.identification.defaults import CHAIN, ESTIMATOR
+from idbench.identify import CHAINS, ESTIMATORS, MODELS, identify, scara
 
 
 def test_the_command_lines_defaults_are_those_of_python(log):

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.cli import main
-from identify.files.log_file import read_log, write_log
-from sim.scenario.scenario_file import load, to_toml
-from sim.trajectories import RandomMoves
+from idbench.experiments.cli import main
+from idbench.identify.files.log_file import read_log, write_log
+from idbench.sim.scenario.scenario_file import load, to_toml
+from idbench.sim.trajectories import RandomMoves
 
 pytestmark = pytest.mark.thorough
 

@@ -6,17 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.cli import main
-from experiments.excite.design import Design
-from experiments.excite.excitation import EXCITATIONS
-from experiments.excite.excited import Excited
-from experiments.excite.stages import STAGES
-from experiments.results.manifest import NAME as MANIFEST
-from sim.limits.motion_limits import MotionLimits
-from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
-from sim.robot.robot import Robot
-from sim.scenario.measurement import TorqueMeasurement
-from sim.scenario.scenario_file import load
+from idbench.experiments.cli import main
+from idbench.experiments.excite.design import Design
+from idbench.experiments.excite.excitation import EXCITATIONS
+from idbench.experiments.excite.excited import Excited
+from idbench.experiments.excite.stages import STAGES
+from idbench.experiments.results.manifest import NAME as MANIFEST
+from idbench.sim.limits.motion_limits import MotionLimits
+from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.measurement import TorqueMeasurement
+from idbench.sim.scenario.scenario_file import load
 
 TORQUES = (68.0, 104.0, 46.0, 6.0, 5.2, 4.4)
 """Of the motors of the PUMA, smaller than they are [N m]: they hold motions back."""
@@ -28,7 +28,7 @@ SHORT = ["--duration", "4", "--no-rerun"]
 def hasty(monkeypatch):
     """Search a quarter as long: limits hold, and files are written, however far a search has come."""
     few = tuple(stage._replace(keep=1, steps=stage.steps // 4) for stage in STAGES)
-    monkeypatch.setattr("experiments.excite.stages.STAGES", few)
+    monkeypatch.setattr("idbench.experiments.excite.stages.STAGES", few)
 
 
 @pytest.fixture(scope="module")
@@ -165,8 +165,8 @@ def test_what_is_weighed_comes_out_better(tmp_path):
 @pytest.mark.thorough
 def test_a_keep_out_box_is_kept_out_of(tmp_path):
     """Of the box of the file, by MuJoCo's own distances at every sample of what is written."""
-    from sim.limits.clearance import Clearance
-    from sim.limits.motion_limits import surroundings
+    from idbench.sim.limits.clearance import Clearance
+    from idbench.sim.limits.motion_limits import surroundings
 
     limits = tmp_path / "limits.toml"
     limits.write_text('[[keep_out]]\nname = "post"\nlowest = [0.3, 0.35, 0]\nhighest = [0.45, 0.5, 1]\n')
@@ -191,7 +191,7 @@ def test_motions_follow_until_all_is_known(tmp_path, capsys):
 
 @pytest.mark.thorough
 def test_what_stays_unknown_is_told_and_nothing_is_lost(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("experiments.excite.sequence.ROUNDS", 1)
+    monkeypatch.setattr("idbench.experiments.excite.sequence.ROUNDS", 1)
     out = tmp_path / "out"
     assert main(["excite", "scara", *SHORT, "--until", "0.0001%", "--out", str(out)]) == 0
     assert "not reached after 1 motions: Fs2 still makes" in capsys.readouterr().out
@@ -225,7 +225,7 @@ def test_motors_stay_cool_however_often_a_motion_is_run():
 
 @pytest.mark.thorough
 def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
-    from identify.design.plan import Plan
+    from idbench.identify.design.plan import Plan
 
     calls, value = [0], Plan.value
 
@@ -235,7 +235,7 @@ def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
             raise KeyboardInterrupt
         return value(self, c)
 
-    monkeypatch.setattr("experiments.excite.stages.STAGES", STAGES)
+    monkeypatch.setattr("idbench.experiments.excite.stages.STAGES", STAGES)
     monkeypatch.setattr(Plan, "value", interrupted)
     assert main(["excite", "scara", *SHORT, "--out", str(tmp_path / "out")]) == 0
     assert "interrupted: this is the best motion so far" in capsys.readouterr().out

@@ -6,8 +6,8 @@ import time
 import numpy as np
 import pytest
 
-from experiments.cli import main
-from identify.files.log_file import write_log
+from idbench.experiments.cli import main
+from idbench.identify.files.log_file import write_log
 
 TORQUE = ["--torque", "instantaneous", "--torque-delay", "0"]
 

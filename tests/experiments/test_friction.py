@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from experiments.cli import main
-from experiments.errors import ExperimentError
-from experiments.identification.friction_laws import FrictionLaws
-from identify import OfJoints
-from identify.basis import StribeckFriction
-from identify.files.log_file import write_log
-from sim.engine.simulation import simulate
-from sim.frictions import LoadDependent
-from sim.scenario.scenario_file import from_dict, load
-from sim.trajectories import RandomMoves
+from idbench.experiments.cli import main
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.friction_laws import FrictionLaws
+from idbench.identify import OfJoints
+from idbench.identify.basis import StribeckFriction
+from idbench.identify.files.log_file import write_log
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.frictions import LoadDependent
+from idbench.sim.scenario.scenario_file import from_dict, load
+from idbench.sim.trajectories import RandomMoves
 
 JOINTS = ("hip", "knee")
 
@@ -124,9 +124,9 @@ def test_the_log_says_which_law(tmp_path, monkeypatch, capsys):
 )
 def test_simulated_laws_are_identified(friction, name, tolerance):
     """Without noise, to what the physics step leaves of loads, and reversals of slow joints."""
-    from experiments.identification.parameters import Parameters
-    from experiments.identification.robot_model import RobotModel
-    from identify import ExplicitModel, identify
+    from idbench.experiments.identification.parameters import Parameters
+    from idbench.experiments.identification.robot_model import RobotModel
+    from idbench.identify import ExplicitModel, identify
 
     trajectory = {"kind": "random", "moves": 10, "durations": [2.0, 2.0], "rest": 1.0}
     scenario = from_dict({"name": "law", "trajectory": trajectory, "friction": friction})
@@ -146,7 +146,7 @@ def test_hysteresis_is_seen(tmp_path):
     dahl = {"kind": "dahl", "deflection": 0.02}
     run = simulate(from_dict({"name": "dahl", "trajectory": trajectory, "friction": dahl}))
     assert not run.failures
-    from identify import ExplicitModel, identify, scara
+    from idbench.identify import ExplicitModel, identify, scara
 
     found = identify(run.alone(), scara(), ExplicitModel())
     assert 0.3 < found.X[2] < 0.51

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.identification.fit import fit
-from experiments.identification.friction_choice import chosen_friction
-from experiments.identification.logs import Logs
-from experiments.identification.request import Request
-from experiments.identification.robot_model import RobotModel
-from identify import ExplicitModel, MotionLog, Problem, TorqueChannel, validate
-from identify.signals.masks import NoMask
-from sim.robot.inverse_dynamics import inverse_dynamics
+from idbench.experiments.identification.fit import fit
+from idbench.experiments.identification.friction_choice import chosen_friction
+from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.identify import ExplicitModel, MotionLog, Problem, TorqueChannel, validate
+from idbench.identify.signals.masks import NoMask
+from idbench.sim.robot.inverse_dynamics import inverse_dynamics
 
 pytestmark = pytest.mark.thorough
 

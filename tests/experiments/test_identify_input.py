@@ -5,9 +5,9 @@ from importlib.metadata import files
 import numpy as np
 import pytest
 
-from experiments.cli import main
-from identify import MotionLog
-from identify.files.log_file import read_log, write_log
+from idbench.experiments.cli import main
+from idbench.identify import MotionLog
+from idbench.identify.files.log_file import read_log, write_log
 
 NEEDED = "--robot", "puma560", "--model", "explicit"
 
@@ -54,7 +54,7 @@ def test_torques_that_are_zero_throughout(idbench, as_csv):
 
 def test_a_log_is_not_judged_on_itself(idbench, logs, tmp_path):
     log = read_log(logs / "first.parquet")
-    from identify.files.log_file import write_log
+    from idbench.identify.files.log_file import write_log
 
     write_log(log.part(500, 3000), tmp_path / "part.parquet")
     for other in (logs / "first.parquet", tmp_path / "part.parquet"):
@@ -72,7 +72,7 @@ def test_names_in_another_case_are_guessed(idbench, logs):
 @pytest.mark.thorough
 def test_one_models_failure_takes_nothing_from_the_others(idbench, logs, tmp_path):
     """A seventh of the log leaves the power model fewer rows than parameters; the explicit one has six times as many."""
-    from identify.files.log_file import write_log
+    from idbench.identify.files.log_file import write_log
 
     log = read_log(logs / "first.parquet")
     write_log(log.part(0, int(0.14 * log.samples)), tmp_path / "short.parquet")
@@ -85,12 +85,12 @@ def test_one_models_failure_takes_nothing_from_the_others(idbench, logs, tmp_pat
 
 @pytest.mark.thorough
 def test_a_file_that_cannot_be_written_costs_nothing_else(idbench, logs, monkeypatch):
-    from identify import IdentificationError
+    from idbench.identify import IdentificationError
 
     def impossible(*args, **settings):
         raise IdentificationError("link 2 cannot exist")
 
-    monkeypatch.setattr("experiments.identification.consistent_estimate.consistent_parameters", impossible)
+    monkeypatch.setattr("idbench.experiments.identification.consistent_estimate.consistent_parameters", impossible)
     words = "--write-mjcf", "out.xml", "--out", "found", "--no-rerun"
     code, out, err = idbench("identify", logs / "first.parquet", *NEEDED, *words)
     assert code == 2

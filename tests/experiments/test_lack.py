@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from experiments.cli import main
+from idbench.experiments.cli import main
 
 pytestmark = pytest.mark.thorough
 

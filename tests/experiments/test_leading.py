@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from experiments.cli import main
-from experiments.reports.leading import leading
+from idbench.experiments.cli import main
+from idbench.experiments.reports.leading import leading
 
 
 def test_the_best_leads_and_of_equals_the_first():

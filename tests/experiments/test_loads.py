@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.cli import main
-from experiments.loads.simulated import Pairs
-from identify import ESTIMATORS, LogError, MotionLog, SettingError
-from identify.files.log_file import write_log
-from identify.loads.drive_gains import identify_drive_gains
-from identify.loads.payload import WAYS, with_known_robot
-from sim.robot.robot import Robot
-from sim.scenario.scenario_file import from_dict
+from idbench.experiments.cli import main
+from idbench.experiments.loads.simulated import Pairs
+from idbench.identify import ESTIMATORS, LogError, MotionLog, SettingError
+from idbench.identify.files.log_file import write_log
+from idbench.identify.loads.drive_gains import identify_drive_gains
+from idbench.identify.loads.payload import WAYS, with_known_robot
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.scenario_file import from_dict
 
 LOAD = {"mass": 2.0, "position": [0.03, -0.02, 0.15], "inertia": 0.012}
 

@@ -6,9 +6,9 @@ import re
 import numpy as np
 import pytest
 
-from experiments.cli import main
-from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
-from sim.robot.robot import Robot
+from idbench.experiments.cli import main
+from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
+from idbench.sim.robot.robot import Robot
 
 LEFT = """<body name="{0}" pos="0 .2 .1"><joint name="{0}" axis="0 1 0" damping=".3" frictionloss=".4" armature=".02"/>
   <geom type="capsule" size=".05 .1" pos=".1 0 .1"/><body pos=".3 0 .1"><joint name="{1}" axis="1 0 0" damping=".1"

@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from experiments.cli import main
-from experiments.errors import ExperimentError
-from experiments.paper.motions import COMPARED, Errors, Pace, Table1Motions
-from experiments.paper.table1 import PAPER
-from identify import IirLowPass, ReversalMask
-from identify.rows.chains import CHAINS
+from idbench.experiments.cli import main
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.paper.motions import COMPARED, Errors, Pace, Table1Motions
+from idbench.experiments.paper.table1 import PAPER
+from idbench.identify import IirLowPass, ReversalMask
+from idbench.identify.rows.chains import CHAINS
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ import sys
 import numpy as np
 import pytest
 
-from experiments.cli import main
-from identify import TorqueChannel
-from identify.files.log_file import read_log, write_log
+from idbench.experiments.cli import main
+from idbench.identify import TorqueChannel
+from idbench.identify.files.log_file import read_log, write_log
 
 DH = 'angles = "rad"\n{gravity}[[joints]]\nname = "a"\n{first}\n[[joints]]\nname = "b"\nalpha = 1.5708\nd = 0.3\n'
 
@@ -189,7 +189,7 @@ def test_a_plain_robot_is_asked_for_its_speeds_at_once(tmp_path, complaint, monk
         + '<geom size="0.05" pos="0.2 0 0"/></body></body></worldbody></mujoco>'
     )  # fmt: skip
     asked = []
-    monkeypatch.setattr("experiments.identification.robot_model.BaseParameters.of", lambda *args: asked.append(args))
+    monkeypatch.setattr("idbench.experiments.identification.robot_model.BaseParameters.of", lambda *args: asked.append(args))
     line = complaint("excite", "arm.xml")
     assert "add --velocity with rad/s of all joints or of each, such as --velocity 1.5" in line
     assert "add --acceleration" in complaint("excite", "arm.xml", "--velocity", "1.5")
@@ -210,7 +210,7 @@ def test_files_go_into_the_folder_that_is_made(idbench, logs, tmp_path):
 
 
 def test_an_estimator_that_fails_is_not_a_short_log(monkeypatch, complaint, logs):
-    from identify import ESTIMATORS, AbstractEstimator, Estimate
+    from idbench.identify import ESTIMATORS, AbstractEstimator, Estimate
 
     class Nanny(AbstractEstimator):
         """Gives NaN."""
@@ -240,7 +240,11 @@ def test_control_characters_do_not_reach_the_terminal(tmp_path, capfd):
 @pytest.mark.parametrize("encoding", ["cp1252", "latin-1", "ascii"])
 def test_other_encodings_of_the_terminal(encoding, start):
     process = start(
-        "-c", "from experiments.cli import entry; entry()", "robot", "scara", env=os.environ | {"PYTHONIOENCODING": encoding}
+        "-c",
+        "from idbench.experiments.cli import entry; entry()",
+        "robot",
+        "scara",
+        env=os.environ | {"PYTHONIOENCODING": encoding},
     )
     out, err = process.communicate()
     assert process.returncode == 0, err
@@ -266,7 +270,7 @@ def test_names_of_files_that_are_no_utf8(csv):
         b"--out",
         b"o",
     ]
-    code = "from experiments.cli import entry; entry()"
+    code = "from idbench.experiments.cli import entry; entry()"
     done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, check=False)
     assert done.returncode == 0, done.stderr
     assert b"l\\xfcg.csv" in done.stdout
@@ -293,14 +297,14 @@ def test_a_pipe_is_not_waited_for(csv, complaint):
 
 def test_a_small_file_that_unpacks_to_more_than_there_is(tmp_path, complaint, monkeypatch):
     np.savez_compressed(tmp_path / "big.npz", t=np.zeros(200_000), q1=np.zeros(200_000), tau1=np.zeros(200_000))
-    monkeypatch.setattr("identify.files.room.memory", lambda: 1e-3)
+    monkeypatch.setattr("idbench.identify.files.room.memory", lambda: 1e-3)
     assert "3 arrays of 0.0048 GB: reading them takes 0.0144 GB" in complaint("log", str(tmp_path / "big.npz"))
 
 
 def test_a_long_log_of_zeros_takes_no_time_for_each_of_its_rows(log):
     """Once the median of all steps was computed for each of them."""
-    from identify.data.clock import Clock
-    from identify.data.log_columns import LogColumns
+    from idbench.identify.data.clock import Clock
+    from idbench.identify.data.log_columns import LogColumns
 
     n, calls = 20_000, []
     clock = Clock.of(LogColumns(np.arange(n) / 1000.0, np.zeros((n, 2)), np.zeros((n, 2)), None))
@@ -314,7 +318,8 @@ def test_a_long_log_of_zeros_takes_no_time_for_each_of_its_rows(log):
 
 
 def test_little_memory_is_told(start):
-    code = "import resource; resource.setrlimit(resource.RLIMIT_AS, (10**9, 10**9))\nfrom experiments.cli import entry; entry()"
+    code = "import resource; resource.setrlimit(resource.RLIMIT_AS, (10**9, 10**9))\n"
+    code += "from idbench.experiments.cli import entry; entry()"
     process = start("-c", code, "list")
     _, err = process.communicate()
     assert process.returncode == 2
@@ -323,7 +328,7 @@ def test_little_memory_is_told(start):
 
 def test_progress_is_told_by_model_and_estimator(csv, monkeypatch, capfd):
     """A line for each stage where there is no terminal, at most every so often; none on standard output."""
-    monkeypatch.setattr("experiments.cli.progress.EVERY", 0.002)
+    monkeypatch.setattr("idbench.experiments.cli.progress.EVERY", 0.002)
     assert main([*IDENTIFY, "--estimator", "GLS", "--no-rerun"]) == 0
     out, err = capfd.readouterr()
     assert "identifying: " in err

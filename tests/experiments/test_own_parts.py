@@ -4,13 +4,13 @@ import json
 
 import pytest
 
-from experiments.errors import ExperimentError
-from experiments.identification.chain_settings import chain_of
-from identify import CHAINS, MODELS
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.chain_settings import chain_of
+from idbench.identify import CHAINS, MODELS
 
 OWN = '''
 from dataclasses import dataclass, replace
-from identify import CHAINS, ExplicitModel, FirLowPass
+from idbench.identify import CHAINS, ExplicitModel, FirLowPass
 
 class Steady(ExplicitModel):
     """The explicit model, by another name."""

@@ -6,11 +6,11 @@ from dataclasses import replace
 import covertable
 import pytest
 
-from experiments.cli import main
-from identify.files.log_file import write_log
-from sim.engine.simulation import simulate
-from sim.scenario.scenario_file import load, to_toml
-from sim.trajectories import RandomMoves
+from idbench.experiments.cli import main
+from idbench.identify.files.log_file import write_log
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.scenario.scenario_file import load, to_toml
+from idbench.sim.trajectories import RandomMoves
 
 pytestmark = pytest.mark.thorough
 

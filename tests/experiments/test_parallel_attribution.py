@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.paper import parallel_attribution
-from experiments.paper.attribution import imperfections
-from experiments.paper.parallel_attribution import ParallelAttribution, lines
-from experiments.paper.table2 import Table2
-from sim.drives import AveragedDrive
-from sim.scenario.scenario_file import load, to_dict
-from sim.trajectories import Quintic, RandomMoves
+from idbench.experiments.paper import parallel_attribution
+from idbench.experiments.paper.attribution import imperfections
+from idbench.experiments.paper.parallel_attribution import ParallelAttribution, lines
+from idbench.experiments.paper.table2 import Table2
+from idbench.sim.drives import AveragedDrive
+from idbench.sim.scenario.scenario_file import load, to_dict
+from idbench.sim.trajectories import Quintic, RandomMoves
 
 pytestmark = pytest.mark.thorough
 
@@ -63,7 +63,7 @@ def test_a_run_that_fails_ends_the_process(short, monkeypatch):
     def fail(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("experiments.paper.table2.simulate", fail)
+    monkeypatch.setattr("idbench.experiments.paper.table2.simulate", fail)
     with pytest.raises(KeyboardInterrupt), closing(Table2(short)) as table:
         _ = table.run
     assert table._attribution._process.poll() is not None

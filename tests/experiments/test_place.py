@@ -8,12 +8,12 @@ import time
 
 import pytest
 
-from experiments.cli import main
-from experiments.errors import ResultsError
-from experiments.results.folder import ResultsFolder
-from experiments.results.manifest import NAME, Manifest
-from experiments.results.writing import HIDDEN, new_file, write_text
-from identify.files.log_file import read_log, write_log
+from idbench.experiments.cli import main
+from idbench.experiments.errors import ResultsError
+from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.results.manifest import NAME, Manifest
+from idbench.experiments.results.writing import HIDDEN, new_file, write_text
+from idbench.identify.files.log_file import read_log, write_log
 
 RUN = "run", "ideal", "--no-rerun", "--out"
 
@@ -134,7 +134,7 @@ def test_two_runs_into_one_folder_at_once(tmp_path):
     with folder.held():
         with pytest.raises(ResultsError, match="another process is writing its results to"), folder.held():
             pass
-        code = f"import sys; from experiments.cli import main; sys.exit(main({[*RUN, str(tmp_path / 'out')]}))"
+        code = f"import sys; from idbench.experiments.cli import main; sys.exit(main({[*RUN, str(tmp_path / 'out')]}))"
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
         assert (done.returncode, "another process is writing" in done.stderr) == (2, True)
 
@@ -227,7 +227,7 @@ def test_a_log_with_gaps_replaces_none_of_its_pieces(tmp_path, complaint, log):
 
 
 def test_a_payload_does_not_replace_the_robots_own_file(tmp_path, complaint, logs):
-    from sim.robot.robot import Robot
+    from idbench.sim.robot.robot import Robot
 
     own = tmp_path / "p.xml"
     own.write_text(Robot.path("puma560").read_text())
@@ -247,7 +247,7 @@ def test_folders_of_killed_processes_go_and_those_of_others_stay(tmp_path):
 
 
 def test_a_process_that_is_killed_lets_its_folder_go(tmp_path, start):
-    code = "import time; from pathlib import Path; from experiments.results.folder import ResultsFolder\n"
+    code = "import time; from pathlib import Path; from idbench.experiments.results.folder import ResultsFolder\n"
     code += "with ResultsFolder(Path('out'), 'run', 'x').held(): print('held', flush=True); time.sleep(60)"
     process = start("-c", code, cwd=tmp_path)
     assert process.stdout.readline() == "held\n"

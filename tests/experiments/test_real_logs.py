@@ -6,10 +6,10 @@ import runpy
 import numpy as np
 import pytest
 
-from identify import MotionLog, TorqueChannel
-from identify.files.log_file import read_log, write_log
-from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
-from sim.robot.robot import Robot
+from idbench.identify import MotionLog, TorqueChannel
+from idbench.identify.files.log_file import read_log, write_log
+from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
+from idbench.sim.robot.robot import Robot
 
 PUMA = ("--robot", "puma560")
 
@@ -229,13 +229,13 @@ def test_what_is_written_makes_the_torques_that_were_identified(idbench, logs, t
 
 @pytest.mark.parametrize("robot", ["scara", "puma560", "panda"])
 def test_the_function_of_true_parameters_is_mujocos_inverse_dynamics(robot, tmp_path):
-    from experiments.exports.controller import python_text
-    from experiments.identification.fit import Fit
-    from experiments.identification.logs import Logs
-    from experiments.identification.request import Request
-    from experiments.identification.robot_model import RobotModel
-    from identify import ExplicitModel, Problem
-    from identify.estimators.estimate import Estimate
+    from idbench.experiments.exports.controller import python_text
+    from idbench.experiments.identification.fit import Fit
+    from idbench.experiments.identification.logs import Logs
+    from idbench.experiments.identification.request import Request
+    from idbench.experiments.identification.robot_model import RobotModel
+    from idbench.identify import ExplicitModel, Problem
+    from idbench.identify.estimators.estimate import Estimate
 
     robot_model = RobotModel(robot)
     arm, rng = robot_model.robot, np.random.default_rng(1)

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from experiments.cli import main
-from experiments.results.manifest import NAME
-from identify import IdentificationError
+from idbench.experiments.cli import main
+from idbench.experiments.results.manifest import NAME
+from idbench.identify import IdentificationError
 
 WORDS = "--robot", "puma560", "--model", "explicit", "--estimator", "WLS"
 
@@ -29,14 +29,14 @@ def refused(*args, **options):
 RECORDING = "recording.rrd", "recording.idbench-WLS.rrd"
 
 VIEWS = {
-    "experiments.reports.page.rendered": ("report.html", {*RECORDING, "arm.json"}),
-    "experiments.reports.page.friction_figure": (
+    "idbench.experiments.reports.page.rendered": ("report.html", {*RECORDING, "arm.json"}),
+    "idbench.experiments.reports.page.friction_figure": (
         "the figure of friction in report.html",
         {"report.html", *RECORDING, "arm.json"},
     ),
-    "experiments.recording.identification_recording.record_log": ("the recording", {"report.html", "arm.json"}),
-    "experiments.exports.exports.json_text": ("--write found/arm.json", {"report.html", *RECORDING}),
-    "experiments.cli.commands.identify.checks": (
+    "idbench.experiments.recording.identification_recording.record_log": ("the recording", {"report.html", "arm.json"}),
+    "idbench.experiments.exports.exports.json_text": ("--write found/arm.json", {"report.html", *RECORDING}),
+    "idbench.experiments.cli.commands.identify.checks": (
         "the checks",
         {"report.html", *RECORDING, "arm.json"},
     ),
@@ -71,7 +71,7 @@ def test_a_view_that_fails_leaves_everything_else(view, error, idbench, logs, tm
 @pytest.mark.parametrize("error", [broken, refused], ids=["fault", "refusal"])
 def test_a_held_out_log_that_cannot_be_judged_leaves_the_others(error, idbench, logs, tmp_path, monkeypatch):
     """The second of three; the table was printed, the summary is there, one line names what is missing."""
-    from experiments.identification import held_out
+    from idbench.experiments.identification import held_out
 
     real, calls = held_out.validate, []
 
@@ -96,14 +96,14 @@ def test_a_held_out_log_that_cannot_be_judged_leaves_the_others(error, idbench, 
 
 def part(log, target, k):
     """Write a part of a log."""
-    from identify.files.log_file import read_log, write_log
+    from idbench.identify.files.log_file import read_log, write_log
 
     whole = read_log(log)
     write_log(whole.part(100 * k, whole.samples - 100), target)
 
 
 def test_a_fault_before_the_results_is_told_with_its_report(idbench, logs, monkeypatch, tmp_path):
-    monkeypatch.setattr("experiments.cli.commands.identify.fit", broken)
+    monkeypatch.setattr("idbench.experiments.cli.commands.identify.fit", broken)
     code, out, err = idbench("identify", logs / "first.parquet", *WORDS, "--out", "found")
     assert (code, out) == (1, "")
     assert len(err.splitlines()) == 1
@@ -119,7 +119,7 @@ def test_results_are_saved_before_the_judgement(idbench, logs, tmp_path, monkeyp
     def interrupted(*args):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("experiments.cli.commands.identify.judge", interrupted)
+    monkeypatch.setattr("idbench.experiments.cli.commands.identify.judge", interrupted)
     code, out, err = idbench("identify", logs / "first.parquet", *WORDS, "--out", "found")
     kept = "idbench: the estimates are printed, and with the logs in found"
     assert (code, err.strip().splitlines()) == (130, [kept, "idbench: interrupted"])
@@ -133,7 +133,7 @@ def test_results_are_saved_before_the_judgement(idbench, logs, tmp_path, monkeyp
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
 def test_a_screen_that_is_full_costs_no_view(logs, tmp_path):
     words = ["identify", str(logs / "first.parquet"), *WORDS, "--no-rerun", "--out", "found"]
-    code = f"import sys; from experiments.cli import main; sys.exit(main({words}))"
+    code = f"import sys; from idbench.experiments.cli import main; sys.exit(main({words}))"
     with Path("/dev/full").open("w") as full:
         done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, check=False)
     assert (done.returncode, b"cannot print: No space left" in done.stderr) == (2, True)
@@ -163,7 +163,7 @@ def test_a_full_disk_in_each_view(most, lost, kept, logs, tmp_path):
     """No file may grow beyond a size: views that have room are there, the others are named in one line."""
     code = f"import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, ({most}, {most}))\n"
     words = ["identify", str(logs / "first.parquet"), *WORDS, "--out", "found"]
-    code += f"from experiments.cli import main; sys.exit(main({words}))"
+    code += f"from idbench.experiments.cli import main; sys.exit(main({words}))"
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "Cond(W)" in done.stdout
@@ -199,7 +199,7 @@ def test_a_disk_that_is_full_for_one_file_leaves_the_others(lost, idbench, logs,
 
 @pytest.mark.thorough
 def test_json_is_whole_whatever_fails(idbench, logs, monkeypatch):
-    monkeypatch.setattr("experiments.reports.page.rendered", broken)
+    monkeypatch.setattr("idbench.experiments.reports.page.rendered", broken)
     code, out, err = idbench("identify", logs / "first.parquet", *WORDS, "--out", "found", "--no-rerun", "--json")
     assert code == 2
     found = json.loads(out)
@@ -209,7 +209,7 @@ def test_json_is_whole_whatever_fails(idbench, logs, monkeypatch):
 
 def test_runs_and_tables_keep_theirs(tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("experiments.recording.identification_recording.layer", broken)
+    monkeypatch.setattr("idbench.experiments.recording.identification_recording.layer", broken)
     assert main(["run", "ideal", "--estimator", "OLS", "--out", "kept"]) == 2
     out, err = capfd.readouterr()
     assert "Cond(W)" in out

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from sim.robot.robot import Robot
-from sim.robot.tree import standard_parameters
-from sim.scenario.scenario_file import load, to_toml
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.tree import standard_parameters
+from idbench.sim.scenario.scenario_file import load, to_toml
 
 
 def test_robot_tells_what_can_be_identified(idbench):

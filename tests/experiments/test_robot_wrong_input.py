@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from identify import MotionLog
-from identify.files.log_file import read_log, write_log
-from sim.robot.robot import Robot
+from idbench.identify import MotionLog
+from idbench.identify.files.log_file import read_log, write_log
+from idbench.sim.robot.robot import Robot
 
 
 @pytest.mark.parametrize(

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.errors import ExperimentError
-from experiments.paper.search import Search
-from experiments.paper.table1 import SCENARIO, Table1
-from sim.errors import ScenarioError
-from sim.scenario.scenario_file import load
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.paper.search import Search
+from idbench.experiments.paper.table1 import SCENARIO, Table1
+from idbench.sim.errors import ScenarioError
+from idbench.sim.scenario.scenario_file import load
 
 pytestmark = pytest.mark.thorough
 
@@ -61,8 +61,8 @@ def test_it_never_sees_an_error_of_identification(robot):
     """Another truth, the same motion: with twice the friction and inertia the search takes the same way."""
     import mujoco
 
-    import models
-    from sim.robot.robot import Robot
+    from idbench import models
+    from idbench.sim.robot.robot import Robot
 
     spec = mujoco.MjSpec.from_file(str(models.path("scara")))
     spec.joint("joint1").damping, spec.joint("joint1").armature = [0.1, 0, 0], 0.5

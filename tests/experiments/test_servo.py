@@ -15,15 +15,15 @@ import mujoco
 import numpy as np
 import pytest
 
-from experiments.cli import main
-from experiments.recording.folder import known
-from identify.files.servo_file import ServoFile
-from identify.servo import JointLoad, ServoRun
-from identify.servo.closed_loop import ServoLoop
-from identify.servo.parameters import SERVO_PARAMETERS
-from sim.robot.robot import Robot
-from sim.robot.servos import STEP, Commands, ServoValues, replay, with_servos
-from sim.scenario.scenario_file import load, to_toml
+from idbench.experiments.cli import main
+from idbench.experiments.recording.folder import known
+from idbench.identify.files.servo_file import ServoFile
+from idbench.identify.servo import JointLoad, ServoRun
+from idbench.identify.servo.closed_loop import ServoLoop
+from idbench.identify.servo.parameters import SERVO_PARAMETERS
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.servos import STEP, Commands, ServoValues, replay, with_servos
+from idbench.sim.scenario.scenario_file import load, to_toml
 
 KP, GAIN, SUPPLY, LIMIT, COUNT = 16.0, 0.166, 12.0, 0.97, 2 * np.pi / 4096
 
@@ -130,7 +130,7 @@ def test_joints_that_are_done_are_kept_when_the_others_are_interrupted(tmp_path,
     arm = load("servo-arm")
     Path("short.toml").write_text(to_toml(replace(arm, trajectory=replace(arm.trajectory, steps=24))))
     assert main(["run", "short.toml", "--out", "run", "--no-rerun"]) == 0
-    from experiments.servo import identification
+    from idbench.experiments.servo import identification
 
     real, calls = identification.identify_servo, []
 
@@ -154,7 +154,9 @@ def test_the_page_takes_an_arm_to_a_model(root, tmp_path, monkeypatch, capfd):
     blocks = re.findall(r"```sh\n(.*?)```", (root / "docs" / "servo.md").read_text(), re.DOTALL)
     for block in blocks:
         if not block.startswith("uv run") or "sed" in block:
-            commands = block.replace("uv run idbench", f"{sys.executable} -c 'from experiments.cli import entry; entry()'")
+            commands = block.replace(
+                "uv run idbench", f"{sys.executable} -c 'from idbench.experiments.cli import entry; entry()'"
+            )
             subprocess.run(
                 ["bash", "-euc", commands], check=True, env=os.environ | {"PYTHONPATH": str(root)}, capture_output=True
             )

@@ -6,18 +6,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from experiments.servo import joints as module
-from experiments.servo.joints import Joints, JointsLog
-from experiments.study.servo_rows import _joints
-from identify import IdentificationError
-from identify.files.servo_log import ServoColumns
-from identify.servo import Servo, UnscaledError, identify_again, identify_servo
-from identify.servo.stages import looked_at
-from identify.servo.together import APART, per_offset
-from sim.engine.simulation import simulate
-from sim.robot.mounting import PLAIN
-from sim.robot.servos import links
-from sim.scenario.scenario_file import load
+from idbench.experiments.servo import joints as module
+from idbench.experiments.servo.joints import Joints, JointsLog
+from idbench.experiments.study.servo_rows import _joints
+from idbench.identify import IdentificationError
+from idbench.identify.files.servo_log import ServoColumns
+from idbench.identify.servo import Servo, UnscaledError, identify_again, identify_servo
+from idbench.identify.servo.stages import looked_at
+from idbench.identify.servo.together import APART, per_offset
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.robot.mounting import PLAIN
+from idbench.sim.robot.servos import links
+from idbench.sim.scenario.scenario_file import load
 
 SERVO = Servo(0.166, 16.0, 12.0)
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from experiments.servo.loads import Moving, loads
-from identify.files.servo_log import ServoColumns
-from sim.robot.inverse_dynamics import inverse_dynamics
-from sim.robot.mounting import PLAIN
-from sim.robot.servos import links
+from idbench.experiments.servo.loads import Moving, loads
+from idbench.identify.files.servo_log import ServoColumns
+from idbench.sim.robot.inverse_dynamics import inverse_dynamics
+from idbench.sim.robot.mounting import PLAIN
+from idbench.sim.robot.servos import links
 
 ARM = "servo_arm"
 

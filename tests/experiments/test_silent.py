@@ -6,17 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.cli import main
-from experiments.errors import ExperimentError
-from experiments.identification.friction_laws import FrictionLaws
-from identify import ESTIMATORS, AbstractEstimator, Estimate, MotionLog
-from identify.data.jumps import jumps
-from identify.files.log_file import read_log, write_log
-from sim.engine.simulation import simulate
-from sim.robot.payload import Payload
-from sim.scenario.measurement import TorqueMeasurement
-from sim.scenario.scenario_file import load, to_toml
-from sim.trajectories import RandomMoves
+from idbench.experiments.cli import main
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.friction_laws import FrictionLaws
+from idbench.identify import ESTIMATORS, AbstractEstimator, Estimate, MotionLog
+from idbench.identify.data.jumps import jumps
+from idbench.identify.files.log_file import read_log, write_log
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.robot.payload import Payload
+from idbench.sim.scenario.measurement import TorqueMeasurement
+from idbench.sim.scenario.scenario_file import load, to_toml
+from idbench.sim.trajectories import RandomMoves
 
 HELD = "--torque", "held", "--torque-delay", "0"
 SCARA = "--robot", "scara", "--model", "explicit", "--no-rerun"
@@ -138,7 +138,7 @@ def test_a_payload_is_saved_before_it_is_judged(payload, idbench, tmp_path, monk
     def broken(*args):
         raise ZeroDivisionError("on purpose")
 
-    monkeypatch.setattr("experiments.loads.judgement.LoadJudgement.warnings", broken)
+    monkeypatch.setattr("idbench.experiments.loads.judgement.LoadJudgement.warnings", broken)
     code, out, err = idbench("payload", payload / "full.parquet", "--unloaded", payload / "empty.parquet", *WAY, "--out", "f")
     assert (code, "the verdict: " in err, "consistent body" in out) == (2, True, True)
     assert (tmp_path / "f" / "summary.json").is_file()
@@ -339,7 +339,6 @@ def test_plugins_that_spoil_or_end_are_named(plugin, words, complaint, logs, mon
     """Their code counts as another package's."""
     monkeypatch.setattr(plugin, "__module__", "elsewhere")
     monkeypatch.setitem(ESTIMATORS._builtin, "strange", plugin)
-    monkeypatch.setattr("identify.blame.OURS", ("identify", "sim", "models", "experiments"))
     line = complaint("identify", str(logs / "first.parquet"), "--robot", "puma560", "--estimator", "strange")
     assert words in line
 
@@ -351,9 +350,9 @@ def test_a_check_that_ends_is_an_answer(monkeypatch, capsys):
 
 
 def test_rows_are_read_only(logs):
-    from identify import ExplicitModel, Problem, idbench_chain, scara
-    from sim.engine.ideal_log import ideal_log
-    from sim.robot.robot import Robot
+    from idbench.identify import ExplicitModel, Problem, idbench_chain, scara
+    from idbench.sim.engine.ideal_log import ideal_log
+    from idbench.sim.robot.robot import Robot
 
     robot = Robot.load("scara")
     problem = Problem(

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.identification.suited_mask import masked_laws
-from identify import BLOCKS, CHAINS, ExplicitModel, Problem, ReversalMask, scara
-from identify.basis.of_joints import OfJoints
-from sim.engine.simulation import simulate
-from sim.scenario.scenario_file import load
+from idbench.experiments.identification.suited_mask import masked_laws
+from idbench.identify import BLOCKS, CHAINS, ExplicitModel, Problem, ReversalMask, scara
+from idbench.identify.basis.of_joints import OfJoints
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.scenario.scenario_file import load
 
 
 @pytest.fixture(scope="module")

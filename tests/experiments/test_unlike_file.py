@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.cli import main
-from experiments.identification.unlike_file import without_shapes
-from identify import BLOCKS, ExplicitModel, MotionLog, NoMask, Problem, TorqueChannel, idbench_chain, scara
+from idbench.experiments.cli import main
+from idbench.experiments.identification.unlike_file import without_shapes
+from idbench.identify import BLOCKS, ExplicitModel, MotionLog, NoMask, Problem, TorqueChannel, idbench_chain, scara
 
 
 @pytest.mark.thorough

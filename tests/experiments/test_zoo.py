@@ -12,17 +12,17 @@ import pinocchio as pin
 import pytest
 import scipy
 
-from experiments.cli import main
-from experiments.identification.fit import fit
-from experiments.identification.logs import Logs
-from experiments.identification.request import Request
-from experiments.identification.robot_model import RobotModel
-from identify import MotionLog, TorqueChannel
-from identify.basis.parameter import BODY
-from identify.data.kinematics import INERTIAL
-from identify.files.log_file import write_log
-from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
-from sim.robot.robot import Robot
+from idbench.experiments.cli import main
+from idbench.experiments.identification.fit import fit
+from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.identify import MotionLog, TorqueChannel
+from idbench.identify.basis.parameter import BODY
+from idbench.identify.data.kinematics import INERTIAL
+from idbench.identify.files.log_file import write_log
+from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
+from idbench.sim.robot.robot import Robot
 
 pytestmark = pytest.mark.thorough
 

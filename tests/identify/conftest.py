@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from identify import Joint, KinematicTree
+from idbench.identify import Joint, KinematicTree
 
 URDF = {"UR5": "ur_description/urdf/ur5_robot.urdf", "Panda with its hand": "panda_description/urdf/panda.urdf"}
 """Six hinges; seven hinges and, on two branches, two slides."""

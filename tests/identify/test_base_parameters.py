@@ -7,8 +7,8 @@ from importlib.metadata import files
 import numpy as np
 import pytest
 
-import identify.parameters.base_parameters
-from identify import (
+import idbench.identify.parameters.base_parameters
+from idbench.identify import (
     MODELS,
     AbstractConservativeBlock,
     Armature,
@@ -29,11 +29,11 @@ from identify import (
     scara,
     tree_basis,
 )
-from identify.data.motion_log import MotionLog, TorqueChannel
-from sim.engine.ideal_log import ideal_log
-from sim.robot.robot import Robot
-from sim.robot.tree import kinematic_tree, standard_parameters
-from sim.trajectories import RandomMoves
+from idbench.identify.data.motion_log import MotionLog, TorqueChannel
+from idbench.sim.engine.ideal_log import ideal_log
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.tree import kinematic_tree, standard_parameters
+from idbench.sim.trajectories import RandomMoves
 
 
 def inertial(tree):
@@ -167,7 +167,7 @@ def test_parameters_can_be_left_out_and_unknown_ones_are_refused():
 def test_the_grouping_does_not_depend_on_the_states_that_were_drawn(monkeypatch):
     tree = kinematic_tree(Robot.load("panda"))
     one = BaseParameters.of(tree, tree_basis(tree))
-    monkeypatch.setattr(identify.parameters.base_parameters, "SEED", 7)
+    monkeypatch.setattr(idbench.identify.parameters.base_parameters, "SEED", 7)
     two = BaseParameters.of(tree, tree_basis(tree))
     assert one.names == two.names
     np.testing.assert_allclose(one.K, two.K, atol=1e-9)

@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from experiments.identification.robot_model import RobotModel
-from identify import (
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.identify import (
     AbstractBlock,
     AbstractConservativeBlock,
     AbstractFriction,
@@ -21,8 +21,8 @@ from identify import (
     ViscousFriction,
     scara,
 )
-from identify.errors import SettingError
-from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
+from idbench.identify.errors import SettingError
+from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 
 STATES = np.random.default_rng(5).uniform(-3, 3, (3, 2, 300))
 """q, qd, qdd of 300 random instants, shape (joint, time) each."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from identify import (
+from idbench.identify import (
     AbstractEstimator,
     AbstractFriction,
     AbstractMask,
@@ -102,7 +102,7 @@ def test_a_mask_of_another_shape(log):
 
 
 def test_our_own_mistakes_are_not_blamed_on_plugins(log, monkeypatch):
-    space = {"__name__": "identify.broken"}
+    space = {"__name__": "idbench.identify.broken"}
     exec("def broken(*args): return 1 / 0", space)
     monkeypatch.setattr(Chain, "rows", space["broken"])
     with pytest.raises(ZeroDivisionError):

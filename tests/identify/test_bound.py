@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from identify import Basis, CoulombFriction, NoiseLevels, ViscousFriction, cramer_rao, scara
-from identify.basis.armature import Armature
+from idbench.identify import Basis, CoulombFriction, NoiseLevels, ViscousFriction, cramer_rao, scara
+from idbench.identify.basis.armature import Armature
 
 FS = 100.0
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify import (
+from idbench.identify import (
     CHAINS,
     MODELS,
     OPERATORS,
@@ -31,7 +31,7 @@ from identify import (
     paper_chain,
     scara,
 )
-from sim.engine.ideal_log import ideal_log
+from idbench.sim.engine.ideal_log import ideal_log
 
 CHANNELS = [
     TorqueChannel("instantaneous"),

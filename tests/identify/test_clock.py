@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from identify import LogError, TorqueChannel
-from identify.data.clock import Clock
-from identify.data.log_columns import LogColumns
-from identify.data.resample import Repaired
-from identify.data.velocities import Velocities
+from idbench.identify import LogError, TorqueChannel
+from idbench.identify.data.clock import Clock
+from idbench.identify.data.log_columns import LogColumns
+from idbench.identify.data.resample import Repaired
+from idbench.identify.data.velocities import Velocities
 
 FS = 1000.0
 T = np.arange(0, 8, 1 / FS)

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from identify import AsLogged, MotionLog, TorqueChannel, WeightedLeastSquares, idbench_chain, identify_each, scara
-from identify.models import ExplicitModel, ImplicitModel, PowerModel
-from sim.drives import AveragedDrive, SwitchedDrive
-from sim.encoders import IncrementalEncoder
-from sim.engine.simulation import simulate
-from sim.scenario.measurement import TorqueMeasurement
-from sim.scenario.scenario_file import load
-from sim.trajectories import RandomMoves
+from idbench.identify import AsLogged, MotionLog, TorqueChannel, WeightedLeastSquares, idbench_chain, identify_each, scara
+from idbench.identify.models import ExplicitModel, ImplicitModel, PowerModel
+from idbench.sim.drives import AveragedDrive, SwitchedDrive
+from idbench.sim.encoders import IncrementalEncoder
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.scenario.measurement import TorqueMeasurement
+from idbench.sim.scenario.scenario_file import load
+from idbench.sim.trajectories import RandomMoves
 
 FORMS = {"explicit": ExplicitModel(), "implicit": ImplicitModel(), "power": PowerModel()}
 

@@ -5,12 +5,12 @@ import sys
 import numpy as np
 import pytest
 
-from identify import BaseParameters, IdentificationError, consistent_parameters, tree_basis
-from identify.data.kinematics import INERTIAL
-from identify.parameters.pseudo_inertia import inertial, pseudo_inertia
-from sim.robot.rewrite import rewritten
-from sim.robot.robot import Robot
-from sim.robot.tree import kinematic_tree, standard_parameters
+from idbench.identify import BaseParameters, IdentificationError, consistent_parameters, tree_basis
+from idbench.identify.data.kinematics import INERTIAL
+from idbench.identify.parameters.pseudo_inertia import inertial, pseudo_inertia
+from idbench.sim.robot.rewrite import rewritten
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.tree import kinematic_tree, standard_parameters
 
 
 @pytest.fixture(scope="module", params=["scara", "puma560", "panda"])
@@ -94,7 +94,7 @@ def test_a_last_body_of_next_to_nothing_does_not_keep_the_estimate_away(arm, mas
 def test_what_the_solver_leaves_far_outside_is_no_result(monkeypatch, arm):
     grouping, X = arm
     moved = lambda self, standard: 1.1 * standard  # noqa: E731
-    monkeypatch.setattr("identify.parameters.bodies.Bodies.projected", moved)
+    monkeypatch.setattr("idbench.identify.parameters.bodies.Bodies.projected", moved)
     with pytest.raises(IdentificationError, match="the solver left inconsistent bodies"):
         consistent_parameters(grouping, grouping.base(X), 1e-6 * np.eye(len(grouping.names)), X)
 
@@ -214,5 +214,5 @@ def test_a_large_rotor_does_not_make_bodies_heavier(monkeypatch):
     base = grouping.base(truth)
     sigma = 1e-3 * np.maximum(np.abs(base), 0.01)
     found = consistent_parameters(grouping, base, np.diag(sigma**2), given)
-    monkeypatch.setattr("identify.parameters.consistent.LARGER", np.inf)
+    monkeypatch.setattr("idbench.identify.parameters.consistent.LARGER", np.inf)
     np.testing.assert_array_equal(found.standard, consistent_parameters(grouping, base, np.diag(sigma**2), given).standard)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from identify import ESTIMATORS, MODELS, MotionLog, TorqueChannel, identify_each, scara
-from sim.engine.ideal_log import ideal_log
-from sim.trajectories import RandomMoves, Reference
+from idbench.identify import ESTIMATORS, MODELS, MotionLog, TorqueChannel, identify_each, scara
+from idbench.sim.engine.ideal_log import ideal_log
+from idbench.sim.trajectories import RandomMoves, Reference
 
 RUNS, BATCH, FS = 1500, 250, 100.0
 

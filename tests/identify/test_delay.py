@@ -5,15 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify import ExcitationError, LogError, MotionLog, SettingError, TorqueChannel, idbench_chain, paper_chain, scara
-from identify.judge.delay import estimate_delay
-from sim.drives import AveragedDrive
-from sim.encoders import IncrementalEncoder
-from sim.engine.simulation import simulate
-from sim.scenario.measurement import TorqueMeasurement
-from sim.scenario.scenario import Timing
-from sim.scenario.scenario_file import load
-from sim.trajectories import RandomMoves
+from idbench.identify import (
+    ExcitationError,
+    LogError,
+    MotionLog,
+    SettingError,
+    TorqueChannel,
+    idbench_chain,
+    paper_chain,
+    scara,
+)
+from idbench.identify.judge.delay import estimate_delay
+from idbench.sim.drives import AveragedDrive
+from idbench.sim.encoders import IncrementalEncoder
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.scenario.measurement import TorqueMeasurement
+from idbench.sim.scenario.scenario import Timing
+from idbench.sim.scenario.scenario_file import load
+from idbench.sim.trajectories import RandomMoves
 
 SIXTEEN = IncrementalEncoder(lines=2**14)
 

@@ -6,16 +6,25 @@ import numpy as np
 import pytest
 import scipy
 
-from identify import CHAINS, ExplicitModel, GeneralizedLeastSquares, MotionLog, NoiseLevels, TorqueChannel, identify, scara
-from identify.data.limits import Limits
-from identify.design.criteria import CRITERIA, LogSigma, sigmas_of
-from identify.design.greedy import Greedy
-from identify.design.information import Information
-from identify.design.plan import Plan
-from identify.design.predicted import predicted_information
-from identify.design.search import Search
-from identify.design.shapes import Shapes
-from identify.errors import SettingError
+from idbench.identify import (
+    CHAINS,
+    ExplicitModel,
+    GeneralizedLeastSquares,
+    MotionLog,
+    NoiseLevels,
+    TorqueChannel,
+    identify,
+    scara,
+)
+from idbench.identify.data.limits import Limits
+from idbench.identify.design.criteria import CRITERIA, LogSigma, sigmas_of
+from idbench.identify.design.greedy import Greedy
+from idbench.identify.design.information import Information
+from idbench.identify.design.plan import Plan
+from idbench.identify.design.predicted import predicted_information
+from idbench.identify.design.search import Search
+from idbench.identify.design.shapes import Shapes
+from idbench.identify.errors import SettingError
 
 X = np.array([3.5, 0.05, 0.5, 0.06, 0.12, 0.005, 0.01, 0.1])
 LEVELS = NoiseLevels(np.array([0.05, 0.02]), np.array([2e-5, 4e-5]))

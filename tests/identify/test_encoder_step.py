@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identify import encoder_steps
+from idbench.identify import encoder_steps
 
 T = np.arange(2000) / 100.0
 MOTION = np.stack([np.sin(T) + 0.1 * T, 0.3 * np.cos(2 * T)], axis=-1)

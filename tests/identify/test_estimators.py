@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from experiments.identification.fit import fit
-from experiments.identification.logs import Logs
-from experiments.identification.request import Request
-from experiments.identification.robot_model import RobotModel
-from experiments.identification.simulators import RobotPlant, ScenarioLoop
-from identify import (
+from idbench.experiments.identification.fit import fit
+from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.identification.simulators import RobotPlant, ScenarioLoop
+from idbench.identify import (
     ESTIMATORS,
     AbstractLoop,
     ExplicitModel,
@@ -28,20 +28,20 @@ from identify import (
     noise_in_rows,
     scara,
 )
-from identify.estimators import (
+from idbench.identify.estimators import (
     DirectInverse,
     InstrumentalVariables,
     RecursiveLeastSquares,
     UnscentedKalmanFilter,
 )
-from sim.controllers import PDFeedforward
-from sim.encoders import IncrementalEncoder
-from sim.engine.simulation import simulate
-from sim.robot.tree import standard_parameters
-from sim.scenario.measurement import TorqueMeasurement
-from sim.scenario.scenario import Timing
-from sim.scenario.scenario_file import load
-from sim.trajectories import RandomMoves
+from idbench.sim.controllers import PDFeedforward
+from idbench.sim.encoders import IncrementalEncoder
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.robot.tree import standard_parameters
+from idbench.sim.scenario.measurement import TorqueMeasurement
+from idbench.sim.scenario.scenario import Timing
+from idbench.sim.scenario.scenario_file import load
+from idbench.sim.trajectories import RandomMoves
 
 MOVES = RandomMoves(moves=12, durations=(1.3, 1.3), rest=0.7, seed=1)
 WIDE = replace(idbench_chain(), operator=replace(idbench_chain().operator, cutoff=20.0))

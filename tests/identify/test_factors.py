@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from identify import Estimate, ExcitationError, IdentificationError, LogError, OrdinaryLeastSquares, Rows, Status
-from identify.rows.factors import Factors
+from idbench.identify import Estimate, ExcitationError, IdentificationError, LogError, OrdinaryLeastSquares, Rows, Status
+from idbench.identify.rows.factors import Factors
 
 NAMES = ("a", "b", "c")
 

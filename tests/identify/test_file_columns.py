@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify import LogError, MotionLog, TorqueChannel
-from identify.data.resample import Repaired
-from identify.files.layout import LogLayout, Source, matching
-from identify.files.log_file import read_log, write_log
-from identify.files.reading import read_columns
-from identify.files.units import factor, named_unit
+from idbench.identify import LogError, MotionLog, TorqueChannel
+from idbench.identify.data.resample import Repaired
+from idbench.identify.files.layout import LogLayout, Source, matching
+from idbench.identify.files.log_file import read_log, write_log
+from idbench.identify.files.reading import read_columns
+from idbench.identify.files.units import factor, named_unit
 
 
 def test_units_have_one_meaning():

@@ -10,12 +10,12 @@ import pytest
 import scipy
 from pyarrow import parquet
 
-from identify import LogError, MotionLog, TorqueChannel
-from identify.files.formats import read_table
-from identify.files.guess import guess
-from identify.files.layout import LogLayout, Source
-from identify.files.log_file import read_log, write_log
-from identify.files.reading import read_columns
+from idbench.identify import LogError, MotionLog, TorqueChannel
+from idbench.identify.files.formats import read_table
+from idbench.identify.files.guess import guess
+from idbench.identify.files.layout import LogLayout, Source
+from idbench.identify.files.log_file import read_log, write_log
+from idbench.identify.files.reading import read_columns
 
 T = np.arange(0, 4, 0.01)
 Q = np.stack([np.sin(T), 0.5 * np.cos(2 * T), 0.2 * np.sin(3 * T)], axis=1)

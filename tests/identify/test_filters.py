@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.special import eval_chebyt
 
-from identify import ButterworthPrefilter, FirLowPass, IirLowPass, LogError, SettingError
-from identify.rows.grid import Grid
+from idbench.identify import ButterworthPrefilter, FirLowPass, IirLowPass, LogError, SettingError
+from idbench.identify.rows.grid import Grid
 
 FS = 100.0
 T = np.arange(4000) / FS

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify import (
+from idbench.identify import (
     BLOCKS,
     ESTIMATORS,
     ExplicitModel,
@@ -20,10 +20,10 @@ from identify import (
     identify,
     scara,
 )
-from identify.basis import LoadFriction, StribeckFriction
-from identify.estimators.settle import settled
-from identify.judge.friction_choice import choose_friction
-from identify.signals.state import State
+from idbench.identify.basis import LoadFriction, StribeckFriction
+from idbench.identify.estimators.settle import settled
+from idbench.identify.judge.friction_choice import choose_friction
+from idbench.identify.signals.state import State
 
 X = np.array([3.5, 0.5, 0.5, 0.06, 0.12, 0.005, 0.1, 0.2])
 """Parameters of the SCARA."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify import (
+from idbench.identify import (
     MODELS,
     OPERATORS,
     GeneralizedLeastSquares,
@@ -19,12 +19,12 @@ from identify import (
     identify_each,
     scara,
 )
-from identify.noise.band_matrix import Band, Cholesky
-from identify.noise.noisy_rows import NoisyRows
-from identify.noise.propagation import NoiseLevels
-from identify.noise.restricted_likelihood import likely_levels
-from identify.noise.unbiased import unbiased, with_more_noise
-from identify.rows import long_logs
+from idbench.identify.noise.band_matrix import Band, Cholesky
+from idbench.identify.noise.noisy_rows import NoisyRows
+from idbench.identify.noise.propagation import NoiseLevels
+from idbench.identify.noise.restricted_likelihood import likely_levels
+from idbench.identify.noise.unbiased import unbiased, with_more_noise
+from idbench.identify.rows import long_logs
 
 EVERY = {name: MODELS.create(name) for name in MODELS.builtin}
 GLS = GeneralizedLeastSquares()

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from identify import MODELS, OPERATORS, AsLogged, PowerModel, idbench_chain, identify, scara
-from sim.engine.simulation import simulate
-from sim.scenario.scenario import Timing
-from sim.scenario.scenario_file import load
+from idbench.identify import MODELS, OPERATORS, AsLogged, PowerModel, idbench_chain, identify, scara
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.scenario.scenario import Timing
+from idbench.sim.scenario.scenario_file import load
 
 DELAYS = [0.0, 0.003, 0.0052, 0.007, 0.010, 0.013]
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify import CHAINS, ESTIMATORS, ExplicitModel, IdentificationError, MotionLog, Problem, scara
-from identify.judge.lack_of_fit import WRONG, lack_of_fit
-from sim.engine.simulation import simulate
-from sim.scenario.scenario_file import load
-from sim.trajectories import RandomMoves
+from idbench.identify import CHAINS, ESTIMATORS, ExplicitModel, IdentificationError, MotionLog, Problem, scara
+from idbench.identify.judge.lack_of_fit import WRONG, lack_of_fit
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.scenario.scenario_file import load
+from idbench.sim.trajectories import RandomMoves
 
 NOISE, BITS16 = np.array([0.05, 0.005]), 2 * np.pi / 2**16 / np.sqrt(12)
 

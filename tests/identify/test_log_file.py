@@ -5,8 +5,8 @@ import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
-from identify import IdentificationError, LogError, MotionLog, TorqueChannel
-from identify.files.log_file import read_log, write_log
+from idbench.identify import IdentificationError, LogError, MotionLog, TorqueChannel
+from idbench.identify.files.log_file import read_log, write_log
 
 
 @pytest.fixture

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from identify import NoMask, ReversalMask, SettingError
+from idbench.identify import NoMask, ReversalMask, SettingError
 
 
 @pytest.mark.parametrize("fs", [100.0, 1000.0])

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify import (
+from idbench.identify import (
     MODELS,
     GeneralizedLeastSquares,
     IdentificationError,
@@ -19,15 +19,15 @@ from identify import (
     smoothed_log,
     smoothed_motion,
 )
-from identify.estimators.likelihood import maximum_likelihood
-from identify.estimators.likelihood.cells import GAUSS, Cells, hermite
-from identify.estimators.likelihood.normal_equations import Noise, NormalEquations
-from identify.estimators.likelihood.reversals import Turns
-from identify.estimators.problem import Problem
-from identify.rows.chains import idbench_chain
-from sim.engine.simulation import simulate
-from sim.scenario.scenario_file import load
-from sim.trajectories import RandomMoves
+from idbench.identify.estimators.likelihood import maximum_likelihood
+from idbench.identify.estimators.likelihood.cells import GAUSS, Cells, hermite
+from idbench.identify.estimators.likelihood.normal_equations import Noise, NormalEquations
+from idbench.identify.estimators.likelihood.reversals import Turns
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.rows.chains import idbench_chain
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.scenario.scenario_file import load
+from idbench.sim.trajectories import RandomMoves
 
 EXPLICIT, ML, GLS = MODELS.create("explicit"), MaximumLikelihood(), GeneralizedLeastSquares()
 BITS16 = 2 * np.pi / 2**16 / np.sqrt(12)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from identify import LogError, MotionLog, SettingError, TorqueChannel
+from idbench.identify import LogError, MotionLog, SettingError, TorqueChannel
 
 CHANNEL = TorqueChannel("held", 0.003)
 Q = np.zeros((100, 2))

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify import (
+from idbench.identify import (
     ESTIMATORS,
     MASKS,
     MODELS,
@@ -25,9 +25,9 @@ from identify import (
     paper_chain,
     scara,
 )
-from identify.estimators.propagated import noise_covariance
-from identify.noise.linearization import Linearization
-from identify.noise.propagation import position_paths, torque_paths
+from idbench.identify.estimators.propagated import noise_covariance
+from idbench.identify.noise.linearization import Linearization
+from idbench.identify.noise.propagation import position_paths, torque_paths
 
 TRUTH = (3.5, 0.05, 0.5, 0.06, 0.12, 0.005, 0.01, 0.1)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identify import (
+from idbench.identify import (
     MODELS,
     MotionLog,
     NoiseLevels,

@@ -6,9 +6,18 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from identify import CentralDifference, FirLowPass, IirLowPass, LogError, ModulatingFunctions, Rows, SettingError, Windows
-from identify.models.equations import Equations
-from identify.rows.operators import OPERATORS, Samples
+from idbench.identify import (
+    CentralDifference,
+    FirLowPass,
+    IirLowPass,
+    LogError,
+    ModulatingFunctions,
+    Rows,
+    SettingError,
+    Windows,
+)
+from idbench.identify.models.equations import Equations
+from idbench.identify.rows.operators import OPERATORS, Samples
 
 FS = 100.0
 T = np.arange(1500) / FS

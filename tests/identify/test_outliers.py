@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify import ESTIMATORS, ExplicitModel, identify, scara
-from identify.estimators import IterativelyReweighted
-from identify.signals.wild_samples import without_wild_samples
-from sim.encoders import IncrementalEncoder
-from sim.engine.simulation import simulate
-from sim.scenario.measurement import TorqueMeasurement
-from sim.scenario.scenario_file import load
-from sim.trajectories import RandomMoves
+from idbench.identify import ESTIMATORS, ExplicitModel, identify, scara
+from idbench.identify.estimators import IterativelyReweighted
+from idbench.identify.signals.wild_samples import without_wild_samples
+from idbench.sim.encoders import IncrementalEncoder
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.scenario.measurement import TorqueMeasurement
+from idbench.sim.scenario.scenario_file import load
+from idbench.sim.trajectories import RandomMoves
 
 
 def logged(bits, runs=1, **parts):

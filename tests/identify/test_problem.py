@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import scipy
 
-from identify import (
+from idbench.identify import (
     ESTIMATORS,
     AbstractEstimator,
     Armature,
@@ -27,7 +27,7 @@ from identify import (
     identify,
     scara,
 )
-from identify.rows import long_logs
+from idbench.identify.rows import long_logs
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from identify import CHAINS, ESTIMATORS, MODELS, IdentificationError, MotionLog, identify, recursive_least_squares, scara
+from idbench.identify import (
+    CHAINS,
+    ESTIMATORS,
+    MODELS,
+    IdentificationError,
+    MotionLog,
+    identify,
+    recursive_least_squares,
+    scara,
+)
 
 
 @pytest.fixture(scope="module")

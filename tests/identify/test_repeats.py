@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from identify import MODELS, MotionLog, TorqueChannel, identify, scara
-from identify.noise.repeats import repeats
+from idbench.identify import MODELS, MotionLog, TorqueChannel, identify, scara
+from idbench.identify.noise.repeats import repeats
 
 FS, SECONDS = 100.0, 40.0
 T = np.arange(0, SECONDS, 1 / FS)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from identify import LogError, MotionLog, PowerModel, TimeError, TorqueChannel, identify, scara
-from identify.data.resample import resample
-from sim.engine.simulation import simulate
-from sim.scenario.scenario_file import load
+from idbench.identify import LogError, MotionLog, PowerModel, TimeError, TorqueChannel, identify, scara
+from idbench.identify.data.resample import resample
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.scenario.scenario_file import load
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +27,7 @@ def test_an_instantaneous_log_with_jittered_times_is_identified(log, table1, tru
     """Times scattered by 5 % of a step: refused as they are, and identified when they are made uniform."""
     t = log.t + rng.uniform(-0.025, 0.025, log.samples) / log.fs
     reference = table1.scenario.trajectory.points.at(t, log.fs)
-    from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
+    from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 
     tau = inverse_dynamics(table1.robot, reference.q, reference.qd, reference.qdd) + coulomb_torque(table1.robot, reference.qd)
     with pytest.raises(TimeError, match="time is not uniform"):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import lapack
 
-from identify import (
+from idbench.identify import (
     MODELS,
     MaximumLikelihood,
     MotionLog,
@@ -19,10 +19,10 @@ from identify import (
     idbench_chain,
     scara,
 )
-from identify.estimators.likelihood.cells import Cells
-from identify.estimators.likelihood.joint_fit import JointFit
-from identify.estimators.likelihood.normal_equations import NormalEquations, torque_squares
-from identify.noise.band_matrix import solve_lower
+from idbench.identify.estimators.likelihood.cells import Cells
+from idbench.identify.estimators.likelihood.joint_fit import JointFit
+from idbench.identify.estimators.likelihood.normal_equations import NormalEquations, torque_squares
+from idbench.identify.noise.band_matrix import solve_lower
 
 EXPLICIT, HELD, FS, RUNS = MODELS.create("explicit"), TorqueChannel("held"), 100.0, 16
 MASKED, USED = MaximumLikelihood(), MaximumLikelihood(reversals=True)

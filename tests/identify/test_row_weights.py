@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identify.noise.row_weights import MAX_RATIO, MIN_RATIO, floor_of, reciprocal_root, rectified
+from idbench.identify.noise.row_weights import MAX_RATIO, MIN_RATIO, floor_of, reciprocal_root, rectified
 
 ALL = np.ones((200, 400), dtype=bool)
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from identify import CHAINS, ESTIMATORS, ExplicitModel, MotionLog, Problem, TorqueChannel, scara
-from identify.judge.slow_motion import slow_motion
-from identify.signals.state import State
+from idbench.identify import CHAINS, ESTIMATORS, ExplicitModel, MotionLog, Problem, TorqueChannel, scara
+from idbench.identify.judge.slow_motion import slow_motion
+from idbench.identify.signals.state import State
 
 X = np.array([3.5, 0.5, 0.5, 0.06, 0.12, 0.005, 0.1, 0.2])
 """Parameters of the SCARA."""

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from identify import CentralDifference, SettingError
-from identify.signals.stencils import averaged, shift
+from idbench.identify import CentralDifference, SettingError
+from idbench.identify.signals.stencils import averaged, shift
 
 FS = 50.0
 T = np.arange(40) / FS

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identify.estimators.simulating.steps import SecantSteps, Steps
+from idbench.identify.estimators.simulating.steps import SecantSteps, Steps
 
 TRUTH = np.array([1.0, -2.0, 0.5])
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad_vec
 
-from identify import AsLogged, ByChannel, CentralDifference, TorqueChannel
+from idbench.identify import AsLogged, ByChannel, CentralDifference, TorqueChannel
 
 FS = 100.0
 PERIOD = 1 / FS

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify import ExplicitModel, IdentificationError, idbench_chain, identify, scara
-from identify.estimators import TotalLeastSquares
-from sim.encoders import IncrementalEncoder
-from sim.engine.simulation import simulate
-from sim.scenario.scenario_file import load
-from sim.trajectories import RandomMoves
+from idbench.identify import ExplicitModel, IdentificationError, idbench_chain, identify, scara
+from idbench.identify.estimators import TotalLeastSquares
+from idbench.sim.encoders import IncrementalEncoder
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.scenario.scenario_file import load
+from idbench.sim.trajectories import RandomMoves
 
 
 def test_total_least_squares_refuses_where_noise_hides_the_answer():
@@ -25,7 +25,7 @@ def test_total_least_squares_refuses_where_noise_hides_the_answer():
 
 def test_total_least_squares_is_that_of_the_textbook(rng):
     """Van Huffel and Vandewalle: X of the last right singular vector, where all columns and Y have the same noise."""
-    from identify.estimators.least_squares.total_least_squares import _solved
+    from idbench.identify.estimators.least_squares.total_least_squares import _solved
 
     A = rng.standard_normal((200, 4))
     R, S = np.linalg.qr(A, mode="r"), 200 * 0.01 * np.eye(4)

@@ -10,9 +10,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-import identify.basis.tree_links
-from identify import Joint, KinematicTree, State, TreeLinks
-from identify.data.kinematics import INERTIAL
+import idbench.identify.basis.tree_links
+from idbench.identify import Joint, KinematicTree, State, TreeLinks
+from idbench.identify.data.kinematics import INERTIAL
 
 TIMES = 25
 EPS = 1e-30
@@ -156,11 +156,11 @@ def sites(tree):
 def loaded(trees, monkeypatch):
     """Return the class of the block, its modules made anew of syntax trees."""
     for name, tree in trees.items():
-        module = ModuleType(f"identify.basis.{name}")
+        module = ModuleType(f"idbench.identify.basis.{name}")
         monkeypatch.setitem(sys.modules, module.__name__, module)
         exec(compile(ast.fix_missing_locations(tree), name, "exec"), module.__dict__)
-        module.__dict__.setdefault("plus", sys.modules["identify.basis.terms"].plus)  # what `minus` may become
-    return sys.modules["identify.basis.tree_links"].TreeLinks
+        module.__dict__.setdefault("plus", sys.modules["idbench.identify.basis.terms"].plus)  # what `minus` may become
+    return sys.modules["idbench.identify.basis.tree_links"].TreeLinks
 
 
 def pinocchio_defect(block, peer):
@@ -187,7 +187,7 @@ def test_positions_count_from_where_the_frames_are_placed():
 @pytest.mark.thorough
 def test_any_sign_that_is_changed_is_noticed(peer, monkeypatch):
     """By pinocchio's explicit columns or by an identity; changes that leave all columns as they are do not count."""
-    folder = Path(identify.basis.tree_links.__file__).parent
+    folder = Path(idbench.identify.basis.tree_links.__file__).parent
     trees = {name: ast.parse((folder / f"{name}.py").read_text()) for name in MODULES}
     slanted, changed, number = oblique(), 0, count()
     right = {f: getattr(TreeLinks(slanted), f)(at(*states(6))) for f in ("explicit", "momentum", "remainder", "energy")}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identify.noise.two_levels import two_levels
+from idbench.identify.noise.two_levels import two_levels
 
 
 @pytest.fixture

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from identify import LogError
-from identify.files.guess import guess
-from identify.files.reading import read_columns
+from idbench.identify import LogError
+from idbench.identify.files.guess import guess
+from idbench.identify.files.reading import read_columns
 
 T = np.arange(0, 1, 0.01)
 Q = 0.5 * np.sin(np.outer(T, [1.0, 2.0, 3.0]))

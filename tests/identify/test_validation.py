@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify import (
+from idbench.identify import (
     ExplicitModel,
     LogError,
     MotionLog,

@@ -4,11 +4,11 @@ import mujoco
 import numpy as np
 import pytest
 
-import models
-from sim.errors import RobotError
-from sim.robot.inverse_dynamics import inverse_dynamics
-from sim.robot.robot import Robot
-from sim.robot.scara import scara_truth
+from idbench import models
+from idbench.sim.errors import RobotError
+from idbench.sim.robot.inverse_dynamics import inverse_dynamics
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.scara import scara_truth
 
 
 def mass_matrix(X, q2):

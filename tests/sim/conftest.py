@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from sim.robot.robot import Robot
-from sim.scenario.scenario import Scenario
-from sim.scenario.scenario_file import load
-from sim.trajectories import Quintic
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.scenario.scenario_file import load
+from idbench.sim.trajectories import Quintic
 
 MOVE = Quintic(((0.0, 0.0), (1.2, -1.0), (-0.4, 0.8), (0.6, -0.3)), (0.8, 1.0, 0.9), 0.3)
 

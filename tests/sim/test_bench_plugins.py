@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify import PluginError
-from sim.controllers import AbstractController
-from sim.controllers.controller import AbstractLaw
-from sim.encoders import AbstractEncoder
-from sim.encoders.encoder import AbstractReader
-from sim.engine.simulation import simulate
-from sim.settings import settings
+from idbench.identify import PluginError
+from idbench.sim.controllers import AbstractController
+from idbench.sim.controllers.controller import AbstractLaw
+from idbench.sim.encoders import AbstractEncoder
+from idbench.sim.encoders.encoder import AbstractReader
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.settings import settings
 
 
 @settings

@@ -6,19 +6,19 @@ import mujoco
 import numpy as np
 import pytest
 
-import models
-from sim.controllers import PID, ComputedTorque, PDFeedforward
-from sim.drives import AveragedDrive
-from sim.engine.simulation import simulate
-from sim.errors import ScenarioError
-from sim.frictions import CoulombViscous, LuGre, Stribeck
-from sim.robot.payload import Payload
-from sim.robot.robot import Robot
-from sim.robot.scara import scara_truth
-from sim.scenario.measurement import CurrentSensor, TorqueMeasurement
-from sim.scenario.ripple import Ripple
-from sim.scenario.scenario import Physics, Timing
-from sim.trajectories import Quintic
+from idbench import models
+from idbench.sim.controllers import PID, ComputedTorque, PDFeedforward
+from idbench.sim.drives import AveragedDrive
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.errors import ScenarioError
+from idbench.sim.frictions import CoulombViscous, LuGre, Stribeck
+from idbench.sim.robot.payload import Payload
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.scara import scara_truth
+from idbench.sim.scenario.measurement import CurrentSensor, TorqueMeasurement
+from idbench.sim.scenario.ripple import Ripple
+from idbench.sim.scenario.scenario import Physics, Timing
+from idbench.sim.trajectories import Quintic
 
 WAIT = Quintic(((0.3, 0.2), (0.3, 0.2)), (1.0,), 0.2)
 

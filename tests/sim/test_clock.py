@@ -2,7 +2,7 @@
 
 import pytest
 
-from sim.engine.clock import Clock
+from idbench.sim.engine.clock import Clock
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.0004, 0.001, 0.0034, 0.0101, 0.03])

@@ -6,14 +6,14 @@ import mujoco
 import numpy as np
 import pytest
 
-from identify import ExplicitModel, OfJoints, tree_basis
-from identify.basis import CoulombFriction, ViscousFriction
-from identify.signals.state import State
-from sim.errors import RobotError
-from sim.robot.mounting import Mounting, coupled
-from sim.robot.rewrite import compiled, rewritten
-from sim.robot.robot import Robot
-from sim.robot.tree import kinematic_tree, standard_parameters
+from idbench.identify import ExplicitModel, OfJoints, tree_basis
+from idbench.identify.basis import CoulombFriction, ViscousFriction
+from idbench.identify.signals.state import State
+from idbench.sim.errors import RobotError
+from idbench.sim.robot.mounting import Mounting, coupled
+from idbench.sim.robot.rewrite import compiled, rewritten
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.tree import kinematic_tree, standard_parameters
 
 WRIST = """<mujoco><compiler angle="radian"/><worldbody>
 <body name="a"><joint name="bend" axis="0 1 0" stiffness="3" springref="0.2" armature="0.1" damping="0.4"/>
@@ -124,10 +124,10 @@ def test_what_is_no_coupling_is_refused(text, message):
 
 def test_a_wrist_is_identified_with_its_coupling(wrist):
     """On noise-free data, to the differences' own error; without the coupling it is far off."""
-    from experiments.identification.robot_model import RobotModel
-    from identify import identify
-    from sim.engine.simulation import simulate
-    from sim.scenario.scenario_file import from_dict
+    from idbench.experiments.identification.robot_model import RobotModel
+    from idbench.identify import identify
+    from idbench.sim.engine.simulation import simulate
+    from idbench.sim.scenario.scenario_file import from_dict
 
     trajectory = {"kind": "random", "moves": 12, "durations": [1.0, 1.4], "rest": 1.0}
     run = simulate(from_dict({"name": "wrist", "robot": wrist, "trajectory": trajectory, "fs": 200.0}))

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sim.drives import DRIVES, AveragedDrive, IdealDrive, SwitchedDrive
-from sim.engine.simulation import simulate
-from sim.errors import RobotError, ScenarioError
-from sim.robot.robot import Robot
+from idbench.sim.drives import DRIVES, AveragedDrive, IdealDrive, SwitchedDrive
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.errors import RobotError, ScenarioError
+from idbench.sim.robot.robot import Robot
 
 
 def stepped(drive, robot, demand, speed, h, steps):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from sim.encoders import ExactEncoder, IncrementalEncoder
-from sim.errors import ScenarioError
+from idbench.sim.encoders import ExactEncoder, IncrementalEncoder
+from idbench.sim.errors import ScenarioError
 
 N = 4000
 Q = np.linspace(-1.0, 1.5, N)[:, None, None] * np.array([1.0, -0.7])  # (sample, nsim, joint)

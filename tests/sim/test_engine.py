@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify import scara
-from identify.judge.delay import estimate_delay
-from sim.controllers import CONTROLLERS, ComputedTorque, PDFeedforward
-from sim.drives import AveragedDrive, ServoDrive, SwitchedDrive
-from sim.encoders import IncrementalEncoder
-from sim.engine.simulation import simulate
-from sim.errors import ScenarioError
-from sim.frictions import LuGre, Stribeck
-from sim.robot.scara import scara_truth
-from sim.scenario.measurement import TorqueMeasurement
-from sim.scenario.ripple import Ripple
-from sim.scenario.scenario import Physics, Timing
-from sim.trajectories import Quintic, RandomMoves
+from idbench.identify import scara
+from idbench.identify.judge.delay import estimate_delay
+from idbench.sim.controllers import CONTROLLERS, ComputedTorque, PDFeedforward
+from idbench.sim.drives import AveragedDrive, ServoDrive, SwitchedDrive
+from idbench.sim.encoders import IncrementalEncoder
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.errors import ScenarioError
+from idbench.sim.frictions import LuGre, Stribeck
+from idbench.sim.robot.scara import scara_truth
+from idbench.sim.scenario.measurement import TorqueMeasurement
+from idbench.sim.scenario.ripple import Ripple
+from idbench.sim.scenario.scenario import Physics, Timing
+from idbench.sim.trajectories import Quintic, RandomMoves
 
 BUSY = {
     "controller": ComputedTorque(model_error=0.1),
@@ -119,22 +119,22 @@ def test_a_loop_that_runs_away_without_a_range_fails_quietly(ideal, tmp_path, mo
 
 def test_an_error_of_mujoco_ends_its_simulation_alone(short, monkeypatch):
     """MuJoCo raises in the second of three, after a while; the others have the bits that they have alone."""
-    import sim.engine.plant
+    import idbench.sim.engine.plant
 
-    class Failing(sim.engine.plant.Batch):
+    class Failing(idbench.sim.engine.plant.Batch):
         calls = 0
 
         def step(self, ids=None, nstep=1, **kwargs):
             super().step(ids, nstep, **kwargs)
             self.calls += 1
             if self.calls == 50 and self.nsim == 3:
-                raise sim.engine.plant.SimulationError(np.array([1]), "mj_step: stack overflow")
+                raise idbench.sim.engine.plant.SimulationError(np.array([1]), "mj_step: stack overflow")
 
         def error(self, sim):
             return "mj_step: stack overflow"
 
     alone = simulate(short, (7,))
-    monkeypatch.setattr(sim.engine.plant, "Batch", Failing)
+    monkeypatch.setattr(idbench.sim.engine.plant, "Batch", Failing)
     run = simulate(replace(short), (3, 5, 7), throw=False)
     assert run.failures == {1: "MuJoCo cannot go on: mj_step: stack overflow (seed 5)"}
     np.testing.assert_array_equal(run.log.tau[2], alone.log.tau[0])
@@ -142,12 +142,13 @@ def test_an_error_of_mujoco_ends_its_simulation_alone(short, monkeypatch):
 
 @pytest.mark.parametrize(("part", "message"), [("drive", "the drive gives"), ("friction", "the friction gives")])
 def test_a_torque_that_is_not_finite_is_blamed_on_its_part(short, monkeypatch, part, message):
-    import sim.drives.ideal_drive
-    import sim.frictions.coulomb_law
+
+    import idbench.sim.drives.ideal_drive
+    import idbench.sim.frictions.coulomb_law
 
     owner, name = {
-        "drive": (sim.drives.ideal_drive._Amplifier, "step"),
-        "friction": (sim.frictions.coulomb_law._Contact, "torque"),
+        "drive": (idbench.sim.drives.ideal_drive._Amplifier, "step"),
+        "friction": (idbench.sim.frictions.coulomb_law._Contact, "torque"),
     }[part]
     before, calls = getattr(owner, name), []
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim.engine.free_run import free_run
-from sim.engine.simulation import simulate
-from sim.errors import ScenarioError
-from sim.robot.robot import Robot
-from sim.scenario.scenario_file import load
-from sim.trajectories import RandomMoves
+from idbench.sim.engine.free_run import free_run
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.scenario_file import load
+from idbench.sim.trajectories import RandomMoves
 
 
 @pytest.fixture(scope="module")

@@ -3,11 +3,11 @@
 import mujoco
 import numpy as np
 
-import models
-from sim.engine.ideal_log import ideal_log
-from sim.robot.inverse_dynamics import BLOCK, inverse_dynamics
-from sim.robot.robot import Robot
-from sim.scenario.scenario_file import load
+from idbench import models
+from idbench.sim.engine.ideal_log import ideal_log
+from idbench.sim.robot.inverse_dynamics import BLOCK, inverse_dynamics
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.scenario_file import load
 
 ARM_WITH_GRAVITY = """
 <mujoco>

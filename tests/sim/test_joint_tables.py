@@ -4,10 +4,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from sim.errors import RobotError
-from sim.robot.mounting import Mounting
-from sim.robot.rewrite import rewritten
-from sim.robot.robot import Robot
+from idbench.sim.errors import RobotError
+from idbench.sim.robot.mounting import Mounting
+from idbench.sim.robot.rewrite import rewritten
+from idbench.sim.robot.robot import Robot
 
 KHALIL = """
 angles = "deg"

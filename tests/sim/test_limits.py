@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim.errors import RobotError, ScenarioError
-from sim.limits.clearance import Clearance
-from sim.limits.motion_limits import KeepOut, MotionLimits, home_of, limits_of, surroundings
-from sim.robot.robot import Robot
-from sim.trajectories import Fourier
+from idbench.sim.errors import RobotError, ScenarioError
+from idbench.sim.limits.clearance import Clearance
+from idbench.sim.limits.motion_limits import KeepOut, MotionLimits, home_of, limits_of, surroundings
+from idbench.sim.robot.robot import Robot
+from idbench.sim.trajectories import Fourier
 
 BALLS = """
 <mujoco><compiler angle="radian"/><option gravity="0 0 0"/><worldbody>

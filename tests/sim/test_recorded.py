@@ -5,8 +5,8 @@ import re
 import numpy as np
 import pytest
 
-from sim.errors import ScenarioError
-from sim.trajectories import Quintic, Recorded
+from idbench.sim.errors import ScenarioError
+from idbench.sim.trajectories import Quintic, Recorded
 
 PLANNED = Quintic(waypoints=((0.0, 0.0), (0.8, -0.6), (0.1, 0.5)), durations=(1.0, 1.2), rest=0.5).points
 

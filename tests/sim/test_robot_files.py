@@ -6,12 +6,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from sim.errors import RobotError
-from sim.robot.inverse_dynamics import inverse_dynamics
-from sim.robot.mounting import Mounting, locked
-from sim.robot.rewrite import rewritten
-from sim.robot.robot import Robot
-from sim.robot.tree import kinematic_tree
+from idbench.sim.errors import RobotError
+from idbench.sim.robot.inverse_dynamics import inverse_dynamics
+from idbench.sim.robot.mounting import Mounting, locked
+from idbench.sim.robot.rewrite import rewritten
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.tree import kinematic_tree
 
 SOLID = '<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
 

@@ -5,16 +5,16 @@ from dataclasses import replace
 
 import pytest
 
-from sim.drives import AveragedDrive, SwitchedDrive
-from sim.encoders import IncrementalEncoder
-from sim.errors import ScenarioError
-from sim.robot.payload import Payload
-from sim.scenario.measurement import TorqueMeasurement
-from sim.scenario.ripple import Ripple
-from sim.scenario.scenario import Physics, Scenario, Timing
-from sim.scenario.scenario_file import KINDS, from_dict, load, names, to_dict, to_toml
-from sim.settings import description, fields_of, per_joint
-from sim.trajectories import Quintic
+from idbench.sim.drives import AveragedDrive, SwitchedDrive
+from idbench.sim.encoders import IncrementalEncoder
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.payload import Payload
+from idbench.sim.scenario.measurement import TorqueMeasurement
+from idbench.sim.scenario.ripple import Ripple
+from idbench.sim.scenario.scenario import Physics, Scenario, Timing
+from idbench.sim.scenario.scenario_file import KINDS, from_dict, load, names, to_dict, to_toml
+from idbench.sim.settings import description, fields_of, per_joint
+from idbench.sim.trajectories import Quintic
 
 MOVE = {"kind": "quintic", "waypoints": [[0.0, 0.0], [1.0, 1.0]], "durations": [2.0]}
 

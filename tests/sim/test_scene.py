@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sim.robot.scene import motion, shapes
+from idbench.sim.robot.scene import motion, shapes
 
 
 def test_shapes_moved_by_their_bodies_are_where_mujoco_puts_the_geoms(robot, rng):

@@ -5,18 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.files.log_file import write_log
-from identify.files.servo_log import read_servo_log
-from identify.servo import JointLoad, Servo, ServoRun
-from identify.servo.closed_loop import ServoLoop
-from sim.drives import ServoDrive
-from sim.drives.profile import Profile
-from sim.encoders import ExactEncoder
-from sim.engine.simulation import simulate
-from sim.engine.watch import Watch
-from sim.errors import RobotError, ScenarioError
-from sim.robot.robot import Robot
-from sim.scenario.scenario_file import from_dict, load, to_dict
+from idbench.identify.files.log_file import write_log
+from idbench.identify.files.servo_log import read_servo_log
+from idbench.identify.servo import JointLoad, Servo, ServoRun
+from idbench.identify.servo.closed_loop import ServoLoop
+from idbench.sim.drives import ServoDrive
+from idbench.sim.drives.profile import Profile
+from idbench.sim.encoders import ExactEncoder
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.engine.watch import Watch
+from idbench.sim.errors import RobotError, ScenarioError
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.scenario_file import from_dict, load, to_dict
 
 H = 5e-4
 K, R, V = 2.05, 3.33, 12.0

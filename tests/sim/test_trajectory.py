@@ -5,8 +5,8 @@ import pytest
 import ruckig
 from scipy.interpolate import BPoly
 
-from sim.errors import ScenarioError
-from sim.trajectories import PointToPoint
+from idbench.sim.errors import ScenarioError
+from idbench.sim.trajectories import PointToPoint
 
 POINTS = [[0.0, 1.0, -0.5], [0.7, -0.4, 0.1], [0.2, 0.9, 1.3]]
 

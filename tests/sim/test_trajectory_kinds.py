@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from sim.errors import ScenarioError
-from sim.robot.robot import Robot
-from sim.trajectories import TRAJECTORIES, Quintic, RandomMoves, TimeOptimal
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.robot import Robot
+from idbench.sim.trajectories import TRAJECTORIES, Quintic, RandomMoves, TimeOptimal
 
 POINTS = ((0.0, 0.0), (1.5, -1.0), (1.4, 1.0), (-1.0, 0.9))
 FAST = TimeOptimal(POINTS, velocity=(4.0, 5.0), acceleration=(15.0, 20.0), jerk=(200.0, 300.0), rest=0.5)
@@ -47,7 +47,7 @@ def test_it_rests_at_its_waypoints_and_ends(robot):
 
 
 def test_it_is_faster_than_fifth_order_moves_under_the_same_limits(robot):
-    from sim.trajectories import PointToPoint
+    from idbench.sim.trajectories import PointToPoint
 
     quintic = PointToPoint.fastest(np.array(POINTS), FAST.velocity, FAST.acceleration, np.zeros(4))
     assert FAST.plan(robot).duration - 1.0 < quintic.duration

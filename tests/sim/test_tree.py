@@ -4,13 +4,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from identify import BaseParameters, State, tree_basis
-from sim.errors import RobotError
-from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
-from sim.robot.mounting import Mounting
-from sim.robot.rewrite import rewritten
-from sim.robot.robot import Robot
-from sim.robot.tree import kinematic_tree, standard_parameters
+from idbench.identify import BaseParameters, State, tree_basis
+from idbench.sim.errors import RobotError
+from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
+from idbench.sim.robot.mounting import Mounting
+from idbench.sim.robot.rewrite import rewritten
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.tree import kinematic_tree, standard_parameters
 
 CROOKED = """
 <mujoco model="crooked">

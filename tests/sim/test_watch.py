@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from sim.engine.simulation import simulate
-from sim.engine.watch import Watch
-from sim.scenario.scenario_file import from_dict
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.engine.watch import Watch
+from idbench.sim.scenario.scenario_file import from_dict
 
 MOTION = {"kind": "random", "moves": 1, "rest": 0.3}
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from sim.drives import SwitchedDrive
-from sim.drives import switched_drive as switched
-from sim.drives.passages import ExactPassages, TabulatedPassages
-from sim.drives.pwm import Modulator, pieces
-from sim.drives.winding import Winding, pass_period
-from sim.robot.robot import Robot
+from idbench.sim.drives import SwitchedDrive
+from idbench.sim.drives import switched_drive as switched
+from idbench.sim.drives.passages import ExactPassages, TabulatedPassages
+from idbench.sim.drives.pwm import Modulator, pieces
+from idbench.sim.drives.winding import Winding, pass_period
+from idbench.sim.robot.robot import Robot
 
 V, R, L, T = 160.0, 3.0, 0.012, 2e-4
 INDEX = np.linspace(-0.96, 0.96, 49)

@@ -4,13 +4,13 @@ from pathlib import Path
 
 from rich.text import Text
 
-from experiments.cli.options.authors import Check, New
-from experiments.cli.page import new_page
-from experiments.cli.progress import stages_of
-from experiments.contracts.contract import Example
-from experiments.contracts.contracts import found, keeps
-from experiments.errors import ExperimentError
-from experiments.starters.starters import new_example, new_plugin, new_scenario, new_set, new_study
+from idbench.experiments.cli.options.authors import Check, New
+from idbench.experiments.cli.page import new_page
+from idbench.experiments.cli.progress import stages_of
+from idbench.experiments.contracts.contract import Example
+from idbench.experiments.contracts.contracts import found, keeps
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.starters.starters import new_example, new_plugin, new_scenario, new_set, new_study
 
 
 def begin(options: New) -> None:

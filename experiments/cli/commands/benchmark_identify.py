@@ -8,23 +8,23 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from experiments.benchmark.definition import FILE, IN_FOLDER, Definition
-from experiments.benchmark.for_tools import what_tools_read, write_for_tools
-from experiments.benchmark.row import row_of
-from experiments.benchmark.set_fit import SetFit
-from experiments.benchmark.tools import predictions
-from experiments.cli.app import parsed
-from experiments.cli.commands.identify import fit_of, loaded_logs
-from experiments.cli.commands.requests import read_options, request_of
-from experiments.cli.options.identify import Identify
-from experiments.errors import ExperimentError
-from experiments.identification.fit import Fit
-from experiments.identification.logs import Logs
-from experiments.identification.reading import ReadLog, file_of, read_as
-from experiments.identification.request import Request
-from identify import MotionLog
-from identify.judge.leaks import seen
-from identify.judge.validation import split
+from idbench.experiments.benchmark.definition import FILE, IN_FOLDER, Definition
+from idbench.experiments.benchmark.for_tools import what_tools_read, write_for_tools
+from idbench.experiments.benchmark.row import row_of
+from idbench.experiments.benchmark.set_fit import SetFit
+from idbench.experiments.benchmark.tools import predictions
+from idbench.experiments.cli.app import parsed
+from idbench.experiments.cli.commands.identify import fit_of, loaded_logs
+from idbench.experiments.cli.commands.requests import read_options, request_of
+from idbench.experiments.cli.options.identify import Identify
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.reading import ReadLog, file_of, read_as
+from idbench.experiments.identification.request import Request
+from idbench.identify import MotionLog
+from idbench.identify.judge.leaks import seen
+from idbench.identify.judge.validation import split
 
 
 def identified(folder: Path, definition: Definition, out: Path) -> tuple[dict[str, Any], Callable[[Path], None]]:

@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from experiments.benchmark.definition import FILE, IN_FOLDER, Definition
-from experiments.cli.app import parsed
-from experiments.cli.commands.servo_inputs import held_of, servos_of
-from experiments.cli.options.servo import IdentifyServo
-from experiments.errors import ExperimentError
-from experiments.results.summaries import finite
-from experiments.servo.identification import Servos, summary_of
-from experiments.servo.servo_text import verdicts
-from identify import Array
-from identify.servo import ServoFit
-from identify.servo.choice import FrictionChoice
+from idbench.experiments.benchmark.definition import FILE, IN_FOLDER, Definition
+from idbench.experiments.cli.app import parsed
+from idbench.experiments.cli.commands.servo_inputs import held_of, servos_of
+from idbench.experiments.cli.options.servo import IdentifyServo
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.results.summaries import finite
+from idbench.experiments.servo.identification import Servos, summary_of
+from idbench.experiments.servo.servo_text import verdicts
+from idbench.identify import Array
+from idbench.identify.servo import ServoFit
+from idbench.identify.servo.choice import FrictionChoice
 
 
 def servos_identified(folder: Path, definition: Definition, out: Path) -> tuple[dict[str, Any], Callable[[Path], None]]:

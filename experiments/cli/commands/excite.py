@@ -6,34 +6,34 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.cli.command_text import command_of
-from experiments.cli.options.excite import Excite
-from experiments.cli.page import new_page, shown
-from experiments.cli.progress import progress_of
-from experiments.cli.saving import Files, saved, write_scenario
-from experiments.errors import ExperimentError
-from experiments.excite.design import Design
-from experiments.excite.excited import Excited
-from experiments.excite.motion_file import write_motion
-from experiments.excite.sequence import MotionSequence
-from experiments.identification.reading import ReadOptions, file_of, read
-from experiments.identification.request import Request
-from experiments.identification.robot_model import RobotModel, absolute
-from experiments.identification.warnings import FILE, warnings_of_robot
-from experiments.recording.audience import Audience
-from experiments.reports.excite_printed import print_excited, print_sequence
-from experiments.results.folder import ResultsFolder
-from identify import MotionLog, TorqueChannel
-from identify.files.log_file import write_log
-from sim.encoders import IncrementalEncoder
-from sim.limits.motion_limits import MotionLimits, limits_of, looser
-from sim.robot.robot import Robot
-from sim.scenario.measurement import TorqueMeasurement
-from sim.scenario.scenario import Scenario
-from sim.scenario.scenario_file import load
+from idbench.experiments.cli.command_text import command_of
+from idbench.experiments.cli.options.excite import Excite
+from idbench.experiments.cli.page import new_page, shown
+from idbench.experiments.cli.progress import progress_of
+from idbench.experiments.cli.saving import Files, saved, write_scenario
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.excite.design import Design
+from idbench.experiments.excite.excited import Excited
+from idbench.experiments.excite.motion_file import write_motion
+from idbench.experiments.excite.sequence import MotionSequence
+from idbench.experiments.identification.reading import ReadOptions, file_of, read
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.robot_model import RobotModel, absolute
+from idbench.experiments.identification.warnings import FILE, warnings_of_robot
+from idbench.experiments.recording.audience import Audience
+from idbench.experiments.reports.excite_printed import print_excited, print_sequence
+from idbench.experiments.results.folder import ResultsFolder
+from idbench.identify import MotionLog, TorqueChannel
+from idbench.identify.files.log_file import write_log
+from idbench.sim.encoders import IncrementalEncoder
+from idbench.sim.limits.motion_limits import MotionLimits, limits_of, looser
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.measurement import TorqueMeasurement
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.scenario.scenario_file import load
 
 if TYPE_CHECKING:
-    from experiments.results.streams import Streams
+    from idbench.experiments.results.streams import Streams
 
 LONGEST, FASTEST = 3600.0, 10000.0
 """Time of a motion, repeated [s], and sampling frequency [Hz] above which they are taken for a slip."""
@@ -81,13 +81,13 @@ def _files(found: Excited, sequence: MotionSequence | None) -> Files:
 
 
 def _report(found: Excited, command: str) -> str:
-    from experiments.reports.excite import report
+    from idbench.experiments.reports.excite import report
 
     return report(found, command)
 
 
 def _recorded(found: Excited, audience: Audience | None) -> "Streams":
-    from experiments.recording.excite_recording import record_excited
+    from idbench.experiments.recording.excite_recording import record_excited
 
     return record_excited(found, audience)
 

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from experiments.errors import ExperimentError
-from experiments.identification.reading import ReadOptions, read
-from experiments.identification.request import Request
-from experiments.recording.audience import Audience
-from identify import IdentificationError, MotionLog, measured_state
-from identify.files.log_file import CSV
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.reading import ReadOptions, read
+from idbench.experiments.identification.request import Request
+from idbench.experiments.recording.audience import Audience
+from idbench.identify import IdentificationError, MotionLog, measured_state
+from idbench.identify.files.log_file import CSV
 
 if TYPE_CHECKING:
-    from experiments.recording.live_layer import LiveIdentification
-    from experiments.recording.motion_layer import Base
+    from idbench.experiments.recording.live_layer import LiveIdentification
+    from idbench.experiments.recording.motion_layer import Base
 
 EVERY = 0.25
 """Time between two looks at the file [s]."""
@@ -141,10 +141,10 @@ class Follower:
         """Return what grows, begun with the first look; a recording of the motion is made for who watches alone."""
         if self._live is not None:
             return self._live
-        from experiments.recording.columns import parts
-        from experiments.recording.live_layer import LiveIdentification
-        from experiments.recording.motion_layer import Base
-        from experiments.recording.stream import Stream
+        from idbench.experiments.recording.columns import parts
+        from idbench.experiments.recording.live_layer import LiveIdentification
+        from idbench.experiments.recording.motion_layer import Base
+        from idbench.experiments.recording.stream import Stream
 
         robot_model, name = self.request.robot_model, f"following-{self.path.stem}"
         if self.audience:

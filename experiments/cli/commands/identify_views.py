@@ -7,18 +7,18 @@ from typing import final
 
 from rich.text import Text
 
-from experiments.cli.options.identify import Identify
-from experiments.cli.page import Page
-from experiments.errors import ExperimentError, ResultsError
-from experiments.exports.exports import EXPORTS
-from experiments.identification.fit import Fit
-from experiments.identification.judgement import Judgement
-from experiments.identification.robot_model import RobotModel
-from experiments.recording.audience import Audience
-from experiments.results.attempts import Attempts
-from experiments.results.folder import RECORDING, ResultsFolder
-from experiments.results.manifest import Manifest
-from experiments.results.writing import require_free, write_text
+from idbench.experiments.cli.options.identify import Identify
+from idbench.experiments.cli.page import Page
+from idbench.experiments.errors import ExperimentError, ResultsError
+from idbench.experiments.exports.exports import EXPORTS
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.judgement import Judgement
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.recording.audience import Audience
+from idbench.experiments.results.attempts import Attempts
+from idbench.experiments.results.folder import RECORDING, ResultsFolder
+from idbench.experiments.results.manifest import Manifest
+from idbench.experiments.results.writing import require_free, write_text
 
 
 @final
@@ -62,7 +62,7 @@ def report(shown: Shown, attempts: Attempts) -> None:
     """Write the page of the identification."""
     if shown.folder is None or shown.fit.logs.long:
         return
-    from experiments.reports.page import report as page_of
+    from idbench.experiments.reports.page import report as page_of
 
     text = page_of(shown.judgement, shown.warnings, shown.page.found["notes"], shown.command, attempts)
     shown.folder.add("report.html", text)
@@ -78,8 +78,8 @@ def recording(shown: Shown, attempts: Attempts) -> None:
     if shown.fit.logs.long:
         shown.page.print("not recorded: the rows of such a long log are not kept; identify a part of it to look inside")
         return
-    from experiments.recording.identification_recording import add_layer, record_log
-    from experiments.results.streams import write_streams
+    from idbench.experiments.recording.identification_recording import add_layer, record_log
+    from idbench.experiments.results.streams import write_streams
 
     alone = shown.folder is not None or into is None
     made = record_log(shown.fit.on(0), shown.audience) if alone else add_layer(run, shown.fit, shown.audience)

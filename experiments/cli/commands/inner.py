@@ -2,14 +2,14 @@
 
 from typing import TYPE_CHECKING
 
-from experiments.cli.page import Page
-from experiments.errors import ExperimentError
-from experiments.identification.robot_model import RobotModel
-from experiments.recording.audience import Audience, Watching
-from sim.scenario.scenario import Scenario
+from idbench.experiments.cli.page import Page
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.recording.audience import Audience, Watching
+from idbench.sim.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
-    from experiments.recording.identification_recording import RunRecording
+    from idbench.experiments.recording.identification_recording import RunRecording
 
 
 def require_window(inner: tuple[float, float] | None, watching: Watching) -> None:
@@ -35,6 +35,6 @@ def recording_of(
     robot_model: RobotModel | None = None,
 ) -> "RunRecording":
     """Return the recording of a scenario that is to be simulated."""
-    from experiments.recording.identification_recording import RunRecording
+    from idbench.experiments.recording.identification_recording import RunRecording
 
     return RunRecording(scenario, audience, window, robot_model)

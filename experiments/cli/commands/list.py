@@ -4,10 +4,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from experiments.cli.options.authors import List
-from experiments.cli.page import new_page
-from experiments.plugin_tables import TABLES, plugin_conflicts
-from identify.plugins import PluginTable
+from idbench.experiments.cli.options.authors import List
+from idbench.experiments.cli.page import new_page
+from idbench.experiments.plugin_tables import TABLES, plugin_conflicts
+from idbench.identify.plugins import PluginTable
 
 
 def list_plugins(options: List) -> None:

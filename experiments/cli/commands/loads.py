@@ -9,33 +9,33 @@ from typing import Any
 import numpy as np
 from rich.text import Text
 
-from experiments.cli.command_text import command_of
-from experiments.cli.commands.requests import read_options
-from experiments.cli.options.loads import IdentifyGains, IdentifyPayload, LoadOptions
-from experiments.cli.page import Page, new_page, shown
-from experiments.cli.progress import progress_of, stages_of
-from experiments.errors import ExperimentError
-from experiments.identification.friction_choice import chosen_friction, words
-from experiments.identification.load import in_band, load
-from experiments.identification.reading import file_of
-from experiments.identification.request import Request
-from experiments.identification.robot_model import RobotModel, absolute
-from experiments.loads.judgement import LoadJudgement, negative_mass
-from experiments.loads.known_load import known_of
-from experiments.loads.loads_text import body_of, gains_summary, payload_summary, print_gains, print_payloads
-from experiments.loads.simulated import Pairs, Score
-from experiments.results.attempts import Attempts
-from experiments.results.folder import ResultsFolder
-from experiments.results.summaries import write_summary
-from experiments.results.writing import require_free, write_text
-from experiments.text import new_table, print_titled
-from identify import Array, IdentificationError
-from identify.loads.drive_gains import identify_drive_gains
-from identify.loads.loaded_robot import LETTERS, LoadedRobot
-from identify.loads.payload import WAYS, Payload, with_known_robot
-from sim.robot.rewrite import with_body
-from sim.robot.robot import Robot
-from sim.scenario.scenario_file import load as load_scenario
+from idbench.experiments.cli.command_text import command_of
+from idbench.experiments.cli.commands.requests import read_options
+from idbench.experiments.cli.options.loads import IdentifyGains, IdentifyPayload, LoadOptions
+from idbench.experiments.cli.page import Page, new_page, shown
+from idbench.experiments.cli.progress import progress_of, stages_of
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.friction_choice import chosen_friction, words
+from idbench.experiments.identification.load import in_band, load
+from idbench.experiments.identification.reading import file_of
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.robot_model import RobotModel, absolute
+from idbench.experiments.loads.judgement import LoadJudgement, negative_mass
+from idbench.experiments.loads.known_load import known_of
+from idbench.experiments.loads.loads_text import body_of, gains_summary, payload_summary, print_gains, print_payloads
+from idbench.experiments.loads.simulated import Pairs, Score
+from idbench.experiments.results.attempts import Attempts
+from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.results.summaries import write_summary
+from idbench.experiments.results.writing import require_free, write_text
+from idbench.experiments.text import new_table, print_titled
+from idbench.identify import Array, IdentificationError
+from idbench.identify.loads.drive_gains import identify_drive_gains
+from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot
+from idbench.identify.loads.payload import WAYS, Payload, with_known_robot
+from idbench.sim.robot.rewrite import with_body
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.scenario_file import load as load_scenario
 
 RUNS = 20
 """Simulated pairs of runs."""

@@ -7,20 +7,20 @@ from pathlib import Path
 
 from rich.text import Text
 
-from experiments.cli.options.log import ShowLog
-from experiments.cli.page import Page, new_page, shown
-from experiments.errors import ExperimentError
-from experiments.identification.log_facts import LogFacts
-from experiments.identification.reading import columns_of
-from experiments.results.attempts import Attempts
-from experiments.results.writing import new_file, require_free, write_text
-from experiments.text import new_table, print_titled
-from identify import LogError
-from identify.data.log_columns import LogColumns
-from identify.files.guess import Guess, guess
-from identify.files.layout import LAYOUT, LogLayout, Source
-from identify.files.reading import LAYOUT_FILE, layout_of, read_columns
-from identify.files.units import needs_gain
+from idbench.experiments.cli.options.log import ShowLog
+from idbench.experiments.cli.page import Page, new_page, shown
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.log_facts import LogFacts
+from idbench.experiments.identification.reading import columns_of
+from idbench.experiments.results.attempts import Attempts
+from idbench.experiments.results.writing import new_file, require_free, write_text
+from idbench.experiments.text import new_table, print_titled
+from idbench.identify import LogError
+from idbench.identify.data.log_columns import LogColumns
+from idbench.identify.files.guess import Guess, guess
+from idbench.identify.files.layout import LAYOUT, LogLayout, Source
+from idbench.identify.files.reading import LAYOUT_FILE, layout_of, read_columns
+from idbench.identify.files.units import needs_gain
 
 ROUNDED = 1e-4
 """Departure of a step's logarithm from a whole number up to which it is a file's decimal places, no encoder's."""
@@ -50,7 +50,7 @@ def show_log(options: ShowLog) -> None:
 
 
 def _draw(page: Page, options: ShowLog, facts: LogFacts) -> None:
-    from experiments.reports.log_picture import figure_of
+    from idbench.experiments.reports.log_picture import figure_of
 
     if (path := options.picture) is None:
         return

@@ -6,28 +6,28 @@ from pathlib import Path
 
 from rich.console import Console
 
-from experiments.cli.command_text import command_of
-from experiments.cli.commands.inner import doubt_window, recording_of, require_window
-from experiments.cli.options.paper import Search as SearchOptions
-from experiments.cli.options.paper import Table1 as Table1Options
-from experiments.cli.options.paper import Table2 as Table2Options
-from experiments.cli.page import new_page, shown
-from experiments.cli.progress import progress_of
-from experiments.cli.saving import saved
-from experiments.errors import ExperimentError
-from experiments.paper.motions import Table1Motions
-from experiments.paper.motions_report import picture, print_motions
-from experiments.paper.search import Search
-from experiments.paper.table1 import CHAINS_COMPARED, SCENARIO, Table1
-from experiments.paper.table1_text import print_table1
-from experiments.paper.table2 import Table2
-from experiments.paper.table2_text import print_table2
-from experiments.results.folder import ResultsFolder
-from experiments.results.writing import require_free, write_text
-from identify.files.log_file import write_log
-from sim.robot.robot import Robot
-from sim.scenario.scenario import Scenario
-from sim.scenario.scenario_file import load, to_toml
+from idbench.experiments.cli.command_text import command_of
+from idbench.experiments.cli.commands.inner import doubt_window, recording_of, require_window
+from idbench.experiments.cli.options.paper import Search as SearchOptions
+from idbench.experiments.cli.options.paper import Table1 as Table1Options
+from idbench.experiments.cli.options.paper import Table2 as Table2Options
+from idbench.experiments.cli.page import new_page, shown
+from idbench.experiments.cli.progress import progress_of
+from idbench.experiments.cli.saving import saved
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.paper.motions import Table1Motions
+from idbench.experiments.paper.motions_report import picture, print_motions
+from idbench.experiments.paper.search import Search
+from idbench.experiments.paper.table1 import CHAINS_COMPARED, SCENARIO, Table1
+from idbench.experiments.paper.table1_text import print_table1
+from idbench.experiments.paper.table2 import Table2
+from idbench.experiments.paper.table2_text import print_table2
+from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.results.writing import require_free, write_text
+from idbench.identify.files.log_file import write_log
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.scenario.scenario_file import load, to_toml
 
 LEFT_OUT = ("out", "force", "json", "watching")
 """Options that make no difference to a table."""
@@ -58,7 +58,7 @@ def compare(options: Table1Options) -> None:
         files, hint = {"log.parquet": partial(write_log, table.log)}, options.watching.hint(folder.out)
         with saved(page, folder, table.summary(), files, hint) as attempts:
             if options.watching.rerun:
-                from experiments.recording import table1_recording
+                from idbench.experiments.recording import table1_recording
 
                 attempts.recording(lambda: table1_recording.record_table1(table, audience))
 
@@ -115,7 +115,7 @@ def table2(options: Table2Options) -> None:
         files = {f"log{i}.parquet": partial(write_log, table.run.alone(i)) for i in range(len(table.run.seeds))}
         with saved(page, folder, summary, files, watching.hint(folder.out)) as attempts:
             if recording:
-                from experiments.recording.table2_recording import finish_table2
+                from idbench.experiments.recording.table2_recording import finish_table2
 
                 attempts.recording(lambda: finish_table2(recording, table))
                 doubt_window(page, options.inner, recording)

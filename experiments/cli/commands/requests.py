@@ -5,18 +5,18 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from experiments.cli.options.identify import Identify
-from experiments.cli.options.shared import LogOptions
-from experiments.errors import ExperimentError
-from experiments.identification.chain_settings import chain_of
-from experiments.identification.defaults import CHAIN
-from experiments.identification.load import in_band
-from experiments.identification.reading import ReadOptions
-from experiments.identification.request import Request
-from experiments.identification.robot_model import SCARA, RobotModel, absolute
-from identify import CHAINS, ESTIMATORS, MODELS
-from identify.signals.masks import NoMask
-from sim.scenario.scenario_file import load
+from idbench.experiments.cli.options.identify import Identify
+from idbench.experiments.cli.options.shared import LogOptions
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.chain_settings import chain_of
+from idbench.experiments.identification.defaults import CHAIN
+from idbench.experiments.identification.load import in_band
+from idbench.experiments.identification.reading import ReadOptions
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.robot_model import SCARA, RobotModel, absolute
+from idbench.identify import CHAINS, ESTIMATORS, MODELS
+from idbench.identify.signals.masks import NoMask
+from idbench.sim.scenario.scenario_file import load
 
 
 def read_options(options: LogOptions) -> ReadOptions:

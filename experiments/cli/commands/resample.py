@@ -5,16 +5,16 @@ from pathlib import Path
 
 from rich.text import Text
 
-from experiments.cli.options.log import Export, Resample
-from experiments.cli.page import new_page, shown
-from experiments.errors import ExperimentError
-from experiments.identification.reading import channel_of, columns_of, stated_by
-from experiments.identification.robot_model import SCARA
-from experiments.results.writing import folder_for, new_file, require_free
-from identify import MotionLog
-from identify.data.resample import Repaired
-from identify.files.layout import LAYOUT
-from identify.files.log_file import CSV, WRITTEN, read_log, write_log
+from idbench.experiments.cli.options.log import Export, Resample
+from idbench.experiments.cli.page import new_page, shown
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.reading import channel_of, columns_of, stated_by
+from idbench.experiments.identification.robot_model import SCARA
+from idbench.experiments.results.writing import folder_for, new_file, require_free
+from idbench.identify import MotionLog
+from idbench.identify.data.resample import Repaired
+from idbench.identify.files.layout import LAYOUT
+from idbench.identify.files.log_file import CSV, WRITTEN, read_log, write_log
 
 
 def resample(options: Resample) -> None:

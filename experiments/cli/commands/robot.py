@@ -8,14 +8,14 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
-from experiments.cli.options.robot import DescribeRobot
-from experiments.cli.page import new_page
-from experiments.identification.budget import Budget
-from experiments.identification.robot_model import RobotModel, absolute
-from experiments.identification.warnings import FILE, warnings_of_robot
-from experiments.text import new_table, print_titled
-from sim.errors import BenchError
-from sim.trajectories import RandomMoves
+from idbench.experiments.cli.options.robot import DescribeRobot
+from idbench.experiments.cli.page import new_page
+from idbench.experiments.identification.budget import Budget
+from idbench.experiments.identification.robot_model import RobotModel, absolute
+from idbench.experiments.identification.warnings import FILE, warnings_of_robot
+from idbench.experiments.text import new_table, print_titled
+from idbench.sim.errors import BenchError
+from idbench.sim.trajectories import RandomMoves
 
 MANY = 30
 """Joints from which on a line says that grouping takes its time: it grows with their cube."""

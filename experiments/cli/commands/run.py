@@ -7,34 +7,34 @@ from shlex import quote
 
 from rich.text import Text
 
-from experiments.cli.command_text import command_of
-from experiments.cli.commands.inner import doubt_window, recording_of, require_window
-from experiments.cli.options.run import Run
-from experiments.cli.page import Page, new_page, shown
-from experiments.cli.progress import stages_of
-from experiments.cli.saving import Files, saved, write_scenario
-from experiments.errors import ExperimentError
-from experiments.identification.log_warnings import warnings_of_log
-from experiments.identification.parameters import Parameters
-from experiments.identification.request import Request
-from experiments.identification.robot_model import RobotModel, absolute
-from experiments.identification.scenario_run import ScenarioRun
-from experiments.identification.warnings import FILE, LOG, warnings_of_robot
-from experiments.plugin_tables import plugin_conflicts
-from experiments.reports.leading import shown_whole
-from experiments.reports.printed import print_fit
-from experiments.results.folder import ResultsFolder
-from experiments.servo.known import servo_toml, write_commands
-from experiments.study.method import Method, of_currents
-from identify import CHAINS
-from identify.files.log_file import write_log
-from sim.drives import IdealDrive, ServoDrive
-from sim.errors import RobotError
-from sim.robot.robot import Robot
-from sim.scenario.ripple import Ripple
-from sim.scenario.scenario import Scenario
-from sim.scenario.scenario_file import load
-from sim.trajectories import Quintic
+from idbench.experiments.cli.command_text import command_of
+from idbench.experiments.cli.commands.inner import doubt_window, recording_of, require_window
+from idbench.experiments.cli.options.run import Run
+from idbench.experiments.cli.page import Page, new_page, shown
+from idbench.experiments.cli.progress import stages_of
+from idbench.experiments.cli.saving import Files, saved, write_scenario
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.log_warnings import warnings_of_log
+from idbench.experiments.identification.parameters import Parameters
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.robot_model import RobotModel, absolute
+from idbench.experiments.identification.scenario_run import ScenarioRun
+from idbench.experiments.identification.warnings import FILE, LOG, warnings_of_robot
+from idbench.experiments.plugin_tables import plugin_conflicts
+from idbench.experiments.reports.leading import shown_whole
+from idbench.experiments.reports.printed import print_fit
+from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.servo.known import servo_toml, write_commands
+from idbench.experiments.study.method import Method, of_currents
+from idbench.identify import CHAINS
+from idbench.identify.files.log_file import write_log
+from idbench.sim.drives import IdealDrive, ServoDrive
+from idbench.sim.errors import RobotError
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.ripple import Ripple
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.scenario.scenario_file import load
+from idbench.sim.trajectories import Quintic
 
 LEFT_OUT = ("out", "force", "json", "watching", "yes")
 """Options that make no difference to a run's results."""
@@ -153,8 +153,8 @@ def _alone(scenario: str, study: Path | None, index: int | None) -> str:
 
 def _again(page: Page, folder: Path | None, index: int | None, method: int | None) -> tuple[Scenario, Method]:
     """Return the scenario of a run of a study, which is reproduced, and the method by which it is identified."""
-    from experiments.study.again import compare_again
-    from experiments.study.store import Store
+    from idbench.experiments.study.again import compare_again
+    from idbench.experiments.study.store import Store
 
     if folder is None or index is None:
         raise ExperimentError("name a scenario, as idbench scenario lists them, or a run of a study: --from DIR --index N")

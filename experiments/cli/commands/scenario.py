@@ -1,9 +1,9 @@
 """The command that writes scenarios."""
 
-from experiments.cli.options.scenario import WriteScenario
-from experiments.cli.page import new_page
-from experiments.results.writing import require_free, write_text
-from sim.scenario.scenario_file import designed, load, names, to_toml
+from idbench.experiments.cli.options.scenario import WriteScenario
+from idbench.experiments.cli.page import new_page
+from idbench.experiments.results.writing import require_free, write_text
+from idbench.sim.scenario.scenario_file import designed, load, names, to_toml
 
 
 def write(options: WriteScenario) -> None:

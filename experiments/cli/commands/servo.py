@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.text import Text
 
-from experiments.cli.command_text import command_of
-from experiments.cli.commands.servo_inputs import files_read, held_of, servos_of
-from experiments.cli.options.servo import IdentifyServo
-from experiments.cli.page import Page, new_page, shown
-from experiments.cli.progress import stages_of
-from experiments.errors import ExperimentError
-from experiments.recording.audience import Audience
-from experiments.results.attempts import Attempts
-from experiments.results.folder import ResultsFolder
-from experiments.results.summaries import write_summary
-from experiments.results.writing import require_free, write_text
-from experiments.servo.identification import Servos, lacks_summary, summary_of
-from experiments.servo.servo_function import servo_function
-from experiments.servo.servo_text import (
+from idbench.experiments.cli.command_text import command_of
+from idbench.experiments.cli.commands.servo_inputs import files_read, held_of, servos_of
+from idbench.experiments.cli.options.servo import IdentifyServo
+from idbench.experiments.cli.page import Page, new_page, shown
+from idbench.experiments.cli.progress import stages_of
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.recording.audience import Audience
+from idbench.experiments.results.attempts import Attempts
+from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.results.summaries import write_summary
+from idbench.experiments.results.writing import require_free, write_text
+from idbench.experiments.servo.identification import Servos, lacks_summary, summary_of
+from idbench.experiments.servo.servo_function import servo_function
+from idbench.experiments.servo.servo_text import (
     inexpressible,
     print_choice,
     print_errors,
@@ -30,12 +30,12 @@ from experiments.servo.servo_text import (
     warnings_of,
     without_servo,
 )
-from experiments.servo.written import in_mujoco, mjcf_of
-from identify.servo import ServoFit
-from identify.servo.choice import FrictionChoice
+from idbench.experiments.servo.written import in_mujoco, mjcf_of
+from idbench.identify.servo import ServoFit
+from idbench.identify.servo.choice import FrictionChoice
 
 if TYPE_CHECKING:
-    from experiments.results.streams import Streams
+    from idbench.experiments.results.streams import Streams
 
 
 def servo(options: IdentifyServo) -> None:
@@ -144,7 +144,7 @@ def _write_function(page: Page, options: IdentifyServo, servos: Servos, found: d
 
 
 def _recorded(servos: Servos, found: dict[str, ServoFit], audience: Audience | None) -> "Streams":
-    from experiments.recording.servo_recording import record_servos
+    from idbench.experiments.recording.servo_recording import record_servos
 
     path, log = next(iter(servos.logs.items()))
     return record_servos(servos.links_of(path), path.stem, log, servos.simulated(found, path), audience)

@@ -3,17 +3,17 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from experiments.cli.options.servo import IdentifyServo
-from experiments.errors import ExperimentError
-from experiments.identification.robot_model import absolute
-from experiments.servo.identification import AUTO, Servos
-from identify import SettingError
-from identify.files.servo_file import ServoFile
-from identify.files.servo_log import ServoColumns, order, read_servo_log
-from identify.servo import SERVO_FRICTIONS
-from identify.servo.parameters import SERVO_PARAMETERS
-from identify.servo.refusals import require_possible
-from sim.robot.robot import Robot
+from idbench.experiments.cli.options.servo import IdentifyServo
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.robot_model import absolute
+from idbench.experiments.servo.identification import AUTO, Servos
+from idbench.identify import SettingError
+from idbench.identify.files.servo_file import ServoFile
+from idbench.identify.files.servo_log import ServoColumns, order, read_servo_log
+from idbench.identify.servo import SERVO_FRICTIONS
+from idbench.identify.servo.parameters import SERVO_PARAMETERS
+from idbench.identify.servo.refusals import require_possible
+from idbench.sim.robot.robot import Robot
 
 
 def servos_of(options: IdentifyServo) -> tuple[Servos, Servos | None]:

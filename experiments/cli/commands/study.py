@@ -9,21 +9,21 @@ from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from experiments.cli.options.study import Study
-from experiments.cli.page import new_page, shown
-from experiments.cli.progress import runs_of
-from experiments.errors import StudyError
-from experiments.recording.audience import Audience
-from experiments.results.folder import ResultsFolder
-from experiments.study.run_study import local_pool, run_missing
-from experiments.study.shard_file import arrays
-from experiments.study.statistics import cells
-from experiments.study.store import Store
-from experiments.study.study_file import load_study, names
-from experiments.study.study_results import write_results
+from idbench.experiments.cli.options.study import Study
+from idbench.experiments.cli.page import new_page, shown
+from idbench.experiments.cli.progress import runs_of
+from idbench.experiments.errors import StudyError
+from idbench.experiments.recording.audience import Audience
+from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.study.run_study import local_pool, run_missing
+from idbench.experiments.study.shard_file import arrays
+from idbench.experiments.study.statistics import cells
+from idbench.experiments.study.store import Store
+from idbench.experiments.study.study_file import load_study, names
+from idbench.experiments.study.study_results import write_results
 
 if TYPE_CHECKING:
-    from experiments.recording.study_recording import StudyRecording
+    from idbench.experiments.recording.study_recording import StudyRecording
 
 MANY = 100_000
 """Runs beyond which a study is taken for a slip unless --yes says otherwise: days of a machine."""
@@ -69,7 +69,7 @@ def study(options: Study) -> None:
 
 def _recording(store: Store, audience: Audience | None) -> "StudyRecording":
     """Return the recording of a study, with the runs that are finished already if somebody watches."""
-    from experiments.recording.study_recording import StudyRecording
+    from idbench.experiments.recording.study_recording import StudyRecording
 
     recording = StudyRecording(store.study, store.folder, audience)
     if audience and store.shards():
@@ -104,7 +104,7 @@ def _pool(
     store: Store, scheduler: str | None, workers: int | None, threads: int | None, width: int
 ) -> AbstractContextManager[Any]:
     """Return where shards are computed; nowhere, if nothing is missing."""
-    from experiments.study.cluster import cluster_pool
+    from idbench.experiments.study.cluster import cluster_pool
 
     given = [f"--{what}" for what, value in (("workers", workers), ("threads", threads)) if value is not None]
     if (scheduler and given) or len(given) > 1:

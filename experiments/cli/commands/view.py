@@ -5,13 +5,13 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from experiments.cli.options.view import View
-from experiments.cli.page import new_page
-from experiments.errors import ExperimentError, ResultsError
-from experiments.recording.comparison_recording import compare
-from experiments.recording.folder import BASE, files, merge
-from experiments.recording.viewers import LOOPBACK, require_display, viewer_binary
-from experiments.results.writing import new_file
+from idbench.experiments.cli.options.view import View
+from idbench.experiments.cli.page import new_page
+from idbench.experiments.errors import ExperimentError, ResultsError
+from idbench.experiments.recording.comparison_recording import compare
+from idbench.experiments.recording.folder import BASE, files, merge
+from idbench.experiments.recording.viewers import LOOPBACK, require_display, viewer_binary
+from idbench.experiments.results.writing import new_file
 
 LATEST = Path("runs")
 """Where the latest results are looked for."""

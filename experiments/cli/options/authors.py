@@ -5,9 +5,9 @@ from typing import Annotated, Literal, final
 
 import tyro
 
-from experiments.cli.app import command
-from experiments.cli.command import Command
-from experiments.option_types import File, Json
+from idbench.experiments.cli.app import command
+from idbench.experiments.cli.command import Command
+from idbench.experiments.option_types import File, Json
 
 
 @command("new")

@@ -5,11 +5,11 @@ from typing import Annotated, final
 
 import tyro
 
-from experiments.cli.app import command
-from experiments.cli.command import Command
-from experiments.cli.options.shared import Asked, RecordedOptions
-from experiments.identification.parameters import Parameters
-from experiments.option_types import Each, File, Files, Folder, Real, Scenario
+from idbench.experiments.cli.app import command
+from idbench.experiments.cli.command import Command
+from idbench.experiments.cli.options.shared import Asked, RecordedOptions
+from idbench.experiments.identification.parameters import Parameters
+from idbench.experiments.option_types import Each, File, Files, Folder, Real, Scenario
 
 Weights = Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=WEIGHT", help_behavior_hint="")]
 Percent = Annotated[str | None, tyro.conf.arg(metavar="PERCENT", help_behavior_hint="")]

@@ -6,13 +6,13 @@ from typing import ClassVar, final
 
 import tyro
 
-from experiments.cli.app import command
-from experiments.cli.command import Command
-from experiments.cli.options.shared import LogOptions, Watched
-from experiments.identification.choices import Consistency, Start
-from experiments.identification.defaults import CHAIN
-from experiments.option_types import File, Files, Scenarios, Seconds
-from experiments.recording.audience import Watching
+from idbench.experiments.cli.app import command
+from idbench.experiments.cli.command import Command
+from idbench.experiments.cli.options.shared import LogOptions, Watched
+from idbench.experiments.identification.choices import Consistency, Start
+from idbench.experiments.identification.defaults import CHAIN
+from idbench.experiments.option_types import File, Files, Scenarios, Seconds
+from idbench.experiments.recording.audience import Watching
 
 
 @command("identify")

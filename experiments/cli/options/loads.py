@@ -6,10 +6,10 @@ from typing import Annotated, Literal, final
 
 import tyro
 
-from experiments.cli.app import command
-from experiments.cli.command import Command
-from experiments.cli.options.shared import LogOptions
-from experiments.option_types import Count, File, Files, Real, Scenario, Vector
+from idbench.experiments.cli.app import command
+from idbench.experiments.cli.command import Command
+from idbench.experiments.cli.options.shared import LogOptions
+from idbench.experiments.option_types import Count, File, Files, Real, Scenario, Vector
 
 Six = Annotated[
     tuple[float, float, float, float, float, float] | None,

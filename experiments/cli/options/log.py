@@ -6,11 +6,11 @@ from typing import final
 
 import tyro
 
-from experiments.cli.app import command
-from experiments.cli.command import Command
-from experiments.cli.options.shared import Reading
-from experiments.identification.read_options import ColumnOptions
-from experiments.option_types import Delay, File, Folder, Hertz, Json, Torque
+from idbench.experiments.cli.app import command
+from idbench.experiments.cli.command import Command
+from idbench.experiments.cli.options.shared import Reading
+from idbench.experiments.identification.read_options import ColumnOptions
+from idbench.experiments.option_types import Delay, File, Folder, Hertz, Json, Torque
 
 
 @command("log")

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import final
 
-from experiments.cli.app import command
-from experiments.cli.command import Command
-from experiments.cli.options.shared import RecordedOptions
-from experiments.option_types import Count, File, Folder, Scenario, Window
+from idbench.experiments.cli.app import command
+from idbench.experiments.cli.command import Command
+from idbench.experiments.cli.options.shared import RecordedOptions
+from idbench.experiments.option_types import Count, File, Folder, Scenario, Window
 
 
 @command("table1")

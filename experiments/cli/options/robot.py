@@ -5,12 +5,12 @@ from typing import final
 
 import tyro
 
-from experiments.cli.app import command
-from experiments.cli.command import Command
-from experiments.cli.options.shared import Asked, Mounted
-from experiments.identification.parameters import Parameters
-from experiments.identification.read_options import MountingOptions
-from experiments.option_types import Json
+from idbench.experiments.cli.app import command
+from idbench.experiments.cli.command import Command
+from idbench.experiments.cli.options.shared import Asked, Mounted
+from idbench.experiments.identification.parameters import Parameters
+from idbench.experiments.identification.read_options import MountingOptions
+from idbench.experiments.option_types import Json
 
 
 @command("robot")

@@ -6,13 +6,13 @@ from typing import Annotated, final
 
 import tyro
 
-from experiments.cli.app import command
-from experiments.cli.command import Command
-from experiments.cli.options.shared import Asked, RecordedOptions
-from experiments.identification.choices import Consistency, Start
-from experiments.identification.defaults import CHAIN, ESTIMATOR
-from experiments.identification.parameters import Parameters
-from experiments.option_types import Count, Folder, Robot, Scenario, Window
+from idbench.experiments.cli.app import command
+from idbench.experiments.cli.command import Command
+from idbench.experiments.cli.options.shared import Asked, RecordedOptions
+from idbench.experiments.identification.choices import Consistency, Start
+from idbench.experiments.identification.defaults import CHAIN, ESTIMATOR
+from idbench.experiments.identification.parameters import Parameters
+from idbench.experiments.option_types import Count, Folder, Robot, Scenario, Window
 
 
 @command("run")

@@ -5,9 +5,9 @@ from typing import final
 
 import tyro
 
-from experiments.cli.app import command
-from experiments.cli.command import Command
-from experiments.option_types import File, Scenario
+from idbench.experiments.cli.app import command
+from idbench.experiments.cli.command import Command
+from idbench.experiments.option_types import File, Scenario
 
 
 @command("scenario")

@@ -6,11 +6,11 @@ from typing import Annotated, final
 
 import tyro
 
-from experiments.cli.app import command
-from experiments.cli.command import Command
-from experiments.cli.options.shared import Mounted, RecordedOptions
-from experiments.identification.read_options import MountingOptions
-from experiments.option_types import File, Files, Robot, Texts
+from idbench.experiments.cli.app import command
+from idbench.experiments.cli.command import Command
+from idbench.experiments.cli.options.shared import Mounted, RecordedOptions
+from idbench.experiments.identification.read_options import MountingOptions
+from idbench.experiments.option_types import File, Files, Robot, Texts
 
 Law = Annotated[str, tyro.conf.arg(metavar="LAW")]
 Letters = Annotated[tuple[str, ...], tyro.conf.arg(metavar="LETTER")]

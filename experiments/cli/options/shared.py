@@ -5,11 +5,11 @@ from typing import Annotated
 
 import tyro
 
-from experiments.identification.defaults import ESTIMATOR
-from experiments.identification.parameters import Parameters
-from experiments.identification.read_options import ColumnOptions, MountingOptions
-from experiments.option_types import Delay, Each, Folder, Hertz, Json, Robot, Torque
-from experiments.recording.audience import Watching
+from idbench.experiments.identification.defaults import ESTIMATOR
+from idbench.experiments.identification.parameters import Parameters
+from idbench.experiments.identification.read_options import ColumnOptions, MountingOptions
+from idbench.experiments.option_types import Delay, Each, Folder, Hertz, Json, Robot, Torque
+from idbench.experiments.recording.audience import Watching
 
 Watched = Annotated[Watching, tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes]
 """How a command is watched."""

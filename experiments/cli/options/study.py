@@ -5,11 +5,11 @@ from typing import Annotated, final
 
 import tyro
 
-from experiments.cli.app import command
-from experiments.cli.command import Command
-from experiments.cli.options.shared import Watched
-from experiments.option_types import Count, Folder, Json, Url
-from experiments.recording.audience import Watching
+from idbench.experiments.cli.app import command
+from idbench.experiments.cli.command import Command
+from idbench.experiments.cli.options.shared import Watched
+from idbench.experiments.option_types import Count, Folder, Json, Url
+from idbench.experiments.recording.audience import Watching
 
 
 @command("study")

@@ -6,9 +6,9 @@ from typing import Annotated, final
 
 import tyro
 
-from experiments.cli.app import command
-from experiments.cli.command import Command
-from experiments.option_types import File
+from idbench.experiments.cli.app import command
+from idbench.experiments.cli.command import Command
+from idbench.experiments.option_types import File
 
 
 @command("view")

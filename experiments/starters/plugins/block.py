@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identify import AbstractFriction, Array
+from idbench.identify import AbstractFriction, Array
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,11 @@ from typing import final
 
 import numpy as np
 
-from sim.drives.drive import AbstractAmplifier, AbstractDrive, Trace
-from sim.drives.electric import Electric
-from sim.robot.motors import Array
-from sim.robot.robot import Robot
-from sim.settings import Positive, settings
+from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, Trace
+from idbench.sim.drives.electric import Electric
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.settings import Positive, settings
 
 
 @final

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identify import AbstractEstimator, Estimate, Problem
+from idbench.identify import AbstractEstimator, Estimate, Problem
 
 
 @dataclass(frozen=True)

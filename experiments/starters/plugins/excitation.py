@@ -5,11 +5,11 @@ from typing import final
 
 import numpy as np
 
-from experiments.excite.excitation import REST, AbstractExcitation
-from identify import Array
-from identify.design.plan import Plan
-from identify.design.shapes import Shapes
-from sim.trajectories import Fourier
+from idbench.experiments.excite.excitation import REST, AbstractExcitation
+from idbench.identify import Array
+from idbench.identify.design.plan import Plan
+from idbench.identify.design.shapes import Shapes
+from idbench.sim.trajectories import Fourier
 
 
 @final

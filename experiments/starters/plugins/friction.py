@@ -5,9 +5,9 @@ from typing import final
 import numpy as np
 from mujoco.batch import Batch
 
-from sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
-from sim.robot.motors import Array
-from sim.settings import EachNotNegativeOrNone, NotNegative, settings
+from idbench.sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
+from idbench.sim.robot.motors import Array
+from idbench.sim.settings import EachNotNegativeOrNone, NotNegative, settings
 
 
 @final

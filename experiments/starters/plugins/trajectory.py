@@ -4,10 +4,10 @@ from typing import final
 
 import numpy as np
 
-from sim.robot.robot import Robot
-from sim.settings import Positive, settings
-from sim.trajectories.point_to_point import PointToPoint, at_rest
-from sim.trajectories.trajectory import AbstractTrajectory
+from idbench.sim.robot.robot import Robot
+from idbench.sim.settings import Positive, settings
+from idbench.sim.trajectories.point_to_point import PointToPoint, at_rest
+from idbench.sim.trajectories.trajectory import AbstractTrajectory
 
 
 @final

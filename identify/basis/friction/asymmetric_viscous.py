@@ -5,8 +5,8 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.basis.joint_law import AbstractFriction
+from idbench.identify.arrays import Array
+from idbench.identify.basis.joint_law import AbstractFriction
 
 
 @final

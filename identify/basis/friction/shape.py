@@ -7,11 +7,11 @@ from typing import Any, NamedTuple, Self, final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.basis.basis import Basis
-from identify.basis.joint_law import AbstractFriction, AbstractJointLaw
-from identify.basis.parameter import Kind, Parameter
-from identify.signals.state import State
+from idbench.identify.arrays import Array
+from idbench.identify.basis.basis import Basis
+from idbench.identify.basis.joint_law import AbstractFriction, AbstractJointLaw
+from idbench.identify.basis.parameter import Kind, Parameter
+from idbench.identify.signals.state import State
 
 STEP = 1e-4
 """Of central differences by the logarithm of a shape."""

@@ -6,10 +6,10 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.basis.joint_law import AbstractJointLaw
-from identify.basis.parameter import Kind
-from identify.signals.state import State
+from idbench.identify.arrays import Array
+from idbench.identify.basis.joint_law import AbstractJointLaw
+from idbench.identify.basis.parameter import Kind
+from idbench.identify.signals.state import State
 
 
 @final

@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING, final
 
 import numpy as np
 
-from identify.basis.block import AbstractBlock, BlockColumns
-from identify.basis.parameter import Parameter
-from identify.data.kinematics import Coupling
-from identify.signals.state import State
+from idbench.identify.basis.block import AbstractBlock, BlockColumns
+from idbench.identify.basis.parameter import Parameter
+from idbench.identify.data.kinematics import Coupling
+from idbench.identify.signals.state import State
 
 if TYPE_CHECKING:
-    from identify.arrays import Array
+    from idbench.identify.arrays import Array
 
 
 @final

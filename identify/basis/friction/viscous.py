@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from identify.arrays import Array
-from identify.basis.joint_law import AbstractFriction
-from identify.basis.parameter import Kind
+from idbench.identify.arrays import Array
+from idbench.identify.basis.joint_law import AbstractFriction
+from idbench.identify.basis.parameter import Kind
 
 
 @final

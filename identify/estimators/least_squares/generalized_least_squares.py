@@ -5,13 +5,13 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from identify.arrays import frozen
-from identify.estimators.estimate import Estimate
-from identify.estimators.estimator import AbstractEstimator, Need
-from identify.estimators.problem import Problem
-from identify.estimators.propagated import bias_covariance
-from identify.estimators.solution import OfWhitenedRows
-from identify.rows.factors import Factor, Status
+from idbench.identify.arrays import frozen
+from idbench.identify.estimators.estimate import Estimate
+from idbench.identify.estimators.estimator import AbstractEstimator, Need
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.estimators.propagated import bias_covariance
+from idbench.identify.estimators.solution import OfWhitenedRows
+from idbench.identify.rows.factors import Factor, Status
 
 
 @final

@@ -7,16 +7,16 @@ from typing import ClassVar, Self, final
 import numpy as np
 import numpy.typing as npt
 
-from identify.arrays import Array, frozen
-from identify.data.motion_log import MotionLog
-from identify.errors import require_positive, require_whole
-from identify.estimators.estimate import Estimate
-from identify.estimators.estimator import AbstractEstimator, Need
-from identify.estimators.problem import Problem
-from identify.estimators.simulating.row_products import Kinds, Solved, solve_with, with_weights
-from identify.estimators.solution import Given
-from identify.noise.restricted_likelihood import EXACT
-from identify.signals.wild_samples import without_wild_samples
+from idbench.identify.arrays import Array, frozen
+from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.errors import require_positive, require_whole
+from idbench.identify.estimators.estimate import Estimate
+from idbench.identify.estimators.estimator import AbstractEstimator, Need
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.estimators.simulating.row_products import Kinds, Solved, solve_with, with_weights
+from idbench.identify.estimators.solution import Given
+from idbench.identify.noise.restricted_likelihood import EXACT
+from idbench.identify.signals.wild_samples import without_wild_samples
 
 SIGMA = 1.4826
 """Standard deviation of normal numbers over the median of their absolute values."""

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from identify.estimators.estimate import Estimate
-from identify.estimators.estimator import AbstractEstimator, Need
-from identify.estimators.problem import Problem
+from idbench.identify.estimators.estimate import Estimate
+from idbench.identify.estimators.estimator import AbstractEstimator, Need
+from idbench.identify.estimators.problem import Problem
 
 
 @final

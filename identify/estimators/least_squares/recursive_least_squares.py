@@ -5,14 +5,14 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from identify.arrays import Array, frozen
-from identify.errors import IdentificationError, require_positive
-from identify.estimators.estimate import Estimate
-from identify.estimators.estimator import AbstractEstimator, Need
-from identify.estimators.problem import Problem
-from identify.estimators.simulating.row_products import Kinds, solve_with, with_weights
-from identify.estimators.solution import Given
-from identify.rows.factors import Factor, Status
+from idbench.identify.arrays import Array, frozen
+from idbench.identify.errors import IdentificationError, require_positive
+from idbench.identify.estimators.estimate import Estimate
+from idbench.identify.estimators.estimator import AbstractEstimator, Need
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.estimators.simulating.row_products import Kinds, solve_with, with_weights
+from idbench.identify.estimators.solution import Given
+from idbench.identify.rows.factors import Factor, Status
 
 
 @final

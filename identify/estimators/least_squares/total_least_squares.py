@@ -5,13 +5,13 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.errors import IdentificationError, require_whole
-from identify.estimators.estimate import Estimate
-from identify.estimators.estimator import AbstractEstimator, Need
-from identify.estimators.problem import Problem
-from identify.estimators.simulating.row_products import Kinds, solve_with
-from identify.rows.factors import Status, triangular
+from idbench.identify.arrays import Array
+from idbench.identify.errors import IdentificationError, require_whole
+from idbench.identify.estimators.estimate import Estimate
+from idbench.identify.estimators.estimator import AbstractEstimator, Need
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.estimators.simulating.row_products import Kinds, solve_with
+from idbench.identify.rows.factors import Status, triangular
 
 EXACT = 1e-9
 """Share of its squares below which noise of a combination of columns counts as none: it is exact, as that of an offset."""

@@ -7,8 +7,8 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from identify.arrays import Array
-from identify.data.motion_log import Meaning, MotionLog
+from idbench.identify.arrays import Array
+from idbench.identify.data.motion_log import Meaning, MotionLog
 
 GAUSS = 0.5 - np.sqrt(3) / 6, 0.5 + np.sqrt(3) / 6
 """Where the torque equation is asked for in a cell: their mean has the torque's mean over it, to fourth order."""

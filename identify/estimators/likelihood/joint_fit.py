@@ -7,15 +7,15 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from identify.arrays import Array
-from identify.basis.basis import Basis
-from identify.errors import IdentificationError
-from identify.estimators.likelihood.cells import HELD, Cells
-from identify.estimators.likelihood.normal_equations import Noise, NormalEquations, Solved, torque_squares
-from identify.estimators.likelihood.reversals import Turns, stretches
-from identify.noise.linearization import friction_jumps, smoothed
-from identify.noise.propagation import NoiseLevels
-from identify.signals.masks.reversal import ReversalMask
+from idbench.identify.arrays import Array
+from idbench.identify.basis.basis import Basis
+from idbench.identify.errors import IdentificationError
+from idbench.identify.estimators.likelihood.cells import HELD, Cells
+from idbench.identify.estimators.likelihood.normal_equations import Noise, NormalEquations, Solved, torque_squares
+from idbench.identify.estimators.likelihood.reversals import Turns, stretches
+from idbench.identify.noise.linearization import friction_jumps, smoothed
+from idbench.identify.noise.propagation import NoiseLevels
+from idbench.identify.signals.masks.reversal import ReversalMask
 
 ROUNDS, STEPS = 12, 12
 """Rounds at most, in each of which mask and levels are frozen, and Gauss-Newton steps of each."""

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from identify.arrays import Array
-from identify.basis.basis import Basis
-from identify.noise.linearization import observation
+from idbench.identify.arrays import Array
+from idbench.identify.basis.basis import Basis
+from idbench.identify.noise.linearization import observation
 
 CREEP = 1e-9
 """Speed [rad/s, of slides m/s] that stands for a sign: friction has its jump there, and nothing else changes."""

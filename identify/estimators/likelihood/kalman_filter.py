@@ -5,21 +5,21 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from identify.arrays import HELD, Array, frozen
-from identify.basis.basis import Basis
-from identify.data.motion_log import MotionLog
-from identify.errors import IdentificationError, require_positive
-from identify.estimators.estimate import Estimate
-from identify.estimators.estimator import AbstractEstimator, Need
-from identify.estimators.likelihood.cells import Cells
-from identify.estimators.likelihood.joint_fit import MASK, UNKNOWN
-from identify.estimators.problem import Problem
-from identify.estimators.simulating.simulated_rounds import small_steps, starting_point
-from identify.models.explicit import ExplicitModel
-from identify.noise.linearization import friction_jumps
-from identify.noise.propagation import NoiseLevels
-from identify.rows.factors import Status
-from identify.signals.state import State
+from idbench.identify.arrays import HELD, Array, frozen
+from idbench.identify.basis.basis import Basis
+from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.errors import IdentificationError, require_positive
+from idbench.identify.estimators.estimate import Estimate
+from idbench.identify.estimators.estimator import AbstractEstimator, Need
+from idbench.identify.estimators.likelihood.cells import Cells
+from idbench.identify.estimators.likelihood.joint_fit import MASK, UNKNOWN
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.estimators.simulating.simulated_rounds import small_steps, starting_point
+from idbench.identify.models.explicit import ExplicitModel
+from idbench.identify.noise.linearization import friction_jumps
+from idbench.identify.noise.propagation import NoiseLevels
+from idbench.identify.rows.factors import Status
+from idbench.identify.signals.state import State
 
 ALPHA, BETA = 0.1, 2.0
 """Spread of the sigma points, and 2 for normal distributions (E. A. Wan and R. van der Merwe, "The unscented Kalman filter for

@@ -5,18 +5,18 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from identify.arrays import Array, frozen
-from identify.errors import IdentificationError
-from identify.estimators.estimate import Estimate
-from identify.estimators.estimator import AbstractEstimator, Need
-from identify.estimators.least_squares.generalized_least_squares import GeneralizedLeastSquares
-from identify.estimators.likelihood.cells import Cells
-from identify.estimators.likelihood.joint_fit import CHECK, JointFit
-from identify.estimators.problem import Problem
-from identify.models.explicit import ExplicitModel
-from identify.noise.propagation import NoiseLevels
-from identify.noise.restricted_likelihood import EXACT, SMALLEST
-from identify.rows.factors import Status
+from idbench.identify.arrays import Array, frozen
+from idbench.identify.errors import IdentificationError
+from idbench.identify.estimators.estimate import Estimate
+from idbench.identify.estimators.estimator import AbstractEstimator, Need
+from idbench.identify.estimators.least_squares.generalized_least_squares import GeneralizedLeastSquares
+from idbench.identify.estimators.likelihood.cells import Cells
+from idbench.identify.estimators.likelihood.joint_fit import CHECK, JointFit
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.models.explicit import ExplicitModel
+from idbench.identify.noise.propagation import NoiseLevels
+from idbench.identify.noise.restricted_likelihood import EXACT, SMALLEST
+from idbench.identify.rows.factors import Status
 
 FAR, APART, SMALL = 15.0, 3.0, 1e-2
 """Sigmas from the generalized least-squares estimate beyond which a fit is not believed; those where its own sigma is below

@@ -7,14 +7,14 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from identify.arrays import Array
-from identify.basis.basis import Basis
-from identify.errors import IdentificationError
-from identify.estimators.likelihood.cells import GAUSS, Cells, hermite
-from identify.estimators.likelihood.jumps import Inside, Jumps, signed
-from identify.estimators.likelihood.reversals import Turns
-from identify.noise.band_matrix import solve_lower
-from identify.noise.linearization import observation, slopes
+from idbench.identify.arrays import Array
+from idbench.identify.basis.basis import Basis
+from idbench.identify.errors import IdentificationError
+from idbench.identify.estimators.likelihood.cells import GAUSS, Cells, hermite
+from idbench.identify.estimators.likelihood.jumps import Inside, Jumps, signed
+from idbench.identify.estimators.likelihood.reversals import Turns
+from idbench.identify.noise.band_matrix import solve_lower
+from idbench.identify.noise.linearization import observation, slopes
 
 Solved = tuple[Array, Array, Array]
 """L^-1 A_zX, L^-1 b_nodes, and the factor L of A_zz in bands."""

@@ -6,11 +6,11 @@ from typing import NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from identify.arrays import Array
-from identify.basis.basis import Basis
-from identify.estimators.likelihood.cells import Cells
-from identify.estimators.likelihood.jumps import CREEP, Inside, Ints
-from identify.noise.linearization import observation
+from idbench.identify.arrays import Array
+from idbench.identify.basis.basis import Basis
+from idbench.identify.estimators.likelihood.cells import Cells
+from idbench.identify.estimators.likelihood.jumps import CREEP, Inside, Ints
+from idbench.identify.noise.linearization import observation
 
 OUTPACED = 5.0
 """Speed over its largest change from cell to cell, in a stretch, beyond which a joint does not stop within a cell."""

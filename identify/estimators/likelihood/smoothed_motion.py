@@ -6,13 +6,13 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from identify.arrays import Array
-from identify.data.motion_log import MotionLog
-from identify.errors import IdentificationError
-from identify.estimators.likelihood.cells import hermite
-from identify.estimators.likelihood.joint_fit import JointFit
-from identify.estimators.likelihood.normal_equations import NormalEquations
-from identify.noise.band_matrix import Band, Cholesky
+from idbench.identify.arrays import Array
+from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.errors import IdentificationError
+from idbench.identify.estimators.likelihood.cells import hermite
+from idbench.identify.estimators.likelihood.joint_fit import JointFit
+from idbench.identify.estimators.likelihood.normal_equations import NormalEquations
+from idbench.identify.noise.band_matrix import Band, Cholesky
 
 
 class SmoothedMotion(NamedTuple):

@@ -5,15 +5,15 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.data.motion_log import MotionLog
-from identify.estimators.estimate import Estimate
-from identify.estimators.estimator import Need
-from identify.estimators.problem import Problem
-from identify.estimators.simulating.gauss_newton import gauss_newton
-from identify.estimators.simulating.residual_scatter import scatter
-from identify.estimators.simulating.row_products import Kinds
-from identify.estimators.simulating.simulated_rounds import AbstractSimulating, rates, require_explicit
+from idbench.identify.arrays import Array
+from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.estimators.estimate import Estimate
+from idbench.identify.estimators.estimator import Need
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.estimators.simulating.gauss_newton import gauss_newton
+from idbench.identify.estimators.simulating.residual_scatter import scatter
+from idbench.identify.estimators.simulating.row_products import Kinds
+from idbench.identify.estimators.simulating.simulated_rounds import AbstractSimulating, rates, require_explicit
 
 
 @final

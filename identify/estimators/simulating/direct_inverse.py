@@ -3,14 +3,14 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from identify.arrays import Array
-from identify.estimators.estimate import Estimate
-from identify.estimators.estimator import Need
-from identify.estimators.problem import Problem
-from identify.estimators.simulating.residual_scatter import scatter
-from identify.estimators.simulating.row_products import Kinds, Solved, solve_with
-from identify.estimators.simulating.simulated_rounds import AbstractSimulating, rates
-from identify.estimators.simulating.steps import SecantSteps
+from idbench.identify.arrays import Array
+from idbench.identify.estimators.estimate import Estimate
+from idbench.identify.estimators.estimator import Need
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.estimators.simulating.residual_scatter import scatter
+from idbench.identify.estimators.simulating.row_products import Kinds, Solved, solve_with
+from idbench.identify.estimators.simulating.simulated_rounds import AbstractSimulating, rates
+from idbench.identify.estimators.simulating.steps import SecantSteps
 
 
 @final

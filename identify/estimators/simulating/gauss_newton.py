@@ -4,11 +4,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.data.motion_log import MotionLog
-from identify.estimators.problem import Problem
-from identify.estimators.simulating.row_products import Kinds, Solved, solve_with
-from identify.estimators.simulating.simulated_rounds import Rounds, small_steps
+from idbench.identify.arrays import Array
+from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.estimators.simulating.row_products import Kinds, Solved, solve_with
+from idbench.identify.estimators.simulating.simulated_rounds import Rounds, small_steps
 
 WORSE = 1.2
 """Growth of the rms of the residuals at which a step counts as too long."""

@@ -3,14 +3,14 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-from identify.arrays import Array
-from identify.estimators.estimate import Estimate
-from identify.estimators.estimator import Need
-from identify.estimators.problem import Problem
-from identify.estimators.simulating.row_products import Kinds, Solved, solve_with
-from identify.estimators.simulating.simulated_rounds import AbstractSimulating
-from identify.estimators.simulating.steps import SecantSteps
-from identify.estimators.solution import Given
+from idbench.identify.arrays import Array
+from idbench.identify.estimators.estimate import Estimate
+from idbench.identify.estimators.estimator import Need
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.estimators.simulating.row_products import Kinds, Solved, solve_with
+from idbench.identify.estimators.simulating.simulated_rounds import AbstractSimulating
+from idbench.identify.estimators.simulating.steps import SecantSteps
+from idbench.identify.estimators.solution import Given
 
 
 @final

@@ -6,15 +6,15 @@ from typing import ClassVar, final
 import numpy as np
 import numpy.typing as npt
 
-from identify.arrays import Array
-from identify.data.motion_log import MotionLog
-from identify.errors import IdentificationError, require_positive
-from identify.estimators.estimate import Estimate
-from identify.estimators.estimator import Need
-from identify.estimators.problem import Problem
-from identify.estimators.simulating.row_products import Solved
-from identify.estimators.simulating.simulated_rounds import AbstractSimulating, Rounds, require_explicit, small_steps
-from identify.estimators.simulator import AbstractPlant
+from idbench.identify.arrays import Array
+from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.errors import IdentificationError, require_positive
+from idbench.identify.estimators.estimate import Estimate
+from idbench.identify.estimators.estimator import Need
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.estimators.simulating.row_products import Solved
+from idbench.identify.estimators.simulating.simulated_rounds import AbstractSimulating, Rounds, require_explicit, small_steps
+from idbench.identify.estimators.simulator import AbstractPlant
 
 STEP_Q, STEP_QD = 1e-5, 1e-4
 """Changes of a state at the beginning of a segment [rad, rad/s]."""

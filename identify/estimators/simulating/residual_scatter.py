@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.estimators.simulating.row_products import Kinds, Solved
+from idbench.identify.arrays import Array
+from idbench.identify.estimators.simulating.row_products import Kinds, Solved
 
 MEMORY = 1.0
 """Time [s] after which residuals are taken for independent: loops and filters remember less."""

@@ -6,8 +6,8 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from identify.arrays import Array
-from identify.estimators.problem import Problem
+from idbench.identify.arrays import Array
+from idbench.identify.estimators.problem import Problem
 
 WORST = 1e-12
 """Reciprocal condition number of Z' W, its rows and columns scaled to length 1, below which it counts as singular."""

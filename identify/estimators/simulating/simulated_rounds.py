@@ -7,18 +7,18 @@ from typing import ClassVar, final
 import numpy as np
 import numpy.typing as npt
 
-from identify.arrays import Array, frozen
-from identify.data.motion_log import MotionLog
-from identify.errors import IdentificationError, require_positive, require_whole
-from identify.estimators.estimate import Estimate
-from identify.estimators.estimator import AbstractEstimator
-from identify.estimators.problem import Problem
-from identify.estimators.simulating.row_products import Solved
-from identify.estimators.simulating.steps import Steps
-from identify.estimators.simulator import AbstractLoop, Simulated
-from identify.estimators.solution import AbstractSolution
-from identify.models.explicit import ExplicitModel
-from identify.telling import stage
+from idbench.identify.arrays import Array, frozen
+from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.errors import IdentificationError, require_positive, require_whole
+from idbench.identify.estimators.estimate import Estimate
+from idbench.identify.estimators.estimator import AbstractEstimator
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.estimators.simulating.row_products import Solved
+from idbench.identify.estimators.simulating.steps import Steps
+from idbench.identify.estimators.simulator import AbstractLoop, Simulated
+from idbench.identify.estimators.solution import AbstractSolution
+from idbench.identify.models.explicit import ExplicitModel
+from idbench.identify.telling import stage
 
 SMALL = 1e-3
 """Change of a parameter, as a share of what makes the whole torque of a joint."""

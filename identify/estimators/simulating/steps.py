@@ -4,7 +4,7 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Array
+from idbench.identify.arrays import Array
 
 FARTHEST = 1.0
 """Share of the last two answers' difference by which the next round may begin beyond the last answer."""

@@ -1,12 +1,12 @@
 """Operators that turn a model into rows, and their table."""
 
-from identify.plugins import Table
-from identify.rows.operators.fir_low_pass import FirLowPass as FirLowPass
-from identify.rows.operators.iir_low_pass import IirLowPass as IirLowPass
-from identify.rows.operators.modulating import ModulatingFunctions as ModulatingFunctions
-from identify.rows.operators.operator import AbstractOperator as AbstractOperator
-from identify.rows.operators.samples import Samples as Samples
-from identify.rows.operators.windows import Windows as Windows
+from idbench.identify.plugins import Table
+from idbench.identify.rows.operators.fir_low_pass import FirLowPass as FirLowPass
+from idbench.identify.rows.operators.iir_low_pass import IirLowPass as IirLowPass
+from idbench.identify.rows.operators.modulating import ModulatingFunctions as ModulatingFunctions
+from idbench.identify.rows.operators.operator import AbstractOperator as AbstractOperator
+from idbench.identify.rows.operators.samples import Samples as Samples
+from idbench.identify.rows.operators.windows import Windows as Windows
 
 OPERATORS: Table[AbstractOperator] = Table(
     "operators",

@@ -7,11 +7,11 @@ from typing import final
 
 import scipy
 
-from identify.arrays import Array, frozen
-from identify.errors import require_below_nyquist, require_positive
-from identify.rows.grid import Grid, Kernel
-from identify.rows.operators.low_pass import AbstractLowPass, decimation
-from identify.rows.row_map import Window
+from idbench.identify.arrays import Array, frozen
+from idbench.identify.errors import require_below_nyquist, require_positive
+from idbench.identify.rows.grid import Grid, Kernel
+from idbench.identify.rows.operators.low_pass import AbstractLowPass, decimation
+from idbench.identify.rows.row_map import Window
 
 
 @final

@@ -8,12 +8,12 @@ from typing import final
 import numpy as np
 import scipy
 
-from identify.arrays import Array, frozen
-from identify.errors import require_below_nyquist, require_positive, require_whole
-from identify.rows.grid import Grid
-from identify.rows.operators.low_pass import AbstractLowPass, decimation
-from identify.rows.row_map import Window
-from identify.signals.zero_phase import forward_backward, settling_time
+from idbench.identify.arrays import Array, frozen
+from idbench.identify.errors import require_below_nyquist, require_positive, require_whole
+from idbench.identify.rows.grid import Grid
+from idbench.identify.rows.operators.low_pass import AbstractLowPass, decimation
+from idbench.identify.rows.row_map import Window
+from idbench.identify.signals.zero_phase import forward_backward, settling_time
 
 
 @final

@@ -6,11 +6,11 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.models.equations import Equations
-from identify.rows.grid import Grid, Kernel
-from identify.rows.operators.operator import AbstractOperator
-from identify.rows.row_map import RowMap, Window
+from idbench.identify.arrays import Array
+from idbench.identify.models.equations import Equations
+from idbench.identify.rows.grid import Grid, Kernel
+from idbench.identify.rows.operators.operator import AbstractOperator
+from idbench.identify.rows.row_map import RowMap, Window
 
 
 class AbstractLowPass(AbstractOperator):

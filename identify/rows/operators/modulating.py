@@ -5,8 +5,8 @@ from typing import final
 
 import numpy as np
 
-from identify.errors import SettingError, require_positive, require_whole
-from identify.rows.operators.weak_form import AbstractWeakForm, Kernels
+from idbench.identify.errors import SettingError, require_positive, require_whole
+from idbench.identify.rows.operators.weak_form import AbstractWeakForm, Kernels
 
 
 @final

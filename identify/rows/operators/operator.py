@@ -3,10 +3,10 @@
 from abc import ABC, abstractmethod
 from typing import final
 
-from identify.arrays import Array
-from identify.models.equations import Equations
-from identify.rows.grid import Grid
-from identify.rows.row_map import RowMap
+from idbench.identify.arrays import Array
+from idbench.identify.models.equations import Equations
+from idbench.identify.rows.grid import Grid
+from idbench.identify.rows.row_map import RowMap
 
 
 class AbstractOperator(ABC):

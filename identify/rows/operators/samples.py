@@ -5,10 +5,10 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.rows.grid import Grid, Kernel
-from identify.rows.operators.low_pass import AbstractLowPass
-from identify.rows.row_map import Window
+from idbench.identify.arrays import Array
+from idbench.identify.rows.grid import Grid, Kernel
+from idbench.identify.rows.operators.low_pass import AbstractLowPass
+from idbench.identify.rows.row_map import Window
 
 
 @final

@@ -5,11 +5,11 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.models.equations import Equations
-from identify.rows.grid import Grid, Kernel
-from identify.rows.operators.operator import AbstractOperator
-from identify.rows.row_map import RowMap
+from idbench.identify.arrays import Array
+from idbench.identify.models.equations import Equations
+from idbench.identify.rows.grid import Grid, Kernel
+from idbench.identify.rows.operators.operator import AbstractOperator
+from idbench.identify.rows.row_map import RowMap
 
 
 class Kernels(NamedTuple):

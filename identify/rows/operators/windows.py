@@ -5,9 +5,9 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.errors import SettingError, require_positive
-from identify.rows.operators.weak_form import AbstractWeakForm, Kernels
+from idbench.identify.arrays import Array
+from idbench.identify.errors import SettingError, require_positive
+from idbench.identify.rows.operators.weak_form import AbstractWeakForm, Kernels
 
 
 @final

@@ -1,8 +1,8 @@
 """Differentiators, and their table."""
 
-from identify.plugins import Table
-from identify.signals.differentiators.central import CentralDifference as CentralDifference
-from identify.signals.differentiators.differentiator import (
+from idbench.identify.plugins import Table
+from idbench.identify.signals.differentiators.central import CentralDifference as CentralDifference
+from idbench.identify.signals.differentiators.differentiator import (
     AbstractDifferentiator as AbstractDifferentiator,
 )
 

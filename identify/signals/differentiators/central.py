@@ -5,10 +5,10 @@ from typing import Literal, final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.errors import SettingError, require_positive
-from identify.signals.differentiators.differentiator import AbstractDifferentiator
-from identify.signals.stencils import slide
+from idbench.identify.arrays import Array
+from idbench.identify.errors import SettingError, require_positive
+from idbench.identify.signals.differentiators.differentiator import AbstractDifferentiator
+from idbench.identify.signals.stencils import slide
 
 _WEIGHTS = {
     2: np.array([-1.0, 0.0, 1.0]) / 2,

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 
-from identify.arrays import Array
+from idbench.identify.arrays import Array
 
 
 class AbstractDifferentiator(ABC):

@@ -1,9 +1,9 @@
 """Masks, and their table."""
 
-from identify.plugins import Table
-from identify.signals.masks.mask import AbstractMask as AbstractMask
-from identify.signals.masks.no_mask import NoMask as NoMask
-from identify.signals.masks.reversal import ReversalMask as ReversalMask
+from idbench.identify.plugins import Table
+from idbench.identify.signals.masks.mask import AbstractMask as AbstractMask
+from idbench.identify.signals.masks.no_mask import NoMask as NoMask
+from idbench.identify.signals.masks.reversal import ReversalMask as ReversalMask
 
 MASKS: Table[AbstractMask] = Table(
     "masks",

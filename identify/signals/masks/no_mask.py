@@ -5,8 +5,8 @@ from typing import final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.signals.masks.mask import AbstractMask
+from idbench.identify.arrays import Array
+from idbench.identify.signals.masks.mask import AbstractMask
 
 
 @final

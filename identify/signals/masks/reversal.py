@@ -7,9 +7,9 @@ from typing import Self, final
 import numpy as np
 import scipy
 
-from identify.arrays import Array
-from identify.errors import SettingError, require_not_negative, require_positive
-from identify.signals.masks.mask import AbstractMask
+from idbench.identify.arrays import Array
+from idbench.identify.errors import SettingError, require_not_negative, require_positive
+from idbench.identify.signals.masks.mask import AbstractMask
 
 SLOW = 0.05
 """Share of a joint's rms speed up to which it counts as turning: 0.1 rad/s of the SCARA's 2 rad/s."""

@@ -1,9 +1,9 @@
 """Prefilters of positions and torques, and their table."""
 
-from identify.plugins import Table
-from identify.signals.prefilters.butterworth import ButterworthPrefilter as ButterworthPrefilter
-from identify.signals.prefilters.no_prefilter import NoPrefilter as NoPrefilter
-from identify.signals.prefilters.prefilter import AbstractPrefilter as AbstractPrefilter
+from idbench.identify.plugins import Table
+from idbench.identify.signals.prefilters.butterworth import ButterworthPrefilter as ButterworthPrefilter
+from idbench.identify.signals.prefilters.no_prefilter import NoPrefilter as NoPrefilter
+from idbench.identify.signals.prefilters.prefilter import AbstractPrefilter as AbstractPrefilter
 
 PREFILTERS: Table[AbstractPrefilter] = Table(
     "prefilters",

@@ -6,10 +6,10 @@ from typing import final
 
 import scipy
 
-from identify.arrays import Array, frozen
-from identify.errors import require_below_nyquist, require_positive, require_whole
-from identify.signals.prefilters.prefilter import AbstractPrefilter
-from identify.signals.zero_phase import forward_backward, settling_time
+from idbench.identify.arrays import Array, frozen
+from idbench.identify.errors import require_below_nyquist, require_positive, require_whole
+from idbench.identify.signals.prefilters.prefilter import AbstractPrefilter
+from idbench.identify.signals.zero_phase import forward_backward, settling_time
 
 
 @final

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import final
 
-from identify.arrays import Array
-from identify.signals.prefilters.prefilter import AbstractPrefilter
+from idbench.identify.arrays import Array
+from idbench.identify.signals.prefilters.prefilter import AbstractPrefilter
 
 
 @final

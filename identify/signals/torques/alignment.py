@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import final
 
-from identify.arrays import Array
-from identify.data.motion_log import TorqueChannel
-from identify.signals.torques.torque import AbstractAlignment, Torque
+from idbench.identify.arrays import Array
+from idbench.identify.data.motion_log import TorqueChannel
+from idbench.identify.signals.torques.torque import AbstractAlignment, Torque
 
 
 @final

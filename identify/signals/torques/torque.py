@@ -7,9 +7,9 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from identify.arrays import Array
-from identify.data.motion_log import Meaning, TorqueChannel
-from identify.signals.stencils import REACH, averaged, shift, slide
+from idbench.identify.arrays import Array
+from idbench.identify.data.motion_log import Meaning, TorqueChannel
+from idbench.identify.signals.stencils import REACH, averaged, shift, slide
 
 _DIFFERENCE = np.array([-0.5, 0.0, 0.5])
 

@@ -14,11 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
-from identify import MotionLog, TorqueChannel, scara
-from identify.arrays import combined
-from identify.signals.state import State
-from sim.robot.robot import Robot
-from sim.robot.scara import scara_truth
+from idbench.identify import MotionLog, TorqueChannel, scara
+from idbench.identify.arrays import combined
+from idbench.identify.signals.state import State
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.scara import scara_truth
 
 OUTPUT_ERROR = runpy.run_path(str(Path(__file__).parent.parent / "output_error.py"))["output_error"]
 NOTE = "output error, start 30 % off, windows of 2 s, at 100 Hz"

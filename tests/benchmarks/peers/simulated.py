@@ -16,14 +16,14 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from identify import Array, MotionLog
-from identify.files.log_file import write_log
-from sim.encoders import ExactEncoder, IncrementalEncoder
-from sim.engine.simulation import simulate
-from sim.frictions import LoadDependent
-from sim.scenario.scenario import Scenario, Timing
-from sim.scenario.scenario_file import load
-from sim.trajectories import RandomMoves
+from idbench.identify import Array, MotionLog
+from idbench.identify.files.log_file import write_log
+from idbench.sim.encoders import ExactEncoder, IncrementalEncoder
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.frictions import LoadDependent
+from idbench.sim.scenario.scenario import Scenario, Timing
+from idbench.sim.scenario.scenario_file import load
+from idbench.sim.trajectories import RandomMoves
 
 ARMS = {"scara": "ideal", "puma560": "arm", "panda": "arm"}
 """Arms, and the scenario that each is simulated in."""

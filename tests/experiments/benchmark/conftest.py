@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from identify.files.log_file import write_log
-from sim.engine.simulation import simulate
-from sim.scenario.scenario_file import load
-from sim.trajectories import RandomMoves
+from idbench.identify.files.log_file import write_log
+from idbench.sim.engine.simulation import simulate
+from idbench.sim.scenario.scenario_file import load
+from idbench.sim.trajectories import RandomMoves
 
 DEFINITION = """
 title = "A SCARA"

@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experiments.benchmark.definition import SHIPPED, read_definition, shipped
-from experiments.benchmark.for_tools import prepared
-from experiments.benchmark.tables import share
-from experiments.cli import main
-from experiments.cli.commands.benchmark_set import set_row
-from identify import MotionLog, TorqueChannel
-from identify.files.log_file import write_log
-from sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
-from sim.robot.robot import Robot
+from idbench.experiments.benchmark.definition import SHIPPED, read_definition, shipped
+from idbench.experiments.benchmark.for_tools import prepared
+from idbench.experiments.benchmark.tables import share
+from idbench.experiments.cli import main
+from idbench.experiments.cli.commands.benchmark_set import set_row
+from idbench.identify import MotionLog, TorqueChannel
+from idbench.identify.files.log_file import write_log
+from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
+from idbench.sim.robot.robot import Robot
 
 
 def row_of(out, name="arm"):

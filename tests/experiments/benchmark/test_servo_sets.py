@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.benchmark.definition import SHIPPED, read_definition
-from experiments.cli import main
-from sim.scenario.scenario_file import load, to_toml
+from idbench.experiments.benchmark.definition import SHIPPED, read_definition
+from idbench.experiments.cli import main
+from idbench.sim.scenario.scenario_file import load, to_toml
 
 DEFINITION = """
 title = "A servo"

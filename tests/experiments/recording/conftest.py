@@ -11,10 +11,10 @@ import rerun as rr
 import rerun_cli
 from rerun.chunk import RrdReader
 
-from experiments.identification.request import Request
-from experiments.identification.scenario_run import ScenarioRun
-from experiments.recording.identification_recording import RunRecording
-from sim.scenario.scenario_file import from_dict
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.scenario_run import ScenarioRun
+from idbench.experiments.recording.identification_recording import RunRecording
+from idbench.sim.scenario.scenario_file import from_dict
 
 SCENARIO = {
     "name": "short",

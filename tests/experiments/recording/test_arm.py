@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 import rerun as rr
 
-from experiments.recording.arm import Arm
-from experiments.recording.columns import time_columns
-from experiments.recording.stream import Stream
-from sim.robot.robot import Robot
-from sim.robot.scene import motion, shapes
+from idbench.experiments.recording.arm import Arm
+from idbench.experiments.recording.columns import time_columns
+from idbench.experiments.recording.stream import Stream
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.scene import motion, shapes
 
 MJCF = """
 <mujoco>

@@ -8,12 +8,12 @@ from dataclasses import replace
 
 import pytest
 
-from experiments.cli import main
-from experiments.errors import ExperimentError
-from experiments.recording.audience import Audience, Watching
-from experiments.results.manifest import NAME as MANIFEST
-from sim.scenario.scenario_file import load, to_toml
-from sim.trajectories import RandomMoves
+from idbench.experiments.cli import main
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.recording.audience import Audience, Watching
+from idbench.experiments.results.manifest import NAME as MANIFEST
+from idbench.sim.scenario.scenario_file import load, to_toml
+from idbench.sim.trajectories import RandomMoves
 
 NOBODY = "rerun+http://127.0.0.1:{port}/proxy"
 
@@ -81,7 +81,7 @@ def test_options_that_make_no_sense_are_told(complaint, out, options, said):
 
 @pytest.mark.thorough
 def test_without_rerun_it_is_not_even_loaded(tmp_path):
-    code = "import sys; from experiments.cli import main\n"
+    code = "import sys; from idbench.experiments.cli import main\n"
     code += "code = main(['run', 'ideal', '--no-rerun', '--out', 'run'])\n"
     code += "code = code or main(['identify', 'run/log.parquet', '--no-rerun'])\n"
     code += "sys.exit(code or [name for name in sys.modules if name.startswith('rerun')] != [])"
@@ -126,8 +126,8 @@ def test_a_viewer_that_goes_away_costs_nothing_but_itself(tmp_path, reading):
 
         threading.Thread(target=answer_once, daemon=True).start()
         words = ["run", brief(tmp_path), "--connect", url, "--out", "run"]
-        code = "import sys; import experiments.recording.audience as a; a.GOODBYE = 1.0\n"
-        code += f"sys.argv = ['idbench', *{words}]; from experiments.cli import entry; entry()"
+        code = "import sys; import idbench.experiments.recording.audience as a; a.GOODBYE = 1.0\n"
+        code += f"sys.argv = ['idbench', *{words}]; from idbench.experiments.cli import entry; entry()"
         done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0
     assert said_of_viewers(done.stderr) == [f"idbench: the viewer at {url} has gone; the work goes on without it"]
@@ -143,8 +143,9 @@ def test_a_viewer_that_hangs_keeps_nothing_back(tmp_path, reading):
         server.listen(64)
         url = NOBODY.format(port=server.getsockname()[1])
         words = ["run", brief(tmp_path), "--connect", url, "--out", "run"]
-        code = f"import sys; sys.argv = ['idbench', *{words}]; import experiments.recording.audience as a; a.GOODBYE = 1.0\n"
-        code += "from experiments.cli import entry; entry()"
+        code = f"import sys; sys.argv = ['idbench', *{words}]; import idbench.experiments.recording.audience as a\n"
+        code += "a.GOODBYE = 1.0\n"
+        code += "from idbench.experiments.cli import entry; entry()"
         done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0
     assert said_of_viewers(done.stderr) == [f"idbench: the viewer at {url} takes nothing; the work goes on without it"]

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from experiments.recording.chart import HEIGHT, WIDE, Chart
-from experiments.recording.scales import decades, linear, listed, named, signed
-from experiments.recording.stream import Stream
+from idbench.experiments.recording.chart import HEIGHT, WIDE, Chart
+from idbench.experiments.recording.scales import decades, linear, listed, named, signed
+from idbench.experiments.recording.stream import Stream
 
 
 @pytest.mark.parametrize(

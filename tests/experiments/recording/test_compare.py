@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from experiments.cli import main
-from experiments.recording.compared import difference, shift_of
-from identify import MotionLog, TorqueChannel
+from idbench.experiments.cli import main
+from idbench.experiments.recording.compared import difference, shift_of
+from idbench.identify import MotionLog, TorqueChannel
 
 pytestmark = pytest.mark.thorough
 

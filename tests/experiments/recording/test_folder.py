@@ -6,20 +6,20 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from experiments.cli import main
-from experiments.errors import ResultsError
-from experiments.recording.columns import parts
-from experiments.recording.folder import files, known, merge
-from experiments.recording.run_layouts import friction
-from experiments.recording.views import Shelf
+from idbench.experiments.cli import main
+from idbench.experiments.errors import ResultsError
+from idbench.experiments.recording.columns import parts
+from idbench.experiments.recording.folder import files, known, merge
+from idbench.experiments.recording.run_layouts import friction
+from idbench.experiments.recording.views import Shelf
 
 
 @pytest.fixture
 def copied(recorded, tmp_path):
     """Return a results folder that may be changed."""
-    from experiments.results.folder import ResultsFolder
-    from experiments.results.summaries import write_summary
-    from identify.files.log_file import write_log
+    from idbench.experiments.results.folder import ResultsFolder
+    from idbench.experiments.results.summaries import write_summary
+    from idbench.identify.files.log_file import write_log
 
     folder = ResultsFolder(tmp_path / "run", "run", "idbench run short")
     with folder.held(), folder.complete() as hidden:
@@ -100,7 +100,7 @@ def test_what_is_wrong_is_told(copied, tmp_path, complaint):
 
 
 def test_files_of_two_recordings_are_not_mixed(copied, table1, tmp_path):
-    from experiments.recording.table1_recording import record_table1
+    from idbench.experiments.recording.table1_recording import record_table1
 
     name, stream = record_table1(table1)[0]
     stream.write(tmp_path / name)

@@ -74,7 +74,7 @@ def until(condition, process=None):
 
 
 def run(start, client, out, *options):
-    code = f"import sys; from experiments.cli import main; sys.exit(main({['run', 'saturation', *options]!r}))"
+    code = f"import sys; from idbench.experiments.cli import main; sys.exit(main({['run', 'saturation', *options]!r}))"
     return start("-c", code.replace("URL", client.url).replace("OUT", str(out)))
 
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 import rerun as rr
 
-from experiments.identification.fit import fit
-from experiments.identification.logs import Logs
-from experiments.identification.request import Request
-from experiments.identification.robot_model import RobotModel
-from experiments.recording.live_layer import LiveIdentification
-from experiments.recording.stream import Stream
-from identify import MotionLog
+from idbench.experiments.identification.fit import fit
+from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.recording.live_layer import LiveIdentification
+from idbench.experiments.recording.stream import Stream
+from idbench.identify import MotionLog
 
 JOINTS = ("joint1", "joint2")
 
@@ -55,7 +55,7 @@ def test_a_fault_in_it_is_told_once_and_the_run_goes_on(table1, monkeypatch, cap
         raise np.linalg.LinAlgError("on purpose")
 
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    monkeypatch.setattr("experiments.recording.live_layer.fit", broken)
+    monkeypatch.setattr("idbench.experiments.recording.live_layer.fit", broken)
     log = table1.log
     live = LiveIdentification(Stream("broken"), RobotModel(), "idbench", log.torque, log.fs, JOINTS)
     assert not any(live.grow(log.q[k : k + 500], log.tau[k : k + 500]) for k in range(0, 2000, 500))

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import rerun.blueprint as rrb
 
-from experiments.cli import main
-from experiments.recording.folder import files, known
-from experiments.recording.layouts import noise
-from experiments.recording.views import Shelf
+from idbench.experiments.cli import main
+from idbench.experiments.recording.folder import files, known
+from idbench.experiments.recording.layouts import noise
+from idbench.experiments.recording.views import Shelf
 
 STEP = 2 * np.pi / (4 * 4096)
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from experiments.recording.audience import Audience
-from experiments.recording.chart import SQUARE
-from experiments.recording.columns import POSES, shown
-from experiments.recording.identification_recording import RunRecording
-from identify import measured_state
-from sim.robot.scene import motion, shapes
-from sim.scenario.scenario_file import from_dict
+from idbench.experiments.recording.audience import Audience
+from idbench.experiments.recording.chart import SQUARE
+from idbench.experiments.recording.columns import POSES, shown
+from idbench.experiments.recording.identification_recording import RunRecording
+from idbench.identify import measured_state
+from idbench.sim.robot.scene import motion, shapes
+from idbench.sim.scenario.scenario_file import from_dict
 
 TICK = 10_000_000
 """[ns] between samples."""

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from experiments.recording.columns import seconds
-from experiments.recording.stream import Stream
-from experiments.recording.views import Shelf
-from experiments.reports.printed import _position_noise
-from experiments.text import of_each
+from idbench.experiments.recording.columns import seconds
+from idbench.experiments.recording.stream import Stream
+from idbench.experiments.recording.views import Shelf
+from idbench.experiments.reports.printed import _position_noise
+from idbench.experiments.text import of_each
 
 
 def test_titles_have_the_rms_of_what_was_sent_in_pieces():

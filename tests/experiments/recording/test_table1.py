@@ -5,8 +5,8 @@ import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
 
-from experiments.errors import ResultsError
-from experiments.recording.table1_recording import record_table1
+from idbench.experiments.errors import ResultsError
+from idbench.experiments.recording.table1_recording import record_table1
 
 
 @pytest.fixture(scope="module")

@@ -5,10 +5,10 @@ from contextlib import nullcontext
 
 import pytest
 
-from experiments.cli import main
-from experiments.study.run_study import local_pool, run_missing
-from experiments.study.store import Store
-from experiments.study.study_file import study_from
+from idbench.experiments.cli import main
+from idbench.experiments.study.run_study import local_pool, run_missing
+from idbench.experiments.study.store import Store
+from idbench.experiments.study.study_file import study_from
 
 TOML = """
 name = "small"

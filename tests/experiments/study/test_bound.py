@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from experiments.cli import main
-from sim.encoders import IncrementalEncoder
-from sim.encoders.encoder import AbstractEncoder
-from sim.errors import ScenarioError
+from idbench.experiments.cli import main
+from idbench.sim.encoders import IncrementalEncoder
+from idbench.sim.encoders.encoder import AbstractEncoder
+from idbench.sim.errors import ScenarioError
 
 
 @pytest.mark.thorough

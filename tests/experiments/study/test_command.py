@@ -11,10 +11,10 @@ import rerun_cli
 from distributed import LocalCluster
 from rerun.chunk import RrdReader
 
-from experiments.cli import main
-from experiments.cli.commands import study as study_commands
-from experiments.study import run_study as engine
-from experiments.study.store import Store
+from idbench.experiments.cli import main
+from idbench.experiments.cli.commands import study as study_commands
+from idbench.experiments.study import run_study as engine
+from idbench.experiments.study.store import Store
 
 
 @pytest.mark.thorough
@@ -101,7 +101,7 @@ def test_a_run_is_made_again_bit_for_bit(done, tmp_path, capfd):
 @pytest.fixture
 def bare(monkeypatch):
     """Leave the figures of reports out: they take most of the time of a study of a second."""
-    monkeypatch.setattr("experiments.study.study_results.report", lambda *args: "")
+    monkeypatch.setattr("idbench.experiments.study.study_results.report", lambda *args: "")
 
 
 @pytest.mark.thorough
@@ -172,7 +172,7 @@ def test_a_scheduler_may_be_anywhere(file, tmp_path, undisturbed, bare):
 
 
 def test_an_unreachable_scheduler_leaves_nothing(file, tmp_path, complaint, monkeypatch):
-    monkeypatch.setattr("experiments.study.dask_client.PATIENCE", 1.0)
+    monkeypatch.setattr("idbench.experiments.study.dask_client.PATIENCE", 1.0)
     printed = complaint("study", str(file), "--scheduler", "tcp://127.0.0.1:9", "--out", str(tmp_path / "out"))
     assert "cannot reach the scheduler tcp://127.0.0.1:9" in printed
     assert not (tmp_path / "out").exists()

@@ -4,14 +4,14 @@ import pytest
 from distributed import LocalCluster
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from experiments.errors import StudyError
-from experiments.study import cluster, dask_client
-from experiments.study.again import compare_again
-from experiments.study.cluster import cluster_pool, compute
-from experiments.study.shard import run_shard
-from experiments.study.store import Store
-from experiments.study.study_file import study_from
-from experiments.study.versions import versions
+from idbench.experiments.errors import StudyError
+from idbench.experiments.study import cluster, dask_client
+from idbench.experiments.study.again import compare_again
+from idbench.experiments.study.cluster import cluster_pool, compute
+from idbench.experiments.study.shard import run_shard
+from idbench.experiments.study.store import Store
+from idbench.experiments.study.study_file import study_from
+from idbench.experiments.study.versions import versions
 
 
 @pytest.mark.thorough

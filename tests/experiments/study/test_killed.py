@@ -6,16 +6,16 @@ import time
 
 import pytest
 
-from experiments.study.cluster import cluster_pool
-from experiments.study.run_study import local_pool, run_missing
-from experiments.study.store import Store
+from idbench.experiments.study.cluster import cluster_pool
+from idbench.experiments.study.run_study import local_pool, run_missing
+from idbench.experiments.study.store import Store
 
 CODE = """
 import sys
 import time
 from pathlib import Path
-from experiments.study.run_study import local_pool, run_missing
-from experiments.study.store import Store
+from idbench.experiments.study.run_study import local_pool, run_missing
+from idbench.experiments.study.store import Store
 store = Store.open(Path(sys.argv[1]))
 with local_pool(store.study, 2) as pool:
     run_missing(store, pool, 2, lambda done: time.sleep(0.05))  # time for the kill, whatever else the machine does

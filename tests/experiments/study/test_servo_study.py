@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from experiments.errors import StudyError
-from experiments.study.shard import run_shard
-from experiments.study.study_file import load_study, study_from
+from idbench.experiments.errors import StudyError
+from idbench.experiments.study.shard import run_shard
+from idbench.experiments.study.study_file import load_study, study_from
 
 SHORT = {
     "name": "short",

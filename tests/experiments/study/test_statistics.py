@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from experiments.study.answer import answer
-from experiments.study.comparison import SURE, differences
-from experiments.study.requirement import requirements
-from experiments.study.statistics import Cell, cells
-from experiments.study.study_report import WORST, worst_runs
+from idbench.experiments.study.answer import answer
+from idbench.experiments.study.comparison import SURE, differences
+from idbench.experiments.study.requirement import requirements
+from idbench.experiments.study.statistics import Cell, cells
+from idbench.experiments.study.study_report import WORST, worst_runs
 
 TRUTH = np.array([2.0, -0.5])
 

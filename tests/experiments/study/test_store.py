@@ -3,10 +3,10 @@
 import pyarrow.parquet as pq
 import pytest
 
-from experiments.errors import ResultsError, StudyError
-from experiments.study import versions as module
-from experiments.study.shard import Shard, run_shard
-from experiments.study.store import Store
+from idbench.experiments.errors import ResultsError, StudyError
+from idbench.experiments.study import versions as module
+from idbench.experiments.study.shard import Shard, run_shard
+from idbench.experiments.study.store import Store
 
 
 @pytest.fixture(scope="module")

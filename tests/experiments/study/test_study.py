@@ -7,12 +7,12 @@ import tomllib
 import numpy as np
 import pytest
 
-from experiments.errors import StudyError
-from experiments.study.axis import Axis
-from experiments.study.study_file import load_study, names, study_from, study_from_text
-from identify import IirLowPass, NoMask
-from sim.drives import AveragedDrive
-from sim.errors import ScenarioError
+from idbench.experiments.errors import StudyError
+from idbench.experiments.study.axis import Axis
+from idbench.experiments.study.study_file import load_study, names, study_from, study_from_text
+from idbench.identify import IirLowPass, NoMask
+from idbench.sim.drives import AveragedDrive
+from idbench.sim.errors import ScenarioError
 
 
 def axes(content, *more, **first):

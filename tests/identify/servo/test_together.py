@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify.servo import Servo, ServoFit
-from identify.servo.search import Found
-from identify.servo.together import Joint, together
+from idbench.identify.servo import Servo, ServoFit
+from idbench.identify.servo.search import Found
+from idbench.identify.servo.together import Joint, together
 
 RNG = np.random.default_rng(0)
 FREE = ("a", "offset", "lead")

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identify import ExcitationError
-from identify.servo import SERVO_FRICTIONS, JointLoad, Servo, ServoRun, UnscaledError, identify_again, identify_servo
-from identify.servo.choice import choose_friction
-from identify.servo.closed_loop import ServoLoop, count_of
-from identify.servo.lack import lacks_of
-from identify.servo.search import Search
+from idbench.identify import ExcitationError
+from idbench.identify.servo import SERVO_FRICTIONS, JointLoad, Servo, ServoRun, UnscaledError, identify_again, identify_servo
+from idbench.identify.servo.choice import choose_friction
+from idbench.identify.servo.closed_loop import ServoLoop, count_of
+from idbench.identify.servo.lack import lacks_of
+from idbench.identify.servo.search import Search
 
 SERVO = Servo(0.166, 16.0, supply=12.0, duty_limit=0.97)
 LAW = {"a": 0.6, "b": 1.2, "Ia": 0.02, "Fs": 0.1, "Fv": 0.02, "offset": 0.0, "delay": 0.02, "rate": 4.5}

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from identify.arrays import Array
+from idbench.identify.arrays import Array
 
 LIGHT = 1e-9
 """Inertia of a link that has none, beside that of its rotor."""

@@ -1,0 +1,1 @@
+"""A MuJoCo testbench for the dynamic identification of robots."""
