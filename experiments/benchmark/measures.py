@@ -13,21 +13,14 @@ Row = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Measure:
-    """An error of held-out logs.
-
-    Parameters
-    ----------
-    name : str
-        What summaries call it.
-    words : str
-        What it is.
-    over_logs : callable
-        What is said of several logs, of shape (log, joint).
-    """
+    """An error of held-out logs."""
 
     name: str
+    """What summaries call it."""
     words: str
+    """What it is."""
     over_logs: Callable[[Array], Array]
+    """What is said of several logs, of shape (log, joint)."""
 
 
 def rms(each: Array) -> Array:

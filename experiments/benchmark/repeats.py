@@ -14,21 +14,14 @@ from idbench.identify import Estimate, IdentificationError, MotionLog
 
 
 class Repeats(NamedTuple):
-    """Differences of parameters between fits of single logs, in their standard errors.
-
-    Parameters
-    ----------
-    inside : int
-        How many are within two.
-    compared : int
-        How many there are.
-    failed : tuple of str
-        Why logs have no fit.
-    """
+    """Differences of parameters between fits of single logs, in their standard errors."""
 
     inside: int
+    """How many are within two."""
     compared: int
+    """How many there are."""
     failed: tuple[str, ...]
+    """Why logs have no fit."""
 
 
 def repeats(request: Request, logs: Sequence[MotionLog], names: Sequence[str]) -> Repeats:

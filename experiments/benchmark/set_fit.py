@@ -12,24 +12,15 @@ from idbench.identify import MotionLog
 @final
 @dataclass(frozen=True, eq=False)
 class SetFit:
-    """A set that is fitted.
-
-    Parameters
-    ----------
-    definition : Definition
-        What it is.
-    fit : Fit
-        Its fit.
-    repeated : callable
-        Reads the logs that are fitted one by one, by name.
-    seen : callable
-        Counts samples that files of the fit have too, by the name of the held-out file, before any were resampled.
-    seconds : float
-        How long reading and fitting took.
-    """
+    """A set that is fitted."""
 
     definition: Definition
+    """What it is."""
     fit: Fit
+    """Its fit."""
     repeated: Callable[[], Mapping[str, MotionLog]]
+    """Reads the logs that are fitted one by one, by name."""
     seen: Callable[[], Mapping[str, int]]
+    """Counts samples that files of the fit have too, by the name of the held-out file, before any were resampled."""
     seconds: float
+    """How long reading and fitting took."""

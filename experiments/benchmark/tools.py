@@ -21,21 +21,14 @@ PREDICTED = "predicted-*.npz"
 @final
 @dataclass(frozen=True)
 class Predicted:
-    """What a tool has predicted.
-
-    Parameters
-    ----------
-    torques : tuple of Array, each of shape (time, joint)
-        Torques at the samples of each held-out log [N m].
-    seconds : float
-        How long its fit took.
-    note : str
-        Its settings, and what else is to be known.
-    """
+    """What a tool has predicted."""
 
     torques: tuple[Array, ...]
+    """Torques at the samples of each held-out log [N m], shape (time, joint)."""
     seconds: float
+    """How long its fit took."""
     note: str
+    """Its settings, and what else is to be known."""
 
 
 def predictions(folder: Path) -> dict[str, Path]:

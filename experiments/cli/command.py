@@ -7,15 +7,10 @@ from idbench.experiments.cli.interruption import importing
 
 
 class Command:
-    """Options of a command; calling them does its work.
-
-    Parameters
-    ----------
-    action : str
-        File of `idbench.experiments.cli.commands` and function, as in log:show_log; it receives the options.
-    """
+    """Options of a command; calling them does its work."""
 
     action: ClassVar[str] = ""
+    """File of `idbench.experiments.cli.commands` and function, as in log:show_log; it receives the options."""
 
     def __init_subclass__(cls, action: str = "") -> None:
         cls.action = action or cls.action

@@ -46,48 +46,32 @@ PACES = 1.0, 0.3, 0.1
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """What is asked of a motion.
-
-    Parameters
-    ----------
-    robot : str
-        Its name or file.
-    scenario : Scenario
-        Noise, sampling frequency, and how it will be simulated; its trajectory does not matter.
-    kind : str
-        Of motion, of `EXCITATIONS`.
-    duration : float
-        Time of the motion, without ways and rest [s].
-    frequency : float
-        How fast it may change [Hz].
-    asked : MotionLimits
-        What it must keep.
-    repeat : int
-        Times that it is run.
-    seed : int
-        Of random motions and starts.
-    weights : mapping of str to float
-        Parameters that count more than others, or less; all count 1.
-    criterion : str
-        What is minimised: of `CRITERIA`, or sigma, the weighted mean of ln sigma, begun with the determinant.
-    logs : tuple of MotionLog
-        What is logged already.
-    parameters : Parameters
-        Which parameters are asked for.
-    """
+    """What is asked of a motion."""
 
     robot: str
+    """Its name or file."""
     scenario: Scenario
+    """Noise, sampling frequency, and how it will be simulated; its trajectory does not matter."""
     kind: str = "fourier"
+    """Of motion, of `EXCITATIONS`."""
     duration: float = 10.0
+    """Time of the motion, without ways and rest [s]."""
     frequency: float = 1.0
+    """How fast it may change [Hz]."""
     asked: MotionLimits = field(default_factory=MotionLimits)
+    """What it must keep."""
     repeat: int = 1
+    """Times that it is run."""
     seed: int = 0
+    """Of random motions and starts."""
     weights: Mapping[str, float] = field(default_factory=dict)
+    """Parameters that count more than others, or less; all count 1."""
     criterion: str = SIGMA
+    """What is minimised: of `CRITERIA`, or sigma, the weighted mean of ln sigma, begun with the determinant."""
     logs: tuple[MotionLog, ...] = ()
+    """What is logged already."""
     parameters: Parameters = Parameters()  # noqa: RUF009  # frozen
+    """Which parameters are asked for."""
 
     def __post_init__(self) -> None:
         names = self.robot_model.basis.names

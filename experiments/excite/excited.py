@@ -31,27 +31,18 @@ STRETCHES = 20
 
 @dataclass(frozen=True, eq=False)
 class Excited:
-    """The outcome of a design.
-
-    Parameters
-    ----------
-    design : Design
-        What was asked.
-    c : Array, shape (m, joint)
-        Coefficients of the motion.
-    random : list of Array
-        Those of random motions that keep the limits.
-    drawn : int
-        How many were drawn for them.
-    interrupted : bool
-        Whether the search was ended before its time.
-    """
+    """The outcome of a design."""
 
     design: Design
+    """What was asked."""
     c: Array
+    """Coefficients of the motion, shape (m, joint)."""
     random: list[Array]
+    """Those of random motions that keep the limits."""
     drawn: int
+    """How many were drawn for them."""
     interrupted: bool = False
+    """Whether the search was ended before its time."""
 
     @classmethod
     def of(cls, design: Design, progress: Progress | None = None) -> "Excited":

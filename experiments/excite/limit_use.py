@@ -27,25 +27,17 @@ ROUNDING = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class LimitUse:
-    """Shares of limits that a motion uses.
-
-    Parameters
-    ----------
-    shares : dict of str to Array, shape (time, joint), or (1, joint)
-        Of positions, from the middle of the range, velocities, accelerations, jerks, torques, torques of parameters that are
-        off, and of torques on average; 1 at the limit, without those that have none.
-    touch : Touch, optional
-        The nearest that shapes come, if nearer than they may.
-    least : float
-        Distance that they must keep [m].
-    joints : tuple of str
-        Names.
-    """
+    """Shares of limits that a motion uses."""
 
     shares: dict[str, Array]
+    """Of positions, from the middle of the range, velocities, accelerations, jerks, torques, torques of parameters that are
+    off, and of torques on average; 1 at the limit, without those that have none, shape (time, joint), or (1, joint)."""
     touch: Touch | None
+    """The nearest that shapes come, if nearer than they may."""
     least: float
+    """Distance that they must keep [m]."""
     joints: tuple[str, ...]
+    """Names."""
 
     @property
     def largest(self) -> dict[str, Array]:
@@ -65,30 +57,20 @@ class LimitUse:
 
 @dataclass(frozen=True, eq=False)
 class Inspector:
-    """Looks at motions of a robot.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-    limits : Limits
-        Its limits.
-    asked : MotionLimits
-        How they are to be kept.
-    clearance : Clearance
-        Its distances.
-    basis : Basis
-        Its parameters.
-    X : Array, shape (p,)
-        As far as they are known.
-    """
+    """Looks at motions of a robot."""
 
     robot: Robot
+    """The robot."""
     limits: Limits
+    """Its limits."""
     asked: MotionLimits
+    """How they are to be kept."""
     clearance: Clearance
+    """Its distances."""
     basis: Basis
+    """Its parameters."""
     X: Array
+    """As far as they are known, shape (p,)."""
 
     def look(self, motion: Reference) -> LimitUse:
         """Return how far a motion, sampled at FS, uses its limits."""

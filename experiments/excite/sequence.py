@@ -18,24 +18,16 @@ ROUNDS = 12
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """A motion, its log, and what all logs so far say.
-
-    Parameters
-    ----------
-    excited : Excited
-        The motion.
-    log : MotionLog
-        What was logged.
-    estimate : Estimate
-        Parameters from all logs so far.
-    shares : Array, shape (p,)
-        What one sigma of each parameter makes of a brisk motion's torque.
-    """
+    """A motion, its log, and what all logs so far say."""
 
     excited: Excited
+    """The motion."""
     log: MotionLog
+    """What was logged."""
     estimate: Estimate
+    """Parameters from all logs so far."""
     shares: Array
+    """What one sigma of each parameter makes of a brisk motion's torque, shape (p,)."""
 
     @property
     def share(self) -> float:
@@ -50,21 +42,14 @@ class Round:
 
 @dataclass(frozen=True, eq=False)
 class MotionSequence:
-    """Motions until every parameter is known well enough.
-
-    Parameters
-    ----------
-    rounds : tuple of Round
-        One a motion.
-    wished : float
-        Share that was asked for.
-    interrupted : bool
-        Whether it was ended before its time.
-    """
+    """Motions until every parameter is known well enough."""
 
     rounds: tuple[Round, ...]
+    """One a motion."""
     wished: float
+    """Share that was asked for."""
     interrupted: bool = False
+    """Whether it was ended before its time."""
 
     @classmethod
     def of(cls, design: Design, wished: float, progress: Progress | None = None) -> "MotionSequence":

@@ -19,18 +19,12 @@ ROUNDING = 1e-12
 @final
 @dataclass(frozen=True, eq=False)
 class Budget:
-    """The largest torques that each cause asks of the joints along a motion.
-
-    Parameters
-    ----------
-    robot : Robot
-        The robot as its file describes it.
-    motion : Reference
-        Where it goes.
-    """
+    """The largest torques that each cause asks of the joints along a motion."""
 
     robot: Robot
+    """The robot as its file describes it."""
     motion: Reference
+    """Where it goes."""
 
     @cached_property
     def parts(self) -> Mapping[str, Array]:

@@ -21,18 +21,12 @@ SIGMAS = 3.0
 @final
 @dataclass(frozen=True, eq=False)
 class Written:
-    """The physically consistent robot that agrees best with an estimate, as a file.
-
-    Parameters
-    ----------
-    fit : Fit
-        The identification.
-    model : str
-        Name of the model whose estimate is taken.
-    """
+    """The physically consistent robot that agrees best with an estimate, as a file."""
 
     fit: Fit
+    """The identification."""
     model: str
+    """Name of the model whose estimate is taken."""
 
     @cached_property
     def consistent(self) -> Consistent:

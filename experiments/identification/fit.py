@@ -100,36 +100,24 @@ def _moved(request: Request, outcome: Estimate | IdentificationError) -> Estimat
 @final
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Logs, identified.
-
-    Parameters
-    ----------
-    request : Request
-        What was asked for, with the laws of friction that were chosen, and without parameters that the logs do not show.
-    logs : Logs
-        The logs.
-    problem : Problem
-        Logs, robot and chain, by the explicit model.
-    unconstrained : mapping of str to Estimate or IdentificationError
-        What each model gives, whether it is physically consistent or not.
-    outcomes : mapping of str to Estimate or IdentificationError
-        The same, made consistent where that is asked for.
-    choice : FrictionChoice, optional
-        What was compared, where laws of friction were chosen.
-    hidden : tuple of str
-        Parameters that were left out because the logs do not show them.
-    raised : tuple of int
-        Joints whose mask was made to reach farther, since their friction in slow motion is not that of faster motion.
-    """
+    """Logs, identified."""
 
     request: Request
+    """What was asked for, with the laws of friction that were chosen, and without parameters that the logs do not show."""
     logs: Logs
+    """The logs."""
     problem: Problem
+    """Logs, robot and chain, by the explicit model."""
     unconstrained: Outcomes
+    """What each model gives, whether it is physically consistent or not."""
     outcomes: Outcomes
+    """The same, made consistent where that is asked for."""
     choice: FrictionChoice | None = None
+    """What was compared, where laws of friction were chosen."""
     hidden: tuple[str, ...] = ()
+    """Parameters that were left out because the logs do not show them."""
     raised: tuple[int, ...] = ()
+    """Joints whose mask was made to reach farther, since their friction in slow motion is not that of faster motion."""
 
     @property
     def robot_model(self) -> RobotModel:

@@ -35,18 +35,12 @@ Coulomb friction at rest alone, where no mask takes that out."""
 @final
 @dataclass(frozen=True)
 class FrictionLaws:
-    """The laws of each joint.
-
-    Parameters
-    ----------
-    names : tuple of tuple of str
-        Names of `BLOCKS`, joint by joint; a number after a colon is a law's first setting.
-    auto : bool
-        Whether what suits the logs is to be added.
-    """
+    """The laws of each joint."""
 
     names: tuple[tuple[str, ...], ...]
+    """Names of `BLOCKS`, joint by joint; a number after a colon is a law's first setting."""
     auto: bool = False
+    """Whether what suits the logs is to be added."""
 
     @classmethod
     def of(cls, texts: Sequence[str], joints: Sequence[str]) -> "FrictionLaws":

@@ -48,21 +48,14 @@ def on_last_quarter(result: Fit) -> "HeldOut":
 @final
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """A fit on a log that it was not fitted to.
-
-    Parameters
-    ----------
-    fit : Fit
-        The fit.
-    log : MotionLog
-        The log.
-    title : str
-        What to call it.
-    """
+    """A fit on a log that it was not fitted to."""
 
     fit: Fit
+    """The fit."""
     log: MotionLog
+    """The log."""
     title: str
+    """What to call it."""
 
     @cached_property
     def problem(self) -> Problem:

@@ -13,21 +13,14 @@ from idbench.experiments.identification.verdict import WORDS
 @final
 @dataclass(frozen=True)
 class Unjudged:
-    """A held-out log on which a fit could not be judged.
-
-    Parameters
-    ----------
-    title : str
-        What to call it.
-    why : str
-        The reason.
-    traceback : str
-        Of a fault of idbench.
-    """
+    """A held-out log on which a fit could not be judged."""
 
     title: str
+    """What to call it."""
     why: str
+    """The reason."""
     traceback: str = ""
+    """Of a fault of idbench."""
 
     def summary(self) -> dict[str, Any]:
         """Return what a summary.json says of it."""
@@ -37,18 +30,12 @@ class Unjudged:
 @final
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """A fit, judged.
-
-    Parameters
-    ----------
-    fit : Fit
-        The fit.
-    on : tuple of HeldOut or Unjudged
-        The fit on each held-out log.
-    """
+    """A fit, judged."""
 
     fit: Fit
+    """The fit."""
     on: tuple[HeldOut | Unjudged, ...]
+    """The fit on each held-out log."""
 
     @property
     def held_out(self) -> list[HeldOut]:

@@ -23,21 +23,14 @@ MOST_STARTS = 1000
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """Logs as they were read, and the request with the band that suits them.
-
-    Parameters
-    ----------
-    request : Request
-        What is asked for.
-    read : tuple of ReadLog
-        The logs.
-    notes : tuple of str
-        What was read, done and assumed.
-    """
+    """Logs as they were read, and the request with the band that suits them."""
 
     request: Request
+    """What is asked for."""
     read: tuple[ReadLog, ...]
+    """The logs."""
     notes: tuple[str, ...]
+    """What was read, done and assumed."""
 
     def logs(self, some: slice = slice(None)) -> tuple[MotionLog, ...]:
         """Return some of the logs, or the pieces of those with gaps."""

@@ -20,15 +20,10 @@ STILL = 1e-3
 @final
 @dataclass(frozen=True, eq=False)
 class LogFacts:
-    """What a log is like.
-
-    Parameters
-    ----------
-    columns : LogColumns
-        Its columns, in SI units.
-    """
+    """What a log is like."""
 
     columns: LogColumns
+    """Its columns, in SI units."""
 
     @cached_property
     def repaired(self) -> Repaired:

@@ -15,30 +15,20 @@ WITH_LAWS = "torque delay with the laws of friction that were chosen"
 
 @dataclass(frozen=True, eq=False)
 class Logs:
-    """The logs of one fit.
-
-    Parameters
-    ----------
-    fitted : tuple of MotionLog
-        The logs, and the pieces of those with gaps.
-    names : tuple of str
-        What to call them.
-    held_out : mapping of str to MotionLog
-        Logs on which the fit is judged, by name; without any, the last quarter of the longest fitted log.
-    notes : tuple of str
-        What was read, done and assumed.
-    truth : mapping of str to float, optional
-        The true parameters, where they are known.
-    delay_sought : bool
-        Whether the delay of the torques was estimated, and may be estimated again with more laws of friction.
-    """
+    """The logs of one fit."""
 
     fitted: tuple[MotionLog, ...]
+    """The logs, and the pieces of those with gaps."""
     names: tuple[str, ...] = ()
+    """What to call them."""
     held_out: Mapping[str, MotionLog] | None = None
+    """Logs on which the fit is judged, by name; without any, the last quarter of the longest fitted log."""
     notes: tuple[str, ...] = ()
+    """What was read, done and assumed."""
     truth: Mapping[str, float] | None = None
+    """The true parameters, where they are known."""
     delay_sought: bool = False
+    """Whether the delay of the torques was estimated, and may be estimated again with more laws of friction."""
 
     def delayed(self, basis: Basis, chain: Chain) -> tuple["Logs", bool]:
         """Return the logs with the delay that explains their torques best with other laws, and whether it moved by a sigma.

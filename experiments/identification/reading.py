@@ -59,53 +59,36 @@ def stated_by(log: Path) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """How a log is read.
-
-    Parameters
-    ----------
-    torque, delay : str, optional
-        What its torque means, and its delay, as options say.
-    unwrap : bool
-        Whether 2 pi jumps of the angles are undone.
-    fallback : TorqueChannel, optional
-        What its torque means where the file says nothing.
-    columns : ColumnOptions
-        What the columns are, as options say.
-    """
+    """How a log is read."""
 
     torque: Meaning | None = None
+    """What its torque means, and its delay, as options say."""
     delay: str | None = None
+    """What its torque means, and its delay, as options say."""
     unwrap: bool = False
+    """Whether 2 pi jumps of the angles are undone."""
     fallback: TorqueChannel | None = None
+    """What its torque means where the file says nothing."""
     columns: ColumnOptions = ColumnOptions()  # noqa: RUF009  # frozen
+    """What the columns are, as options say."""
 
 
 @dataclass(frozen=True, eq=False)
 class ReadLog:
-    """A log as it was read.
-
-    Parameters
-    ----------
-    path : Path
-        Its file.
-    logs : tuple of MotionLog
-        The log; its pieces, if it has gaps.
-    columns : LogColumns
-        What the file holds.
-    channel : TorqueChannel
-        What its torque means, as it was logged.
-    repaired : Repaired or None
-        What was done to its clock, if that was asked for.
-    notes : tuple of str
-        What was done or assumed.
-    """
+    """A log as it was read."""
 
     path: Path
+    """Its file."""
     logs: tuple[MotionLog, ...]
+    """The log; its pieces, if it has gaps."""
     columns: LogColumns
+    """What the file holds."""
     channel: TorqueChannel
+    """What its torque means, as it was logged."""
     repaired: Repaired | None = None
+    """What was done to its clock, if that was asked for."""
     notes: tuple[str, ...] = ()
+    """What was done or assumed."""
 
     @property
     def longest(self) -> MotionLog:

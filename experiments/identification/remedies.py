@@ -57,15 +57,10 @@ def delay_advice(result: Fit) -> Iterator[str]:
 @final
 @dataclass(frozen=True, eq=False)
 class Remedies:
-    """Options of identification, tried on a held-out log.
-
-    Parameters
-    ----------
-    held_out : HeldOut
-        The fit that is to be mended, on a held-out log.
-    """
+    """Options of identification, tried on a held-out log."""
 
     held_out: HeldOut
+    """The fit that is to be mended, on a held-out log."""
 
     def options(self) -> Iterator[str]:
         """Yield options with which the error falls, and how far."""

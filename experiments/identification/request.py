@@ -21,29 +21,6 @@ from idbench.sim.scenario.scenario import Scenario
 class Request:
     """What is asked for of logs; names and settings are checked when it is made.
 
-    Parameters
-    ----------
-    robot_model : RobotModel
-        The robot.
-    models : tuple of str
-        Names of the models.
-    chain, estimator : str
-        Their names.
-    method : tuple of Chain and AbstractEstimator, optional
-        Both with settings of their own, instead of those that have the names.
-    trim : float, optional
-        Time at either end of a log that makes no rows [s]; by default what the chain needs.
-    name : str
-        What to call it beside others of the same log; by default chain and estimator.
-    loops : tuple of Scenario
-        The closed loops in which the logs were recorded, for estimators that simulate them: one for each log.
-    start : {"least-squares", "file"}
-        Where estimators begin that simulate or filter: at the least-squares estimate, or at the parameters of the robot's file.
-    mask_speed : tuple of float
-        Speeds up to which joints count as standing or turning, of all or of each [rad/s, m/s]; by default they follow the log.
-    consistent : {"no", "pullback", "entropic"}
-        Whether estimates are moved to the nearest physically consistent parameters.
-
     Raises
     ------
     ExperimentError, IdentificationError, BenchError
@@ -51,16 +28,29 @@ class Request:
     """
 
     robot_model: RobotModel = field(default_factory=RobotModel)
+    """The robot."""
     models: tuple[str, ...] = ("explicit", "implicit", "power")
+    """Names of the models."""
     chain: str = CHAIN
+    """Their names."""
     estimator: str = ESTIMATOR
+    """Their names."""
     method: tuple[Chain, AbstractEstimator] | None = None
+    """Both with settings of their own, instead of those that have the names."""
     trim: float | None = None
+    """Time at either end of a log that makes no rows [s]; by default what the chain needs."""
     name: str = ""
+    """What to call it beside others of the same log; by default chain and estimator."""
     loops: tuple[Scenario, ...] = ()
+    """The closed loops in which the logs were recorded, for estimators that simulate them: one for each log."""
     start: Start = "least-squares"
+    """Where estimators begin that simulate or filter: at the least-squares estimate, or at the parameters of the robot's
+    file."""
     consistent: Consistency = "no"
+    """Whether estimates are moved to the nearest physically consistent parameters."""
     mask_speed: tuple[float, ...] = ()
+    """Speeds up to which joints count as standing or turning, of all or of each [rad/s, m/s]; by default they follow the
+    log."""
 
     def __post_init__(self) -> None:
         _ = self.robot_model.basis, self.processing, self.solver, [MODELS.create(name) for name in self.models]

@@ -24,21 +24,14 @@ SCARA = "scara"
 @final
 @dataclass(frozen=True, eq=False)
 class RobotModel:
-    """A robot by its name or file, and which of its parameters are asked for.
-
-    Parameters
-    ----------
-    name : str
-        Name of a robot that ships, or path of an MJCF or URDF file.
-    asked : Parameters
-        Which of its parameters are asked for.
-    mounting : Mounting
-        How it is mounted, and which of its joints move.
-    """
+    """A robot by its name or file, and which of its parameters are asked for."""
 
     name: str = SCARA
+    """Name of a robot that ships, or path of an MJCF or URDF file."""
     asked: Parameters = Parameters()  # noqa: RUF009  # frozen
+    """Which of its parameters are asked for."""
     mounting: Mounting = PLAIN
+    """How it is mounted, and which of its joints move."""
 
     @cached_property
     def robot(self) -> Robot:

@@ -24,24 +24,16 @@ LONG, ENDLESS = 3e6, 1e9
 
 @dataclass(frozen=True, eq=False)
 class ScenarioRun:
-    """A scenario, simulated and identified when it is asked for.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        What to run.
-    request : Request
-        How its log is identified.
-    progress : callable, optional
-        Receives how much of the simulation is done.
-    watch : Watch, optional
-        Receives what happens in it.
-    """
+    """A scenario, simulated and identified when it is asked for."""
 
     scenario: Scenario
+    """What to run."""
     request: Request
+    """How its log is identified."""
     progress: Progress | None = None
+    """Receives how much of the simulation is done."""
     watch: Watch | None = None
+    """Receives what happens in it."""
 
     def __post_init__(self) -> None:
         # A robot that does not fit is reported before the simulation.

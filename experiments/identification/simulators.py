@@ -34,15 +34,10 @@ SAME = 1e-6
 @final
 @dataclass(frozen=True, eq=False)
 class Fields:
-    """MuJoCo's model of a robot with parameters of its basis.
-
-    Parameters
-    ----------
-    robot_model : RobotModel
-        The robot.
-    """
+    """MuJoCo's model of a robot with parameters of its basis."""
 
     robot_model: RobotModel
+    """The robot."""
 
     @cached_property
     def robot(self) -> Robot:
@@ -92,24 +87,16 @@ class Fields:
 @final
 @dataclass(frozen=True, eq=False)
 class ScenarioLoop(AbstractLoop):
-    """The closed loops of scenarios, one for each log, without noise, ripple and payload.
-
-    Parameters
-    ----------
-    robot_model : RobotModel
-        The robot.
-    scenarios : tuple of Scenario
-        Controller, timing, drive and motion of each log.
-    logs : tuple of MotionLog
-        What they are to repeat.
-    motions : tuple of Reference
-        Planned motions of all runs of the only log, where they differ; those of the scenarios by default.
-    """
+    """The closed loops of scenarios, one for each log, without noise, ripple and payload."""
 
     robot_model: RobotModel
+    """The robot."""
     scenarios: tuple[Scenario, ...]
+    """Controller, timing, drive and motion of each log."""
     logs: tuple[MotionLog, ...]
+    """What they are to repeat."""
     motions: tuple[Reference, ...] = ()
+    """Planned motions of all runs of the only log, where they differ; those of the scenarios by default."""
 
     @classmethod
     def of(cls, robot_model: RobotModel, scenarios: tuple[Scenario, ...], logs: tuple[MotionLog, ...]) -> Self:
@@ -161,15 +148,10 @@ class ScenarioLoop(AbstractLoop):
 @final
 @dataclass(frozen=True, eq=False)
 class RobotPlant(AbstractPlant):
-    """The robot by itself.
-
-    Parameters
-    ----------
-    robot_model : RobotModel
-        The robot.
-    """
+    """The robot by itself."""
 
     robot_model: RobotModel
+    """The robot."""
 
     def shoot(self, X: Array, q: Array, qd: Array, log: MotionLog, first: npt.NDArray[np.intp], count: int) -> Array:
         """Return the positions of robots that start somewhere in a log."""

@@ -25,24 +25,16 @@ WORDS = ("good", "fair", "unsure", "poor")
 @final
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """What to think of one model on a held-out log.
-
-    Parameters
-    ----------
-    joints : tuple of str
-        Names of the joints.
-    validation : Validation
-        Its torque errors.
-    wrong : tuple of str
-        Which of the fitted torques have the wrong sign, and why.
-    unsimulated : str
-        Why the identified robot was not simulated; empty if it was.
-    """
+    """What to think of one model on a held-out log."""
 
     joints: tuple[str, ...]
+    """Names of the joints."""
     validation: Validation
+    """Its torque errors."""
     wrong: tuple[str, ...] = ()
+    """Which of the fitted torques have the wrong sign, and why."""
     unsimulated: str = ""
+    """Why the identified robot was not simulated; empty if it was."""
 
     @classmethod
     def of(cls, judged: Fit, validation: Validation, unsimulated: str = "") -> Self:

@@ -36,27 +36,18 @@ OPTIONS = {"ML": "--mass", "MXL": "--at", "MYL": "--at", "MZL": "--at"}
 @final
 @dataclass(frozen=True, eq=False)
 class LoadJudgement:
-    """Logs without and with a payload, judged by one estimate of robot and payload.
-
-    Parameters
-    ----------
-    robot : LoadedRobot
-        The robot and its logs.
-    request : Request
-        How one of the logs is identified by itself.
-    names : tuple of str
-        Names of the logs, those without the payload first.
-    gain : Array, shape (joint,)
-        Torque over what the files have: the logs have been read with it.
-    before : mapping of str to float, optional
-        Base parameters of the robot that were identified before, where there are no logs without the payload.
-    """
+    """Logs without and with a payload, judged by one estimate of robot and payload."""
 
     robot: LoadedRobot
+    """The robot and its logs."""
     request: Request
+    """How one of the logs is identified by itself."""
     names: tuple[str, ...]
+    """Names of the logs, those without the payload first."""
     gain: Array
+    """Torque over what the files have: the logs have been read with it, shape (joint,)."""
     before: Mapping[str, float] | None = None
+    """Base parameters of the robot that were identified before, where there are no logs without the payload."""
 
     def with_gains(self, ratio: Array) -> Self:
         """Return the same of logs that are read with other multiples of their gains."""

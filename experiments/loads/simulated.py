@@ -37,26 +37,20 @@ Found: TypeAlias = tuple[tuple[str, ...], Array, Array, Array]
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """How far estimates of many runs are off.
-
-    Parameters
-    ----------
-    names : tuple of str
-        What was estimated.
-    truth, error, z : Array, shape (run, p)
-        True values, errors, and these in sigma.
-    seconds : float
-        A run took.
-    failures : tuple of str
-        Why runs have no estimate.
-    """
+    """How far estimates of many runs are off."""
 
     names: tuple[str, ...]
+    """What was estimated."""
     truth: Array
+    """True values, errors, and these in sigma, shape (run, p)."""
     error: Array
+    """True values, errors, and these in sigma, shape (run, p)."""
     z: Array
+    """True values, errors, and these in sigma, shape (run, p)."""
     seconds: float
+    """A run took."""
     failures: tuple[str, ...] = ()
+    """Why runs have no estimate."""
 
     @property
     def coverage(self) -> float:
@@ -76,21 +70,14 @@ class Score:
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """A scenario with a payload, simulated with and without it, many times; only what is random differs from run to run.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        With the payload.
-    runs : int
-        How many.
-    parameters : Parameters
-        Which parameters of the robot are identified.
-    """
+    """A scenario with a payload, simulated with and without it, many times; only what is random differs from run to run."""
 
     scenario: Scenario
+    """With the payload."""
     runs: int
+    """How many."""
     parameters: Parameters = Parameters()  # noqa: RUF009  # frozen
+    """Which parameters of the robot are identified."""
 
     def __post_init__(self) -> None:
         if not self.scenario.payload.mass:

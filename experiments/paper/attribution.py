@@ -41,24 +41,16 @@ COMPARED = {"explicit": ExplicitModel(), "power": PowerModel()}
 
 @dataclass(frozen=True)
 class Imperfection:
-    """One imperfection.
-
-    Parameters
-    ----------
-    name : str
-        What it is.
-    scenario : Scenario
-        An ideal loop but for it.
-    chain : Chain
-        Chain `idbench`, but for what it is about.
-    assumed : TorqueChannel, optional
-        What identification believes of the torque; by default what is true.
-    """
+    """One imperfection."""
 
     name: str
+    """What it is."""
     scenario: Scenario
+    """An ideal loop but for it."""
     chain: Chain
+    """Chain `idbench`, but for what it is about."""
     assumed: TorqueChannel | None = None
+    """What identification believes of the torque; by default what is true."""
 
 
 def imperfections(table2: Scenario) -> list[Imperfection]:

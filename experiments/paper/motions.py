@@ -36,32 +36,24 @@ BAND = (5.0, 95.0)
 
 @dataclass(frozen=True)
 class Pace:
-    """The class of motions.
-
-    Parameters
-    ----------
-    moves : tuple of int
-        Fewest and most moves.
-    shortest : float
-        Least time of a move [s].
-    motion, rest : float
-        Time of all moves, and at rest at either end [s].
-    fs : float
-        Sampling frequency [Hz]; moves last whole samples.
-    clearance, smallest_move : float
-        Least distance to the ends of the joints' ranges, and of every joint in every move [rad].
-    velocity : float
-        Limit of the joints' speed [rad/s].
-    """
+    """The class of motions."""
 
     moves: tuple[int, int] = (16, 30)
+    """Fewest and most moves."""
     shortest: float = 1.3
+    """Least time of a move [s]."""
     motion: float = 40.0
+    """Time of all moves, and at rest at either end [s]."""
     rest: float = 3.0
+    """Time of all moves, and at rest at either end [s]."""
     fs: float = 100.0
+    """Sampling frequency [Hz]; moves last whole samples."""
     clearance: float = 0.2
+    """Least distance to the ends of the joints' ranges, and of every joint in every move [rad]."""
     smallest_move: float = 0.1
+    """Least distance to the ends of the joints' ranges, and of every joint in every move [rad]."""
     velocity: float = 7.0
+    """Limit of the joints' speed [rad/s]."""
 
     def draw(self, rng: np.random.Generator, robot: Robot) -> PointToPoint:
         """Return a motion of the class: number, times and amplitudes of its moves are random."""
@@ -79,21 +71,14 @@ class Pace:
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Errors of one chain on the motions that are kept.
-
-    Parameters
-    ----------
-    drawn : int
-        Motions that were drawn and keep the robot's limits.
-    condition : dict of str to Array, shape (motion,)
-        Cond(W) of each model.
-    percent : dict of str to Array, shape (motion, p)
-        Relative errors of each model, without sign [%].
-    """
+    """Errors of one chain on the motions that are kept."""
 
     drawn: int
+    """Motions that were drawn and keep the robot's limits."""
     condition: Mapping[str, Array]
+    """Cond(W) of each model, shape (motion,)."""
     percent: Mapping[str, Array]
+    """Relative errors of each model, without sign [%], shape (motion, p)."""
 
     @property
     def kept(self) -> int:
@@ -119,27 +104,18 @@ ROUNDED = 5e-4
 
 @dataclass(frozen=True, eq=False)
 class Table1Motions:
-    """The errors of Table 1 over random motions with the paper's condition numbers, computed when they are asked for.
-
-    Parameters
-    ----------
-    motions : int
-        How many are drawn.
-    seed : int
-        Of the first; motion i of a seed is the same whatever their number.
-    pace : Pace
-        Their class.
-    tolerance : float
-        Motions are kept whose condition numbers are within this share of the paper's, in the chain itself.
-    progress : callable, optional
-        Receives how much is done.
-    """
+    """The errors of Table 1 over random motions with the paper's condition numbers, computed when they are asked for."""
 
     motions: int
+    """How many are drawn."""
     seed: int = 0
+    """Of the first; motion i of a seed is the same whatever their number."""
     pace: Pace = Pace()  # frozen
+    """Their class."""
     tolerance: float = 0.3
+    """Motions are kept whose condition numbers are within this share of the paper's, in the chain itself."""
     progress: Progress | None = None
+    """Receives how much is done."""
 
     def __post_init__(self) -> None:
         if self.motions < 1 or self.seed < 0:

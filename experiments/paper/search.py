@@ -31,45 +31,32 @@ class Search:
 
     It draws a sequence of waypoints, then redraws one of them at a time and keeps what comes closer: first to the
     limits of speed and torque, then, within them, to the condition numbers.
-
-    Parameters
-    ----------
-    seed : int
-        Of everything random.
-    fs : float
-        Sampling frequency [Hz].
-    rest : float
-        Time at rest at both ends [s].
-    motion : float
-        Time from the first to the last move [s].
-    moves : int
-        Number of moves, each within 15 % of motion / moves long, in whole samples.
-    chain : str
-        Name of the chain in which the condition numbers are the paper's: its own steps, reversals left out.
-    smallest_move : float
-        Least change of every joint in every move [rad]: slower moves would be masked for whole rows.
-    clearance : float
-        Least distance to the ends of the joints' ranges [rad].
-    velocity : float
-        Limit of the joints' speed [rad/s].
-    tolerance : float
-        It ends when both condition numbers are within this share of the paper's.
-    rounds, candidates : int
-        It gives up after so many rounds of so many candidates.
     """
 
     seed: int = 0
+    """Of everything random."""
     fs: float = 100.0
+    """Sampling frequency [Hz]."""
     rest: float = 3.0
+    """Time at rest at both ends [s]."""
     motion: float = 40.0
+    """Time from the first to the last move [s]."""
     moves: int = 22
+    """Number of moves, each within 15 % of motion / moves long, in whole samples."""
     chain: str = "paper_masked"
+    """Name of the chain in which the condition numbers are the paper's: its own steps, reversals left out."""
     smallest_move: float = 0.4
+    """Least change of every joint in every move [rad]: slower moves would be masked for whole rows."""
     clearance: float = 0.2
+    """Least distance to the ends of the joints' ranges [rad]."""
     velocity: float = 7.0
+    """Limit of the joints' speed [rad/s]."""
     tolerance: float = 0.01
+    """It ends when both condition numbers are within this share of the paper's."""
     rounds: int = 300
+    """It gives up after so many rounds of so many candidates."""
     candidates: int = 16
+    """It gives up after so many rounds of so many candidates."""
 
     def __post_init__(self) -> None:
         if self.seed < 0:

@@ -39,22 +39,16 @@ SCENARIO = "table1"
 
 @dataclass(frozen=True)
 class PaperColumn:
-    """What the paper's Table 1 prints for one model.
-
-    Parameters
-    ----------
-    estimate, error : tuple of float
-        X and %e of the eight parameters.
-    condition_number : float
-        Cond(W).
-    rows : int
-        r.
-    """
+    """What the paper's Table 1 prints for one model."""
 
     estimate: tuple[float, ...]
+    """X and %e of the eight parameters."""
     error: tuple[float, ...]
+    """X and %e of the eight parameters."""
     condition_number: float
+    """Cond(W)."""
     rows: int
+    """r."""
 
 
 PAPER: Mapping[str, PaperColumn] = {
@@ -82,18 +76,12 @@ PAPER: Mapping[str, PaperColumn] = {
 
 @dataclass(frozen=True, eq=False)
 class Table1:
-    """The comparison, computed when it is asked for.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The motion.
-    chains : tuple of str
-        Names of the chains to compare.
-    """
+    """The comparison, computed when it is asked for."""
 
     scenario: Scenario
+    """The motion."""
     chains: tuple[str, ...]
+    """Names of the chains to compare."""
 
     def __post_init__(self) -> None:
         for name in self.chains:

@@ -38,20 +38,16 @@ PROCESSINGS: Mapping[str, tuple[str, str]] = {"paper": ("paper", "OLS"), "idbenc
 
 @dataclass(frozen=True)
 class PaperColumn:
-    """What the paper's Table 2 prints for a model.
-
-    Parameters
-    ----------
-    estimate, two_sigma, relative_sigma_percent : tuple of float
-        Its columns.
-    condition_number : float
-        Cond(W).
-    """
+    """What the paper's Table 2 prints for a model."""
 
     estimate: tuple[float, ...]
+    """Its columns."""
     two_sigma: tuple[float, ...]
+    """Its columns."""
     relative_sigma_percent: tuple[float, ...]
+    """Its columns."""
     condition_number: float
+    """Cond(W)."""
 
 
 _DYNAMIC = PaperColumn(
@@ -79,21 +75,14 @@ PAPER_ROWS = 1600
 
 @dataclass(frozen=True, eq=False)
 class Table2:
-    """The comparison, computed when it is asked for.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The robot and its motion; realization k has seed + k.
-    progress : callable, optional
-        Receives how much of the simulation is done.
-    watch : Watch, optional
-        Receives what happens in the first realization.
-    """
+    """The comparison, computed when it is asked for."""
 
     scenario: Scenario
+    """The robot and its motion; realization k has seed + k."""
     progress: Progress | None = None
+    """Receives how much of the simulation is done."""
     watch: Watch | None = None
+    """Receives what happens in the first realization."""
 
     def __post_init__(self) -> None:
         scara_truth(self.scenario.real_robot)

@@ -31,18 +31,12 @@ LEFT_OUT = ("name", "origin")
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """A run in a comparison.
-
-    Parameters
-    ----------
-    folder : Path
-        Its results.
-    name : str
-        What it is called.
-    """
+    """A run in a comparison."""
 
     folder: Path
+    """Its results."""
     name: str
+    """What it is called."""
 
     @cached_property
     def summary(self) -> Mapping[str, Any]:

@@ -32,27 +32,18 @@ DARK: Color = (90, 90, 90)
 
 @dataclass(frozen=True, eq=False)
 class ResidualCharts:
-    """The charts of one identification.
-
-    Parameters
-    ----------
-    stream : Stream
-        Where they go.
-    at : str
-        Path of the identification.
-    fit : Fit
-        The identification.
-    joints : sequence of str
-        Names of the joints, as parts of paths.
-    number : int
-        Which identification of the log it is, from 0: each has its own colours.
-    """
+    """The charts of one identification."""
 
     stream: Stream
+    """Where they go."""
     at: str
+    """Path of the identification."""
     fit: Fit
+    """The identification."""
     joints: Sequence[str]
+    """Names of the joints, as parts of paths."""
     number: int = 0
+    """Which identification of the log it is, from 0: each has its own colours."""
 
     def send(self) -> None:
         """Send them all."""

@@ -27,19 +27,14 @@ ROOM = 0.04
 
 @dataclass(frozen=True)
 class AbstractScale(ABC):
-    """An axis of a chart.
-
-    Parameters
-    ----------
-    name : str
-        What it shows, with its unit.
-    low, high : float
-        Its ends.
-    """
+    """An axis of a chart."""
 
     name: str
+    """What it shows, with its unit."""
     low: float
+    """Its ends."""
     high: float
+    """Its ends."""
 
     def at(self, x: npt.ArrayLike) -> Array:
         """Return where values lie, 0 at the low end and 1 at the high one; what is beyond an end lies there."""

@@ -40,21 +40,14 @@ Worst = tuple[Cell, str, float, int, str]
 
 @dataclass(frozen=True, eq=False)
 class AxisCharts:
-    """The charts over one axis.
-
-    Parameters
-    ----------
-    stream : Stream
-        Where they go.
-    axis : Axis
-        The axis.
-    cells : sequence of Cell
-        Those that have runs.
-    """
+    """The charts over one axis."""
 
     stream: Stream
+    """Where they go."""
     axis: Axis
+    """The axis."""
     cells: Sequence[Cell]
+    """Those that have runs."""
 
     def send(self, worst: Sequence[Worst]) -> None:
         """Send the typical error, and that of every parameter with its runs, the worst of them by name."""

@@ -21,18 +21,12 @@ ABOUT = "~"
 
 @dataclass(frozen=True, eq=False)
 class EstimatesTable:
-    """Of each model its estimate, error or sigma, and %sigma, beside the truth if it is known.
-
-    Parameters
-    ----------
-    fit : Fit
-        The identification.
-    models : tuple of str, optional
-        Those that are shown; all of it by default.
-    """
+    """Of each model its estimate, error or sigma, and %sigma, beside the truth if it is known."""
 
     fit: Fit
+    """The identification."""
     models: tuple[str, ...] = ()
+    """Those that are shown; all of it by default."""
 
     @property
     def estimates(self) -> dict[str, Estimate]:

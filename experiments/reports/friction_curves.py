@@ -45,18 +45,12 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class FrictionCurves:
-    """The friction of the joints of an identification.
-
-    Parameters
-    ----------
-    fit : Fit
-        The identification.
-    X : Array, shape (p,)
-        The parameters of one of its estimates.
-    """
+    """The friction of the joints of an identification."""
 
     fit: Fit
+    """The identification."""
     X: Array
+    """The parameters of one of its estimates, shape (p,)."""
 
     def measured(self, j: int) -> tuple[Array, Array, Array]:
         """Return velocities of a joint, its torque less the rigid body's, and the weights of the mask, shape (row,) each."""

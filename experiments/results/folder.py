@@ -43,27 +43,18 @@ FILES: Mapping[str, tuple[str, ...]] = {
 @final
 @dataclass(frozen=True)
 class ResultsFolder:
-    """The folder of an experiment's results.
-
-    Parameters
-    ----------
-    out : Path
-        The folder.
-    experiment : str
-        Which kind of experiment writes there.
-    command : str
-        The command that makes the results, with all options on which they depend.
-    force : bool
-        Whether files of others may be replaced.
-    read : sequence of Path
-        Files that the command reads: they are never replaced.
-    """
+    """The folder of an experiment's results."""
 
     out: Path
+    """The folder."""
     experiment: str
+    """Which kind of experiment writes there."""
     command: str
+    """The command that makes the results, with all options on which they depend."""
     force: bool = False
+    """Whether files of others may be replaced."""
     read: Read = ()
+    """Files that the command reads: they are never replaced."""
 
     def check(self) -> None:
         """Raise ResultsError if the results cannot go there, or files of others would have to go."""

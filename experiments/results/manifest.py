@@ -16,35 +16,23 @@ NAME = ".idbench.json"
 @final
 @dataclass(frozen=True)
 class Written:
-    """A file that idbench wrote.
-
-    Parameters
-    ----------
-    command : str
-        The command that wrote it.
-    digests : tuple of str
-        Of its content, and of that which was there before: an exchange may have been cut off between the two.
-    """
+    """A file that idbench wrote."""
 
     command: str
+    """The command that wrote it."""
     digests: tuple[str, ...]
+    """Of its content, and of that which was there before: an exchange may have been cut off between the two."""
 
 
 @final
 @dataclass(frozen=True)
 class Manifest:
-    """The files of a folder that idbench wrote.
-
-    Parameters
-    ----------
-    folder : Path
-        The folder.
-    files : mapping of str to Written
-        By their names.
-    """
+    """The files of a folder that idbench wrote."""
 
     folder: Path
+    """The folder."""
     files: Mapping[str, Written] = field(default_factory=dict)
+    """By their names."""
 
     @classmethod
     def of(cls, folder: Path) -> Self:

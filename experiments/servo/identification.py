@@ -27,24 +27,16 @@ AUTO = "auto"
 @final
 @dataclass(frozen=True, eq=False)
 class Servos:
-    """Servos of a robot with their logs; joints have their names.
-
-    Parameters
-    ----------
-    robot : str
-        Name or file of the robot.
-    mounting : Mounting
-        How it is mounted.
-    known : ServoFile
-        What is known of the servos.
-    logs : mapping of Path to ServoColumns
-        What was logged.
-    """
+    """Servos of a robot with their logs; joints have their names."""
 
     robot: str
+    """Name or file of the robot."""
     mounting: Mounting
+    """How it is mounted."""
     known: ServoFile
+    """What is known of the servos."""
     logs: dict[Path, ServoColumns]
+    """What was logged."""
 
     @cached_property
     def links(self) -> Robot:

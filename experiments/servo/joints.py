@@ -40,21 +40,14 @@ class JointsLog(NamedTuple):
 @final
 @dataclass(frozen=True, eq=False)
 class Joints:
-    """Joints of a robot, by their numbers.
-
-    Parameters
-    ----------
-    links : Robot
-        The robot without its drives.
-    servos : tuple of Servo
-        What is known of each.
-    logs : tuple of JointsLog
-        What was logged.
-    """
+    """Joints of a robot, by their numbers."""
 
     links: Robot
+    """The robot without its drives."""
     servos: tuple[Servo, ...]
+    """What is known of each."""
     logs: tuple[JointsLog, ...]
+    """What was logged."""
 
     @cached_property
     def runs(self) -> list[list[ServoRun]]:

@@ -141,7 +141,5 @@ def print_choice(page: Page, joint: str, choice: FrictionChoice) -> None:
     grid = new_table("law", ["counts", f"p, against {first}"])
     for law, error in choice.errors.items():
         p = f"{choice.p[law]:.2g}" if law in choice.p else ""
-        grid.add_row(
-            f"{law}{' (chosen)' if law == choice.chosen else ''}", number(error / choice.fits[law].servo.step), p
-        )
+        grid.add_row(f"{law}{' (chosen)' if law == choice.chosen else ''}", number(error / choice.fits[law].servo.step), p)
     print_titled(page, f"{joint}: laws of friction, by the error of parts of the log that their fits did not see", grid)

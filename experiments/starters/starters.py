@@ -22,21 +22,14 @@ NAME = re.compile(r"[A-Za-z]([A-Za-z0-9_-]*[A-Za-z0-9])?")
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of plug-in.
-
-    Parameters
-    ----------
-    point : str
-        Its plug-in point.
-    what : str
-        What it is called.
-    use : str
-        How it is used, with NAME for its name.
-    """
+    """A kind of plug-in."""
 
     point: str
+    """Its plug-in point."""
     what: str
+    """What it is called."""
     use: str
+    """How it is used, with NAME for its name."""
 
 
 OF_SCENARIOS = 'In a scenario (`idbench new scenario mine`): `[{}]`, `kind = "NAME"`, and its settings.'

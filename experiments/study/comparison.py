@@ -23,26 +23,19 @@ ENOUGH = 200
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """Whether two ways of identification differ, on the same runs.
-
-    Parameters
-    ----------
-    better, worse : Cell
-        The two, by their typical errors.
-    ratio : float
-        Typical error of the worse over that of the better: the geometric mean, over the parameters, of the rms over the runs.
-    p : float
-        Probability of so large a ratio if there were no difference (permutation test, paired over the runs, Holm's correction
-        for all pairs).
-    runs : int
-        Runs that both could identify.
-    """
+    """Whether two ways of identification differ, on the same runs."""
 
     better: Cell
+    """The two, by their typical errors."""
     worse: Cell
+    """The two, by their typical errors."""
     ratio: float
+    """Typical error of the worse over that of the better: the geometric mean, over the parameters, of the rms over the runs."""
     p: float
+    """Probability of so large a ratio if there were no difference (permutation test, paired over the runs, Holm's correction
+    for all pairs)."""
     runs: int
+    """Runs that both could identify."""
 
 
 def differences(group: Sequence[Cell]) -> list[Difference]:

@@ -33,43 +33,33 @@ NUMBER = re.compile(r"\d[\d.,e+-]*")
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """The runs of one combination of settings, identified by one model.
-
-    Parameters
-    ----------
-    settings : mapping of str to object
-        Value of each axis.
-    names : tuple of str
-        Chain, estimator and model.
-    parameters : tuple of str
-        Names of X.
-    run : int array, shape (runs,)
-        Numbers of the runs that gave an estimate.
-    X, sigma, paper_sigma, truth : Array, shape (runs, p)
-        Of those runs.
-    failures : mapping of str to int array
-        Reasons of the others, as the first of them has it, and the runs that failed so: reasons that differ in numbers alone
-        are one.
-    bounds : mapping of str to Array, shape (runs, p)
-        The least standard deviations that noise allows, of a study that asks for them: see `BOUNDS`.
-    simulations : Array, shape (runs,), optional
-        How often the estimator simulated each run.
-    shared : bool array, shape (p,), optional
-        Parameters that all methods of the study identify; all by default.
-    """
+    """The runs of one combination of settings, identified by one model."""
 
     settings: Mapping[str, Any]
+    """Value of each axis."""
     names: tuple[str, str, str]
+    """Chain, estimator and model."""
     parameters: tuple[str, ...]
+    """Names of X."""
     run: np.typing.NDArray[np.int64]
+    """Numbers of the runs that gave an estimate, shape (runs,)."""
     X: Array
+    """Of those runs, shape (runs, p)."""
     sigma: Array
+    """Of those runs, shape (runs, p)."""
     paper_sigma: Array
+    """Of those runs, shape (runs, p)."""
     truth: Array
+    """Of those runs, shape (runs, p)."""
     failures: Mapping[str, np.typing.NDArray[np.int64]]
+    """Reasons of the others, as the first of them has it, and the runs that failed so: reasons that differ in numbers alone are
+    one."""
     bounds: Mapping[str, Array] = field(default_factory=dict)
+    """The least standard deviations that noise allows, of a study that asks for them: see `BOUNDS`, shape (runs, p)."""
     simulations: Array | None = None
+    """How often the estimator simulated each run, shape (runs,)."""
     shared: np.typing.NDArray[np.bool_] | None = None
+    """Parameters that all methods of the study identify; all by default, shape (p,)."""
 
     @property
     def runs(self) -> int:

@@ -26,18 +26,12 @@ except ImportError:  # not on Windows, where two processes in one folder are not
 
 @dataclass(frozen=True)
 class Store:
-    """A study and its folder.
-
-    Parameters
-    ----------
-    study : Study
-        What is run.
-    folder : Path
-        Holds study.toml and shards/.
-    """
+    """A study and its folder."""
 
     study: Study
+    """What is run."""
     folder: Path
+    """Holds study.toml and shards/."""
 
     @classmethod
     def new(cls, study: Study, folder: Path) -> Self:

@@ -14,14 +14,10 @@ class Armature(AbstractConservativeBlock):
     """Inertia of a rotor, seen at its joint: Ia qdd, in the row of the joint alone.
 
     Of a rotor that turns fast behind a gear; the small torques it makes when its housing turns are left out, as in MuJoCo.
-
-    Parameters
-    ----------
-    joints : tuple of int, optional
-        Joints that have one, from 0; all by default.
     """
 
     joints: tuple[int, ...] | None = None
+    """Joints that have one, from 0; all by default."""
 
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return Ia of each joint that has one."""

@@ -21,27 +21,20 @@ class Balancer(AbstractConservativeBlock):
     with F0 + Kb (l - least); the gas, behind a piston that oil moves, with Fg (V/(V - l + least))^kappa, its volume V as a
     length of the stroke. With geometry and V from a drawing, F0, Kb and Fg are linear: A. Klimchik et al., "Geometric and
     elastostatic calibration of robotic manipulator with gravity compensator", IROS 2013, for the geometry.
-
-    Parameters
-    ----------
-    joint : int
-        Of the robot, from 0.
-    a, b : float
-        Distances of the points from the axis [m].
-    zero : float
-        Position of the joint at which both points lie in one direction from the axis [rad].
-    volume : float, optional
-        V, gas volume over the area of the piston [m], longer than the stroke of a whole turn; without it there is no gas.
-    kappa : float
-        1 of slow, 1.4 of fast motion (nitrogen).
     """
 
     joint: int = 1
+    """Of the robot, from 0."""
     a: float = 0.2
+    """Distances of the points from the axis [m]."""
     b: float = 0.6
+    """Distances of the points from the axis [m]."""
     zero: float = 0.0
+    """Position of the joint at which both points lie in one direction from the axis [rad]."""
     volume: float | None = None
+    """V, gas volume over the area of the piston [m], longer than the stroke of a whole turn; without it there is no gas."""
     kappa: float = 1.2
+    """1 of slow, 1.4 of fast motion (nitrogen)."""
 
     def __post_init__(self) -> None:
         require_positive(a=self.a, b=self.b, kappa=self.kappa, volume=1.0 if self.volume is None else self.volume)

@@ -21,19 +21,6 @@ from idbench.identify.signals.state import State
 class Basis:
     """A sum of column blocks for a robot of n joints; ``basis + block`` adds one.
 
-    Parameters
-    ----------
-    n : int
-        Number of joints.
-    blocks : tuple of AbstractBlock
-        The blocks; no two may have a parameter in common.
-    kept : tuple of Parameter, optional
-        The p parameters, in the order of X; all of the blocks by default.
-    slides : tuple of int
-        Joints that slide, from 0: their frictions and rotors have units of translation.
-    held : mapping of Parameter to Array or float
-        Parameters that are known, shape (...): their torques are no part of W X, but stand in `HELD`.
-
     Raises
     ------
     SettingError
@@ -41,10 +28,15 @@ class Basis:
     """
 
     n: int
+    """Number of joints."""
     blocks: tuple[AbstractBlock, ...]
+    """The blocks; no two may have a parameter in common."""
     kept: tuple[Parameter, ...] | None = None
+    """The p parameters, in the order of X; all of the blocks by default."""
     slides: tuple[int, ...] = ()
+    """Joints that slide, from 0: their frictions and rotors have units of translation."""
     held: Mapping[Parameter, Array | float] = field(default_factory=dict)
+    """Parameters that are known, shape (...): their torques are no part of W X, but stand in `HELD`."""
 
     def __post_init__(self) -> None:
         every = [parameter for block in self.blocks for parameter in block.parameters(self.n)]

@@ -19,17 +19,12 @@ class Coupled(AbstractBlock):
 
     A torque of the motor acts on each of the joints with the joint's weight, the dual of how positions add up: the columns are
     weights times those of one joint that moves as the motor does.
-
-    Parameters
-    ----------
-    block : AbstractBlock
-        What the drive has, as of a single joint.
-    coupling : Coupling
-        With which joints it turns.
     """
 
     block: AbstractBlock
+    """What the drive has, as of a single joint."""
     coupling: Coupling
+    """With which joints it turns."""
 
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return those of the block, of the drive instead of a joint."""

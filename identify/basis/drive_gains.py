@@ -22,17 +22,12 @@ class DriveGains(AbstractJointLaw):
     of the model by an estimate. The column does not contain the current's noise, so there is no bias as in least squares of
     currents, nor are errors in all variables assumed as in total least squares: M. Gautier and S. Briot, "Global identification
     of joint drive gains and dynamic parameters of robots", J. Dynamic Systems, Measurement, and Control 136 (2014) 051025.
-
-    Parameters
-    ----------
-    model : Basis, optional
-        The robot without the gains.
-    X : Array, shape (..., p), optional
-        Its parameters, as estimated before.
     """
 
     model: Basis | None = None
+    """The robot without the gains."""
     X: Array | None = None
+    """Its parameters, as estimated before, shape (..., p)."""
 
     @property
     def is_nonlinear(self) -> bool:

@@ -16,18 +16,12 @@ if TYPE_CHECKING:
 @final
 @dataclass(frozen=True)
 class OfJoints(AbstractBlock):
-    """A block, the parameters of some joints of it alone: friction that differs from joint to joint.
-
-    Parameters
-    ----------
-    block : AbstractBlock
-        Any.
-    joints : tuple of int
-        From 0.
-    """
+    """A block, the parameters of some joints of it alone: friction that differs from joint to joint."""
 
     block: AbstractBlock
+    """Any."""
     joints: tuple[int, ...]
+    """From 0."""
 
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return those of the joints."""

@@ -39,35 +39,24 @@ class Parameter:
     """A parameter of a robot's model, such as the viscous friction of joint 2.
 
     Two are the same if letters, joint and drive are: a name is only how one is written.
-
-    Parameters
-    ----------
-    symbol : str
-        Letters of what it is, such as Fv.
-    joint : int, optional
-        Its joint, or the joint that moves its link, from 0; None if it belongs to no joint.
-    kind : str
-        What it measures.
-    unit : str
-        Its SI unit.
-    drive : str
-        Name of the drive that it belongs to, if that turns with several joints.
-    grouped : bool
-        Whether others are grouped with it: ZZ of joint 1 is written ZZR1 then.
-    scale : float
-        What it is over what its block has: the paper's LMX2 is L times the first moment.
-    label : str
-        Letters that are written instead of its symbol.
     """
 
     symbol: str
+    """Letters of what it is, such as Fv."""
     joint: int | None
+    """Its joint, or the joint that moves its link, from 0; None if it belongs to no joint."""
     kind: Kind = field(compare=False)
+    """What it measures."""
     unit: str = field(compare=False)
+    """Its SI unit."""
     drive: str = ""
+    """Name of the drive that it belongs to, if that turns with several joints."""
     grouped: bool = field(default=False, compare=False)
+    """Whether others are grouped with it: ZZ of joint 1 is written ZZR1 then."""
     scale: float = field(default=1.0, compare=False)
+    """What it is over what its block has: the paper's LMX2 is L times the first moment."""
     label: str = field(default="", compare=False)
+    """Letters that are written instead of its symbol."""
 
     @property
     def name(self) -> str:

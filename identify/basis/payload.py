@@ -25,20 +25,14 @@ class PayloadLink(AbstractConservativeBlock):
 
     W. Khalil, M. Gautier and P. Lemoine, "Identification of the payload inertial parameters of industrial manipulators", IEEE
     ICRA 2007.
-
-    Parameters
-    ----------
-    tree : KinematicTree
-        The robot.
-    link : int
-        Number of the joint whose link holds it, from 0.
-    only : frozenset of Parameter, optional
-        Parameters whose columns are computed; all by default.
     """
 
     tree: KinematicTree
+    """The robot."""
     link: int
+    """Number of the joint whose link holds it, from 0."""
     only: frozenset[Parameter] | None = None
+    """Parameters whose columns are computed; all by default."""
 
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return the ten parameters; raise SettingError unless the tree has `n` joints."""

@@ -15,18 +15,12 @@ from idbench.identify.signals.state import State
 @final
 @dataclass(frozen=True)
 class Spring(AbstractConservativeBlock):
-    """Springs of joints, K (q - rest); where the rest position is not known, `offset` takes its torque.
-
-    Parameters
-    ----------
-    rest : tuple of float
-        Position without a torque [rad or m], of all joints or of each.
-    joints : tuple of int, optional
-        Joints that have one, from 0; all by default.
-    """
+    """Springs of joints, K (q - rest); where the rest position is not known, `offset` takes its torque."""
 
     rest: tuple[float, ...] = (0.0,)
+    """Position without a torque [rad or m], of all joints or of each."""
     joints: tuple[int, ...] | None = None
+    """Joints that have one, from 0; all by default."""
 
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return K of each joint that has a spring."""

@@ -28,17 +28,12 @@ class TreeLinks(AbstractConservativeBlock):
     Lagrange for the columns of the implicit and power models: with V_j the twist of link j, T_j = V_j' P_j / 2 and
 
         p_i = sum_j (dV_j/dqd_i)' P_j        remainder_i = sum_j -(dV_j/dq_i)' P_j + gravity
-
-    Parameters
-    ----------
-    tree : KinematicTree
-        The robot.
-    only : frozenset of Parameter, optional
-        Parameters whose columns are computed; all by default.
     """
 
     tree: KinematicTree
+    """The robot."""
     only: frozenset[Parameter] | None = None
+    """Parameters whose columns are computed; all by default."""
 
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return ten parameters for each link that has mass; raise SettingError unless the tree has `n` joints."""

@@ -28,33 +28,27 @@ MIN_ROWS = 20
 
 @dataclass(frozen=True, eq=False)
 class Clock:
-    """The rows of a log that count, and their times.
-
-    Parameters
-    ----------
-    kept : int array, shape (row,)
-        Which rows of the log these are.
-    t : Array, shape (row,)
-        Their times [s].
-    repeated, backward, broken : int
-        Rows left out: those that repeat the row before while the robot moves, those whose time does not increase, those with
-        a NaN or an infinity.
-    word : str
-        Which clock is right: "stamps", "steady" (a sample every period, some never logged) or "rows" (a sample a row).
-    jitter : float
-        Rms of the stamps about the clock [s].
-    roughness : mapping of str to float
-        Of the positions at the times of each clock, relative to that at the stamps.
-    """
+    """The rows of a log that count, and their times."""
 
     kept: npt.NDArray[np.intp]
+    """Which rows of the log these are, shape (row,)."""
     t: Array
+    """Their times [s], shape (row,)."""
     repeated: int
+    """Rows left out: those that repeat the row before while the robot moves, those whose time does not increase, those with a
+    NaN or an infinity."""
     backward: int
+    """Rows left out: those that repeat the row before while the robot moves, those whose time does not increase, those with a
+    NaN or an infinity."""
     broken: int
+    """Rows left out: those that repeat the row before while the robot moves, those whose time does not increase, those with a
+    NaN or an infinity."""
     word: str
+    """Which clock is right: "stamps", "steady" (a sample every period, some never logged) or "rows" (a sample a row)."""
     jitter: float
+    """Rms of the stamps about the clock [s]."""
     roughness: dict[str, float]
+    """Of the positions at the times of each clock, relative to that at the stamps."""
 
     @classmethod
     def of(cls, columns: LogColumns) -> Self:

@@ -30,26 +30,20 @@ COUNTS = 2.5
 @final
 @dataclass(frozen=True)
 class Jump:
-    """A step of a position that the motion around it does not explain.
-
-    Parameters
-    ----------
-    joint, sample : int
-        Where it is, from 0.
-    size : float
-        By how far [rad, m].
-    speed, usual : float
-        Its speed, and that below which nearly all steps of the joint are [rad/s, m/s].
-    back : bool
-        Whether the position comes back at once: a wild sample, not a slip.
-    """
+    """A step of a position that the motion around it does not explain."""
 
     joint: int
+    """Where it is, from 0."""
     sample: int
+    """Where it is, from 0."""
     size: float
+    """By how far [rad, m]."""
     speed: float
+    """Its speed, and that below which nearly all steps of the joint are [rad/s, m/s]."""
     usual: float
+    """Its speed, and that below which nearly all steps of the joint are [rad/s, m/s]."""
     back: bool
+    """Whether the position comes back at once: a wild sample, not a slip."""
 
 
 def jumps(q: Array, fs: float) -> list[Jump]:

@@ -28,33 +28,6 @@ class Joint:
 
     The frame of the link stands at `position` and `rotation` in the frame of its parent's link while the joint is at `zero`.
 
-    Parameters
-    ----------
-    name : str
-        Of the joint.
-    kind : {"hinge", "slide"}
-        What it does.
-    parent : int
-        Number of the joint whose link carries it, from 0; `GROUND` if none does.
-    position : array_like, shape (3,)
-        [m].
-    rotation : array_like, shape (3, 3)
-        Turns vectors of the link into those of its parent.
-    axis : array_like, shape (3,)
-        Direction in the frame of the link, of any length above 0.
-    anchor : array_like, shape (3,)
-        A point of a hinge's axis in the frame of the link [m].
-    zero : float
-        Position [rad or m] at which the frames are placed like this.
-    range : tuple of float
-        Lowest and highest position [rad or m]; infinite without limits.
-    armature : bool
-        Whether its drive adds an inertia of its own.
-    massive : bool
-        Whether its link has mass; False for the links between several joints of one body.
-    spring : float, optional
-        Position [rad or m] at which a spring on the joint makes no torque, if it has one.
-
     Raises
     ------
     KinematicsError
@@ -62,17 +35,29 @@ class Joint:
     """
 
     name: str
+    """Of the joint."""
     kind: Kind
+    """What it does."""
     parent: int
+    """Number of the joint whose link carries it, from 0; `GROUND` if none does."""
     position: Array
+    """Shape (3,) [m]."""
     rotation: Array
+    """Turns vectors of the link into those of its parent, shape (3, 3)."""
     axis: Array
+    """Direction in the frame of the link, of any length above 0, shape (3,)."""
     anchor: Array
+    """A point of a hinge's axis in the frame of the link [m], shape (3,)."""
     zero: float = 0.0
+    """Position [rad or m] at which the frames are placed like this."""
     range: tuple[float, float] = (-np.inf, np.inf)
+    """Lowest and highest position [rad or m]; infinite without limits."""
     armature: bool = True
+    """Whether its drive adds an inertia of its own."""
     massive: bool = True
+    """Whether its link has mass; False for the links between several joints of one body."""
     spring: float | None = None
+    """Position [rad or m] at which a spring on the joint makes no torque, if it has one."""
 
     def __post_init__(self) -> None:
         if self.kind not in get_args(Kind):
@@ -97,24 +82,16 @@ class Joint:
 @final
 @dataclass(frozen=True)
 class Coupling:
-    """A drive whose motor turns with several joints, theta = weights' q.
-
-    Parameters
-    ----------
-    name : str
-        Of the drive.
-    weights : tuple of float
-        One per joint; 0 for those with which it does not turn.
-    armature : bool
-        Whether it adds an inertia of its own.
-    spring : float, optional
-        Position of the motor [rad] at which a spring on it makes no torque, if it has one.
-    """
+    """A drive whose motor turns with several joints, theta = weights' q."""
 
     name: str
+    """Of the drive."""
     weights: tuple[float, ...]
+    """One per joint; 0 for those with which it does not turn."""
     armature: bool = True
+    """Whether it adds an inertia of its own."""
     spring: float | None = None
+    """Position of the motor [rad] at which a spring on it makes no torque, if it has one."""
 
     def __post_init__(self) -> None:
         if not np.isfinite(self.weights).all() or not np.any(self.weights):
@@ -126,17 +103,6 @@ class Coupling:
 class KinematicTree:
     """A tree of links on the ground, a joint each, with bodies that are welded together as one link.
 
-    Parameters
-    ----------
-    name : str
-        Of the robot.
-    joints : tuple of Joint
-        In the order of a log's columns; parents come before their children.
-    gravity : array_like, shape (3,)
-        [m/s^2], in the frame of the ground.
-    couplings : tuple of Coupling
-        Drives that turn with several joints.
-
     Raises
     ------
     KinematicsError
@@ -144,9 +110,13 @@ class KinematicTree:
     """
 
     name: str
+    """Of the robot."""
     joints: tuple[Joint, ...]
+    """In the order of a log's columns; parents come before their children."""
     gravity: Array
+    """[m/s^2], in the frame of the ground, shape (3,)."""
     couplings: tuple[Coupling, ...] = ()
+    """Drives that turn with several joints."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "gravity", frozen(self.gravity))

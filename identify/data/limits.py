@@ -13,24 +13,20 @@ MIN_LIMIT = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """Limits of the joints; infinite where there are none.
-
-    Parameters
-    ----------
-    position : array_like, shape (joint, 2)
-        Lowest and highest [rad], finite.
-    velocity, acceleration, jerk : array_like, shape (joint,)
-        [rad/s], [rad/s^2], [rad/s^3]; velocities finite.
-    torque, rms_torque : array_like, shape (joint,)
-        Largest, and on average over the motion [N m].
-    """
+    """Limits of the joints; infinite where there are none."""
 
     position: Array
+    """Lowest and highest [rad], finite, shape (joint, 2)."""
     velocity: Array
+    """[rad/s], [rad/s^2], [rad/s^3]; velocities finite, shape (joint,)."""
     acceleration: Array
+    """[rad/s], [rad/s^2], [rad/s^3]; velocities finite, shape (joint,)."""
     jerk: Array
+    """[rad/s], [rad/s^2], [rad/s^3]; velocities finite, shape (joint,)."""
     torque: Array
+    """Largest, and on average over the motion [N m], shape (joint,)."""
     rms_torque: Array
+    """Largest, and on average over the motion [N m], shape (joint,)."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "position", frozen(self.position))

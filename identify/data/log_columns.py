@@ -11,40 +11,28 @@ from idbench.identify.errors import LogError
 
 @dataclass(frozen=True, eq=False)
 class LogColumns:
-    """The columns of a log, as they are, in SI units.
-
-    Parameters
-    ----------
-    t : Array, shape (time,)
-        [s].
-    q, tau : Array, shape (time, joint)
-        [rad], [N m].
-    torque : TorqueChannel or None
-        What the file says of its torque.
-    joints : tuple of str
-        Names of the joints, where the columns have them.
-    qd : Array, shape (time, joint), optional
-        Logged velocities [rad/s].
-    t_tau : Array, shape (time of torques,), optional
-        Times of the torques, where they are others than those of the positions [s].
-    temperature : Array, shape (time, joint or 1), optional
-        [deg C].
-    gain : tuple of float
-        Torque over what the file has, joint by joint: the torques have been multiplied by it.
-    said : str
-        Which file says what the columns are, and in which units; empty if that was the log itself.
-    """
+    """The columns of a log, as they are, in SI units."""
 
     t: Array
+    """Shape (time,) [s]."""
     q: Array
+    """[rad], [N m], shape (time, joint)."""
     tau: Array
+    """[rad], [N m], shape (time, joint)."""
     torque: TorqueChannel | None
+    """What the file says of its torque."""
     joints: tuple[str, ...] = ()
+    """Names of the joints, where the columns have them."""
     qd: Array | None = None
+    """Logged velocities [rad/s], shape (time, joint)."""
     t_tau: Array | None = None
+    """Times of the torques, where they are others than those of the positions [s], shape (time of torques,)."""
     temperature: Array | None = None
+    """Shape (time, joint or 1), optional [deg C]."""
     gain: tuple[float, ...] = ()
+    """Torque over what the file has, joint by joint: the torques have been multiplied by it."""
     said: str = ""
+    """Which file says what the columns are, and in which units; empty if that was the log itself."""
 
     @property
     def conditions(self) -> dict[str, Array]:

@@ -29,16 +29,6 @@ class TorqueChannel:
     - ``held``: the torque that acts, constant, from t_k + delay to t_k + delay + T (a zero-order hold);
     - ``averaged``: the mean of the torque from t_k + delay to t_k + delay + T.
 
-    Parameters
-    ----------
-    meaning : {"instantaneous", "held", "averaged"}
-        See above.
-    delay : float
-        [s]. A computing delay makes it positive, a torque that was filtered on its way to the log negative.
-    gain : float or tuple of float
-        Torque over logged value, of all joints or of each; 1 for a log in N m. G_T of the paper's Eq. 13 for a log of
-        current references.
-
     Raises
     ------
     SettingError
@@ -46,8 +36,12 @@ class TorqueChannel:
     """
 
     meaning: Meaning
+    """See above."""
     delay: float = 0.0
+    """[s]. A computing delay makes it positive, a torque that was filtered on its way to the log negative."""
     gain: float | tuple[float, ...] = 1.0
+    """Torque over logged value, of all joints or of each; 1 for a log in N m. G_T of the paper's Eq. 13 for a log of current
+    references."""
 
     def __post_init__(self) -> None:
         if self.meaning not in get_args(Meaning):
@@ -68,20 +62,6 @@ class MotionLog:
 
     Leading axes are independent runs, each identified by itself.
 
-    Parameters
-    ----------
-    fs : float
-        Sampling frequency [Hz].
-    q : array_like, shape (..., time, joint)
-        Joint positions [rad].
-    tau : array_like, shape (..., time, joint)
-        Joint torques [N m], or what `torque.gain` turns into them.
-    torque : TorqueChannel
-        What a sample of `tau` means.
-    conditions : mapping of str to array_like, shape (..., time, joint or 1)
-        What else was logged that laws may need: ``temperature`` [deg C]; ``payload``, the share of the payload that is held;
-        ``command`` of servos [rad], and ``on``, 1 where their torque is.
-
     Raises
     ------
     LogError
@@ -91,10 +71,16 @@ class MotionLog:
     """
 
     fs: float
+    """Sampling frequency [Hz]."""
     q: Array
+    """Joint positions [rad], shape (..., time, joint)."""
     tau: Array
+    """Joint torques [N m], or what `torque.gain` turns into them, shape (..., time, joint)."""
     torque: TorqueChannel
+    """What a sample of `tau` means."""
     conditions: Mapping[str, Array] = field(default_factory=dict)
+    """What else was logged that laws may need: ``temperature`` [deg C]; ``payload``, the share of the payload that is held;
+    ``command`` of servos [rad], and ``on``, 1 where their torque is, shape (..., time, joint or 1)."""
 
     def __post_init__(self) -> None:
         require_positive(fs=self.fs)

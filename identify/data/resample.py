@@ -32,27 +32,18 @@ NICE = 2e-3
 
 @dataclass(frozen=True, eq=False)
 class Repaired:
-    """A log made uniform: one, or several where it has gaps.
-
-    Parameters
-    ----------
-    logs : tuple of MotionLog
-        Its pieces.
-    clock : Clock
-        Which rows count, and when they were.
-    velocities : Velocities or None
-        What the logged velocities are worth; None without any.
-    short : int
-        How many pieces were too short to be kept.
-    torque_gaps : int
-        How many gaps torques with times of their own have.
-    """
+    """A log made uniform: one, or several where it has gaps."""
 
     logs: tuple[MotionLog, ...]
+    """Its pieces."""
     clock: Clock
+    """Which rows count, and when they were."""
     velocities: Velocities | None = None
+    """What the logged velocities are worth; None without any."""
     short: int = 0
+    """How many pieces were too short to be kept."""
     torque_gaps: int = 0
+    """How many gaps torques with times of their own have."""
 
     @classmethod
     def of(cls, columns: LogColumns, torque: TorqueChannel, fs: float | None = None) -> Self:

@@ -28,24 +28,16 @@ HIGHEST = 10.0
 
 @dataclass(frozen=True, eq=False)
 class Velocities:
-    """What logged velocities are worth, joint by joint.
-
-    Parameters
-    ----------
-    scale : Array, shape (joint,)
-        Logged velocity over differences of the positions, below 5 Hz.
-    delay : Array, shape (joint,)
-        Of the logged velocity [s].
-    crossover : Array, shape (joint,)
-        Frequency [Hz] above which the integral of the velocity is less noisy than the positions are.
-    fs : float
-        Sampling frequency [Hz].
-    """
+    """What logged velocities are worth, joint by joint."""
 
     scale: Array
+    """Logged velocity over differences of the positions, below 5 Hz, shape (joint,)."""
     delay: Array
+    """Of the logged velocity [s], shape (joint,)."""
     crossover: Array
+    """Frequency [Hz] above which the integral of the velocity is less noisy than the positions are, shape (joint,)."""
     fs: float
+    """Sampling frequency [Hz]."""
 
     @classmethod
     def of(cls, q: Array, qd: Array, fs: float) -> "Velocities":

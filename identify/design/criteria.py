@@ -49,15 +49,10 @@ class Determinant(AbstractCriterion):
 @final
 @dataclass(frozen=True)
 class LogSigma(AbstractCriterion):
-    """Weighted mean of ln sigma_i: what the table of sigmas shows.
-
-    Parameters
-    ----------
-    weights : tuple of float
-        One for each parameter, with sum 1.
-    """
+    """Weighted mean of ln sigma_i: what the table of sigmas shows."""
 
     weights: tuple[float, ...]
+    """One for each parameter, with sum 1."""
 
     def value(self, M: Array) -> Array:
         """Return sum of weights ln(sigma)."""

@@ -24,24 +24,16 @@ PEAKS = 15 / 8, 10 / np.sqrt(3)
 
 @dataclass(frozen=True, eq=False)
 class Greedy:
-    """Chooses moves from random ones by the determinant of the information that they make together.
-
-    Parameters
-    ----------
-    information : Information
-        What motions tell.
-    limits : Limits
-        What they must keep.
-    T : float
-        Time of a move [s].
-    known : Array, shape (p, p)
-        Information of earlier logs.
-    """
+    """Chooses moves from random ones by the determinant of the information that they make together."""
 
     information: Information
+    """What motions tell."""
     limits: Limits
+    """What they must keep."""
     T: float
+    """Time of a move [s]."""
     known: Array
+    """Information of earlier logs, shape (p, p)."""
 
     def waypoints(self, rng: np.random.Generator, count: int) -> Array:
         """Return the beginnings of so many moves, from the middle of the ranges, shape (count, joint); the last leads back."""

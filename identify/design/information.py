@@ -28,27 +28,20 @@ class Information:
     Rows whose joint hardly moves count little. In the frequency domain (cosines: a motion need not be periodic) the covariance
     is a matrix of the joints at each frequency, S(f) = diag(torque noise^2) + w^4 M diag(position noise^2) M'; beyond the
     pass band of the rows nothing counts.
-
-    Parameters
-    ----------
-    basis : Basis
-        The robot.
-    levels : NoiseLevels
-        Of its log, shape (joint,) each.
-    inertia : Array, shape (joint, joint)
-        Of the robot, on average over postures [kg m^2].
-    fs, rate : float
-        Frequencies of the log and of the states [Hz].
-    cutoff : float
-        End of the pass band [Hz].
     """
 
     basis: Basis
+    """The robot."""
     levels: NoiseLevels
+    """Of its log, shape (joint,) each."""
     inertia: Array
+    """Of the robot, on average over postures [kg m^2], shape (joint, joint)."""
     fs: float
+    """Frequencies of the log and of the states [Hz]."""
     rate: float
+    """Frequencies of the log and of the states [Hz]."""
     cutoff: float
+    """End of the pass band [Hz]."""
 
     def columns(self, motion: Array) -> Array:
         """Return the columns of D at a motion, shape (..., 4, time, joint), as (..., time, joint, p)."""

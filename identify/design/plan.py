@@ -39,51 +39,36 @@ class Plan:
 
     Positions, velocities, accelerations and jerks keep their limits whatever the coefficients: with u the largest share of a
     limit that a joint uses, in a smooth norm, its motion is divided by (1 + u^p)^(1/p). Torques and obstacles cost.
-
-    Parameters
-    ----------
-    information : Information
-        What a motion tells.
-    criterion : AbstractCriterion
-        What is asked of it.
-    limits : Limits
-        What it must keep.
-    states, instants : Shapes
-        The unit motions at the states whose rows count, and at more instants, where limits are kept.
-    X : Array, shape (p,)
-        Parameters as far as they are known.
-    known : Array, shape (p, p)
-        Information of earlier logs.
-    prior_error : float
-        Share by which each of X may be off, for torques.
-    torque_share : float
-        Share of the largest torques that X may take.
-    repeat : int
-        Times that the motion is run.
-    home : Array, shape (joint,), optional
-        Where the arm comes from [rad]: limits hold on the way, too.
-    obstacles : callable, optional
-        What to keep away from.
-    hard : float
-        What exceeding a limit by all of it costs, squared.
-    power : float
-        That of the smooth norm by which motions are scaled into their limits; even.
     """
 
     information: Information
+    """What a motion tells."""
     criterion: AbstractCriterion
+    """What is asked of it."""
     limits: Limits
+    """What it must keep."""
     states: Shapes
+    """The unit motions at the states whose rows count, and at more instants, where limits are kept."""
     instants: Shapes
+    """The unit motions at the states whose rows count, and at more instants, where limits are kept."""
     X: Array
+    """Parameters as far as they are known, shape (p,)."""
     known: Array
+    """Information of earlier logs, shape (p, p)."""
     prior_error: float = 0.3
+    """Share by which each of X may be off, for torques."""
     torque_share: float = 0.8
+    """Share of the largest torques that X may take."""
     repeat: int = 1
+    """Times that the motion is run."""
     home: Array | None = None
+    """Where the arm comes from [rad]: limits hold on the way, too, shape (joint,)."""
     obstacles: Obstacles | None = None
+    """What to keep away from."""
     hard: float = HARD
+    """What exceeding a limit by all of it costs, squared."""
     power: float = POWER
+    """That of the smooth norm by which motions are scaled into their limits; even."""
 
     def motion(self, c: Array) -> Array:
         """Return the motion at the states, shape (..., 4, time, joint), for coefficients c, shape (..., m, joint)."""

@@ -14,15 +14,10 @@ ORDERS = 4
 
 @dataclass(frozen=True, eq=False)
 class Shapes:
-    """Unit motions of a joint at some instants; every joint moves along a sum of them.
-
-    Parameters
-    ----------
-    values : Array, shape (4, time, m)
-        Position, velocity, acceleration and jerk of each of m shapes.
-    """
+    """Unit motions of a joint at some instants; every joint moves along a sum of them."""
 
     values: Array
+    """Position, velocity, acceleration and jerk of each of m shapes, shape (4, time, m)."""
 
     @property
     def count(self) -> int:

@@ -21,42 +21,30 @@ from idbench.identify.rows.rows import Rows
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Estimate:
-    """Parameters with their uncertainty, judged on the rows they came from. Leading axes are independent runs.
-
-    Parameters
-    ----------
-    problem : Problem
-        Logs, robot, model and rows.
-    X : Array, shape (..., p)
-        Estimated parameters; NaN where the rows cannot be solved.
-    own_covariance : Array, shape (..., p, p)
-        Covariance of the error of X as the estimator computes it; OLS and WLS assume independent rows (section 7.3).
-    solution : AbstractSolution, optional
-        How X follows from the rows; without it standard errors are the estimator's own.
-    calibrated : Array, shape (..., p, p), optional
-        Covariance of the error of X due to the noise of the logs, if the estimator knows it; by default from `solution`.
-    levels : NoiseLevels, optional
-        The noise of the logs as the estimator found it; by default that of the problem.
-    fits : mapping of tuple of int to JointFit
-        For `ML`: fitted motion and parameters of each solved run, by its index; key () if there is one run.
-    failures : mapping of tuple of int to str
-        Reasons, other than rank deficiency, why a run has no estimate.
-    path : tuple of Array, shape (..., p)
-        Iterates of iterative estimators, the start first.
-    simulations : int array, shape (...), optional
-        How often the robot was simulated.
-    """
+    """Parameters with their uncertainty, judged on the rows they came from. Leading axes are independent runs."""
 
     problem: Problem
+    """Logs, robot, model and rows."""
     X: Array
+    """Estimated parameters; NaN where the rows cannot be solved, shape (..., p)."""
     own_covariance: Array
+    """Covariance of the error of X as the estimator computes it; OLS and WLS assume independent rows (section 7.3), shape (...,
+    p, p)."""
     solution: AbstractSolution | None = None
+    """How X follows from the rows; without it standard errors are the estimator's own."""
     calibrated: Array | None = None
+    """Covariance of the error of X due to the noise of the logs, if the estimator knows it; by default from `solution`, shape
+    (..., p, p), optional."""
     levels: NoiseLevels | None = None
+    """The noise of the logs as the estimator found it; by default that of the problem."""
     fits: Mapping[tuple[int, ...], JointFit] = field(default_factory=dict)
+    """For `ML`: fitted motion and parameters of each solved run, by its index; key () if there is one run."""
     failures: Mapping[tuple[int, ...], str] = field(default_factory=dict)
+    """Reasons, other than rank deficiency, why a run has no estimate."""
     path: tuple[Array, ...] = ()
+    """Iterates of iterative estimators, the start first, shape (..., p)."""
     simulations: npt.NDArray[np.intp] | None = None
+    """How often the robot was simulated, shape (...)."""
 
     @classmethod
     def judge(

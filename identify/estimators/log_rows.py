@@ -24,22 +24,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class LogRows:
-    """The rows of one log, or of a piece of it, and what its noise makes of them; each is made when it is first asked for.
-
-    Parameters
-    ----------
-    owner : weak reference to Problem
-        Robot, model and chain, and the noise of all logs. Weak, since the problem has these rows: a circle of references would
-        keep what is large until the garbage is collected.
-    signals : Signals
-        Of the log.
-    explicit : LogRows, optional
-        Those of the explicit model from the same signals, where this is another model: what noise does to both is shared.
-    """
+    """The rows of one log, or of a piece of it, and what its noise makes of them; each is made when it is first asked for."""
 
     owner: "ref[Problem]"
+    """Robot, model and chain, and the noise of all logs. Weak, since the problem has these rows: a circle of references would
+    keep what is large until the garbage is collected."""
     signals: Signals
+    """Of the log."""
     explicit: "LogRows | None" = None
+    """Those of the explicit model from the same signals, where this is another model: what noise does to both is shared."""
 
     @property
     def problem(self) -> "Problem":

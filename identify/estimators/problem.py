@@ -41,27 +41,18 @@ BEGIN, LEAST = (1.0, 0.1, 0.1), 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Logs, a robot and a model, and what follows from them; each is made when it is first asked for.
-
-    Parameters
-    ----------
-    logs : tuple of MotionLog
-        What was logged: one log, or several of one fit. Leading axes are independent runs.
-    basis : Basis
-        The robot, linear in its parameters.
-    model : AbstractModel
-        Explicit, implicit or power.
-    chain : Chain
-        Signal processing.
-    simulation : Simulation
-        How the robot is simulated, for estimators that need it.
-    """
+    """Logs, a robot and a model, and what follows from them; each is made when it is first asked for."""
 
     logs: tuple[MotionLog, ...]
+    """What was logged: one log, or several of one fit. Leading axes are independent runs."""
     basis: Basis
+    """The robot, linear in its parameters."""
     model: AbstractModel
+    """Explicit, implicit or power."""
     chain: Chain
+    """Signal processing."""
     simulation: Simulation = Simulation()  # noqa: RUF009  # frozen
+    """How the robot is simulated, for estimators that need it."""
     _signals: tuple[Signals, ...] = field(default=(), repr=False)
     _explicit: "Problem | None" = field(default=None, repr=False)
 

@@ -119,15 +119,10 @@ def _sigma(factors: Factors) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class AdaptiveRows:
-    """The rows of a problem with other laws of friction: the columns of what does not depend on an estimate are made once.
-
-    Parameters
-    ----------
-    problem : Problem
-        Of the explicit model.
-    """
+    """The rows of a problem with other laws of friction: the columns of what does not depend on an estimate are made once."""
 
     problem: Problem
+    """Of the explicit model."""
 
     def factors(self, basis: Basis) -> Factors:
         """Return the factors with the laws of a basis in the place of those of the problem."""
@@ -225,18 +220,12 @@ def _best(rows: AdaptiveRows, basis: Basis, shaped: ShapedFriction, joints: Sequ
 @final
 @dataclass(frozen=True, eq=False)
 class Candidates(AbstractJointLaw):
-    """One law with several settings, a parameter each: to see which of them explains most.
-
-    Parameters
-    ----------
-    law : AbstractFriction
-        The law.
-    grid : tuple of mapping of str to float or Array
-        Values of its settings.
-    """
+    """One law with several settings, a parameter each: to see which of them explains most."""
 
     law: AbstractFriction
+    """The law."""
     grid: tuple[Mapping[str, Any], ...]
+    """Values of its settings."""
 
     @property
     def is_nonlinear(self) -> bool:

@@ -13,18 +13,12 @@ from idbench.identify.data.motion_log import MotionLog
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
-    """The logs of simulated robots.
-
-    Parameters
-    ----------
-    logs : tuple of MotionLog
-        One for each log of the problem; leading axes are those of the parameters.
-    failures : mapping of tuple of int to str
-        Why simulations failed, by their place in the leading axes; their logs hold nothing of use.
-    """
+    """The logs of simulated robots."""
 
     logs: tuple[MotionLog, ...]
+    """One for each log of the problem; leading axes are those of the parameters."""
     failures: Mapping[tuple[int, ...], str] = field(default_factory=dict)
+    """Why simulations failed, by their place in the leading axes; their logs hold nothing of use."""
 
 
 class AbstractLoop(ABC):
@@ -78,18 +72,12 @@ class AbstractPlant(ABC):
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """How the robot of a problem is simulated.
-
-    Parameters
-    ----------
-    loop : AbstractLoop, optional
-        The closed loops in which the logs were recorded (IV, DIDIM, CLIE, CLOE).
-    plant : AbstractPlant, optional
-        The robot by itself, driven by the torques of a log (OE).
-    start : Array, shape (..., p), optional
-        Where estimators begin that simulate or filter; by default at the weighted least-squares estimate.
-    """
+    """How the robot of a problem is simulated."""
 
     loop: AbstractLoop | None = None
+    """The closed loops in which the logs were recorded (IV, DIDIM, CLIE, CLOE)."""
     plant: AbstractPlant | None = None
+    """The robot by itself, driven by the torques of a log (OE)."""
     start: Array | None = None
+    """Where estimators begin that simulate or filter; by default at the weighted least-squares estimate, shape (..., p),
+    optional."""

@@ -30,21 +30,14 @@ class AbstractSolution(ABC):
 @final
 @dataclass(frozen=True, eq=False)
 class OfWeightedRows(AbstractSolution):
-    """The solution of rows of which each has a weight.
-
-    Parameters
-    ----------
-    weight : Array, shape (..., kind)
-        Of every kind.
-    inverse : Array, shape (..., p, p)
-        Of W' W of the weighted rows.
-    scaled : bool
-        Whether rows that differ from those of their kind had a weight of their own, too.
-    """
+    """The solution of rows of which each has a weight."""
 
     weight: Array
+    """Of every kind, shape (..., kind)."""
     inverse: Array
+    """Of W' W of the weighted rows, shape (..., p, p)."""
     scaled: bool
+    """Whether rows that differ from those of their kind had a weight of their own, too."""
 
     def influence(self, parts: Sequence[LogRows]) -> list[Array]:
         """Return w^2 W (W' w^2 W)^-1."""
@@ -65,15 +58,10 @@ class OfWeightedRows(AbstractSolution):
 @final
 @dataclass(frozen=True, eq=False)
 class OfWhitenedRows(AbstractSolution):
-    """The solution of rows made independent by their covariance, W without what noise adds to it.
-
-    Parameters
-    ----------
-    inverse : Array, shape (..., p, p)
-        Of W' C^-1 W.
-    """
+    """The solution of rows made independent by their covariance, W without what noise adds to it."""
 
     inverse: Array
+    """Of W' C^-1 W, shape (..., p, p)."""
 
     def influence(self, parts: Sequence[LogRows]) -> list[Array]:
         """Return C^-1 W (W' C^-1 W)^-1."""
@@ -90,18 +78,12 @@ class OfWhitenedRows(AbstractSolution):
 @final
 @dataclass(frozen=True, eq=False)
 class Given(AbstractSolution):
-    """The G, and the weights, of the rows of all parts, one below the other.
-
-    Parameters
-    ----------
-    G : Array, shape (..., r, p)
-        Of all rows.
-    weight : Array, shape (..., r), optional
-        What rows were multiplied by, if X is their solution and each counts by itself.
-    """
+    """The G, and the weights, of the rows of all parts, one below the other."""
 
     G: Array
+    """Of all rows, shape (..., r, p)."""
     weight: Array | None = None
+    """What rows were multiplied by, if X is their solution and each counts by itself, shape (..., r)."""
 
     def influence(self, parts: Sequence[LogRows]) -> list[Array]:
         """Return G as it was given."""

@@ -54,18 +54,12 @@ ALIKE = 0.2
 
 @dataclass(frozen=True)
 class Guess:
-    """A layout that was guessed.
-
-    Parameters
-    ----------
-    layout : LogLayout
-        What the columns probably are.
-    doubts : tuple of str
-        What should be looked at.
-    """
+    """A layout that was guessed."""
 
     layout: LogLayout
+    """What the columns probably are."""
     doubts: tuple[str, ...] = ()
+    """What should be looked at."""
 
 
 def guess(path: Path, table: LogTable | None = None) -> Guess:

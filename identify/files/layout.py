@@ -29,28 +29,19 @@ LAYOUT = "log.toml"
 
 @dataclass(frozen=True)
 class Source:
-    """Where a quantity of a log is.
-
-    Parameters
-    ----------
-    columns : tuple of str
-        Names of its columns, joint by joint; or one that stands for several: a column of several entries, or a name with a *
-        in the place of numbers or names.
-    unit : str
-        Theirs.
-    file : str
-        The file that holds them, from where the layout is; by default that of the log.
-    t : str
-        Column of that file with its own times, in the unit of t; by default those of the log.
-    fs : float, optional
-        Sampling frequency [Hz] where there are no times.
-    """
+    """Where a quantity of a log is."""
 
     columns: tuple[str, ...] = ()
+    """Names of its columns, joint by joint; or one that stands for several: a column of several entries, or a name with a * in
+    the place of numbers or names."""
     unit: str = ""
+    """Theirs."""
     file: str = ""
+    """The file that holds them, from where the layout is; by default that of the log."""
     t: str = ""
+    """Column of that file with its own times, in the unit of t; by default those of the log."""
     fs: float | None = None
+    """Sampling frequency [Hz] where there are no times."""
 
     def scale(self, quantity: str) -> float:
         """Return what turns its values into SI."""
@@ -59,38 +50,28 @@ class Source:
 
 @dataclass(frozen=True)
 class LogLayout:
-    """Which columns of a log's files are times, positions, velocities and torques, and in which units.
-
-    Parameters
-    ----------
-    t, q, tau : Source
-        Times, positions, torques.
-    qd : Source
-        Velocities; without columns if there are none.
-    joints : tuple of str
-        Names of the joints, in the order of the columns.
-    torque : TorqueChannel, optional
-        What the torque means.
-    gain : tuple of float
-        Torque over what is logged, in the unit of tau, joint by joint, or one for all.
-    rows : mapping of str to float
-        Only rows in which these columns have these values: an episode.
-    temperature : Source
-        Temperatures of the joints, or of all; without columns if there are none.
-    motors : tuple of tuple of float
-        Of a log of motors: motor positions = matrix times joint positions; torques are turned by its dual.
-    """
+    """Which columns of a log's files are times, positions, velocities and torques, and in which units."""
 
     t: Source = Source(("t",))  # frozen
+    """Times, positions, torques."""
     q: Source = Source(("q*",))  # frozen
+    """Times, positions, torques."""
     tau: Source = Source(("tau*",))  # frozen
+    """Times, positions, torques."""
     qd: Source = Source()  # frozen
+    """Velocities; without columns if there are none."""
     joints: tuple[str, ...] = ()
+    """Names of the joints, in the order of the columns."""
     torque: TorqueChannel | None = None
+    """What the torque means."""
     gain: tuple[float, ...] = ()
+    """Torque over what is logged, in the unit of tau, joint by joint, or one for all."""
     rows: Mapping[str, float] = field(default_factory=dict)
+    """Only rows in which these columns have these values: an episode."""
     temperature: Source = Source()  # frozen
+    """Temperatures of the joints, or of all; without columns if there are none."""
     motors: tuple[tuple[float, ...], ...] = ()
+    """Of a log of motors: motor positions = matrix times joint positions; torques are turned by its dual."""
 
     @classmethod
     def beside(cls, log: Path) -> tuple[Self, Path] | None:

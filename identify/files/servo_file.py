@@ -26,25 +26,17 @@ ROBOT = "robot"
 @final
 @dataclass(frozen=True)
 class ServoFile:
-    """What is known of the servos of a robot.
-
-    Parameters
-    ----------
-    stated : mapping
-        What holds for all joints.
-    joints : mapping of str to mapping
-        What holds for one joint alone, by its name.
-    logs : mapping of str to mapping
-        What holds for some logs alone, by the name of the file or a pattern (* for any letters): kp, or the robot that carried
-        another load.
-    folder : Path
-        Where the file is: robots of logs are named from there.
-    """
+    """What is known of the servos of a robot."""
 
     stated: Mapping[str, Any]
+    """What holds for all joints."""
     joints: Mapping[str, Mapping[str, Any]]
+    """What holds for one joint alone, by its name."""
     logs: Mapping[str, Mapping[str, Any]]
+    """What holds for some logs alone, by the name of the file or a pattern (* for any letters): kp, or the robot that carried
+    another load."""
     folder: Path = Path()
+    """Where the file is: robots of logs are named from there."""
 
     @classmethod
     def read(cls, path: Path) -> "ServoFile":

@@ -26,28 +26,20 @@ OPTIONAL = ("on", "voltage")
 @final
 @dataclass(frozen=True, eq=False)
 class ServoColumns:
-    """Columns of a log of servos, in SI units.
-
-    Parameters
-    ----------
-    t : Array, shape (time,)
-        [s].
-    q, command : Array, shape (time, joint)
-        [rad].
-    on : Array or None, shape (time, joint)
-        Above 0.5 where torque is enabled.
-    voltage : Array or None, shape (time, joint)
-        [V].
-    joints : tuple of str
-        Names of the joints, where the columns have them.
-    """
+    """Columns of a log of servos, in SI units."""
 
     t: Array
+    """Shape (time,) [s]."""
     q: Array
+    """Shape (time, joint) [rad]."""
     command: Array
+    """Shape (time, joint) [rad]."""
     on: Array | None
+    """Above 0.5 where torque is enabled, shape (time, joint)."""
     voltage: Array | None
+    """Shape (time, joint) [V]."""
     joints: tuple[str, ...]
+    """Names of the joints, where the columns have them."""
 
 
 def read_servo_log(path: Path, columns: Mapping[str, str], units: Mapping[str, str]) -> ServoColumns:

@@ -10,27 +10,18 @@ from idbench.identify.errors import LogError
 
 @dataclass(frozen=True, eq=False)
 class LogTable:
-    """Columns of a file by their names, as they are in it.
-
-    Parameters
-    ----------
-    columns : mapping of str to Array, shape (row,) or (row, entry)
-        A column may be of several entries, as arrays of NumPy and lists of Parquet are.
-    torque : bytes or None
-        What the file itself says of its torque, as idbench writes it.
-    named : bool
-        Whether the names are those of the file, and not numbers of its columns.
-    entries : mapping of str to tuple of str
-        Names of the entries of a column, where the file has them (joints of a JointState).
-    words : mapping of str to str
-        Columns that hold no numbers, and what they do hold.
-    """
+    """Columns of a file by their names, as they are in it."""
 
     columns: Mapping[str, Array]
+    """A column may be of several entries, as arrays of NumPy and lists of Parquet are, shape (row,) or (row, entry)."""
     torque: bytes | None = None
+    """What the file itself says of its torque, as idbench writes it."""
     named: bool = True
+    """Whether the names are those of the file, and not numbers of its columns."""
     entries: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Names of the entries of a column, where the file has them (joints of a JointState)."""
     words: Mapping[str, str] = field(default_factory=dict)
+    """Columns that hold no numbers, and what they do hold."""
 
     @property
     def rows(self) -> int:

@@ -27,24 +27,16 @@ FLOOR = (0.6, 0.95)
 
 @dataclass(frozen=True)
 class Band:
-    """A cut-off frequency, and why.
-
-    Parameters
-    ----------
-    cutoff : float
-        [Hz].
-    rows : float
-        Instants that it makes of the logs.
-    wanted : float
-        Cut-off [Hz] at which there are enough rows for every parameter.
-    content : float
-        Frequency [Hz] from which on the torques are noise.
-    """
+    """A cut-off frequency, and why."""
 
     cutoff: float
+    """[Hz]."""
     rows: float
+    """Instants that it makes of the logs."""
     wanted: float
+    """Cut-off [Hz] at which there are enough rows for every parameter."""
     content: float
+    """Frequency [Hz] from which on the torques are noise."""
 
     @classmethod
     def of(cls, logs: Sequence[MotionLog], parameters: int, least: float) -> "Band":

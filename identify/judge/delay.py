@@ -30,18 +30,12 @@ _COARSE = 15
 
 @dataclass(frozen=True)
 class DelayEstimate:
-    """A delay and how sure it is.
-
-    Parameters
-    ----------
-    delay : float
-        [s], as `TorqueChannel` counts it.
-    sigma : float
-        Standard deviation [s], by the jackknife: from what happens when stretches of the log are left out.
-    """
+    """A delay and how sure it is."""
 
     delay: float
+    """[s], as `TorqueChannel` counts it."""
     sigma: float
+    """Standard deviation [s], by the jackknife: from what happens when stretches of the log are left out."""
 
 
 def estimate_delay(

@@ -22,21 +22,14 @@ HALF = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Instants:
-    """What a model leaves unexplained before the operator.
-
-    Parameters
-    ----------
-    equations : Equations
-        The model's.
-    everywhere : Array, shape (row, time)
-        B tau - (c + s e) X [N m], or [W], at all samples.
-    inner : slice
-        The samples between the first row and the last.
-    """
+    """What a model leaves unexplained before the operator."""
 
     equations: Equations
+    """The model's."""
     everywhere: Array
+    """B tau - (c + s e) X [N m], or [W], at all samples, shape (row, time)."""
     inner: slice
+    """The samples between the first row and the last."""
 
     @property
     def first(self) -> int:

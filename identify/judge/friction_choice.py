@@ -38,21 +38,14 @@ WORTH = 0.02
 
 @dataclass(frozen=True)
 class FrictionChoice:
-    """Laws of friction that each joint has beside those of the basis.
-
-    Parameters
-    ----------
-    laws : tuple of tuple of str
-        Names, joint by joint.
-    scores : tuple of LawScore
-        What was compared, in the order in which it was decided.
-    idle : tuple of tuple of str
-        Letters of laws of the basis in whose place the joint has another, joint by joint.
-    """
+    """Laws of friction that each joint has beside those of the basis."""
 
     laws: tuple[tuple[str, ...], ...]
+    """Names, joint by joint."""
     scores: tuple[LawScore, ...]
+    """What was compared, in the order in which it was decided."""
     idle: tuple[tuple[str, ...], ...] = ()
+    """Letters of laws of the basis in whose place the joint has another, joint by joint."""
 
 
 def choose_friction(problem: Problem, candidates: Mapping[str, AbstractBlock], *, most: int | None = None) -> FrictionChoice:

@@ -38,27 +38,18 @@ RIDGE = 1e-11
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Products of columns with each other, P of them with those of all laws at all their starting shapes, and with Y.
-
-    Parameters
-    ----------
-    start : Problem
-        That of the laws that all joints have.
-    held : Array, shape (FOLDS + 1, joint, P + 1, P + 1)
-        Held-out data of every joint: stretch by stretch, and its fastest motion.
-    weight : Array, shape (joint,)
-        1 over the variance of the joint's error without the laws.
-    p : int
-        Number of parameters that all joints have.
-    places : mapping of (str, int) to list of lists of int
-        Which columns a law of a joint has, one list for every combination of its shapes.
-    """
+    """Products of columns with each other, P of them with those of all laws at all their starting shapes, and with Y."""
 
     start: Problem
+    """That of the laws that all joints have."""
     held: Array
+    """Held-out data of every joint: stretch by stretch, and its fastest motion, shape (FOLDS + 1, joint, P + 1, P + 1)."""
     weight: Array
+    """1 over the variance of the joint's error without the laws, shape (joint,)."""
     p: int
+    """Number of parameters that all joints have."""
     places: Mapping[tuple[str, int], list[list[int]]]
+    """Which columns a law of a joint has, one list for every combination of its shapes."""
 
     @classmethod
     def of(cls, start: Problem, candidates: Mapping[str, AbstractBlock]) -> "HeldOut":

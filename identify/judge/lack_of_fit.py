@@ -28,24 +28,16 @@ DEPENDENT = 1e-6
 @final
 @dataclass(frozen=True)
 class Lack:
-    """What a joint's residual torque depends on.
-
-    Parameters
-    ----------
-    joint : int
-        Of the torque.
-    over : str
-        "velocity", "position", "load" or "time": a name of `OVER`.
-    p : float
-        Probability that noise alone shows as much, anywhere where it was looked for.
-    size : float
-        Rms of it in the torque [N m].
-    """
+    """What a joint's residual torque depends on."""
 
     joint: int
+    """Of the torque."""
     over: str
+    """"velocity", "position", "load" or "time": a name of `OVER`."""
     p: float
+    """Probability that noise alone shows as much, anywhere where it was looked for."""
     size: float
+    """Rms of it in the torque [N m]."""
 
 
 def lack_of_fit(problem: Problem, X: Array) -> tuple[Lack, ...]:

@@ -14,36 +14,24 @@ EXCUSED = 2.0
 
 @dataclass(frozen=True)
 class LawScore:
-    """What a law changes on motion that was not fitted.
-
-    Parameters
-    ----------
-    joint : int
-        From 0.
-    law : str
-        Its name.
-    share : float
-        Of the joint's squared error, how much it takes; negative if it adds to it.
-    deviations : float
-        What it takes of the logarithm of the squared errors of the stretches, on average, in standard deviations of that.
-    sigmas : float
-        How many sigma its parameter is away from zero, with independent rows.
-    least : float
-        Share that it takes without the stretch in which it takes most.
-    beyond : float
-        Share that it takes of the squared error at speeds above those of a fit; NaN where that is not asked, as `sigmas`.
-    taken : bool
-        Whether the joint has it in the end.
-    """
+    """What a law changes on motion that was not fitted."""
 
     joint: int
+    """From 0."""
     law: str
+    """Its name."""
     share: float
+    """Of the joint's squared error, how much it takes; negative if it adds to it."""
     deviations: float
+    """What it takes of the logarithm of the squared errors of the stretches, on average, in standard deviations of that."""
     sigmas: float
+    """How many sigma its parameter is away from zero, with independent rows."""
     least: float
+    """Share that it takes without the stretch in which it takes most."""
     beyond: float
+    """Share that it takes of the squared error at speeds above those of a fit; NaN where that is not asked, as `sigmas`."""
     taken: bool
+    """Whether the joint has it in the end."""
 
 
 def gain(before: Array, after: Array) -> tuple[float, float, float]:
@@ -57,15 +45,10 @@ def gain(before: Array, after: Array) -> tuple[float, float, float]:
 
 @dataclass(frozen=True, eq=False)
 class LawSearch:
-    """Laws that are compared beside those of a problem, joint by joint.
-
-    Parameters
-    ----------
-    products : HeldOut
-        Of the rows, stretch by stretch.
-    """
+    """Laws that are compared beside those of a problem, joint by joint."""
 
     products: HeldOut
+    """Of the rows, stretch by stretch."""
 
     @property
     def places(self) -> list[tuple[int, str]]:

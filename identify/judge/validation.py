@@ -45,40 +45,28 @@ class Validation:
     """Torques measured and predicted at the rows of a chain, joint by joint; all arrays have the shape (joint,).
 
     Rows of which the mask takes a part count as that part of a row, so that a constant has its own size.
-
-    Parameters
-    ----------
-    rms : Array
-        Of measured - predicted torque while the joint moves [N m].
-    level : Array
-        Rms of the measured torque there [N m].
-    R2 : Array
-        Share of the measured torque's variance that is predicted there.
-    standing : Array
-        Rms of the error where the joint rests or reverses [N m], where friction is not determined; NaN if it never does.
-    correlation : Array
-        Largest correlation of the error with itself, by size, 2 to `LAGS` rows later. (Noise of differentiated positions
-        alternates from row to row: what is one row later says nothing of the model.)
-    bound : Array
-        What the correlation of noise that was white before the operator stays below in 95 % of joints; in 90 % where a mask
-        takes part of many rows.
-    rows : int array
-        How many rows move.
-    noise : Array
-        Rms of the noise of these rows, from what lies above their band [N m] (`row_noise`); NaN if it does not.
-    open : Array
-        Rms of what sigma of the parameters makes of the torque there [N m]; 0 if their covariance is not given.
     """
 
     rms: Array
+    """Of measured - predicted torque while the joint moves [N m]."""
     level: Array
+    """Rms of the measured torque there [N m]."""
     R2: Array
+    """Share of the measured torque's variance that is predicted there."""
     standing: Array
+    """Rms of the error where the joint rests or reverses [N m], where friction is not determined; NaN if it never does."""
     correlation: Array
+    """Largest correlation of the error with itself, by size, 2 to `LAGS` rows later. (Noise of differentiated positions
+    alternates from row to row: what is one row later says nothing of the model.)"""
     bound: Array
+    """What the correlation of noise that was white before the operator stays below in 95 % of joints; in 90 % where a mask
+    takes part of many rows."""
     rows: npt.NDArray[np.intp]
+    """How many rows move."""
     noise: Array
+    """Rms of the noise of these rows, from what lies above their band [N m] (`row_noise`); NaN if it does not."""
     open: Array
+    """Rms of what sigma of the parameters makes of the torque there [N m]; 0 if their covariance is not given."""
 
     @property
     def expected(self) -> Array:

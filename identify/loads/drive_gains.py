@@ -33,19 +33,14 @@ VAGUE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class GainEstimate:
-    """Gains of drives.
-
-    Parameters
-    ----------
-    gains, sigma : Array, shape (joint,)
-        Torque over what was logged, in the unit of the logs' own gain, and standard deviations.
-    found : Estimate
-        Robot, what was unknown of the payload, and kg, the gains in multiples of those of the logs.
-    """
+    """Gains of drives."""
 
     gains: Array
+    """Torque over what was logged, in the unit of the logs' own gain, and standard deviations, shape (joint,)."""
     sigma: Array
+    """Torque over what was logged, in the unit of the logs' own gain, and standard deviations, shape (joint,)."""
     found: Estimate
+    """Robot, what was unknown of the payload, and kg, the gains in multiples of those of the logs."""
 
     @property
     def shown(self) -> npt.NDArray[np.bool_]:

@@ -29,34 +29,24 @@ LETTERS = tuple(f"{letters}L" for letters in INERTIAL)
 
 @dataclass(frozen=True, eq=False)
 class LoadedRobot:
-    """Logs of a robot without and with a payload on its last link, and how they are identified.
-
-    Parameters
-    ----------
-    tree : KinematicTree
-        The robot.
-    standard : Basis
-        Its standard parameters, laws of friction included.
-    without, loaded : tuple of MotionLog
-        What was logged without and with the payload.
-    chain : Chain
-        Signal processing.
-    estimator : AbstractEstimator
-        Generalized least squares by default.
-    known : mapping of str to float
-        Parameters of the payload that are known, such as ML, its mass [kg].
-    link : int, optional
-        Number of the joint whose link holds it, from 0; the last by default.
-    """
+    """Logs of a robot without and with a payload on its last link, and how they are identified."""
 
     tree: KinematicTree
+    """The robot."""
     standard: Basis
+    """Its standard parameters, laws of friction included."""
     without: tuple[MotionLog, ...]
+    """What was logged without and with the payload."""
     loaded: tuple[MotionLog, ...]
+    """What was logged without and with the payload."""
     chain: Chain = field(default_factory=idbench_chain)
+    """Signal processing."""
     estimator: AbstractEstimator = field(default_factory=GeneralizedLeastSquares)
+    """Generalized least squares by default."""
     known: Mapping[str, float] = field(default_factory=dict)
+    """Parameters of the payload that are known, such as ML, its mass [kg]."""
     link: int | None = None
+    """Number of the joint whose link holds it, from 0; the last by default."""
 
     def __post_init__(self) -> None:
         if not self.loaded:

@@ -29,24 +29,16 @@ MIN_EIGENVALUE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Payload:
-    """The parameters of a payload.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Base parameters: of XXL XYL XZL YYL YZL ZZL MXL MYL MZL ML, in the frame of the link, those that the robot shows.
-    X : Array, shape (p,)
-        The estimate.
-    covariance : Array, shape (p, p)
-        Of its error.
-    known : mapping of str to float
-        Parameters that were known.
-    """
+    """The parameters of a payload."""
 
     names: tuple[str, ...]
+    """Base parameters: of XXL XYL XZL YYL YZL ZZL MXL MYL MZL ML, in the frame of the link, those that the robot shows."""
     X: Array
+    """The estimate, shape (p,)."""
     covariance: Array
+    """Of its error, shape (p, p)."""
     known: Mapping[str, float]
+    """Parameters that were known."""
 
     @property
     def sigma(self) -> Array:

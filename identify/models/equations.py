@@ -11,25 +11,18 @@ from idbench.identify.signals.signals import Signals
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """B tau = [c + s e] X at every sample of a log, with s = d/dt.
-
-    Parameters
-    ----------
-    signals : Signals
-        The log's.
-    B : mapping of (int, int) to Array or float
-        (row of an instant, joint) -> what the row multiplies the torque of the joint by.
-    c, e : mapping of (int, int) to Array
-        (row, place in X) -> column that is used as it is, and column that is still to be differentiated, shape (..., time).
-    names : tuple of str
-        Names of the parameters X.
-    """
+    """B tau = [c + s e] X at every sample of a log, with s = d/dt."""
 
     signals: Signals
+    """The log's."""
     B: Multipliers
+    """(row of an instant, joint) -> what the row multiplies the torque of the joint by."""
     c: Columns
+    """(row, place in X) -> column that is used as it is, and column that is still to be differentiated, shape (..., time)."""
     e: Columns
+    """(row, place in X) -> column that is used as it is, and column that is still to be differentiated, shape (..., time)."""
     names: tuple[str, ...]
+    """Names of the parameters X."""
 
     @property
     def kinds(self) -> int:

@@ -17,15 +17,10 @@ BLOCK, TOGETHER = 64, 32
 
 @dataclass(frozen=True, eq=False)
 class Band:
-    """A symmetric band matrix C. Leading axes are runs.
-
-    Parameters
-    ----------
-    lower : Array, shape (..., r, width)
-        At [j, d] what C has in row j + d of column j.
-    """
+    """A symmetric band matrix C. Leading axes are runs."""
 
     lower: Array
+    """At [j, d] what C has in row j + d of column j, shape (..., r, width)."""
 
     @classmethod
     def product(cls, x: Array, y: Array, width: int) -> Self:
@@ -72,15 +67,10 @@ class Band:
 
 @dataclass(frozen=True, eq=False)
 class Cholesky:
-    """The factor L of a band matrix L L'.
-
-    Parameters
-    ----------
-    lower : Array, shape (..., r, width)
-        At [j, d] what L has in row j + d of column j; NaN in runs that have no factor.
-    """
+    """The factor L of a band matrix L L'."""
 
     lower: Array
+    """At [j, d] what L has in row j + d of column j; NaN in runs that have no factor, shape (..., r, width)."""
 
     @classmethod
     def of(cls, C: Band) -> Self:

@@ -15,15 +15,11 @@ from idbench.identify.rows.grid import Grid, windowed
 
 @dataclass(frozen=True, eq=False)
 class BandedCovariance:
-    """Covariance C of the rows of one log. Leading axes are runs.
-
-    Parameters
-    ----------
-    bands : Array, shape (..., lag, instant, kind, kind)
-        Covariance of the row of a kind at an instant with that of another kind `lag` instants later.
-    """
+    """Covariance C of the rows of one log. Leading axes are runs."""
 
     bands: Array
+    """Covariance of the row of a kind at an instant with that of another kind `lag` instants later, shape (..., lag, instant,
+    kind, kind)."""
 
     @classmethod
     def of(

@@ -48,21 +48,15 @@ class Slopes(NamedTuple):
 class Linearization:
     """What a small error n of the measured positions does to the torques that a robot's model predicts, sample by sample:
 
-        error of D(q, qd, qdd) X = inertia s^2 n + damping s n + stiffness n
-
-    Parameters
-    ----------
-    signals : Signals
-        The motion.
-    basis : Basis
-        The robot.
-    X : Array, shape (..., p)
-        Its parameters.
+    error of D(q, qd, qdd) X = inertia s^2 n + damping s n + stiffness n
     """
 
     signals: Signals
+    """The motion."""
     basis: Basis
+    """The robot."""
     X: Array
+    """Its parameters, shape (..., p)."""
 
     def at(self, some: slice) -> Slopes:
         """Return the slopes at some samples."""

@@ -22,18 +22,12 @@ SEEN = 0.05
 
 @dataclass(frozen=True, eq=False)
 class NoisyRows:
-    """The rows of one log as noise reaches them; each part is made when it is first asked for.
-
-    Parameters
-    ----------
-    to_rows : RowMap
-        How samples become rows.
-    linear : Linearization
-        Of the explicit model, about the signals of the log.
-    """
+    """The rows of one log as noise reaches them; each part is made when it is first asked for."""
 
     to_rows: RowMap
+    """How samples become rows."""
     linear: Linearization
+    """Of the explicit model, about the signals of the log."""
 
     @cached_property
     def torque(self) -> Paths:

@@ -26,21 +26,16 @@ TAIL = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class NoiseLevels:
-    """Standard deviations of white noise in a log, joint by joint. Leading axes are runs.
-
-    Parameters
-    ----------
-    torque : Array, shape (..., joint)
-        Of the torques [N m]; NaN of all joints in runs that cannot be solved, and of joints whose rows are all masked.
-    position : Array, shape (..., joint)
-        Of the positions [rad].
-    repeats : Array, shape (..., joint), optional
-        How many times the variance of averages is what it would be if the positions' noise did not repeat itself.
-    """
+    """Standard deviations of white noise in a log, joint by joint. Leading axes are runs."""
 
     torque: Array
+    """Of the torques [N m]; NaN of all joints in runs that cannot be solved, and of joints whose rows are all masked, shape
+    (..., joint)."""
     position: Array
+    """Of the positions [rad], shape (..., joint)."""
     repeats: Array = field(default_factory=lambda: np.ones(()))
+    """How many times the variance of averages is what it would be if the positions' noise did not repeat itself, shape (...,
+    joint), optional."""
 
     @property
     def in_rows(self) -> Array:
@@ -56,24 +51,16 @@ class NoiseLevels:
 
 @dataclass(frozen=True, eq=False)
 class Paths:
-    """How unit noise of each joint reaches rows: see `BandedCovariance.of`.
-
-    Parameters
-    ----------
-    grid : Grid
-        The rows, among the samples of the signals.
-    windows : list of Array, shape (length,)
-        What rows sum.
-    signals : list of Array, shape (..., kind, joint, time)
-        What they multiply the noise by, as many.
-    outside : Array, shape (..., kind, instant)
-        Weights of the rows.
-    """
+    """How unit noise of each joint reaches rows: see `BandedCovariance.of`."""
 
     grid: Grid
+    """The rows, among the samples of the signals."""
     windows: list[Array]
+    """What rows sum, shape (length,)."""
     signals: list[Array]
+    """What they multiply the noise by, as many, shape (..., kind, joint, time)."""
     outside: Array
+    """Weights of the rows, shape (..., kind, instant)."""
 
     def covariance(self, level: Array) -> BandedCovariance:
         """Return the covariance that noise of these standard deviations, shape (..., joint), gives the rows."""

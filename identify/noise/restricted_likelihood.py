@@ -101,22 +101,16 @@ def likely(units: Sequence[Sequence[Band]], joined: Sequence[Array], start: Arra
 
 @dataclass(frozen=True, eq=False)
 class _Slope:
-    """How the likelihood of rows depends on the squares of its levels. Leading axes are runs.
-
-    Parameters
-    ----------
-    found, expected : Array, shape (..., i)
-        r' C^-1 C_i C^-1 r, and the trace of P C_i.
-    bend : Array, shape (..., i, i)
-        Average information, times 2: y' P C_i P C_j P y.
-    moves : Array, shape (..., p, i)
-        What X moves by, in its sigma, for a change of each square.
-    """
+    """How the likelihood of rows depends on the squares of its levels. Leading axes are runs."""
 
     found: Array
+    """r' C^-1 C_i C^-1 r, and the trace of P C_i, shape (..., i)."""
     expected: Array
+    """r' C^-1 C_i C^-1 r, and the trace of P C_i, shape (..., i)."""
     bend: Array
+    """Average information, times 2: y' P C_i P C_j P y, shape (..., i, i)."""
     moves: Array
+    """What X moves by, in its sigma, for a change of each square, shape (..., p, i)."""
 
     @classmethod
     def at(cls, units: Sequence[Sequence[Band]], joined: Sequence[Array], squares: Array) -> Self:

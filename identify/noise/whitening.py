@@ -12,18 +12,12 @@ from idbench.identify.noise.band_matrix import Band, Cholesky
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """What makes the rows of one log independent, and of variance 1.
-
-    Parameters
-    ----------
-    C : Band
-        Covariance of those that are kept.
-    kept : bool array, shape (..., r)
-        False for rows that are left out.
-    """
+    """What makes the rows of one log independent, and of variance 1."""
 
     C: Band
+    """Covariance of those that are kept."""
     kept: npt.NDArray[np.bool_]
+    """False for rows that are left out, shape (..., r)."""
 
     @cached_property
     def root(self) -> Cholesky:

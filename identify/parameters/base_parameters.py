@@ -47,23 +47,16 @@ class BaseParameters:
     parameters in the order of the basis are kept (W. Khalil and E. Dombre, "Modeling, Identification and Control of Robots",
     2002, chapter 9; numerically M. Gautier, "Numerical calculation of the base inertial parameters of robots", J. Robotic
     Systems 8 (1991) 485-506).
-
-    Parameters
-    ----------
-    standard : Basis
-        Links, armatures, frictions.
-    kept : tuple of int
-        Numbers of the parameters that stay, from 0.
-    K : Array, shape (b, p)
-        What each base parameter is made of.
-    parameters : tuple of Parameter
-        The base parameters.
     """
 
     standard: Basis
+    """Links, armatures, frictions."""
     kept: tuple[int, ...]
+    """Numbers of the parameters that stay, from 0."""
     K: Array
+    """What each base parameter is made of, shape (b, p)."""
     parameters: tuple[Parameter, ...]
+    """The base parameters."""
 
     @classmethod
     def of(cls, tree: KinematicTree, standard: Basis, written: Mapping[Parameter, Parameter] | None = None) -> Self:

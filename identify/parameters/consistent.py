@@ -32,31 +32,21 @@ REACHED = 0.1
 @final
 @dataclass(frozen=True, eq=False)
 class Consistent:
-    """Physically consistent standard parameters.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Of the standard parameters.
-    standard : Array, shape (p,)
-        Their values.
-    base : Array, shape (b,)
-        The base values that they give.
-    departure : Array, shape (b,)
-        By how many sigma those differ from the estimate.
-    distance : float
-        Mahalanobis distance to the estimate of those that constraints touch.
-    touched : int
-        Their number; were the estimate that of a robot of bodies, squares of its distance would be chi^2 of so many degrees of
-        freedom.
-    """
+    """Physically consistent standard parameters."""
 
     names: tuple[str, ...]
+    """Of the standard parameters."""
     standard: Array
+    """Their values, shape (p,)."""
     base: Array
+    """The base values that they give, shape (b,)."""
     departure: Array
+    """By how many sigma those differ from the estimate, shape (b,)."""
     distance: float
+    """Mahalanobis distance to the estimate of those that constraints touch."""
     touched: int
+    """Their number; were the estimate that of a robot of bodies, squares of its distance would be chi^2 of so many degrees of
+    freedom."""
 
     @property
     def agrees(self) -> bool:

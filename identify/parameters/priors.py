@@ -20,25 +20,18 @@ _PLACES = [(i, j) for j in range(4) for i in range(j, 4)]
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """What a prior adds to a convex programme over x and variables of its own.
-
-    Parameters
-    ----------
-    own : int
-        Number of variables of its own, which stand behind x.
-    linear : Array, shape (p + own,)
-        Of the objective.
-    G, h : Array, shape (rows, p + own), (rows,)
-        h - G (x, own) lies in the cones.
-    cones : list
-        Of the solver.
-    """
+    """What a prior adds to a convex programme over x and variables of its own."""
 
     own: int
+    """Number of variables of its own, which stand behind x."""
     linear: Array
+    """Of the objective, shape (p + own,)."""
     G: Array
+    """H - G (x, own) lies in the cones, shape (rows, p + own), (rows,)."""
     h: Array
+    """H - G (x, own) lies in the cones, shape (rows, p + own), (rows,)."""
     cones: list[Any]
+    """Of the solver."""
 
 
 def entropic_terms(links: list[list[int]], inertias: list[Array], p: int, weight: float, clarabel: ModuleType) -> Terms:

@@ -23,31 +23,21 @@ from idbench.identify.signals.torques.torque import AbstractAlignment
 @final
 @dataclass(frozen=True)
 class Chain:
-    """The stages between a log and Y = W X + rho; the same chain serves every sampling frequency.
-
-    Parameters
-    ----------
-    prefilter : AbstractPrefilter
-        Applied to positions and torques.
-    differentiator : AbstractDifferentiator
-        The operator s, for velocities, accelerations and the columns e.
-    alignment : AbstractAlignment
-        Puts the torque on the time of the columns.
-    mask : AbstractMask
-        Weights of the instants.
-    operator : AbstractOperator
-        Makes the rows.
-    trim : float, optional
-        Time [s] at either end of a log that makes no rows, only feeds the filters. By default as much as the stages look
-        to either side; less than that is refused.
-    """
+    """The stages between a log and Y = W X + rho; the same chain serves every sampling frequency."""
 
     prefilter: AbstractPrefilter
+    """Applied to positions and torques."""
     differentiator: AbstractDifferentiator
+    """The operator s, for velocities, accelerations and the columns e."""
     alignment: AbstractAlignment
+    """Puts the torque on the time of the columns."""
     mask: AbstractMask
+    """Weights of the instants."""
     operator: AbstractOperator
+    """Makes the rows."""
     trim: float | None = None
+    """Time [s] at either end of a log that makes no rows, only feeds the filters. By default as much as the stages look to
+    either side; less than that is refused."""
 
     def __post_init__(self) -> None:
         if self.trim is not None:

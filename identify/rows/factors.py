@@ -27,21 +27,14 @@ class Status(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class Factor:
-    """The triangular factor R of [W Y], which has the least-squares solutions of all rows. Leading axes are runs.
-
-    Parameters
-    ----------
-    R : Array, shape (..., p + 1, p + 1)
-        Q R = [W Y].
-    rows : int array, shape (...)
-        Number of rows that are not void, r.
-    names : tuple of str
-        Names of X.
-    """
+    """The triangular factor R of [W Y], which has the least-squares solutions of all rows. Leading axes are runs."""
 
     R: Array
+    """Q R = [W Y], shape (..., p + 1, p + 1)."""
     rows: npt.NDArray[np.intp]
+    """Number of rows that are not void, r, shape (...)."""
     names: tuple[str, ...]
+    """Names of X."""
 
     @property
     def p(self) -> int:
@@ -172,21 +165,14 @@ class Fit(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Factors:
-    """Triangular factors of [W Y], one for each kind of row: joints, or the one kind of the power model.
-
-    Parameters
-    ----------
-    R : Array, shape (..., kind, p + 1, p + 1)
-        The factors.
-    rows : int array, shape (..., kind)
-        Numbers of rows that are not void.
-    names : tuple of str
-        Names of X.
-    """
+    """Triangular factors of [W Y], one for each kind of row: joints, or the one kind of the power model."""
 
     R: Array
+    """The factors, shape (..., kind, p + 1, p + 1)."""
     rows: npt.NDArray[np.intp]
+    """Numbers of rows that are not void, shape (..., kind)."""
     names: tuple[str, ...]
+    """Names of X."""
     _fits: list[Fit] = field(default_factory=list, repr=False)
 
     def __post_init__(self) -> None:

@@ -38,21 +38,14 @@ class Grid:
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """The weights of the samples k - before, k - before + 1, ... in the row of sample k, for the rows of a grid.
-
-    Parameters
-    ----------
-    weights : Array, shape (length,)
-        What a sample is multiplied by.
-    before : int
-        Samples ahead of the row's own that it looks at.
-    grid : Grid
-        The rows.
-    """
+    """The weights of the samples k - before, k - before + 1, ... in the row of sample k, for the rows of a grid."""
 
     weights: Array
+    """What a sample is multiplied by, shape (length,)."""
     before: int
+    """Samples ahead of the row's own that it looks at."""
     grid: Grid
+    """The rows."""
 
     def apply(self, x: Array) -> Array:
         """Return the weighted sums of `x`, shape (..., time), at the rows, shape (..., count)."""

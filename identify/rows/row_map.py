@@ -21,37 +21,27 @@ class Window(Protocol):
 class RowMap:
     """The rows of one log as a linear function K of signals c and e (..., kind of row, time):
 
-        rows = outside (kernel(inside c) + kernel(inside s e))        without a rate kernel
-        rows = outside (kernel(c) + rate_kernel(e))                   with one, which integrates s e by parts
-
-    Parameters
-    ----------
-    signals : Signals
-        The log's.
-    B : mapping of (int, int) to Array or float
-        (kind of row, joint) -> what the model multiplies torques by.
-    grid : Grid
-        Where the rows lie.
-    kernel : Window
-        Of what is used as it is.
-    rate_kernel : Kernel, optional
-        Of what is still to be differentiated.
-    inside : Array, shape (..., kind, time)
-        Weights of the samples; ones with a rate kernel.
-    outside : Array, shape (..., kind, count)
-        Weights of the rows, 0 for void ones.
-    response : Array, shape (length,)
-        Weights of the samples around k in the row of sample k, where `kernel` is recursive as far as its halo.
+    rows = outside (kernel(inside c) + kernel(inside s e))        without a rate kernel
+    rows = outside (kernel(c) + rate_kernel(e))                   with one, which integrates s e by parts
     """
 
     signals: Signals
+    """The log's."""
     B: Multipliers
+    """(kind of row, joint) -> what the model multiplies torques by."""
     grid: Grid
+    """Where the rows lie."""
     kernel: Window
+    """Of what is used as it is."""
     rate_kernel: Kernel | None
+    """Of what is still to be differentiated."""
     inside: Array
+    """Weights of the samples; ones with a rate kernel, shape (..., kind, time)."""
     outside: Array
+    """Weights of the rows, 0 for void ones, shape (..., kind, count)."""
     response: Array
+    """Weights of the samples around k in the row of sample k, where `kernel` is recursive as far as its halo, shape
+    (length,)."""
 
     @property
     def rows(self) -> int:

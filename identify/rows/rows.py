@@ -20,32 +20,22 @@ class Rows:
     """Y = W X + rho (Eq. 12): what an operator makes of a model's equations, ordered by time, then kind (Eq. 14).
 
     Leading axes are independent runs.
-
-    Parameters
-    ----------
-    Y : Array, shape (..., r)
-        Measurement vector.
-    W : Array, shape (..., r, p)
-        Observation matrix.
-    valid : bool array, shape (..., r)
-        False where a row is void (masked out); such rows of Y and W are zero.
-    time : Array, shape (r,)
-        Instant of every row [s].
-    kinds : int
-        Kinds of rows, each of which comes once at every instant: a kind for each joint, or one in the power model.
-    names : tuple of str
-        Names of X.
-    maps : tuple of RowMap
-        How the samples of each log become its rows.
     """
 
     Y: Array
+    """Measurement vector, shape (..., r)."""
     W: Array
+    """Observation matrix, shape (..., r, p)."""
     valid: npt.NDArray[np.bool_]
+    """False where a row is void (masked out); such rows of Y and W are zero, shape (..., r)."""
     time: Array
+    """Instant of every row [s], shape (r,)."""
     kinds: int
+    """Kinds of rows, each of which comes once at every instant: a kind for each joint, or one in the power model."""
     names: tuple[str, ...]
+    """Names of X."""
     maps: tuple[RowMap, ...]
+    """How the samples of each log become its rows."""
 
     def __post_init__(self) -> None:
         for values in (self.Y, self.W, self.valid, self.time):

@@ -28,24 +28,16 @@ PER_PARAMETER = 2
 @final
 @dataclass(frozen=True, eq=False)
 class FrictionChoice:
-    """Laws of friction compared.
-
-    Parameters
-    ----------
-    fits : mapping of str to ServoFit
-        By the law, those that can be fitted.
-    chosen : str
-        The law to use.
-    errors : mapping of str to float
-        Root mean square of the residuals of parts of the log that were left out, large ones counting less [rad].
-    p : mapping of str to float
-        p value of each law against the simplest, two-sided, times the number of tests.
-    """
+    """Laws of friction compared."""
 
     fits: dict[str, ServoFit]
+    """By the law, those that can be fitted."""
     chosen: str
+    """The law to use."""
     errors: dict[str, float]
+    """Root mean square of the residuals of parts of the log that were left out, large ones counting less [rad]."""
     p: dict[str, float]
+    """P value of each law against the simplest, two-sided, times the number of tests."""
 
     @property
     def fit(self) -> ServoFit:

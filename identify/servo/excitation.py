@@ -23,33 +23,22 @@ DEGREES = 20.0
 @final
 @dataclass(frozen=True)
 class Excitation:
-    """Sizes of the motion of some runs.
-
-    Parameters
-    ----------
-    range : float
-        Of positions [rad].
-    speed : float
-        Largest, but for 1 % of the samples [rad/s].
-    torque : float
-        Root mean square of the torque of the load [N m].
-    T : float
-        Sampling time [s].
-    step : float
-        Of the encoder [rad].
-    off : bool
-        Whether torque is off in some motion: friction then shows apart from back-EMF.
-    tilts : bool
-        Whether gravity depends on the position: only then does an offset show.
-    """
+    """Sizes of the motion of some runs."""
 
     range: float
+    """Of positions [rad]."""
     speed: float
+    """Largest, but for 1 % of the samples [rad/s]."""
     torque: float
+    """Root mean square of the torque of the load [N m]."""
     T: float
+    """Sampling time [s]."""
     step: float
+    """Of the encoder [rad]."""
     off: bool
+    """Whether torque is off in some motion: friction then shows apart from back-EMF."""
     tilts: bool
+    """Whether gravity depends on the position: only then does an offset show."""
 
     @classmethod
     def of(cls, servo: Servo, runs: Sequence[ServoRun], held: Mapping[str, float]) -> Self:

@@ -26,37 +26,26 @@ MIN_PARTS = 24
 @final
 @dataclass(frozen=True, eq=False)
 class ServoFit:
-    """What was identified of a servo.
-
-    Parameters
-    ----------
-    servo : Servo
-        What was known.
-    friction : str
-        Law of friction.
-    free : tuple of str
-        Parameters that were searched for.
-    found : Found
-        The search's result.
-    loop : ServoLoop
-        The runs that it looked at.
-    excitation : Excitation
-        What the runs can show.
-    contrast : float
-        How many times larger the objective is at least with half as much again, or two thirds, of the torque per volt, and with
-        all others as that needs them: near 1 where no known load sets the scale of the torques.
-    of_all : Array, shape (p, p), optional
-        Covariance of the free parameters, where it contains errors of other joints (see `idbench.identify.servo.together`).
-    """
+    """What was identified of a servo."""
 
     servo: Servo
+    """What was known."""
     friction: str
+    """Law of friction."""
     free: tuple[str, ...]
+    """Parameters that were searched for."""
     found: Found
+    """The search's result."""
     loop: ServoLoop
+    """The runs that it looked at."""
     excitation: Excitation
+    """What the runs can show."""
     contrast: float
+    """How many times larger the objective is at least with half as much again, or two thirds, of the torque per volt, and with
+    all others as that needs them: near 1 where no known load sets the scale of the torques."""
     of_all: Array | None = None
+    """Covariance of the free parameters, where it contains errors of other joints (see `idbench.identify.servo.together`),
+    shape (p, p), optional."""
 
     @property
     def p(self) -> dict[str, float]:

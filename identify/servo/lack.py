@@ -16,21 +16,14 @@ SLOW = 0.05
 
 @final
 class Lack(NamedTuple):
-    """Residuals in one kind of motion.
-
-    Parameters
-    ----------
-    when : str
-        What the joint is doing.
-    share : float
-        Of the samples.
-    error : float
-        Mean absolute residual [rad].
-    """
+    """Residuals in one kind of motion."""
 
     when: str
+    """What the joint is doing."""
     share: float
+    """Of the samples."""
     error: float
+    """Mean absolute residual [rad]."""
 
 
 def lacks_of(fit: ServoFit) -> list[Lack]:

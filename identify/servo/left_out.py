@@ -19,18 +19,12 @@ MOST_LEVERAGE = 0.99
 @final
 @dataclass(frozen=True, eq=False)
 class LeftOut:
-    """A fit without each of its clusters, from one step of the search (the jackknife).
-
-    Parameters
-    ----------
-    covariance : Array, shape (p, p)
-        Of the parameters.
-    costs : Array, shape (cluster,)
-        Mean of Fair's function of the residuals of each cluster, by the fit without it [rad^2].
-    """
+    """A fit without each of its clusters, from one step of the search (the jackknife)."""
 
     covariance: Array
+    """Of the parameters, shape (p, p)."""
     costs: Array
+    """Mean of Fair's function of the residuals of each cluster, by the fit without it [rad^2], shape (cluster,)."""
 
 
 def left_out(found: Found, loop: ServoLoop, c: float, parts: int) -> LeftOut:

@@ -19,19 +19,16 @@ class JointLoad:
 
     Exact for one joint. Of an arm, the other joints move as they were measured: J and the coefficients then vary over time, and
     `rest` has what their accelerations and velocities need.
-
-    Parameters
-    ----------
-    inertia : Array, shape (time,) or ()
-        J [kg m^2].
-    sine, cosine, rest : Array, shape (time,) or ()
-        [N m].
     """
 
     inertia: Array
+    """J [kg m^2], shape (time,) or ()."""
     sine: Array
+    """Shape (time,) or () [N m]."""
     cosine: Array
+    """Shape (time,) or () [N m]."""
     rest: Array
+    """Shape (time,) or () [N m]."""
 
     def __post_init__(self) -> None:
         for name in ("inertia", "sine", "cosine", "rest"):

@@ -12,31 +12,22 @@ from idbench.identify.servo.friction import SERVO_FRICTIONS
 
 @final
 class ServoParameter(NamedTuple):
-    """One parameter.
-
-    Parameters
-    ----------
-    unit : str
-        Unit.
-    meaning : str
-        What it is.
-    relative : float
-        Step of differences, as a share of its value; 0 for parameters that may be zero.
-    of : str
-        Scale of the step where it is absolute: torque, angle, time, speed, or 1.
-    share : float
-        Step as a share of that scale.
-    low, high : float
-        Smallest and largest value.
-    """
+    """One parameter."""
 
     unit: str
+    """Unit."""
     meaning: str
+    """What it is."""
     relative: float = 0.0
+    """Step of differences, as a share of its value; 0 for parameters that may be zero."""
     of: str = "1"
+    """Scale of the step where it is absolute: torque, angle, time, speed, or 1."""
     share: float = 0.01
+    """Step as a share of that scale."""
     low: float = 0.0
+    """Smallest and largest value."""
     high: float = float("inf")
+    """Smallest and largest value."""
 
 
 NEGATIVE = float("-inf")

@@ -41,25 +41,6 @@ def without_spikes(t: Array, q: Array) -> Array:
 class ServoRun:
     """Commands and positions of one joint, with their times as logged.
 
-    Parameters
-    ----------
-    t : array_like, shape (time,)
-        Times [s], increasing; steps may differ.
-    q : array_like, shape (time,)
-        Position that the servo reports [rad].
-    command : array_like, shape (time,)
-        Commanded position from each sample on [rad].
-    load : JointLoad
-        What the joint carries.
-    kp : float
-        Gain of the firmware, in its own unit.
-    on : array_like of bool, shape (time,), optional
-        Whether torque is enabled; by default always.
-    voltage : array_like, shape (time,), optional
-        Supply [V], where it was logged.
-    name : str
-        What messages call the run.
-
     Raises
     ------
     LogError
@@ -67,13 +48,21 @@ class ServoRun:
     """
 
     t: Array
+    """Times [s], increasing; steps may differ, shape (time,)."""
     q: Array
+    """Position that the servo reports [rad], shape (time,)."""
     command: Array
+    """Commanded position from each sample on [rad], shape (time,)."""
     load: JointLoad
+    """What the joint carries."""
     kp: float
+    """Gain of the firmware, in its own unit."""
     on: npt.NDArray[np.bool_] | None = None
+    """Whether torque is enabled; by default always, shape (time,)."""
     voltage: Array | None = None
+    """Supply [V], where it was logged, shape (time,)."""
     name: str = field(default="the log", kw_only=True)
+    """What messages call the run."""
 
     def __post_init__(self) -> None:
         require_positive(kp=self.kp)

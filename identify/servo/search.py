@@ -43,21 +43,14 @@ WILD = 4.0
 @final
 @dataclass(frozen=True, eq=False)
 class Beginning:
-    """Where runs begin: the encoder says that to a count, and where torque is off nothing makes a run forget it.
-
-    Parameters
-    ----------
-    ahead : Array, shape (run,)
-        Beyond the position that was measured [rad].
-    sensitivity : Array, shape (run, sample)
-        Of the simulated positions to it.
-    certainty : float
-        Variance of residuals over that of a position that was rounded.
-    """
+    """Where runs begin: the encoder says that to a count, and where torque is off nothing makes a run forget it."""
 
     ahead: Array
+    """Beyond the position that was measured [rad], shape (run,)."""
     sensitivity: Array
+    """Of the simulated positions to it, shape (run, sample)."""
     certainty: float
+    """Variance of residuals over that of a position that was rounded."""
 
     def free_of(self, J: Array, w: Array) -> Array:
         """Return sensitivities, shape (run, sample, parameter), without what other beginnings would do, weighted by w."""
@@ -69,27 +62,18 @@ class Beginning:
 @final
 @dataclass(frozen=True, eq=False)
 class Found:
-    """The best parameters of a search.
-
-    Parameters
-    ----------
-    p : dict of str to float
-        All parameters.
-    cost : float
-        Objective there.
-    residual : Array, shape (run, sample)
-        Measured minus simulated positions [rad].
-    sensitivity : Array, shape (run, sample, parameter)
-        Of the simulated positions to the free parameters.
-    beginning : Beginning
-        Where runs begin.
-    """
+    """The best parameters of a search."""
 
     p: dict[str, float]
+    """All parameters."""
     cost: float
+    """Objective there."""
     residual: Array
+    """Measured minus simulated positions [rad], shape (run, sample)."""
     sensitivity: Array
+    """Of the simulated positions to the free parameters, shape (run, sample, parameter)."""
     beginning: Beginning
+    """Where runs begin."""
 
 
 @final

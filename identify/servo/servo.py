@@ -23,19 +23,6 @@ oscilloscope) and for the STS3215 at GitHub kscalelabs/sysid."""
 class Servo:
     """What is known of a servo: its firmware, its supply, its encoder.
 
-    Parameters
-    ----------
-    gain : float
-        Duty per unit of the firmware's kp and rad of position error.
-    kp : float
-        Firmware gain of the logs, unless they state another.
-    supply : float
-        V [V]. At 1, a is the torque at full duty.
-    duty_limit : float
-        Largest duty.
-    counts : int
-        Counts of the encoder a turn.
-
     Raises
     ------
     SettingError
@@ -43,10 +30,15 @@ class Servo:
     """
 
     gain: float
+    """Duty per unit of the firmware's kp and rad of position error."""
     kp: float = 1.0
+    """Firmware gain of the logs, unless they state another."""
     supply: float = 1.0
+    """V [V]. At 1, a is the torque at full duty."""
     duty_limit: float = 1.0
+    """Largest duty."""
     counts: int = 4096
+    """Counts of the encoder a turn."""
 
     def __post_init__(self) -> None:
         require_positive(gain=self.gain, kp=self.kp, supply=self.supply, duty_limit=self.duty_limit, counts=self.counts)

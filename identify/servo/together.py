@@ -22,18 +22,13 @@ INSEPARABLE = 100.0
 
 @final
 class Joint(NamedTuple):
-    """The fit of a joint, and the offsets of others that its loads assume.
-
-    Parameters
-    ----------
-    fit : ServoFit
-        The fit.
-    per_offset : mapping of int to Array
-        By how much its free parameters change per rad of the offset of another joint, shape (p,), by the number of that joint.
-    """
+    """The fit of a joint, and the offsets of others that its loads assume."""
 
     fit: ServoFit
+    """The fit."""
     per_offset: dict[int, Array]
+    """By how much its free parameters change per rad of the offset of another joint, shape (p,), by the number of that
+    joint."""
 
 
 def per_offset(fit: ServoFit, other: Sequence[ServoRun]) -> Array:

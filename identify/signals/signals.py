@@ -19,30 +19,20 @@ from idbench.identify.signals.torques.torque import AbstractAlignment, Torque
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """The signals of one log, each computed once, when it is first asked for; time is the last axis.
-
-    Parameters
-    ----------
-    log : MotionLog
-        One log; leading axes are independent runs.
-    prefilter : AbstractPrefilter
-        Applied to positions and torques.
-    differentiator : AbstractDifferentiator
-        The operator s.
-    alignment : AbstractAlignment
-        Puts the torque on the time of the positions.
-    mask : AbstractMask
-        Gives the weights of the instants.
-    weights_of : Signals, optional
-        Signals whose weights are taken instead of those of the mask.
-    """
+    """The signals of one log, each computed once, when it is first asked for; time is the last axis."""
 
     log: MotionLog
+    """One log; leading axes are independent runs."""
     prefilter: AbstractPrefilter
+    """Applied to positions and torques."""
     differentiator: AbstractDifferentiator
+    """The operator s."""
     alignment: AbstractAlignment
+    """Puts the torque on the time of the positions."""
     mask: AbstractMask
+    """Gives the weights of the instants."""
     weights_of: "Signals | None" = None
+    """Signals whose weights are taken instead of those of the mask."""
 
     @property
     def fs(self) -> float:

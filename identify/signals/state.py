@@ -16,21 +16,16 @@ class State:
     """Positions, velocities and accelerations of n joints, with time as the last axis.
 
     What several column functions need of it is computed once, when the first of them asks.
-
-    Parameters
-    ----------
-    q, qd : Array, shape (..., joint, time)
-        [rad], [rad/s].
-    s : callable
-        d/dt along the last axis; only asked for accelerations.
-    conditions : mapping of str to Array, shape (..., joint or 1, time)
-        What else the log says, such as temperatures.
     """
 
     q: Array
+    """[rad], [rad/s], shape (..., joint, time)."""
     qd: Array
+    """[rad], [rad/s], shape (..., joint, time)."""
     s: Callable[[Array], Array]
+    """d/dt along the last axis; only asked for accelerations."""
     conditions: Mapping[str, Array] = field(default_factory=dict)
+    """What else the log says, such as temperatures, shape (..., joint or 1, time)."""
 
     @classmethod
     def of(cls, q: Array, s: Callable[[Array], Array], conditions: Mapping[str, Array] | None = None) -> Self:

@@ -17,24 +17,16 @@ from idbench.sim.trajectories import Reference
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What a controller knows when it starts.
-
-    Parameters
-    ----------
-    nominal : Robot
-        The robot as its maker describes it: without payload, with the friction of its MJCF.
-    reference : Reference
-        The planned motion at the sample rate, of all simulations or of each.
-    nsim : int
-        Number of simulations.
-    vary : mapping of str to array_like, optional
-        Fields of MuJoCo's model of a nominal robot that is another one in each simulation, shape (nsim, ...).
-    """
+    """What a controller knows when it starts."""
 
     nominal: Robot
+    """The robot as its maker describes it: without payload, with the friction of its MJCF."""
     reference: Reference
+    """The planned motion at the sample rate, of all simulations or of each."""
     nsim: int
+    """Number of simulations."""
     vary: Mapping[str, npt.ArrayLike] = field(default_factory=dict)
+    """Fields of MuJoCo's model of a nominal robot that is another one in each simulation, shape (nsim, ...)."""
 
     @property
     def model(self) -> InverseDynamics:

@@ -8,22 +8,16 @@ from idbench.sim.drives.passages import TabulatedPassages
 
 
 class Loop(NamedTuple):
-    """A sampled PI current loop with feedforward of the back-EMF, of one winding.
-
-    Parameters
-    ----------
-    kp, ki : float
-        Gains [V/A].
-    most : float
-        Largest voltage that it asks for [V].
-    known : float
-        Share of the back-EMF that it feeds forward.
-    """
+    """A sampled PI current loop with feedforward of the back-EMF, of one winding."""
 
     kp: float
+    """Gains [V/A]."""
     ki: float
+    """Gains [V/A]."""
     most: float
+    """Largest voltage that it asks for [V]."""
     known: float
+    """Share of the back-EMF that it feeds forward."""
 
 
 class Periods(NamedTuple):

@@ -15,18 +15,12 @@ MAX_VALUES = 20_000
 
 @dataclass(frozen=True, eq=False)
 class ExactPassages:
-    """Passages computed period by period, for any modulation index.
-
-    Parameters
-    ----------
-    winding : Winding
-        Shape (sim, joint).
-    modulator : Modulator
-        Its chopper.
-    """
+    """Passages computed period by period, for any modulation index."""
 
     winding: Winding
+    """Shape (sim, joint)."""
     modulator: Modulator
+    """Its chopper."""
 
     def through(self, i: Array, m: Array, e: Array) -> Passage:
         """Return the passage of currents `i` [A] at modulation index `m` and back-EMF `e` [V], all of shape (sim, joint)."""
@@ -39,20 +33,14 @@ class TabulatedPassages:
 
     The modulation index is a multiple of `least`, so that few linear functions occur; their coefficients come from three
     passages each.
-
-    Parameters
-    ----------
-    winding : Winding
-        Shape (sim, joint), the same for all simulations.
-    modulator : Modulator
-        Its chopper.
-    least : float
-        Step of the modulation index.
     """
 
     winding: Winding
+    """Shape (sim, joint), the same for all simulations."""
     modulator: Modulator
+    """Its chopper."""
     least: float
+    """Step of the modulation index."""
 
     def through(self, i: Array, m: Array, e: Array) -> Passage:
         """Return the passage of currents `i` [A] at modulation index `m` and back-EMF `e` [V], all of shape (sim, joint)."""

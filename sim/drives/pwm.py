@@ -31,20 +31,15 @@ class Pattern(NamedTuple):
 
 
 class Modulator(NamedTuple):
-    """A centre-aligned chopper.
-
-    Parameters
-    ----------
-    modulation : str
-        unipolar: two legs, each with the same carrier and opposite references (phase-shifted, two pulses a period);
-        bipolar: the legs switch together, always one up and one down; sign_magnitude: one leg rests at the bus's end.
-    period, dead_time : float
-        [s]. Each transistor turns on `dead_time` after its partner has been turned off.
-    """
+    """A centre-aligned chopper."""
 
     modulation: Modulation
+    """unipolar: two legs, each with the same carrier and opposite references (phase-shifted, two pulses a period); bipolar: the
+    legs switch together, always one up and one down; sign_magnitude: one leg rests at the bus's end."""
     period: float
+    """[s]. Each transistor turns on `dead_time` after its partner has been turned off."""
     dead_time: float
+    """[s]. Each transistor turns on `dead_time` after its partner has been turned off."""
 
     def pattern(self, m: Array, forward: Array) -> Pattern:
         """Return the pulses for the modulation index `m`, mean voltage over bus voltage, -1 to 1.

@@ -10,17 +10,14 @@ from idbench.sim.robot.motors import Array
 
 
 class Winding(NamedTuple):
-    """A winding between the legs of an H-bridge.
-
-    Parameters
-    ----------
-    V, R, L : Array, shape (sim, joint)
-        Bus voltage [V], resistance [ohm], inductance [H].
-    """
+    """A winding between the legs of an H-bridge."""
 
     V: Array
+    """Bus voltage [V], resistance [ohm], inductance [H], shape (sim, joint)."""
     R: Array
+    """Bus voltage [V], resistance [ohm], inductance [H], shape (sim, joint)."""
     L: Array
+    """Bus voltage [V], resistance [ohm], inductance [H], shape (sim, joint)."""
 
 
 class Passage(NamedTuple):

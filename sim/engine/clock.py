@@ -5,21 +5,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Clock:
-    """Samples are taken every `per_sample` physics steps, from step 0; a command acts `delay` after its sample.
-
-    Parameters
-    ----------
-    per_sample : int
-        Physics steps a sample.
-    h : float
-        Physics step [s].
-    delay : float
-        Computing delay [s], not below zero.
-    """
+    """Samples are taken every `per_sample` physics steps, from step 0; a command acts `delay` after its sample."""
 
     per_sample: int
+    """Physics steps a sample."""
     h: float
+    """Physics step [s]."""
     delay: float
+    """Computing delay [s], not below zero."""
 
     @property
     def late(self) -> int:

@@ -19,18 +19,12 @@ from idbench.sim.trajectories import Reference
 @final
 @dataclass(frozen=True, eq=False)
 class Replay:
-    """What a simulated robot does with the torques of a log.
-
-    Parameters
-    ----------
-    q : Array, shape (time, joint)
-        Its positions [rad].
-    feedback : Array, shape (time, joint)
-        What the loop adds to the torques of the log to hold it to the log's motion [N m].
-    """
+    """What a simulated robot does with the torques of a log."""
 
     q: Array
+    """Its positions [rad], shape (time, joint)."""
     feedback: Array
+    """What the loop adds to the torques of the log to hold it to the log's motion [N m], shape (time, joint)."""
 
 
 def replay(robot: Robot, log: MotionLog, qd: Array, bandwidth: float) -> Replay:

@@ -13,40 +13,29 @@ from idbench.sim.trajectories import Reference
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """Simulations of one scenario that advanced together; the leading axis of all arrays is the simulation.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        What was simulated.
-    seeds : tuple of int
-        Seed of every simulation.
-    robots : sequence of Robot
-        The true robot of every simulation.
-    reference : Reference
-        The planned motion.
-    log : MotionLog
-        What the robot logged; shape (nsim, time, joint).
-    q, qd : Array, shape (nsim, time, joint)
-        True positions [rad] and velocities [rad/s] at the instants of the log.
-    tau : Array, shape (nsim, time, joint)
-        True mean torque of the motors between an instant of the log and the next, ripple included [N m].
-    command : Array, shape (nsim, time, joint)
-        Torque that the controller asked for [N m].
-    failures : dict of int to str
-        Why simulations failed, by their number; from then on their arrays hold nothing of use.
-    """
+    """Simulations of one scenario that advanced together; the leading axis of all arrays is the simulation."""
 
     scenario: Scenario
+    """What was simulated."""
     seeds: tuple[int, ...]
+    """Seed of every simulation."""
     robots: Sequence[Robot]
+    """The true robot of every simulation."""
     reference: Reference
+    """The planned motion."""
     log: MotionLog
+    """What the robot logged; shape (nsim, time, joint)."""
     q: Array
+    """True positions [rad] and velocities [rad/s] at the instants of the log, shape (nsim, time, joint)."""
     qd: Array
+    """True positions [rad] and velocities [rad/s] at the instants of the log, shape (nsim, time, joint)."""
     tau: Array
+    """True mean torque of the motors between an instant of the log and the next, ripple included [N m], shape (nsim, time,
+    joint)."""
     command: Array
+    """Torque that the controller asked for [N m], shape (nsim, time, joint)."""
     failures: dict[int, str]
+    """Why simulations failed, by their number; from then on their arrays hold nothing of use."""
 
     @property
     def truth(self) -> dict[str, float]:

@@ -17,85 +17,58 @@ from idbench.sim.trajectories.reference import Reference
 
 @dataclass(frozen=True, eq=False)
 class Inner:
-    """Signals inside the loop of the first simulation, once for each step of its drive.
-
-    Parameters
-    ----------
-    t : Array, shape (step,)
-        When each step begins, on the time of the log [s].
-    electric : Electric
-        Shape (step, joint) each.
-    tau : Array, shape (step, joint)
-        Mean torque of the motors, ripple included [N m].
-    edges : BetweenEdges, optional
-        What happens within the steps, of a drive that chops.
-    """
+    """Signals inside the loop of the first simulation, once for each step of its drive."""
 
     t: Array
+    """When each step begins, on the time of the log [s], shape (step,)."""
     electric: Electric
+    """Shape (step, joint) each."""
     tau: Array
+    """Mean torque of the motors, ripple included [N m], shape (step, joint)."""
     edges: BetweenEdges | None
+    """What happens within the steps, of a drive that chops."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Samples of the first simulation that have become final; all arrays of shape (time, joint).
-
-    Parameters
-    ----------
-    first : int
-        Number of the first sample, in the log.
-    reference : Reference
-        The planned motion.
-    measured : Array
-        Positions as the encoders give them [rad].
-    q, qd : Array
-        True positions [rad] and velocities [rad/s].
-    tau, command : Array
-        True mean torque of the motors until the next sample, and what was commanded: torque [N m] or position [rad].
-    logged : Array
-        The torque that comes into the log [N m].
-    electric : Electric, optional
-        Means until the next sample; none for a drive without currents.
-    inner : Inner, optional
-        What is in the window, if anything is.
-    by_position : bool
-        Whether positions are commanded.
-    gap : Array, optional
-        Position of the rotor minus that of the link [rad], of a robot with backlash.
-    """
+    """Samples of the first simulation that have become final; all arrays of shape (time, joint)."""
 
     first: int
+    """Number of the first sample, in the log."""
     reference: Reference
+    """The planned motion."""
     measured: Array
+    """Positions as the encoders give them [rad]."""
     q: Array
+    """True positions [rad] and velocities [rad/s]."""
     qd: Array
+    """True positions [rad] and velocities [rad/s]."""
     tau: Array
+    """True mean torque of the motors until the next sample, and what was commanded: torque [N m] or position [rad]."""
     command: Array
+    """True mean torque of the motors until the next sample, and what was commanded: torque [N m] or position [rad]."""
     logged: Array
+    """The torque that comes into the log [N m]."""
     electric: Electric | None
+    """Means until the next sample; none for a drive without currents."""
     inner: Inner | None
+    """What is in the window, if anything is."""
     by_position: bool = False
+    """Whether positions are commanded."""
     gap: Array | None = None
+    """Position of the rotor minus that of the link [rad], of a robot with backlash."""
 
 
 @dataclass(frozen=True)
 class Watch:
-    """Somebody who watches the first simulation of a run. No bit of the run depends on it.
-
-    Parameters
-    ----------
-    receive : callable
-        Receives every stretch, in order, while the run goes on.
-    every : float
-        Length of a stretch [s]; by default the whole run is one.
-    window : tuple of float, optional
-        From when to when, on the time of the log [s], the signals inside the loop are given at their full rate.
-    """
+    """Somebody who watches the first simulation of a run. No bit of the run depends on it."""
 
     receive: Callable[[Stretch], None]
+    """Receives every stretch, in order, while the run goes on."""
     every: float = np.inf
+    """Length of a stretch [s]; by default the whole run is one."""
     window: tuple[float, float] | None = None
+    """From when to when, on the time of the log [s], the signals inside the loop are given at their full rate."""
 
 
 class Step(NamedTuple):

@@ -26,21 +26,14 @@ COARSE = 50.0
 
 @dataclass(frozen=True)
 class Touch:
-    """The nearest that two shapes come.
-
-    Parameters
-    ----------
-    distance : float
-        Negative where they overlap [m].
-    shapes : tuple of str
-        Their names.
-    instant : int
-        Sample.
-    """
+    """The nearest that two shapes come."""
 
     distance: float
+    """Negative where they overlap [m]."""
     shapes: tuple[str, str]
+    """Their names."""
     instant: int
+    """Sample."""
 
     def __str__(self) -> str:
         how = f"are {1000 * self.distance:.0f} mm apart" if self.distance > 0 else "touch"

@@ -24,30 +24,24 @@ _SLOTS = {
 
 @dataclass(frozen=True, eq=False)
 class Motors:
-    """One direct-drive DC motor a joint.
-
-    Parameters
-    ----------
-    R, L : Array, shape (joint,)
-        Resistance [ohm] and inductance [H] between the terminals.
-    K : Array, shape (joint,)
-        Torque constant [N m/A], equal to the back-EMF constant [V s/rad].
-    V : Array, shape (joint,)
-        Bus voltage of the amplifier [V]; infinite where the model gives none.
-    I : Array, shape (joint,)
-        Largest current [A]; infinite where the model gives none.
-    cogging, order, phase : Array, shape (joint,)
-        Cogging torque cogging * sin(order * q + phase) [N m, cycles a turn, rad].
-    """
+    """One direct-drive DC motor a joint."""
 
     R: Array
+    """Resistance [ohm] and inductance [H] between the terminals, shape (joint,)."""
     L: Array
+    """Resistance [ohm] and inductance [H] between the terminals, shape (joint,)."""
     K: Array
+    """Torque constant [N m/A], equal to the back-EMF constant [V s/rad], shape (joint,)."""
     V: Array
+    """Bus voltage of the amplifier [V]; infinite where the model gives none, shape (joint,)."""
     I: Array  # noqa: E741  # the letter of a current
+    """Largest current [A]; infinite where the model gives none, shape (joint,)."""
     cogging: Array
+    """Cogging torque cogging * sin(order * q + phase) [N m, cycles a turn, rad], shape (joint,)."""
     order: Array
+    """Cogging torque cogging * sin(order * q + phase) [N m, cycles a turn, rad], shape (joint,)."""
     phase: Array
+    """Cogging torque cogging * sin(order * q + phase) [N m, cycles a turn, rad], shape (joint,)."""
 
     @classmethod
     def of(cls, model: mujoco.MjModel) -> Self:

@@ -16,25 +16,17 @@ from idbench.sim.robot.motors import Array
 @final
 @dataclass(frozen=True)
 class Mounting:
-    """How a robot is mounted, and which of its joints move.
-
-    Parameters
-    ----------
-    joints : tuple of str
-        Joints of the log, in the order of the robot's file or in another; empty for all. The others are held at 0, or where
-        `lock` says.
-    lock : tuple of (str, float)
-        Joints that do not move, and where they are held [rad, m].
-    couplings : tuple of (str, tuple of (str, float))
-        Drives whose motor turns with several joints: name, and joints with what the motor turns for a turn of each.
-    gravity : tuple of float, optional
-        [m/s^2] in the frame of the robot's base; by default what the file says, -9.81 along z in a URDF.
-    """
+    """How a robot is mounted, and which of its joints move."""
 
     joints: tuple[str, ...] = ()
+    """Joints of the log, in the order of the robot's file or in another; empty for all. The others are held at 0, or where
+    `lock` says."""
     lock: tuple[tuple[str, float], ...] = ()
+    """Joints that do not move, and where they are held [rad, m]."""
     gravity: tuple[float, float, float] | None = None
+    """[m/s^2] in the frame of the robot's base; by default what the file says, -9.81 along z in a URDF."""
     couplings: tuple[tuple[str, tuple[tuple[str, float], ...]], ...] = ()
+    """Drives whose motor turns with several joints: name, and joints with what the motor turns for a turn of each."""
 
     @property
     def plain(self) -> bool:

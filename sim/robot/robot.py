@@ -32,21 +32,14 @@ FILES = (".xml", ".urdf", TABLE)
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """An arm whose every joint is a hinge or a slide.
-
-    Parameters
-    ----------
-    name : str
-        Name of the robot.
-    model : mujoco.MjModel
-        The compiled model.
-    notes : tuple of str
-        What was mended in its file to compile it.
-    """
+    """An arm whose every joint is a hinge or a slide."""
 
     name: str
+    """Name of the robot."""
     model: mujoco.MjModel
+    """The compiled model."""
     notes: tuple[str, ...] = ()
+    """What was mended in its file to compile it."""
 
     def __post_init__(self) -> None:
         simple = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))

@@ -29,54 +29,38 @@ HIDDEN = 3
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """One geom.
-
-    Parameters
-    ----------
-    name, body : str
-        Its name and the body that carries it.
-    kind : str
-        Sphere, capsule, ellipsoid, cylinder, box or mesh; capsules and cylinders along z, all but meshes centred.
-    size : Array, shape (3,)
-        MuJoCo's sizes [m]: radius; radius and half length; half lengths.
-    position : Array, shape (3,)
-        In the body's frame [m].
-    quaternion : Array, shape (4,)
-        Orientation in the body's frame, x y z w.
-    rgba : Array, shape (4,)
-        Colour, 0 to 1.
-    vertices, faces : Array, shape (vertex, 3) [m] and (face, 3)
-        Of a mesh, in its own frame; empty otherwise.
-    """
+    """One geom."""
 
     name: str
+    """Its name and the body that carries it."""
     body: str
+    """Its name and the body that carries it."""
     kind: Kind
+    """Sphere, capsule, ellipsoid, cylinder, box or mesh; capsules and cylinders along z, all but meshes centred."""
     size: Array
+    """MuJoCo's sizes [m]: radius; radius and half length; half lengths, shape (3,)."""
     position: Array
+    """In the body's frame [m], shape (3,)."""
     quaternion: Array
+    """Orientation in the body's frame, x y z w, shape (4,)."""
     rgba: Array
+    """Colour, 0 to 1, shape (4,)."""
     vertices: Array
+    """Of a mesh, in its own frame; empty otherwise, shape (vertex, 3) [m] and (face, 3)."""
     faces: npt.NDArray[np.int32]
+    """Of a mesh, in its own frame; empty otherwise, shape (vertex, 3) [m] and (face, 3)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Poses in the world.
-
-    Parameters
-    ----------
-    positions : dict
-        Of every body, by name: (time, 3) [m].
-    quaternions : dict
-        Of every body, by name: (time, 4), x y z w.
-    sites : dict
-        Positions of every site, by name: (time, 3) [m].
-    """
+    """Poses in the world."""
 
     positions: dict[str, Array]
+    """Of every body, by name: (time, 3) [m]."""
     quaternions: dict[str, Array]
+    """Of every body, by name: (time, 4), x y z w."""
     sites: dict[str, Array]
+    """Positions of every site, by name: (time, 3) [m]."""
 
 
 def shapes(robot: Robot) -> list[Shape]:

@@ -41,37 +41,30 @@ SHARP_FRICTION = (1e-4, 1.0), (0.9999, 0.9999, 0.001, 0.5, 2.0)
 @final
 @dataclass(frozen=True)
 class ServoValues:
-    """A servo as MuJoCo has it.
-
-    Parameters
-    ----------
-    a, b : float
-        kt/R [N m/V] and kt^2/R [N m s/rad].
-    gain : float
-        Duty per rad, firmware gain included.
-    supply, duty_limit : float
-        V [V], and the largest duty.
-    armature, damping, frictionloss : float
-        Of the joint: Ia, Fv, Fs.
-    rate : float
-        Rate limit of the target [rad/s]; infinite if there is none.
-    delay : float
-        Of the command [s].
-    backlash : float
-        Free play between rotor and link [rad].
-    """
+    """A servo as MuJoCo has it."""
 
     a: float
+    """kt/R [N m/V] and kt^2/R [N m s/rad]."""
     b: float
+    """kt/R [N m/V] and kt^2/R [N m s/rad]."""
     gain: float
+    """Duty per rad, firmware gain included."""
     supply: float
+    """V [V], and the largest duty."""
     duty_limit: float
+    """V [V], and the largest duty."""
     armature: float
+    """Of the joint: Ia, Fv, Fs."""
     damping: float
+    """Of the joint: Ia, Fv, Fs."""
     frictionloss: float
+    """Of the joint: Ia, Fv, Fs."""
     rate: float
+    """Rate limit of the target [rad/s]; infinite if there is none."""
     delay: float
+    """Of the command [s]."""
     backlash: float = 0.0
+    """Free play between rotor and link [rad]."""
 
 
 def links(name: str, mounting: Mounting = PLAIN, payload: Payload = Payload()) -> Robot:  # noqa: B008  # frozen
@@ -180,24 +173,16 @@ def _position(servo: ServoValues) -> dict[str, str]:
 @final
 @dataclass(frozen=True, eq=False)
 class Commands:
-    """What servos are sent.
-
-    Parameters
-    ----------
-    t : Array, shape (time,)
-        [s].
-    command : Array, shape (time, servo)
-        Angles of the file, held from each sample on [rad].
-    on : Array, shape (time, servo), optional
-        Whether torque is enabled; by default always.
-    joints : sequence of int
-        Joint of each servo.
-    """
+    """What servos are sent."""
 
     t: Array
+    """Shape (time,) [s]."""
     command: Array
+    """Angles of the file, held from each sample on [rad], shape (time, servo)."""
     joints: Sequence[int]
+    """Joint of each servo."""
     on: npt.NDArray[np.bool_] | None = None
+    """Whether torque is enabled; by default always, shape (time, servo)."""
 
 
 def replay(name: str, text: str, folder: Path, sent: Commands, q0: Array) -> Array:

@@ -87,15 +87,9 @@ class _Series:
 
 @dataclass(frozen=True, eq=False)
 class RotorRipple:
-    """The ripple of the motors of a robot.
-
-    Parameters
-    ----------
-    cogging : _Series
-        Torque that needs no current [N m].
-    commutation : _Series
-        Torque constant over its mean, minus 1.
-    """
+    """The ripple of the motors of a robot."""
 
     cogging: _Series
+    """Torque that needs no current [N m]."""
     commutation: _Series
+    """Torque constant over its mean, minus 1."""

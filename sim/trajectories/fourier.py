@@ -20,15 +20,10 @@ STILL = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class FourierMotion(AbstractMotion):
-    """A series that fades in, is run some times, and fades out.
-
-    Parameters
-    ----------
-    series : Fourier
-        Its settings.
-    """
+    """A series that fades in, is run some times, and fades out."""
 
     series: "Fourier"
+    """Its settings."""
 
     @property
     def duration(self) -> float:

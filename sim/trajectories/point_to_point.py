@@ -23,15 +23,6 @@ class PointToPoint(AbstractMotion):
 
     q(t) = q_i + (q_(i+1) - q_i) s(u), s(u) = 10 u^3 - 15 u^4 + 6 u^5, u = (t - t_i) / T_i: all joints start and stop together.
 
-    Parameters
-    ----------
-    waypoints : array_like, shape (w, joint)
-        Positions at rest [rad], at least two.
-    durations : array_like, shape (w - 1,)
-        Time of every move [s].
-    dwells : array_like, shape (w,)
-        Pause at every waypoint [s].
-
     Raises
     ------
     ScenarioError
@@ -39,8 +30,11 @@ class PointToPoint(AbstractMotion):
     """
 
     waypoints: Array
+    """Positions at rest [rad], at least two, shape (w, joint)."""
     durations: Array
+    """Time of every move [s], shape (w - 1,)."""
     dwells: Array
+    """Pause at every waypoint [s], shape (w,)."""
 
     def __post_init__(self) -> None:
         for name in ("waypoints", "durations", "dwells"):

@@ -31,18 +31,12 @@ EXAMPLE, EXAMPLES = Path(__file__).parent / "example.csv", 2
 
 @dataclass(frozen=True, eq=False)
 class RecordedMotion(AbstractMotion):
-    """A spline through recorded positions, at rest at the ends at which it hardly moves.
-
-    Parameters
-    ----------
-    t : Array, shape (time,)
-        Instants, from 0 [s].
-    q : Array, shape (time, joint)
-        Positions [rad].
-    """
+    """A spline through recorded positions, at rest at the ends at which it hardly moves."""
 
     t: Array
+    """Instants, from 0 [s], shape (time,)."""
     q: Array
+    """Positions [rad], shape (time, joint)."""
 
     @property
     def duration(self) -> float:

@@ -11,20 +11,16 @@ from idbench.sim.robot.motors import Array
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """A planned motion, sampled.
-
-    Parameters
-    ----------
-    fs : float
-        [Hz].
-    q, qd, qdd : Array, shape (time, joint), or (time, nsim, joint) for many simulations
-        [rad], [rad/s], [rad/s^2].
-    """
+    """A planned motion, sampled."""
 
     fs: float
+    """[Hz]."""
     q: Array
+    """[rad], [rad/s], [rad/s^2], shape (time, joint), or (time, nsim, joint) for many simulations."""
     qd: Array
+    """[rad], [rad/s], [rad/s^2], shape (time, joint), or (time, nsim, joint) for many simulations."""
     qdd: Array
+    """[rad], [rad/s], [rad/s^2], shape (time, joint), or (time, nsim, joint) for many simulations."""
 
 
 class AbstractMotion(ABC):

@@ -17,21 +17,14 @@ from idbench.sim.trajectories.trajectory import AbstractTrajectory
 
 @dataclass(frozen=True, eq=False)
 class JerkLimited(AbstractMotion):
-    """Moves of piecewise constant jerk.
-
-    Parameters
-    ----------
-    start : Array, shape (joint, piece)
-        Time at which each piece begins [s]; the first at or before 0.
-    states : Array, shape (joint, piece, 4)
-        Position, velocity, acceleration and jerk at that time.
-    end : float
-        Duration [s].
-    """
+    """Moves of piecewise constant jerk."""
 
     start: Array
+    """Time at which each piece begins [s]; the first at or before 0, shape (joint, piece)."""
     states: Array
+    """Position, velocity, acceleration and jerk at that time, shape (joint, piece, 4)."""
     end: float
+    """Duration [s]."""
 
     @classmethod
     def between(cls, points: Array, limits: Array, rest: float) -> Self:

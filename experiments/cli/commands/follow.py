@@ -35,24 +35,16 @@ KNOWN = 10.0
 
 @dataclass(eq=False)
 class Follower:
-    """Shows a log as it grows.
-
-    Parameters
-    ----------
-    path : Path
-        The log, CSV.
-    options : ReadOptions
-        How its torque is to be read.
-    request : Request
-        Robot and chain.
-    audience : Audience, optional
-        Who watches.
-    """
+    """Shows a log as it grows."""
 
     path: Path
+    """The log, CSV."""
     options: ReadOptions
+    """How its torque is to be read."""
     request: Request
+    """Robot and chain."""
     audience: Audience | None = None
+    """Who watches."""
     _samples: int = field(default=0, init=False)
     _live: "LiveIdentification | None" = field(default=None, init=False)
     _base: "Base | None" = field(default=None, init=False)

@@ -24,33 +24,22 @@ from idbench.experiments.results.writing import require_free, write_text
 @final
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """An identification that is complete, and where it is shown.
-
-    Parameters
-    ----------
-    page : Page
-        Where files that are written are named.
-    options : Identify
-        What was asked for.
-    command : str
-        The same as it is typed.
-    judgement : Judgement
-        The judged fit.
-    warnings : mapping of str to sequence of str
-        What to check, by what it is about.
-    folder : ResultsFolder, optional
-        Where its files go.
-    audience : Audience, optional
-        Who watches.
-    """
+    """An identification that is complete, and where it is shown."""
 
     page: Page
+    """Where files that are written are named."""
     options: Identify
+    """What was asked for."""
     command: str
+    """The same as it is typed."""
     judgement: Judgement
+    """The judged fit."""
     warnings: Mapping[str, Sequence[str]]
+    """What to check, by what it is about."""
     folder: ResultsFolder | None
+    """Where its files go."""
     audience: Audience | None
+    """Who watches."""
 
     @property
     def fit(self) -> Fit:

@@ -16,17 +16,12 @@ from idbench.identify.signals.state import State
 @final
 @dataclass(frozen=True)
 class Cogging(AbstractJointLaw):
-    """Cogging of a known period, Cs sin(periods q) + Cc cos(periods q).
-
-    Parameters
-    ----------
-    periods : float
-        In a turn of the joint: slots and poles of the motor, times the ratio of its gear.
-    """
+    """Cogging of a known period, Cs sin(periods q) + Cc cos(periods q)."""
 
     asks: ClassVar[str] = "the number of periods in a turn of the joint, such as cogging:12"
 
     periods: float = 12.0
+    """In a turn of the joint: slots and poles of the motor, times the ratio of its gear."""
 
     def __post_init__(self) -> None:
         require_positive(periods=self.periods)

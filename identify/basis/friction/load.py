@@ -21,17 +21,12 @@ class LoadFriction(AbstractJointLaw):
     The load is all torque but friction, gravity and inertia of links and rotors (which cannot be told apart at every joint), by
     the estimate before: P. Hamon, M. Gautier and P. Garrec, "Dynamic identification of robots with a dry friction model
     depending on load and velocity", IROS 2010. As long as there is none, it is that of a unit inertia.
-
-    Parameters
-    ----------
-    bodies : Basis, optional
-        The rigid bodies and rotors.
-    X : Array, shape (..., p), optional
-        Their parameters, as estimated before.
     """
 
     bodies: Basis | None = None
+    """The rigid bodies and rotors."""
     X: Array | None = None
+    """Their parameters, as estimated before, shape (..., p)."""
 
     def letters(self) -> Mapping[str, tuple[Kind, str]]:
         """Return Fl."""

@@ -13,18 +13,13 @@ from idbench.identify.basis.joint_law import AbstractFriction
 @final
 @dataclass(frozen=True)
 class PowerFriction(AbstractFriction):
-    """Fp |qd|^exponent sign(qd): below 1, as of greased gears, it flattens at speed; in the place of viscous friction.
-
-    Parameters
-    ----------
-    exponent : Array or float
-        1 is viscous friction, 0 Coulomb's.
-    """
+    """Fp |qd|^exponent sign(qd): below 1, as of greased gears, it flattens at speed; in the place of viscous friction."""
 
     symbol: ClassVar[str] = "Fp"
     unit: ClassVar[str] = "N m"
 
     exponent: Array | float = 0.5
+    """1 is viscous friction, 0 Coulomb's."""
 
     def force(self, q: Array, qd: Array) -> Array:
         """Return |qd|^exponent sign(qd)."""

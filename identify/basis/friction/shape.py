@@ -50,23 +50,16 @@ class ShapedFriction(AbstractJointLaw):
 
     With the size F0 and the shapes b0 of an estimate, the columns are g(qd; b0) of F and F0 dg/db of b: at the optimum, where
     F0 and b0 are the estimate itself, these are the slopes of the residual, and sigma is that of nonlinear least squares.
-
-    Parameters
-    ----------
-    law : AbstractFriction
-        The law; its settings of the shapes take arrays.
-    shapes : tuple of Shape
-        What of it is unknown.
-    size : Array or float
-        F0, shape (..., joint).
-    values : mapping of str to Array
-        b0 by the law's settings, shape (..., joint).
     """
 
     law: AbstractFriction
+    """The law; its settings of the shapes take arrays."""
     shapes: tuple[Shape, ...]
+    """What of it is unknown."""
     size: Array | float = 1.0
+    """F0, shape (..., joint)."""
     values: Mapping[str, Array | float] = field(default_factory=dict)
+    """b0 by the law's settings, shape (..., joint)."""
 
     def letters(self) -> Mapping[str, tuple[Kind, str]]:
         """Return those of the law's size and of the shapes."""

@@ -15,19 +15,14 @@ START, RANGE = 0.2, (0.01, 5.0)
 @final
 @dataclass(frozen=True)
 class TanhFriction(AbstractFriction):
-    """Ft tanh(qd/vt): Coulomb friction without its jump, in the place of it.
-
-    Parameters
-    ----------
-    vt : Array or float
-        Velocity over which it rises [rad/s].
-    """
+    """Ft tanh(qd/vt): Coulomb friction without its jump, in the place of it."""
 
     symbol: ClassVar[str] = "Ft"
     unit: ClassVar[str] = "N m"
     replaces: ClassVar[str] = "Fs"
 
     vt: Array | float = 0.1
+    """Velocity over which it rises [rad/s]."""
 
     def force(self, q: Array, qd: Array) -> Array:
         """Return tanh(qd/vt)."""
@@ -38,19 +33,14 @@ class TanhFriction(AbstractFriction):
 @final
 @dataclass(frozen=True)
 class ArctanFriction(AbstractFriction):
-    """Fat 2/pi arctan(qd/vat): Coulomb friction without its jump, in the place of it; it rises longer than tanh.
-
-    Parameters
-    ----------
-    vat : Array or float
-        Velocity at which it has risen by half [rad/s].
-    """
+    """Fat 2/pi arctan(qd/vat): Coulomb friction without its jump, in the place of it; it rises longer than tanh."""
 
     symbol: ClassVar[str] = "Fat"
     unit: ClassVar[str] = "N m"
     replaces: ClassVar[str] = "Fs"
 
     vat: Array | float = 0.1
+    """Velocity at which it has risen by half [rad/s]."""
 
     def force(self, q: Array, qd: Array) -> Array:
         """Return 2/pi arctan(qd/vat)."""

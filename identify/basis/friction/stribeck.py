@@ -16,20 +16,15 @@ class StribeckFriction(AbstractFriction):
     """What friction near standstill has above that of sliding, Fst exp(-(|qd|/vs)^exponent) sign(qd).
 
     B. Armstrong-Helouvry, P. Dupont and C. Canudas de Wit, Automatica 30 (1994) 1083-1138.
-
-    Parameters
-    ----------
-    vs : Array or float
-        Stribeck velocity [rad/s].
-    exponent : Array or float
-        2 is Gaussian, 1 Tustin's.
     """
 
     symbol: ClassVar[str] = "Fst"
     unit: ClassVar[str] = "N m"
 
     vs: Array | float = 0.1
+    """Stribeck velocity [rad/s]."""
     exponent: Array | float = 2.0
+    """2 is Gaussian, 1 Tustin's."""
 
     def force(self, q: Array, qd: Array) -> Array:
         """Return exp(-(|qd|/vs)^exponent) sign(qd)."""

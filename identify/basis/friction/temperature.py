@@ -15,15 +15,10 @@ from idbench.identify.signals.state import State
 @final
 @dataclass(frozen=True)
 class TemperatureFriction(AbstractJointLaw):
-    """Friction that changes with the logged temperature T, (FvT qd + FsT sign(qd)) (T - reference).
-
-    Parameters
-    ----------
-    reference : float
-        Temperature at which Fv and Fs are what they are alone [deg C].
-    """
+    """Friction that changes with the logged temperature T, (FvT qd + FsT sign(qd)) (T - reference)."""
 
     reference: float = 25.0
+    """Temperature at which Fv and Fs are what they are alone [deg C]."""
 
     def letters(self) -> Mapping[str, tuple[Kind, str]]:
         """Return FvT and FsT."""

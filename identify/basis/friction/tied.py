@@ -21,14 +21,10 @@ class TiedFriction(AbstractBlock):
 
     In wrists whose gears run through each other: the tied friction of M. Gautier's models of RX and TX robots, as in J. Swevers
     et al., "Dynamic model identification for industrial robots", IEEE Control Systems Magazine 27 (2007) 58-71.
-
-    Parameters
-    ----------
-    coupling : Coupling
-        The joints, with their weights.
     """
 
     coupling: Coupling
+    """The joints, with their weights."""
 
     def parameters(self, n: int) -> tuple[Parameter, ...]:
         """Return Fsx."""

@@ -41,20 +41,15 @@ class IterativelyReweighted(AbstractEstimator):
     and weighted by Tukey's biweight of their size over its median: those beyond `tuning` standard deviations have no part. Both
     follow from the residuals of the round before (P. W. Holland and R. E. Welsch, "Robust regression using iteratively
     reweighted least-squares", Communications in Statistics A6 (1977) 813-827).
-
-    Parameters
-    ----------
-    tuning : float
-        Standard deviations from which on a row has no part; 4.685 loses 5 % where errors are normal.
-    rounds : int
-        Rounds at most.
     """
 
     acronym: ClassVar[str] = "IRLS"
     needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
 
     tuning: float = 4.685
+    """Standard deviations from which on a row has no part; 4.685 loses 5 % where errors are normal."""
     rounds: int = 50
+    """Rounds at most."""
 
     def __post_init__(self) -> None:
         require_positive(tuning=self.tuning)
@@ -82,30 +77,21 @@ class IterativelyReweighted(AbstractEstimator):
 
 @dataclass(frozen=True, eq=False)
 class _Weights:
-    """What makes the rows of an instant independent, and how much each then counts.
-
-    Parameters
-    ----------
-    kinds : Kinds
-        Of the rows.
-    tuning : float
-        Standard deviations from which on a row has no part.
-    root : Array, shape (..., kind, kind)
-        L^-1 with L L' the covariance of the residuals of an instant.
-    weight : Array, shape (..., instant, kind)
-        Tukey's.
-    relative : Array, shape (..., instant, kind)
-        Standard deviation that noise gives each row, over that of most of its kind: the mask leaves some less.
-    least : Array, shape (..., kind)
-        Standard deviation that residuals have at least.
-    """
+    """What makes the rows of an instant independent, and how much each then counts."""
 
     kinds: Kinds
+    """Of the rows."""
     tuning: float
+    """Standard deviations from which on a row has no part."""
     root: Array
+    """L^-1 with L L' the covariance of the residuals of an instant, shape (..., kind, kind)."""
     weight: Array
+    """Tukey's, shape (..., instant, kind)."""
     relative: Array
+    """Standard deviation that noise gives each row, over that of most of its kind: the mask leaves some less, shape (...,
+    instant, kind)."""
     least: Array
+    """Standard deviation that residuals have at least, shape (..., kind)."""
 
     @classmethod
     def start(cls, kinds: Kinds, residual: Array, tuning: float, relative: Array, least: Array) -> Self:

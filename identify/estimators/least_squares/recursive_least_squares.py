@@ -22,17 +22,13 @@ class RecursiveLeastSquares(AbstractEstimator):
 
     Rows count exp(-(T - t) / memory), T being the end of the log, and by the residuals of their joint as in weighted least
     squares, which it is for an endless memory. What it forgets it pays with variance.
-
-    Parameters
-    ----------
-    memory : float
-        Time [s] after which a row counts a third.
     """
 
     acronym: ClassVar[str] = "RLS"
     needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
 
     memory: float = 10.0
+    """Time [s] after which a row counts a third."""
 
     def __post_init__(self) -> None:
         require_positive(memory=self.memory)
@@ -53,19 +49,14 @@ class RecursiveLeastSquares(AbstractEstimator):
 
 @dataclass(frozen=True, eq=False)
 class Recursive:
-    """An estimate over time; NaN as long as the rows do not determine every parameter.
-
-    Parameters
-    ----------
-    t : Array, shape (instant,)
-        [s].
-    X, sigma : Array, shape (instant, p)
-        Parameters and their standard deviation, as far as the rows that are final at `t` determine them.
-    """
+    """An estimate over time; NaN as long as the rows do not determine every parameter."""
 
     t: Array
+    """Shape (instant,) [s]."""
     X: Array
+    """Parameters and their standard deviation, as far as the rows that are final at `t` determine them, shape (instant, p)."""
     sigma: Array
+    """Parameters and their standard deviation, as far as the rows that are final at `t` determine them, shape (instant, p)."""
 
 
 def recursive_least_squares(estimate: Estimate, t: Array, halo: float = 0.0) -> Recursive:

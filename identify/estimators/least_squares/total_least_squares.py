@@ -36,17 +36,13 @@ class TotalLeastSquares(AbstractEstimator):
     Combinations of columns without noise are exact (mixed least squares and total least squares: S. Van Huffel and
     J. Vandewalle, "The Total Least Squares Problem: Computational Aspects and Analysis", SIAM 1991, sections 3.6 and 8.3). S of
     W is that of the positions' noise, drawn and put through the chain; that of Y is what is then left over.
-
-    Parameters
-    ----------
-    draws : int
-        Noises of which S is the mean.
     """
 
     acronym: ClassVar[str] = "TLS"
     needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
 
     draws: int = 8
+    """Noises of which S is the mean."""
 
     def __post_init__(self) -> None:
         require_whole(1, draws=self.draws)

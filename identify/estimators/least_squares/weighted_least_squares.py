@@ -18,17 +18,13 @@ class WeightedLeastSquares(AbstractEstimator):
     joint's rows is that of their residual. Rows of one kind whose noise differs, as in the power model, are first divided by
     what the noise of torques and positions makes of them. Sigma is that of the weighted rows; Cond(W) and residuals are those
     of the rows as they were.
-
-    Parameters
-    ----------
-    rounds : int
-        How often weights are taken from the residuals of the estimate before, at least 1.
     """
 
     acronym: ClassVar[str] = "WLS"
     needs: ClassVar[frozenset[Need]] = frozenset({"factors"})
 
     rounds: int = 2
+    """How often weights are taken from the residuals of the estimate before, at least 1."""
 
     def __post_init__(self) -> None:
         require_whole(1, rounds=self.rounds)

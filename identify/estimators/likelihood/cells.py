@@ -19,18 +19,12 @@ HELD = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """The cells of one log: each from the instant that a torque sample speaks for, or from which on, to that of the next.
-
-    Parameters
-    ----------
-    log : MotionLog
-        One run.
-    delay : float
-        [s]; what sample k of the torque speaks for begins at t_k + delay.
-    """
+    """The cells of one log: each from the instant that a torque sample speaks for, or from which on, to that of the next."""
 
     log: MotionLog
+    """One run."""
     delay: float
+    """[s]; what sample k of the torque speaks for begins at t_k + delay."""
 
     @property
     def period(self) -> float:

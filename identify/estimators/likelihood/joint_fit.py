@@ -59,39 +59,26 @@ MASK = ReversalMask(width=0.02, taper=0.02)
 
 @dataclass(frozen=True, eq=False)
 class JointFit:
-    """Parameters and motions of logs, together.
-
-    Parameters
-    ----------
-    logs : tuple of Cells
-        Of one run each.
-    basis : Basis
-        The robot.
-    X : Array, shape (p,)
-        Parameters.
-    motions : tuple of Array, shape (node, 2, joint)
-        q [rad] and qd [rad/s] at the nodes of each log.
-    levels : NoiseLevels
-        Noise of torques and positions.
-    delay : float, optional
-        Change of the delays that the logs state [s], if it is unknown.
-    near : Array, shape (joint,), optional
-        Levels of the torques near reversals [N m], if these are used.
-    covariance : Array, shape (p, p), or (p + 1, p + 1)
-        Of the error of X, and of the delay if it is unknown.
-    left_out : str
-        Why reversals, which were asked for, are left out; empty if they are used, or were not asked for.
-    """
+    """Parameters and motions of logs, together."""
 
     logs: tuple[Cells, ...]
+    """Of one run each."""
     basis: Basis
+    """The robot."""
     X: Array
+    """Parameters, shape (p,)."""
     motions: tuple[Array, ...]
+    """Q [rad] and qd [rad/s] at the nodes of each log, shape (node, 2, joint)."""
     levels: NoiseLevels
+    """Noise of torques and positions."""
     delay: float | None = None
+    """Change of the delays that the logs state [s], if it is unknown."""
     near: Array | None = None
+    """Levels of the torques near reversals [N m], if these are used, shape (joint,)."""
     covariance: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    """Of the error of X, and of the delay if it is unknown, shape (p, p), or (p + 1, p + 1)."""
     left_out: str = ""
+    """Why reversals, which were asked for, are left out; empty if they are used, or were not asked for."""
 
     @classmethod
     def start(

@@ -17,25 +17,18 @@ Ints = npt.NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class Inside:
-    """Reversals inside cells, as a motion has them.
-
-    Parameters
-    ----------
-    joint, cell : int array, shape (reversal,)
-        Which joint, and where.
-    share : Array, shape (reversal,)
-        Share of the cell that lies before the reversal.
-    slope : Array, shape (reversal, 2)
-        Its derivative by the velocity at the first and the second node.
-    sign : Array, shape (joint, cell)
-        Signs of the velocities, 0 where they have their own.
-    """
+    """Reversals inside cells, as a motion has them."""
 
     joint: Ints
+    """Which joint, and where, shape (reversal,)."""
     cell: Ints
+    """Which joint, and where, shape (reversal,)."""
     share: Array
+    """Share of the cell that lies before the reversal, shape (reversal,)."""
     slope: Array
+    """Its derivative by the velocity at the first and the second node, shape (reversal, 2)."""
     sign: Array
+    """Signs of the velocities, 0 where they have their own, shape (joint, cell)."""
 
     def jumps(self, basis: Basis, points: list[tuple[Array, Array, Array]], D: Array, part: slice) -> "Jumps":
         """Return what reversals in a part of the cells change, of columns D, shape (point, cell, joint, p), at two points."""
@@ -55,24 +48,18 @@ class Jumps:
 
     A function that is 0 up to the share s of a cell, and 1 then, has the mean 1 - s, and the first moment of a straight line
     that differs by 2 sqrt(3) s (1 - s) between the Gauss points: so much of the jump have the mean torque, and the difference.
-
-    Parameters
-    ----------
-    cell, joint : int array, shape (reversal,)
-        Where.
-    change : Array, shape (point, reversal, joint, p)
-        Columns afterwards less those before.
-    share : Array, shape (reversal,)
-        See `Inside`.
-    slope : Array, shape (reversal, 2)
-        See `Inside`.
     """
 
     cell: Ints
+    """Where, shape (reversal,)."""
     joint: Ints
+    """Where, shape (reversal,)."""
     change: Array
+    """Columns afterwards less those before, shape (point, reversal, joint, p)."""
     share: Array
+    """See `Inside`, shape (reversal,)."""
     slope: Array
+    """See `Inside`, shape (reversal, 2)."""
 
     def add(self, W: Array, H: Array, X: Array, sign: float) -> None:
         """Add them to the mean, or with sign -1 to half the difference, of W, shape (cell, joint, p), and of its slopes H X."""

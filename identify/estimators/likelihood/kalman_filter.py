@@ -47,11 +47,6 @@ class UnscentedKalmanFilter(AbstractEstimator):
     is process noise; where the sign of a velocity says nothing of friction, it is as large as that. Its size is what makes the
     innovations most likely, among some multiples of the noise that the log shows. The chain says where it begins, and how large
     noise is; the filter of rows takes no part.
-
-    Parameters
-    ----------
-    spread : float
-        Standard deviation of every parameter at the beginning, as a share of its value.
     """
 
     acronym: ClassVar[str] = "UKF"
@@ -60,6 +55,7 @@ class UnscentedKalmanFilter(AbstractEstimator):
     filtered: ClassVar[bool] = False
 
     spread: float = 0.15
+    """Standard deviation of every parameter at the beginning, as a share of its value."""
 
     def __post_init__(self) -> None:
         require_positive(spread=self.spread)

@@ -47,15 +47,6 @@ class MaximumLikelihood(AbstractEstimator):
     the instants at which the torque changes. Where the sign of a velocity says nothing of friction, torques count for next to
     nothing. It begins at the generalized least-squares solution and its noise levels, and finds those of the torques anew. No
     filter takes part.
-
-    Parameters
-    ----------
-    find_delay : bool
-        Whether the delay of the torques is one more unknown, one for all logs, from what they state; it is
-        `estimate.fits[()].delay` [s], more than what was stated.
-    reversals : bool
-        Whether friction that jumps at a reversal, as its law says, is used, instead of being left out. Torques near reversals
-        have a level of noise of their own, which is large where friction near rest is not what the law says.
     """
 
     acronym: ClassVar[str] = "ML"
@@ -63,7 +54,11 @@ class MaximumLikelihood(AbstractEstimator):
     filtered: ClassVar[bool] = False
 
     find_delay: bool = False
+    """Whether the delay of the torques is one more unknown, one for all logs, from what they state; it is
+    `estimate.fits[()].delay` [s], more than what was stated."""
     reversals: bool = False
+    """Whether friction that jumps at a reversal, as its law says, is used, instead of being left out. Torques near reversals
+    have a level of noise of their own, which is large where friction near rest is not what the law says."""
 
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate of every run.

@@ -28,55 +28,41 @@ RATE = 50.0
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """Standard deviations of what a log's cells say, shape (joint, cell) where they vary.
-
-    Parameters
-    ----------
-    mean, half : Array, shape (joint, cell)
-        Of the mean torque, and of half the difference of both Gauss points [N m].
-    position : Array, shape (joint,)
-        Of the positions [rad].
-    known : bool array, shape (joint, cell)
-        Where the sign of friction is known.
-    velocity, wanted : Array, shape (node, joint)
-        Of the velocities that differences of the positions give, infinite where torques say more, and these velocities
-        [rad/s].
-    turns : Turns
-        Reversals inside the cells, and which cells have a level of their own beside them.
-    """
+    """Standard deviations of what a log's cells say, shape (joint, cell) where they vary."""
 
     mean: Array
+    """Of the mean torque, and of half the difference of both Gauss points [N m], shape (joint, cell)."""
     half: Array
+    """Of the mean torque, and of half the difference of both Gauss points [N m], shape (joint, cell)."""
     position: Array
+    """Of the positions [rad], shape (joint,)."""
     known: npt.NDArray[np.bool_]
+    """Where the sign of friction is known, shape (joint, cell)."""
     velocity: Array
+    """Of the velocities that differences of the positions give, infinite where torques say more, and these velocities [rad/s],
+    shape (node, joint)."""
     wanted: Array
+    """Of the velocities that differences of the positions give, infinite where torques say more, and these velocities [rad/s],
+    shape (node, joint)."""
     turns: Turns
+    """Reversals inside the cells, and which cells have a level of their own beside them."""
 
 
 @dataclass(eq=False)
 class NormalEquations:
-    """A [dz; dX] = b, with A block-tridiagonal in the nodes and bordered by the parameters.
-
-    Parameters
-    ----------
-    band : Array, shape (4 n, 2 n nodes)
-        A_zz, its lower half as `scipy.linalg.cholesky_banded` has it.
-    both : Array, shape (2 n nodes, p + 2 + m)
-        A_zX, whose last column is that of the delay, as which positions lie elsewhere in their cells; and the right-hand sides.
-    corner : Array, shape (p + 1, p + 1)
-        A_XX.
-    b_parameters : Array, shape (p + 1, 1 + m)
-        The right-hand side, and m of `signs`.
-    cost : float
-        Sum of the squared residuals over their variances.
-    """
+    """A [dz; dX] = b, with A block-tridiagonal in the nodes and bordered by the parameters."""
 
     band: Array
+    """A_zz, its lower half as `scipy.linalg.cholesky_banded` has it, shape (4 n, 2 n nodes)."""
     both: Array
+    """A_zX, whose last column is that of the delay, as which positions lie elsewhere in their cells; and the right-hand sides,
+    shape (2 n nodes, p + 2 + m)."""
     corner: Array
+    """A_XX, shape (p + 1, p + 1)."""
     b_parameters: Array
+    """The right-hand side, and m of `signs`, shape (p + 1, 1 + m)."""
     cost: float = 0.0
+    """Sum of the squared residuals over their variances."""
 
     @classmethod
     def of(cls, cells: Cells, basis: Basis, X: Array, z: Array, noise: Noise, signs: Array | None = None) -> "NormalEquations":

@@ -45,19 +45,14 @@ def stretches(qd: Array, slow: Flags) -> list[Stretch]:
 
 @dataclass(frozen=True, eq=False)
 class Forces:
-    """What accelerates a joint in some cells, shape (cell,) each.
-
-    Parameters
-    ----------
-    ahead, back : Array
-        Its acceleration [rad/s^2] if friction is that of a motion ahead, or back.
-    inertia : Array
-        Torque over acceleration [kg m^2], the other joints free.
-    """
+    """What accelerates a joint in some cells, shape (cell,) each."""
 
     ahead: Array
+    """Its acceleration [rad/s^2] if friction is that of a motion ahead, or back."""
     back: Array
+    """Its acceleration [rad/s^2] if friction is that of a motion ahead, or back."""
     inertia: Array
+    """Torque over acceleration [kg m^2], the other joints free."""
 
     @classmethod
     def of(cls, cells: Cells, basis: Basis, X: Array, z: Array, joint: int, cell: Ints) -> Self:
@@ -99,21 +94,14 @@ class Crossing(NamedTuple):
 
 @dataclass(eq=False)
 class Turns:
-    """What a round of steps takes for granted about slow cells.
-
-    Parameters
-    ----------
-    crossings : list of Crossing
-        Instants at which a joint reverses, and does not stick.
-    near : bool array, shape (joint, cell)
-        Slow cells whose friction is known, which have a level of their own.
-    sign : Array, shape (joint, cell)
-        Signs of the velocity in these, before the instant in the cell of a crossing; 0 elsewhere.
-    """
+    """What a round of steps takes for granted about slow cells."""
 
     crossings: list[Crossing]
+    """Instants at which a joint reverses, and does not stick."""
     near: Flags
+    """Slow cells whose friction is known, which have a level of their own, shape (joint, cell)."""
     sign: Array
+    """Signs of the velocity in these, before the instant in the cell of a crossing; 0 elsewhere, shape (joint, cell)."""
 
     @classmethod
     def none(cls, shape: tuple[int, int]) -> Self:

@@ -31,11 +31,6 @@ class OutputError(AbstractSimulating):
     The log is cut into segments, each with an initial state of its own, which is an unknown that is eliminated; in between the
     robot runs free. By Gauss-Newton, with 1 + p + 2 n simulations of every segment a round. Neither filter nor mask take part.
     It trusts the torques: noise in them is integrated twice, and makes it worse the longer segments are.
-
-    Parameters
-    ----------
-    length : float
-        Of a segment [s].
     """
 
     acronym: ClassVar[str] = "OE"
@@ -43,6 +38,7 @@ class OutputError(AbstractSimulating):
     filtered: ClassVar[bool] = False
 
     length: float = 0.3
+    """Of a segment [s]."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

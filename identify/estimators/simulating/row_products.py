@@ -18,18 +18,12 @@ ROUNDS = 2
 
 @dataclass(frozen=True, eq=False)
 class Kinds:
-    """Which residuals have the same variance.
-
-    Parameters
-    ----------
-    count : int
-        Kinds; residuals follow each other kind by kind.
-    own : Array, shape (..., r)
-        What residuals of a kind are multiplied by where they differ; 0 for those that are void.
-    """
+    """Which residuals have the same variance."""
 
     count: int
+    """Kinds; residuals follow each other kind by kind."""
     own: Array
+    """What residuals of a kind are multiplied by where they differ; 0 for those that are void, shape (..., r)."""
 
     @classmethod
     def of_rows(cls, problem: Problem) -> Self:
@@ -52,24 +46,16 @@ class Kinds:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """X = G' Y of rows Y = W X + rho.
-
-    Parameters
-    ----------
-    X : Array, shape (..., p)
-        NaN where Z' W is singular.
-    G : Array, shape (..., r, p)
-        What X changes by if a row of Y does.
-    residual : Array, shape (..., r)
-        Y - W X.
-    covariance : Array, shape (..., p, p)
-        Of X, as if weighted residuals were independent and alike.
-    """
+    """X = G' Y of rows Y = W X + rho."""
 
     X: Array
+    """NaN where Z' W is singular, shape (..., p)."""
     G: Array
+    """What X changes by if a row of Y does, shape (..., r, p)."""
     residual: Array
+    """Y - W X, shape (..., r)."""
     covariance: Array
+    """Of X, as if weighted residuals were independent and alike, shape (..., p, p)."""
 
     @property
     def sigma(self) -> Array:

@@ -36,24 +36,16 @@ the logged motion about its mean."""
 
 @dataclass(eq=False)
 class Rounds:
-    """What has been simulated, run by run.
-
-    Parameters
-    ----------
-    problem : Problem
-        What is solved.
-    most : int
-        Rounds at most.
-    settled : float
-        Remaining distance, in sigma, below which parameters count as converged.
-    exact : bool
-        Whether the simulated robot must have all parameters of the problem.
-    """
+    """What has been simulated, run by run."""
 
     problem: Problem
+    """What is solved."""
     most: int
+    """Rounds at most."""
     settled: float
+    """Remaining distance, in sigma, below which parameters count as converged."""
     exact: bool = True
+    """Whether the simulated robot must have all parameters of the problem."""
     path: list[Array] = field(default_factory=list)
     failures: dict[tuple[int, ...], str] = field(default_factory=dict)
     simulations: npt.NDArray[np.intp] = field(init=False)
@@ -186,20 +178,14 @@ class Rounds:
 
 @dataclass(frozen=True)
 class AbstractSimulating(AbstractEstimator):
-    """An estimator that simulates the robot in rounds.
-
-    Parameters
-    ----------
-    rounds : int
-        Rounds at most.
-    settled : float
-        Remaining distance, in sigma, below which parameters count as converged.
-    """
+    """An estimator that simulates the robot in rounds."""
 
     begins: ClassVar[bool] = True
 
     rounds: int = 15
+    """Rounds at most."""
     settled: float = 0.05
+    """Remaining distance, in sigma, below which parameters count as converged."""
 
     def __post_init__(self) -> None:
         require_whole(1, rounds=self.rounds)

@@ -20,17 +20,12 @@ class FirLowPass(AbstractLowPass):
     """Windowed-sinc low-pass and decimation by n_d = (fs/2) / cutoff, the paper's rule for a FIR filter (section 6.2).
 
     Its memory ends, and only the kept samples are computed.
-
-    Parameters
-    ----------
-    cutoff : float
-        Frequency [Hz] at which it attenuates by 6 dB; the rows come at twice this rate.
-    transition : float
-        Width [Hz] of the transition from pass band to stop band (below -50 dB), around the cut-off.
     """
 
     cutoff: float = 5.0
+    """Frequency [Hz] at which it attenuates by 6 dB; the rows come at twice this rate."""
     transition: float = 5.0
+    """Width [Hz] of the transition from pass band to stop band (below -50 dB), around the cut-off."""
 
     def __post_init__(self) -> None:
         require_positive(cutoff=self.cutoff, transition=self.transition)

@@ -22,20 +22,14 @@ class IirLowPass(AbstractLowPass):
     """Chebyshev low-pass run forward and backward, and decimation by n_d = 0.8 (fs/2) / cutoff (section 6.2).
 
     With order 8 and a ripple of 0.05 dB it is the filter of Matlab's `decimate`, in second-order sections.
-
-    Parameters
-    ----------
-    cutoff : float
-        End of the pass band, f_fp [Hz].
-    order : int
-        Order of one pass.
-    ripple : float
-        Ripple [dB] of one pass in the pass band.
     """
 
     cutoff: float = 4.0
+    """End of the pass band, f_fp [Hz]."""
     order: int = 8
+    """Order of one pass."""
     ripple: float = 0.05
+    """Ripple [dB] of one pass in the pass band."""
 
     def __post_init__(self) -> None:
         require_positive(cutoff=self.cutoff, ripple=self.ripple)

@@ -15,20 +15,14 @@ class ModulatingFunctions(AbstractWeakForm):
     """Products with phi(t) = (1 - (t/H)^2)^degree over |t| < H, of unit area: the weak form, beyond the paper.
 
     After M. Shinbrot, "On the analysis of linear and nonlinear systems", Trans. ASME 79 (1957) 547-552.
-
-    Parameters
-    ----------
-    support : float
-        2 H [s], where a function is not zero.
-    spacing : float
-        Time [s] between consecutive functions.
-    degree : int
-        Smoothness: phi and its first degree - 1 derivatives vanish at both ends, which makes plain sums accurate.
     """
 
     support: float = 0.4
+    """2 H [s], where a function is not zero."""
     spacing: float = 0.1
+    """Time [s] between consecutive functions."""
     degree: int = 6
+    """Smoothness: phi and its first degree - 1 derivatives vanish at both ends, which makes plain sums accurate."""
 
     def __post_init__(self) -> None:
         require_positive(support=self.support, spacing=self.spacing)

@@ -13,15 +13,10 @@ from idbench.identify.rows.operators.weak_form import AbstractWeakForm, Kernels
 @final
 @dataclass(frozen=True)
 class Windows(AbstractWeakForm):
-    """Integrals over consecutive windows [ta, tb]: power becomes the energy model (Eq. 11, 20), implicit its integral form.
-
-    Parameters
-    ----------
-    length : float
-        tb - ta [s]; the paper's n_d / fs.
-    """
+    """Integrals over consecutive windows [ta, tb]: power becomes the energy model (Eq. 11, 20), implicit its integral form."""
 
     length: float = 0.1
+    """Tb - ta [s]; the paper's n_d / fs."""
 
     def __post_init__(self) -> None:
         require_positive(length=self.length)

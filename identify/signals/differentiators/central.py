@@ -20,20 +20,14 @@ _WEIGHTS = {
 @final
 @dataclass(frozen=True)
 class CentralDifference(AbstractDifferentiator):
-    """Central difference of order 2 (the paper's) or 6.
-
-    Parameters
-    ----------
-    order : {2, 6}
-        Order of accuracy. At the angular frequency w the derivative is too small by (w h)^2 / 6 (order 2) or
-        (w h)^6 / 140 (order 6), with h the time between the samples it takes.
-    spacing : float
-        Least time h [s] between the samples it takes, to the nearest whole number of sampling periods: a log at a higher
-        frequency does not make it noisier.
-    """
+    """Central difference of order 2 (the paper's) or 6."""
 
     order: Literal[2, 6] = 6
+    """Order of accuracy. At the angular frequency w the derivative is too small by (w h)^2 / 6 (order 2) or (w h)^6 / 140
+    (order 6), with h the time between the samples it takes."""
     spacing: float = 0.01
+    """Least time h [s] between the samples it takes, to the nearest whole number of sampling periods: a log at a higher
+    frequency does not make it noisier."""
 
     def __post_init__(self) -> None:
         require_positive(spacing=self.spacing)

@@ -45,25 +45,18 @@ class ReversalMask(AbstractMask):
 
     The weights rise gradually: a weight that jumps would mix the noise of differentiated encoder counts, which lies at high
     frequencies, into the pass band of the operator.
-
-    Parameters
-    ----------
-    threshold : float, tuple of float or Array, shape (..., joint), optional
-        A joint rests or reverses while |qd| is at most this [rad/s, of slides m/s], of all joints or of each, and where the
-        sign of qd changes. By default it follows each joint's own speeds and their noise: `slow_speed`.
-    width : float
-        The instants this close [s] to such a one are left out as well: as far as differences look across the kink.
-    taper : float
-        Time [s] over which the weight then rises from 0 to 1, and falls.
-    couplings : tuple of tuple of float
-        Of drives whose motor turns with several joints, what it turns for a turn of each: where it rests or reverses these
-        joints are left out as well.
     """
 
     threshold: float | tuple[float, ...] | Array | None = None
+    """A joint rests or reverses while |qd| is at most this [rad/s, of slides m/s], of all joints or of each, and where the sign
+    of qd changes, shape (..., joint), optional. By default it follows each joint's own speeds and their noise: `slow_speed`."""
     width: float = 0.03
+    """The instants this close [s] to such a one are left out as well: as far as differences look across the kink."""
     taper: float = 0.1
+    """Time [s] over which the weight then rises from 0 to 1, and falls."""
     couplings: tuple[tuple[float, ...], ...] = ()
+    """Of drives whose motor turns with several joints, what it turns for a turn of each: where it rests or reverses these
+    joints are left out as well."""
 
     def __post_init__(self) -> None:
         for value in () if self.threshold is None else np.ravel(self.threshold):

@@ -15,19 +15,13 @@ from idbench.identify.signals.zero_phase import forward_backward, settling_time
 @final
 @dataclass(frozen=True)
 class ButterworthPrefilter(AbstractPrefilter):
-    """Butterworth low-pass, run forward and backward (section 6.2, Matlab's filtfilt).
-
-    Parameters
-    ----------
-    cutoff : float
-        Cut-off frequency f_fq [Hz] of one pass; both together attenuate it by 6 dB. The paper's rule of thumb is more
-        than 10 times the bandwidth of the robot's dynamics.
-    order : int
-        Order of one pass, above 2 so that s^2 f_fq(s) still rejects high frequencies.
-    """
+    """Butterworth low-pass, run forward and backward (section 6.2, Matlab's filtfilt)."""
 
     cutoff: float = 8.0
+    """Cut-off frequency f_fq [Hz] of one pass; both together attenuate it by 6 dB. The paper's rule of thumb is more than 10
+    times the bandwidth of the robot's dynamics."""
     order: int = 4
+    """Order of one pass, above 2 so that s^2 f_fq(s) still rejects high frequencies."""
 
     def __post_init__(self) -> None:
         require_positive(cutoff=self.cutoff)

@@ -41,24 +41,16 @@ accelerations for smooth within it, which they are not: an error of (w T)^2 time
 @final
 @dataclass(frozen=True, eq=False)
 class Torque:
-    """The measured torque at every sample instant, so that B tau = [c + s e] X is compared with itself.
-
-    Parameters
-    ----------
-    tau : Array, shape (..., joint, time)
-        Logged torque [N m].
-    meaning : {"instantaneous", "held", "averaged"}
-        What a sample means, as `TorqueChannel` has it.
-    delay : float
-        [s]; what sample k speaks for begins at t_k + delay.
-    fs : float
-        [Hz].
-    """
+    """The measured torque at every sample instant, so that B tau = [c + s e] X is compared with itself."""
 
     tau: Array
+    """Logged torque [N m], shape (..., joint, time)."""
     meaning: Meaning
+    """What a sample means, as `TorqueChannel` has it."""
     delay: float
+    """[s]; what sample k speaks for begins at t_k + delay."""
     fs: float
+    """[Hz]."""
 
     @property
     def _reading(self) -> Reading:
