@@ -37,7 +37,7 @@ import pytest
 
 from idbench.experiments.paper.table1 import CHAINS_COMPARED, SCENARIO, Table1
 from idbench.identify import MotionLog
-from idbench.sim.engine.ideal_log import ideal_log
+from idbench.sim.engine.run import ideal_log
 from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario_file import load
 

@@ -8,9 +8,8 @@ import pytest
 EXAMPLES = {
     "idbench.identify.data.motion_log": "MotionLog.at_times",
     "idbench.identify.files.log_file": "read_log",
-    "idbench.identify.basis.tree_basis": "tree_basis",
-    "idbench.identify.parameters.base_parameters": "BaseParameters.of",
-    "idbench.identify.parameters.scara": "scara",
+    "idbench.identify.basis.tree_links": "tree_basis",
+    "idbench.identify.parameters.base_parameters": "scara",
     "idbench.identify.estimators.identification": "identify",
     "idbench.sim.robot.robot": "Robot.load",
     "idbench.sim.robot.tree": "kinematic_tree",

@@ -76,7 +76,7 @@ def test_a_parquet_file_of_terabytes_in_kilobytes_is_refused_before_it_is_read(t
     table = pa.table({name: np.zeros(rows) for name in ("t", "q1", "tau1")})
     pq.write_table(table, tmp_path / "bomb.parquet", compression="zstd")
     assert (tmp_path / "bomb.parquet").stat().st_size < 10_000
-    monkeypatch.setattr("idbench.identify.files.room.memory", lambda: 1e-3)
+    monkeypatch.setattr("idbench.identify.files.table.memory", lambda: 1e-3)
     with pytest.raises(
         LogError, match=r"holds 2e\+05 samples of 3 columns: reading them takes 0.0144 GB, and there are 0.001 GB"
     ):
@@ -92,7 +92,7 @@ def test_columns_that_a_log_does_not_have_are_not_read(tmp_path, monkeypatch):
         "quality": ["good"] * 50,
     }
     pq.write_table(pa.table(columns), tmp_path / "log.parquet")
-    monkeypatch.setattr("idbench.identify.files.room.memory", lambda: 1.1 * 3 * 50 * 8 * 3e-9)
+    monkeypatch.setattr("idbench.identify.files.table.memory", lambda: 1.1 * 3 * 50 * 8 * 3e-9)
     assert len(read_columns(tmp_path / "log.parquet").t) == 50
     pq.write_table(pa.table(columns | {"q1": ["0.0"] * 50}), tmp_path / "words.parquet")
     with pytest.raises(LogError, match="column q1 holds string, not numbers"):
@@ -170,7 +170,7 @@ def test_no_file_is_unpickled(root):
 
 def test_the_summary_is_json_without_surprises(tmp_path):
     """NaN has no place in it: other readers stop there."""
-    from idbench.experiments.results.summaries import write_summary
+    from idbench.experiments.results.writing import write_summary
 
     with pytest.raises(ValueError, match="not JSON compliant"):
         write_summary(tmp_path / "summary.json", {"x": float("nan")})

@@ -124,7 +124,7 @@ BENCHMARK_TABLES = {
 if __name__ == "__main__":
     from tables import DOCS, filled
 
-    from idbench.experiments.benchmark.report import errors_figure
+    from idbench.experiments.benchmark.tables import errors_figure
 
     keep_benchmark(Path(sys.argv[1]))
     every = [json.loads(path.read_text()) for path in sorted(Path(sys.argv[1]).glob("*/summary.json"))]

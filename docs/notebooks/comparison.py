@@ -62,9 +62,9 @@ on the command line `idbench table1` and `idbench view` do the same.
 from pathlib import Path
 
 from idbench.experiments.recording.notebook import notebook_viewer
-from idbench.experiments.recording.table1_recording import record_table1
+from idbench.experiments.recording.comparison_recording import record_table1
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.streams import write_streams
+from idbench.experiments.recording.folder import write_streams
 
 folder = ResultsFolder(Path("comparison"), "table1", command="notebook comparison")
 with folder.held():

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from idbench.experiments.identification.held_out import HeldOut
-from idbench.experiments.results.summaries import finite
+from idbench.experiments.judgement.held_out import HeldOut
+from idbench.experiments.results.writing import finite
 from idbench.sim.engine.free_run import free_run
 
 

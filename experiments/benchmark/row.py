@@ -11,13 +11,13 @@ from idbench.experiments.benchmark.free_runs import free_runs
 from idbench.experiments.benchmark.repeats import repeats
 from idbench.experiments.benchmark.set_fit import SetFit
 from idbench.experiments.benchmark.tools import judged
-from idbench.experiments.faults import is_told, reason
+from idbench.experiments.errors import is_told, reason
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.identification.held_out import HeldOut
-from idbench.experiments.identification.judgement import Unjudged, judge
-from idbench.experiments.identification.verdict import WORDS
-from idbench.experiments.results.summaries import finite
-from idbench.identify.judge.leaks import seen
+from idbench.experiments.judgement.held_out import HeldOut
+from idbench.experiments.judgement.judgement import Unjudged, judge
+from idbench.experiments.judgement.verdict import WORDS
+from idbench.experiments.results.writing import finite
+from idbench.identify.judge.excitation import seen
 
 
 def row_of(made: SetFit, predicted: Mapping[str, Path]) -> dict[str, Any]:

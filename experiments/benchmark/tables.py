@@ -1,14 +1,64 @@
 """Rows of a benchmark as tables."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from rich.console import Console
 from rich.text import Text
 
-from idbench.experiments.benchmark.measures import TORQUE, Row, measure_of, of_logs, pooled
+from idbench.experiments.reports.html import rendered, svg
+from idbench.experiments.style import JOINTS
 from idbench.experiments.text import new_table, percentage, print_table
 from idbench.identify import Array
+
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Measure:
+    """An error of held-out logs."""
+
+    name: str
+    """What summaries call it."""
+    words: str
+    """What it is."""
+    over_logs: Callable[[Array], Array]
+    """What is said of several logs, of shape (log, joint)."""
+
+
+def rms(each: Array) -> Array:
+    """Return the rms over logs, shape (joint,)."""
+    return np.sqrt((each**2).mean(axis=0))
+
+
+def mean(each: Array) -> Array:
+    """Return the mean over logs, shape (joint,)."""
+    found: Array = each.mean(axis=0)
+    return found
+
+
+TORQUE = Measure("torque_error_rms", "torque error on held-out logs, rms [N m, N]", rms)
+POSITION = Measure("position_error", "position on held-out logs, from commands alone, mean absolute error [rad]", mean)
+
+
+def measure_of(row: Row) -> Measure:
+    """Return what a row is judged by."""
+    return POSITION if any(POSITION.name in log for log in row["logs"]) else TORQUE
+
+
+def pooled(logs: Sequence[Row], name: str, over_logs: Callable[[Array], Array] = rms) -> Array:
+    """Return a figure of each joint over all logs that have it, shape (joint,); nothing if none has."""
+    each = of_logs(logs, name)
+    return over_logs(each) if len(each) else np.zeros(0)
+
+
+def of_logs(logs: Sequence[Row], name: str) -> Array:
+    """Return a figure of each log that has it and joint, shape (log, joint)."""
+    return np.array([[np.nan if x is None else x for x in log[name]] for log in logs if name in log], dtype=float)
+
 
 OWN = "idbench"
 """What our own row is called beside those of other tools."""
@@ -138,3 +188,45 @@ def shares(row: Row) -> dict[str, list[float]]:
     """Return the torque errors of each joint over its torque [%], by tool."""
     every = {tool: share(row, logs) for tool, logs, _ in _tools(row)}
     return {(OWN if tool.startswith(OWN) else tool): [float(x) for x in e if np.isfinite(x)] for tool, e in every.items()}
+
+
+def report(rows: Sequence[Row], failures: Mapping[str, str]) -> str:
+    """Return the page of some rows, and why other sets have none."""
+    return rendered(
+        "idbench.experiments.benchmark",
+        "report.html.j2",
+        heads=[head.replace("\n", " ") for head in HEADS],
+        overview=list(overview(rows)),
+        failures=failures,
+        figure=svg(errors_figure(rows)) if any(measure_of(row) is TORQUE for row in rows) else "",
+        sets=[
+            {
+                "title": row["title"],
+                "measure": measure_of(row).words,
+                "joints": row["joints"],
+                "tools": list(of_tools(row)),
+                "remarks": list(remarks(row)),
+            }
+            for row in rows
+        ],
+    )
+
+
+def errors_figure(rows: Sequence[Row]) -> Figure:
+    """Return torque errors of every joint [% of its torque], a line a set that has torques, a colour a tool."""
+    rows = [row for row in rows if measure_of(row) is TORQUE]
+    tools = list(dict.fromkeys(tool for row in rows for tool in shares(row)))
+    figure = Figure(figsize=(8, 1.0 + 0.5 * len(rows)), layout="constrained")
+    panel = figure.subplots()
+    for k, tool in enumerate(tools):
+        height = 0.6 * ((k + 0.5) / len(tools) - 0.5)
+        places = [(share, y + height) for y, row in enumerate(rows) for share in shares(row).get(tool, ())]
+        x, y = np.array(places).reshape(-1, 2).T
+        color = [c / 255 for c in JOINTS[k % len(JOINTS)]]
+        panel.plot(x, y, ".", color=color, label=tool, markersize=7)
+    panel.set_yticks(range(len(rows)), [row["title"] for row in rows], parse_math=False)
+    panel.invert_yaxis()
+    panel.set_xscale("log")
+    panel.set_xlabel("torque error of a joint on held-out logs [% of its torque]")
+    figure.legend(loc="outside upper right", ncols=4, frameon=False)
+    return figure

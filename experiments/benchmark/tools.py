@@ -4,15 +4,95 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, final
+from xml.etree import ElementTree
 from zipfile import BadZipFile
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
-from idbench.experiments.benchmark.for_tools import acting, at_times
+from idbench.experiments.benchmark.set_fit import SetFit
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.identification.held_out import HeldOut
-from idbench.experiments.results.summaries import finite
-from idbench.identify import Array, Problem, validate
+from idbench.experiments.judgement.held_out import HeldOut
+from idbench.experiments.results.writing import finite
+from idbench.identify import Array, MotionLog, Problem, TorqueChannel, validate
+from idbench.identify.arrays import combined
+from idbench.identify.rows.rows import manageable
+from idbench.sim.robot.tree import standard_parameters
+from idbench.sim.robot.write_urdf import urdf_text
+
+
+def what_tools_read(made: SetFit) -> dict[str, Any]:
+    """Return what other tools need to know beside logs and URDF."""
+    fit = made.fit
+    return {
+        "robot": "robot.urdf",
+        "joints": list(fit.robot_model.robot.joints),
+        "gravity": [float(x) for x in fit.robot_model.tree.gravity],
+        "fit": [f"fit{k + 1}.npz" for k in range(len(fit.logs.fitted))],
+        "held_out": [f"held_out{k + 1}.npz" for k in range(len(fit.logs.held_out or {}))],
+        "couplings": [list(map(float, coupling.weights)) for coupling in fit.robot_model.tree.couplings],
+        "rotors": fit.robot_model.asked.armature != "none",
+        "cutoff": getattr(fit.processing.operator, "cutoff", None),
+    }
+
+
+def write_for_tools(made: SetFit, folder: Path) -> None:
+    """Write logs, with torques at the instants when they act, and the robot."""
+    fit = made.fit
+    told = fit.logs.fitted if made.definition.delay_told else [_undelayed(log) for log in fit.logs.fitted]
+    for k, log in enumerate(told):
+        _write_arrays(folder / f"fit{k + 1}.npz", prepared(log))
+    for k, log in enumerate((fit.logs.held_out or {}).values()):
+        held_out = HeldOut(fit, manageable([log])[0], "")
+        _write_arrays(folder / f"held_out{k + 1}.npz", {**prepared(held_out.log), "idbench": own_torques(held_out)})
+    robot_model = fit.robot_model
+    text = urdf_text(
+        robot_model.name, robot_model.robot, robot_model.tree, standard_parameters(robot_model.robot), robot_model.mounting
+    )
+    (folder / "robot.urdf").write_text(_without_shapes(text), encoding="utf-8")
+
+
+def _write_arrays(path: Path, arrays: dict[str, Array]) -> None:
+    with path.open("wb") as file:
+        np.savez(file, **arrays)  # type: ignore[arg-type]
+
+
+def _undelayed(log: MotionLog) -> MotionLog:
+    """Return a log as if its torques had no delay."""
+    return replace(log, torque=replace(log.torque, delay=0.0))
+
+
+def _without_shapes(urdf: str) -> str:
+    """Return a URDF without meshes: they are elsewhere, and some tools refuse a robot whose meshes are missing."""
+    root = ElementTree.fromstring(urdf)
+    for link in root.iter("link"):
+        for shape in [*link.findall("visual"), *link.findall("collision")]:
+            link.remove(shape)
+    return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def acting(torque: TorqueChannel, fs: float) -> float:
+    """Return how much later than its sample a torque acts, on average [s]."""
+    return torque.delay + (0.0 if torque.meaning == "instantaneous" else 0.5 / fs)
+
+
+def prepared(log: MotionLog) -> dict[str, Array]:
+    """Return a log for other tools: times [s], positions [rad], and the torques that act then [N m], gains included."""
+    tau = log.tau * np.asarray(log.torque.gain)
+    return {"t": log.t, "q": log.q, "tau": at_times(log.t, log.t + acting(log.torque, log.fs), tau)}
+
+
+def own_torques(held_out: HeldOut) -> Array:
+    """Return the torques that our own fit predicts at the samples of a log, shape (time, joint) [N m]."""
+    fit, state = held_out.fit, held_out.problem.chain.signals(held_out.log).state
+    X = fit.estimates[fit.leading].X
+    return combined(fit.basis.explicit(state), X, np.zeros(state.q.shape)).T
+
+
+def at_times(t: Array, times: Array, tau: Array) -> Array:
+    """Return torques at other times; straight lines between samples would be low-passes, twice."""
+    return np.asarray(CubicSpline(times, tau)(np.clip(t, times[0], times[-1])))
+
 
 PREDICTED = "predicted-*.npz"
 """Names of the files of other tools, in the folder of a set's results."""

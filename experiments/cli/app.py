@@ -8,9 +8,7 @@ from contextlib import suppress
 from tyro.extras import SubcommandApp
 
 from idbench.experiments.cli.interruption import INTERRUPTED, Notice, TerminatedError, importing, noticing, terminating
-from idbench.experiments.control import visible
-from idbench.experiments.errors import ExperimentError
-from idbench.experiments.faults import is_told, reason, report
+from idbench.experiments.errors import ExperimentError, is_told, reason, report, visible
 
 DESCRIPTION = "A MuJoCo testbench for the dynamic identification of robots."
 

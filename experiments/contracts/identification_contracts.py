@@ -20,7 +20,7 @@ from idbench.identify import (
     identify,
     scara,
 )
-from idbench.identify.rows.grid import Grid
+from idbench.identify.rows.row_map import Grid
 from idbench.identify.rows.rows import Rows
 
 SMALL = 1e-30

@@ -13,10 +13,10 @@ from idbench.experiments.excite.planning import plan_for
 from idbench.experiments.identification.parameters import Parameters
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.identify import CHAINS, Array, MotionLog, NoiseLevels
-from idbench.identify.data.limits import Limits
+from idbench.identify.data.kinematics import Limits
 from idbench.identify.design.criteria import CRITERIA, AbstractCriterion, LogSigma
+from idbench.identify.design.information import predicted_information
 from idbench.identify.design.plan import Plan
-from idbench.identify.design.predicted import predicted_information
 from idbench.identify.plugins import did_you_mean
 from idbench.sim.limits.clearance import Clearance
 from idbench.sim.limits.motion_limits import BOX, CLEARANCE, FLOOR, MotionLimits, home_of, limits_of, surroundings

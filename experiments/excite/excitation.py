@@ -8,8 +8,8 @@ import numpy as np
 
 from idbench.experiments.errors import ExperimentError
 from idbench.identify.arrays import Array
-from idbench.identify.design.greedy import Greedy
 from idbench.identify.design.plan import Plan
+from idbench.identify.design.search import Greedy
 from idbench.identify.design.shapes import Shapes
 from idbench.identify.plugins import PluginTable
 from idbench.sim.trajectories import Fourier, Quintic

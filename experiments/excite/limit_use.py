@@ -7,7 +7,7 @@ import numpy as np
 
 from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
-from idbench.identify.data.limits import Limits
+from idbench.identify.data.kinematics import Limits
 from idbench.identify.parameters.base_parameters import columns_at
 from idbench.sim.limits.clearance import Clearance, Touch
 from idbench.sim.limits.motion_limits import MotionLimits

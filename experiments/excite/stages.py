@@ -9,7 +9,7 @@ import numpy as np
 from idbench.experiments.excite.design import SIGMA, Design
 from idbench.experiments.excite.limit_use import LimitUse
 from idbench.identify import Array
-from idbench.identify.data.limits import Limits
+from idbench.identify.data.kinematics import Limits
 from idbench.identify.design.plan import POWER, Plan
 from idbench.identify.design.search import Search
 

@@ -1,15 +1,197 @@
 """The files that an identification can be written to, and their table."""
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Mapping
+from importlib.metadata import version
+from importlib.resources import files
 from pathlib import Path
+from pprint import pformat
+from typing import TYPE_CHECKING, Any
 
-from idbench.experiments.exports.base_json import json_text
-from idbench.experiments.exports.controller import python_text
-from idbench.experiments.exports.standard import require_known
+import numpy as np
+
+from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.consistent_robot import Written
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.robot_model import RobotModel
+from idbench.identify import AbstractBlock, Parameter, ShapedFriction
+from idbench.identify.basis import LoadFriction
+from idbench.identify.basis.of_joints import inner_of
+from idbench.identify.basis.parameter import BODY
+from idbench.identify.data.kinematics import INERTIAL, Joint
 from idbench.sim.robot.rewrite import rewritten
+
+if TYPE_CHECKING:
+    from idbench.identify import Array
+
+TERMS: Mapping[str, tuple[str, Mapping[str, str]]] = {
+    "Fva": ("np.abs(qd)", {}),
+    "Fst": ("np.exp(-((np.abs(qd) / {vs}) ** {exponent})) * np.sign(qd)", {"vs": "vs", "exponent": "ds"}),
+    "Fp": ("np.abs(qd) ** {exponent} * np.sign(qd)", {"exponent": "ap"}),
+    "Ft": ("np.tanh(qd / {vt})", {"vt": "vt"}),
+    "Fat": ("2 / np.pi * np.arctan(qd / {vat})", {"vat": "vat"}),
+    "Fl": ("np.abs(load) * np.sign(qd)", {}),
+}
+"""Letters of a law -> its torque of a unit parameter, and the letters of its settings."""
+
+
+def lines_of(fit: Fit, values: Mapping[str, float]) -> list[str]:
+    """Return the lines that add the laws to `tau`, whose torque without friction is `load`."""
+    n, lines = fit.basis.n, list[str]()
+    for block in fit.basis.blocks:
+        law = _law(block)
+        letters = getattr(law, "symbol", "Fl" if isinstance(law, LoadFriction) else "")
+        if letters not in TERMS or not any(f"{letters}{j + 1}" in values for j in range(n)):
+            continue
+        text, settings = TERMS[letters]
+        each = {name: [values.get(f"{x}{j + 1}", _fixed(law, name)) for j in range(n)] for name, x in settings.items()}
+        torque = text.format(**{name: _array(x) for name, x in each.items()})
+        lines.append(f"tau = tau + {_array([values.get(f'{letters}{j + 1}', 0.0) for j in range(n)])} * {torque}")
+    return lines
+
+
+def _law(block: AbstractBlock) -> Any:
+    """Return the law of a block, of some joints, with unknown shapes or without."""
+    inner = inner_of(block)
+    return inner.law if isinstance(inner, ShapedFriction) else inner
+
+
+def _fixed(law: Any, setting: str) -> float:
+    """Return what a setting is where it is no parameter."""
+    return float(np.max(getattr(law, setting)))
+
+
+def _array(values: list[float]) -> str:
+    return f"np.array({[float(f'{x:.12g}') for x in values]})"
+
+
+KNOWN = ("Ia", "Fv", "Fs", "off", *TERMS, *(letters for _, settings in TERMS.values() for letters in settings.values()))
+"""Letters of the laws that a controller's function has, beside the links."""
+
+
+def standard_of(fit: Fit, model: str) -> dict[str, float]:
+    """Return standard parameters with the torques of a model's estimate, by name.
+
+    Base parameters stand for themselves, what is grouped with them is zero: no body need have them, but the torques are those
+    of the estimate to the last digit.
+    """
+    robot_model, estimate = fit.robot_model, fit.estimates[model]
+    grouping = robot_model.grouping
+    values: Array = np.zeros(len(grouping.standard.names))
+    for parameter, x in zip(estimate.problem.basis.parameters, estimate.X, strict=True):
+        values[grouping.standard.places[parameter]] = x / parameter.scale
+    return dict(zip(grouping.standard.names, map(float, values), strict=True))
+
+
+def require_known(robot_model: RobotModel, target: object) -> None:
+    """Raise ExperimentError if a robot has what a controller's function does not: springs, other laws, coupled drives."""
+    strange = [p for p in robot_model.grouping.standard.parameters if p.kind not in BODY and (p.symbol not in KNOWN or p.drive)]
+    if strange:
+        names = ", ".join(parameter.name for parameter in strange[:6])
+        raise ExperimentError(
+            f"{target}: the function of a controller has links, rotors, laws of friction and offsets of joints, not {names}: "
+            "write the .json, which has all columns, or leave out what makes them (--add, --friction, --coupling, springs)"
+        )
+
+
+ABOUT = (
+    "tau = D(q, qd, qdd) X: X are `parameters`, each the sum of standard parameters in `made_of`. D has the columns of the "
+    "standard parameters `column`, over `scale`: those of links from the tree (inertia about the origin of the link's frame "
+    "and in its axes, first moments, mass), Ia: qdd of its joint, Fv: qd, Fs: sign(qd), off: 1."
+)
+
+
+def json_text(fit: Fit, model: str) -> str:
+    """Return the text: parameters, sigma, covariance, the tree of links, and which columns the regressor has."""
+    robot_model, estimate = fit.robot_model, fit.estimates[model]
+    standard = robot_model.grouping.standard
+    parameters = [
+        {
+            "name": p.name,
+            "value": float(x),
+            "sigma": float(s),
+            "unit": p.unit,
+            "kind": p.kind,
+            "joint": p.joint,
+            "column": standard.names[standard.places[p]],
+            "scale": p.scale,
+            "made_of": _made_of(fit, p),
+        }
+        for p, x, s in zip(fit.basis.parameters, estimate.X, estimate.standard_errors, strict=True)
+    ]
+    content = {
+        "format": "idbench base parameters 1",
+        "version": version("idbench"),
+        "about": ABOUT,
+        "robot": robot_model.tree.name,
+        "model": model,
+        "estimator": fit.request.estimator,
+        "logs": list(fit.logs.names),
+        "parameters": parameters,
+        "covariance": np.asarray(estimate.covariance).tolist(),
+        "letters_of_links": list(INERTIAL),
+        "gravity": [float(x) for x in robot_model.tree.gravity],
+        "tree": [
+            {
+                "joint": joint.name,
+                "kind": joint.kind,
+                "parent": joint.parent,
+                "position": joint.position.tolist(),
+                "rotation": joint.rotation.tolist(),
+                "axis": joint.axis.tolist(),
+                "anchor": joint.anchor.tolist(),
+                "zero": float(joint.zero),
+            }
+            for joint in robot_model.tree.joints
+        ],
+    }
+    return json.dumps(content, indent=1, allow_nan=False) + "\n"
+
+
+def _made_of(fit: Fit, parameter: Parameter) -> dict[str, float]:
+    """Return the standard parameters of a base parameter, and their factors."""
+    base = fit.robot_model.grouping
+    row = base.K[base.parameters.index(parameter)]
+    return {base.standard.names[k]: float(row[k]) for k in np.flatnonzero(row)}
+
+
+def python_text(fit: Fit, model: str, target: Path) -> str:
+    """Return the module: recursive Newton and Euler, with the parameters of a model's estimate.
+
+    Raises
+    ------
+    ExperimentError
+        If the estimate has a law of friction that the function does not have.
+    """
+    require_known(fit.robot_model, target)
+    tree, values = fit.robot_model.tree, standard_of(fit, model)
+    n = tree.n
+    each = {x: [values.get(f"{x}{j + 1}", 0.0) for j in range(n)] for x in ("Ia", "Fv", "Fs", "off")}
+    text = files("idbench.experiments.exports").joinpath("inverse_dynamics.py.txt").read_text(encoding="utf-8")
+    words = {
+        "{laws}": "".join(f"    {line}\n" for line in lines_of(fit, values)),
+        "{name}": tree.name,
+        "{version}": version("idbench"),
+        "{logs}": ", ".join(fit.logs.names) or "a log",
+        "{n}": str(n),
+        "{joints}": pformat(tuple(joint.name for joint in tree.joints), width=110),
+        "{model!r}": repr(model),
+        "{estimator!r}": repr(fit.request.estimator),
+        "{gravity}": repr([float(x) for x in tree.gravity]),
+        "{tree}": pformat([_joint(joint) for joint in tree.joints], width=110),
+        "{links}": pformat([[values.get(f"{x}{j + 1}", 0.0) for x in INERTIAL] for j in range(n)], width=110),
+        **{f"{{{x}}}": repr(of) for x, of in each.items()},
+    }
+    for mark, word in words.items():
+        text = text.replace(mark, word)
+    return text
+
+
+def _joint(joint: Joint) -> tuple[object, ...]:
+    """Return a joint as the function has it."""
+    lists = (joint.position, joint.rotation, joint.axis, joint.anchor)
+    return (joint.parent, joint.kind == "slide", *(x.tolist() for x in lists), float(joint.zero))
+
 
 Exported = tuple[str, list[str]]
 """A file's text, and what is to be known of it."""

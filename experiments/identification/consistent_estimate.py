@@ -7,8 +7,8 @@ import numpy as np
 
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.identify import Array, Consistent, Estimate, consistent_parameters
+from idbench.identify.parameters.bodies import Prior
 from idbench.identify.parameters.consistent import NEAR
-from idbench.identify.parameters.priors import Prior
 from idbench.sim.robot.tree import standard_parameters
 
 SURE = 0.1

@@ -7,13 +7,12 @@ from typing import Any, Self, final
 import numpy as np
 
 from idbench.experiments.identification.consistent_estimate import made_consistent
-from idbench.experiments.identification.friction_choice import chosen_in_turns
+from idbench.experiments.identification.friction_choice import chosen_in_turns, masked_laws, suited_mask
 from idbench.experiments.identification.lack import advice_on_lack
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
-from idbench.experiments.identification.suited_mask import masked_laws, suited_mask
-from idbench.experiments.results.summaries import finite, summarize
+from idbench.experiments.results.writing import finite, summarize
 from idbench.identify import (
     ESTIMATORS,
     MODELS,

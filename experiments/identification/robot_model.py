@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Self, final
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.identification.balancers import balancers
-from idbench.experiments.identification.friction_laws import FrictionLaws, law_of
+from idbench.experiments.identification.friction_laws import FrictionLaws, balancers, law_of
 from idbench.experiments.identification.parameters import Parameters
 from idbench.identify import BLOCKS, AbstractJointLaw, BaseParameters, Basis, KinematicTree, tree_basis
-from idbench.identify.parameters.scara import in_letters_of_the_paper
+from idbench.identify.parameters.base_parameters import in_letters_of_the_paper
 from idbench.sim.frictions import AbstractFrictionLaw
 from idbench.sim.robot.mounting import PLAIN, Mounting
 from idbench.sim.robot.robot import FILES, Robot

@@ -8,12 +8,11 @@ from typing import Any, Self, final
 import numpy as np
 
 from idbench.experiments.identification.fit import fit
-from idbench.experiments.identification.log_warnings import warnings_of_log
+from idbench.experiments.identification.log_warnings import unlike_file, warnings_of_log
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
-from idbench.experiments.identification.unlike_file import unlike_file
-from idbench.experiments.identification.verdict import GOOD, WORDS, Verdict
-from idbench.experiments.identification.warnings import LOG, MODEL, wrong_sign
+from idbench.experiments.judgement.verdict import GOOD, WORDS, Verdict
+from idbench.experiments.judgement.warnings import LOG, MODEL, wrong_sign
 from idbench.experiments.text import error_percentage
 from idbench.identify import Array, Estimate, ExplicitModel, IdentificationError, MotionLog, Problem, validate
 from idbench.identify.loads.drive_gains import read_with

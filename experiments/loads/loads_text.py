@@ -13,7 +13,7 @@ from idbench.identify import IdentificationError
 from idbench.identify.loads.drive_gains import VAGUE, GainEstimate
 from idbench.identify.loads.loaded_robot import LETTERS
 from idbench.identify.loads.payload import Payload
-from idbench.identify.parameters.pseudo_inertia import pseudo_inertia
+from idbench.identify.parameters.bodies import pseudo_inertia
 
 UNITS = (*["kg m^2"] * 6, *["kg m"] * 3, "kg")
 

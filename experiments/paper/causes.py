@@ -20,7 +20,7 @@ from idbench.identify import (
     paper_chain,
     scara,
 )
-from idbench.identify.rows.chains import SCHOOL
+from idbench.identify.rows.chain import SCHOOL
 
 
 def _finer(chain: Chain) -> Chain:

@@ -22,7 +22,7 @@ from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.scara import scara_truth
 from idbench.sim.trajectories.point_to_point import PointToPoint, at_rest
-from idbench.sim.trajectories.waypoints import draw_waypoint
+from idbench.sim.trajectories.quintic import draw_waypoint
 
 COMPARED = ("paper", "paper_masked")
 """Chains whose errors are compared with the paper's."""

@@ -14,12 +14,12 @@ import numpy as np
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.paper.table1 import PAPER
 from idbench.identify import CHAINS, MODELS, ExplicitModel, MotionLog, Problem, TorqueChannel, scara
-from idbench.sim.engine.ideal_log import ideal_log
+from idbench.sim.engine.run import ideal_log
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.trajectories import Quintic
-from idbench.sim.trajectories.waypoints import draw_waypoint
+from idbench.sim.trajectories.quintic import draw_waypoint
 
 PAPER_CONDITION = {MODELS.create(name): PAPER[name].condition_number for name in ("explicit", "power")}
 """Cond(W) of the paper's Table 1; that of the implicit model is the explicit one's."""

@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import Any
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.results.summaries import summarize
+from idbench.experiments.results.writing import summarize
 from idbench.identify import (
     CHAINS,
     MODELS,
@@ -23,7 +23,7 @@ from idbench.identify import (
     identify_each,
     scara,
 )
-from idbench.sim.engine.ideal_log import ideal_log
+from idbench.sim.engine.run import ideal_log
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.scara import scara_truth
 from idbench.sim.scenario.scenario import Scenario

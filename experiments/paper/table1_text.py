@@ -87,7 +87,7 @@ def _cells(estimate: Estimate, truth: list[float], i: int) -> tuple[str, str]:
     return f"{estimate.X[i]:.5f}", f"{estimate.relative_error_percent(truth)[i]:.2g}"
 
 
-def markdown(table: Table1) -> str:
+def table1_markdown(table: Table1) -> str:
     """Return the errors of every form as a markdown table, from the first chain to the last."""
     truth, forms = list(table.truth.values()), list(next(iter(table.estimates.values())))
     found = {form: [estimates[form] for estimates in table.estimates.values()] for form in forms}

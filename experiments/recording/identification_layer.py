@@ -9,14 +9,11 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.recording.chart import send_keys
 from idbench.experiments.recording.columns import part, parts, seconds, shown, time_columns
-from idbench.experiments.recording.iteration_charts import send_iterations
-from idbench.experiments.recording.lanes import Lanes, mask_states
+from idbench.experiments.recording.lanes import Lanes, estimates_table, mask_states, noise_table, short_table
 from idbench.experiments.recording.layouts import tabs
-from idbench.experiments.recording.parameter_charts import send_parameters
-from idbench.experiments.recording.residual_charts import ResidualCharts
+from idbench.experiments.recording.residual_charts import ResidualCharts, send_iterations, send_parameters
 from idbench.experiments.recording.smoothed_layer import send_smoothed
 from idbench.experiments.recording.stream import Stream
-from idbench.experiments.recording.texts import estimates_table, noise_table, short_table
 from idbench.experiments.style import FORM_WIDTHS, GREY, JOINTS, Color, kind_colors, model_color
 from idbench.identify import (
     Estimate,

@@ -15,12 +15,12 @@ from idbench.experiments.recording.audience import Audience
 from idbench.experiments.recording.columns import parts
 from idbench.experiments.recording.folder import BASE, INNER, files, known, layer_file, rearranged
 from idbench.experiments.recording.identification_layer import Layer
+from idbench.experiments.recording.lanes import about
 from idbench.experiments.recording.live_layer import LiveIdentification
 from idbench.experiments.recording.motion_layer import Base
 from idbench.experiments.recording.stream import Stream
-from idbench.experiments.recording.texts import about
 from idbench.identify import measured_state
-from idbench.identify.rows.long_logs import is_long
+from idbench.identify.rows.rows import is_long
 from idbench.sim.engine.run import Run
 from idbench.sim.engine.watch import Watch
 from idbench.sim.scenario.scenario import Scenario

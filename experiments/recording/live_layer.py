@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import rerun as rr
 
-from idbench.experiments.faults import reason, report
+from idbench.experiments.errors import reason, report
 from idbench.experiments.identification.fit import Fit, fit
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
@@ -16,7 +16,7 @@ from idbench.experiments.recording.identification_layer import row_names, send_r
 from idbench.experiments.recording.stream import Stream
 from idbench.experiments.style import FORM_WIDTHS, FORMS, GREY
 from idbench.identify import Array, Estimate, IdentificationError, MotionLog, TorqueChannel
-from idbench.identify.rows.long_logs import is_long
+from idbench.identify.rows.rows import is_long
 
 GROWTH = 1.1
 """How much longer the log must be before it is identified again: so often that the work stays in proportion to the log."""

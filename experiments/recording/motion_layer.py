@@ -15,7 +15,7 @@ from idbench.experiments.recording.layouts import tabs
 from idbench.experiments.recording.stream import Stream
 from idbench.experiments.style import GREY, WIDTHS, joint_colors, kind_colors
 from idbench.identify import Array, MotionLog
-from idbench.identify.signals.masks.reversal import slow_speed
+from idbench.identify.signals.masks import slow_speed
 from idbench.sim.drives.electric import BetweenEdges
 from idbench.sim.engine.watch import Inner, Stretch
 from idbench.sim.robot.robot import Robot

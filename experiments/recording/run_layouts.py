@@ -20,7 +20,7 @@ from idbench.experiments.recording.views import (
     window,
 )
 from idbench.identify import BLOCKS
-from idbench.identify.basis.body_regressor import KINDS
+from idbench.identify.basis.tree_links import KINDS
 
 DIGITS = "0123456789"
 

@@ -13,7 +13,7 @@ from idbench.experiments.recording.stream import Stream
 from idbench.experiments.style import FORMS, GREY
 from idbench.identify import Array
 from idbench.identify.files.servo_log import ServoColumns
-from idbench.identify.servo.smooth import smoothed
+from idbench.identify.servo.rows import smoothed
 from idbench.sim.robot.robot import Robot
 
 COMMANDED = [200, 160, 60]

@@ -1,24 +1,161 @@
 """The recording of a study: errors over the values of its axes, their distribution, and the worst runs."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import rerun as rr
 
 from idbench.experiments.recording.audience import Audience
-from idbench.experiments.recording.chart import Chart
+from idbench.experiments.recording.chart import NARROW, SYMBOLS, Chart, Symbol
+from idbench.experiments.recording.columns import part
 from idbench.experiments.recording.folder import BASE
 from idbench.experiments.recording.layouts import tabs
-from idbench.experiments.recording.scales import linear
+from idbench.experiments.recording.scales import Words, decades, linear, named
 from idbench.experiments.recording.stream import Stream
-from idbench.experiments.recording.study_charts import AxisCharts
-from idbench.experiments.study.answer import answer, where
-from idbench.experiments.study.statistics import Cell
+from idbench.experiments.study.answer import answer, short, value, where
+from idbench.experiments.study.axis import Axis
+from idbench.experiments.study.statistics import MIN_ERROR, Cell
 from idbench.experiments.study.study import Study
 from idbench.experiments.study.study_report import command, worst_runs
-from idbench.experiments.style import FORMS, GREY
+from idbench.experiments.style import FORMS, GREY, JOINTS, Color, lighter
+from idbench.identify import Array
+
+PERCENT = 100.0
+
+DOTS = 150
+"""Runs of a cell that are drawn."""
+
+MANY = 5
+"""Values of an axis from which on a small chart writes some only."""
+
+BESIDE = 0.5
+"""Share of the room of an axis' value over which models and ways stand beside each other."""
+
+WORST: Color = (255, 255, 255)
+
+Worst = tuple[Cell, str, float, int, str]
+"""A run: its cell, parameter and error, its number, and the command that makes it again."""
+
+
+@dataclass(frozen=True, eq=False)
+class AxisCharts:
+    """The charts over one axis."""
+
+    stream: Stream
+    """Where they go."""
+    axis: Axis
+    """The axis."""
+    cells: Sequence[Cell]
+    """Those that have runs."""
+
+    def send(self, worst: Sequence[Worst]) -> None:
+        """Send the typical error, and that of every parameter with its runs, the worst of them by name."""
+        at, typical = f"study/{part(self.axis.field)}", [PERCENT * cell.typical for cell in self.cells]
+        chart = Chart(self.stream, f"{at}/typical", self._x, decades("typical error [%]", typical))
+        for line in self._lines.values():
+            self._draw(chart, line, np.array([PERCENT * cell.typical for cell in line]))
+            self._name_others(chart, line)
+        for name, color in self._legend.items():
+            chart.list_entry(name, color)
+        for p, name in enumerate(self.cells[0].parameters):
+            if all(cell.relative[p] for cell in self.cells):
+                self._parameter(f"{at}/parameters/{p:02}/{part(name)}", p, [w for w in worst if w[1] == name])
+
+    @property
+    def _x(self) -> Words:
+        return named(short(self.axis.field), [value(self.axis.label(v)) for v in self.axis.points])
+
+    @cached_property
+    def _lines(self) -> dict[tuple[Any, ...], list[Cell]]:
+        """The cells that differ in this axis alone."""
+        lines: dict[tuple[Any, ...], list[Cell]] = {}
+        for cell in self.cells:
+            others = [str(x) for name, x in cell.settings.items() if name != self.axis.field]
+            lines.setdefault((*cell.names, *others), []).append(cell)
+        return lines
+
+    @cached_property
+    def _ways(self) -> list[tuple[str, str]]:
+        return list(dict.fromkeys(cell.names[:2] for cell in self.cells))
+
+    @cached_property
+    def _models(self) -> list[str]:
+        return list(dict.fromkeys(cell.names[2] for cell in self.cells))
+
+    @property
+    def _legend(self) -> Mapping[str, Color]:
+        model = self._models[0]
+        alone = self._alone
+        ways = {
+            f"{_SIGNS[self._symbol(way)]} {' '.join(way)}": self._color((*way, model)) if alone else GREY for way in self._ways
+        }
+        models = {} if alone else {model: FORMS.get(model, GREY) for model in self._models}
+        return models | (ways if len(ways) > 1 else {})
+
+    @property
+    def _alone(self) -> bool:
+        """Whether there is one model, so that colours can tell ways of identification apart."""
+        return len(self._models) == 1 and len(self._ways) > 1
+
+    def _color(self, names: tuple[str, str, str]) -> Color:
+        """Return the colour of what has a chain, an estimator and a model."""
+        if self._alone:
+            return JOINTS[self._ways.index(names[:2]) % len(JOINTS)]
+        return FORMS.get(names[2], GREY)
+
+    def _symbol(self, way: tuple[str, str]) -> Symbol:
+        return SYMBOLS[self._ways.index(way) % len(SYMBOLS)]
+
+    def _place(self, cell: Cell) -> float:
+        """Return where a cell lies on the axis: models and ways beside each other, at the value."""
+        places = len(self._models) * len(self._ways)
+        mine = self._models.index(cell.names[2]) * len(self._ways) + self._ways.index(cell.names[:2])
+        values = [self.axis.label(v) for v in self.axis.points]
+        return values.index(cell.settings[self.axis.field]) + BESIDE * ((mine + 0.5) / places - 0.5)
+
+    def _draw(self, chart: Chart, line: Sequence[Cell], y: Array) -> None:
+        x, color = np.array([self._place(cell) for cell in line]), self._color(line[0].names)
+        name = "_".join([*line[0].names, *(value(v) for k, v in line[0].settings.items() if k != self.axis.field)])
+        chart.line(name, x, y, color, listed=False)
+        chart.marks(name, x, y, color, self._symbol(line[0].names[:2]))
+
+    def _name_others(self, chart: Chart, line: Sequence[Cell]) -> None:
+        """Write the values of the other axes at the end of a line, of the first model only."""
+        others = [value(v) for name, v in line[0].settings.items() if name != self.axis.field]
+        if others and line[0].names[2] == self._models[0]:
+            at = np.array([self._place(line[-1])]), np.array([PERCENT * line[-1].typical])
+            chart.write(f"others/{'_'.join([*line[0].names, *others])}", *at, [", ".join(others)])
+
+    def _parameter(self, path: str, p: int, worst: Sequence[Worst]) -> None:
+        """Send the rms error of a parameter, its runs as dots, and the worst of them."""
+        sizes = [np.maximum(PERCENT * np.abs(cell.error[:, p]), PERCENT * MIN_ERROR) for cell in self.cells]
+        low = np.concatenate([np.quantile(size, [0.02, 1.0]) for size in sizes])  # errors pass through 0
+        words = [word if k % (1 + len(self._x.words) // MANY) == 0 else "" for k, word in enumerate(self._x.words)]
+        chart = Chart(self.stream, path, named("", words), decades("error [%]", low), NARROW)
+        for cell, size in zip(self.cells, sizes, strict=True):
+            some = size[:: max(1, len(size) // DOTS)]
+            name = "_".join([*cell.names, *map(value, cell.settings.values())])
+            chart.dots(name, np.full(len(some), self._place(cell)), some, lighter(self._color(cell.names), 1))
+        for line in self._lines.values():
+            self._draw(chart, line, np.array([PERCENT * cell.rmse[p] for cell in line]))
+        self._worst(chart, path, worst)
+
+    def _worst(self, chart: Chart, path: str, worst: Sequence[Worst]) -> None:
+        """Mark the worst runs, by their number, with the command that makes them again; none where they are others'."""
+        x = np.array([self._place(cell) for cell, *_ in worst])
+        y = np.array([PERCENT * abs(error) for _, _, error, _, _ in worst])
+        chart.marks("worst", x, y, WORST)
+        chart.write("worst", x, y, [f"run {run}" for *_, run, _ in worst])
+        self.stream.keep(f"{path}/marks/worst", rr.AnyValues(commands=[command for *_, command in worst] or ["none"]))
+
+
+_SIGNS: dict[Symbol, str] = {"square": "□", "triangle": "△", "diamond": "◇", "cross": "x", "circle": "o"}
+
 
 EDGES = np.arange(-6.25, 6.3, 0.5)
 """Bins of errors in sigma; what lies beyond counts in the outermost."""

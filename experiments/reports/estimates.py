@@ -1,16 +1,20 @@
 """The table of estimates: made once, for the screen, the page of a report and a recording."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite, log10
 
+import numpy as np
+
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.lack import lacking
-from idbench.experiments.identification.warnings import FLAGS, doubtful, used
-from idbench.experiments.text import WORTHLESS, number, percent, percentage
+from idbench.experiments.judgement.held_out import HeldOut
+from idbench.experiments.judgement.judgement import Judgement
+from idbench.experiments.judgement.warnings import FLAGS, doubtful, used
+from idbench.experiments.text import WORTHLESS, error_percentage, number, percent, percentage
 from idbench.identify import Estimate
-from idbench.identify.arrays import TINY
+from idbench.identify.arrays import TINY, Array
 
 LEAST_PERCENT = 0.01
 """%sigma without a bar: such a parameter is known better than anybody needs."""
@@ -106,3 +110,76 @@ def _explained(share: float) -> str:
     if not isfinite(share):
         return "no torque"
     return f"{100 * share:.3f} %" if share > -WORTHLESS / 100 else f"<-{WORTHLESS:g} %"
+
+
+FEW = 3
+"""Joints up to which tables of all models can be seen at once."""
+
+SAME = 0.99
+"""Errors in multiples of an earlier model's from which on a later one is no better."""
+
+
+def shown_whole(fit: Fit, asked: bool) -> tuple[str, ...]:
+    """Return the models whose tables are shown whole: all if they were asked for, or joints are few; else the leading one."""
+    every = tuple(fit.estimates)
+    if asked or fit.basis.n <= FEW or len(every) < 2:
+        return every
+    return (leading({model: np.sqrt(np.maximum(1 - share, 0)) for model, share in fit.explained.items()}),)
+
+
+def leading(errors: Mapping[str, Array]) -> str:
+    """Return the model with the least errors, shape (joint,) each, on average of their logarithms; of equals the first."""
+    first, *others = errors
+    for model in others:
+        ratio = np.log(np.maximum(errors[model], 1e-300) / np.maximum(errors[first], 1e-300))
+        if (ratio := ratio[np.isfinite(ratio)]).size and ratio.mean() < np.log(SAME):
+            first = model
+    return first
+
+
+def in_lines(fit: Fit, whole: Sequence[str]) -> Iterator[str]:
+    """Yield a line of each model on its fit as a whole, and how far those are from the leading one that are not shown whole."""
+    lead = fit.estimates[whole[0]]
+    for model, estimate in fit.estimates.items():
+        share = _range(fit.explained[model])
+        words = f"{model}: Cond(W) {estimate.condition_number:.1f}, {estimate.row_count} rows, explains {share} of the torques"
+        if model not in whole:
+            sigma = np.maximum(np.hypot(estimate.standard_errors, lead.standard_errors), 1e-300)
+            far = float(np.max(np.abs(estimate.X - lead.X) / sigma))
+            words += f"; parameters within {far:.2g} sigma of the {whole[0]} model's (--model {model} shows them)"
+        yield words
+
+
+def _range(share: Array) -> str:
+    known = 100 * share[np.isfinite(share)]
+    return f"{max(known.min(), 0):.3f} to {known.max():.3f} %" if known.size else "nothing"
+
+
+def conclusion(judgement: Judgement, warnings: Mapping[str, Sequence[str]]) -> str:
+    """Return one sentence on the hardest held-out log, and the next step."""
+    first = next((about for about, found in warnings.items() if found), "")
+    return f"{_found(judgement.hardest)}; {_next(judgement, first)}"
+
+
+def _found(one: HeldOut | None) -> str:
+    if one is None:
+        return "Result: not validated"
+    model = leading({name: validation.rms for name, validation in one.torques.items()})
+    worst = float(np.nanmax(np.nan_to_num(one.torques[model].percent, nan=0.0, posinf=np.inf)))
+    word, wrong = one.verdicts[model].word, one.verdicts[model].wrong
+    if wrong:
+        return f"Result: {word} ({model} model): {wrong[0].partition(':')[0]}"
+    return f"Result: {word} ({model} model), torque errors of at most {error_percentage(worst)} on {_short(one.title)}"
+
+
+def _short(title: str) -> str:
+    """Return what a held-out log is called, without how it was made."""
+    return title.partition(", by a fit of the rest")[0]
+
+
+def _next(judgement: Judgement, first: str) -> str:
+    if first:
+        return f"next: check {first}"
+    if judgement.good:
+        return "next: --write arm.urdf arm.json arm.py keeps the robot"
+    return "next: a longer or more exciting motion (idbench excite), or another law of friction (--friction auto)"

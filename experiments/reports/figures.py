@@ -9,10 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.identification.held_out import HeldOut
-from idbench.experiments.reports.friction_curves import FRICTIONS, WHOLE, FrictionCurves
+from idbench.experiments.judgement.held_out import HeldOut
+from idbench.experiments.reports.friction_curves import FRICTIONS, WHOLE, FrictionCurves, left_over, spectra
 from idbench.experiments.reports.html import svg
-from idbench.experiments.reports.spectra import left_over, spectra
 from idbench.experiments.style import SIGMAS, model_color
 from idbench.experiments.text import percentage
 from idbench.identify import Array, cutoffs

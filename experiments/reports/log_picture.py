@@ -5,7 +5,7 @@ import scipy
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from idbench.experiments.identification.log_facts import LogFacts
+from idbench.experiments.identification.logs import LogFacts
 from idbench.experiments.style import JOINTS
 from idbench.identify import Array
 

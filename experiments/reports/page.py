@@ -5,8 +5,8 @@ from importlib.metadata import version
 from typing import Any, TypeVar
 
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.identification.held_out import HeldOut
-from idbench.experiments.identification.judgement import Judgement, Unjudged
+from idbench.experiments.judgement.held_out import HeldOut
+from idbench.experiments.judgement.judgement import Judgement, Unjudged
 from idbench.experiments.reports.estimates import EstimatesTable
 from idbench.experiments.reports.figures import (
     friction_figure,

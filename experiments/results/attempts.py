@@ -6,14 +6,13 @@ from contextlib import suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Self, TypeVar, final
 
-from idbench.experiments.errors import ResultsError
-from idbench.experiments.faults import REPORT, is_told, reason, report, trace
+from idbench.experiments.errors import REPORT, ResultsError, is_told, reason, report, trace
+from idbench.experiments.recording.folder import write_streams
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.streams import write_streams
 from idbench.identify.blame import is_mistake
 
 if TYPE_CHECKING:
-    from idbench.experiments.results.streams import Streams
+    from idbench.experiments.recording.folder import Streams
 
 T = TypeVar("T")
 

@@ -1,17 +1,43 @@
 """Servos as text."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+from pprint import pformat
 
 import numpy as np
 from rich.text import Text
 
 from idbench.experiments.cli.page import Page
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.servo.identification import Servos
 from idbench.experiments.text import new_table, number, print_titled
 from idbench.identify import Array
-from idbench.identify.servo import ServoFit
-from idbench.identify.servo.choice import FrictionChoice
-from idbench.identify.servo.lack import lacks_of
+from idbench.identify.servo import Servo, ServoFit
+from idbench.identify.servo.choice import FrictionChoice, lacks_of
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
+from idbench.sim.robot.servos import Commands, ServoValues, replay, with_servos
+
+NONE = {"rate": float("inf"), "vs": 1.0}
+"""What parameters are that a servo does not have; others are 0."""
+
+
+def servo_function(robot: str, fits: Mapping[str, tuple[Servo, ServoFit]], logs: Sequence[str]) -> str:
+    """Return the file: what is known of each joint's servo, and what was found."""
+    text = files("idbench.experiments.exports").joinpath("servo.py.txt").read_text(encoding="utf-8")
+    every = {joint: _parameters(servo, fit) for joint, (servo, fit) in fits.items()}
+    table = pformat(every, width=110, sort_dicts=False).replace("inf", 'float("inf")')
+    words = {"{name}": robot, "{version}": version("idbench"), "{logs}": ", ".join(logs), "{servos}": table}
+    for mark, word in words.items():
+        text = text.replace(mark, word)
+    return text
+
+
+def _parameters(servo: Servo, fit: ServoFit) -> dict[str, float]:
+    known = {"gain": servo.gain * servo.kp, "supply": servo.supply, "duty_limit": servo.duty_limit, "counts": servo.counts}
+    return {**known, **{name: float(fit.p.get(name, NONE.get(name, 0.0))) for name in SERVO_PARAMETERS if name != "backlash"}}
+
 
 VAGUE = 0.5
 """Standard error, as a share of the value, from which on a parameter is reported as unidentified."""
@@ -143,3 +169,34 @@ def print_choice(page: Page, joint: str, choice: FrictionChoice) -> None:
         p = f"{choice.p[law]:.2g}" if law in choice.p else ""
         grid.add_row(f"{law}{' (chosen)' if law == choice.chosen else ''}", number(error / choice.fits[law].servo.step), p)
     print_titled(page, f"{joint}: laws of friction, by the error of parts of the log that their fits did not see", grid)
+
+
+def values_of(servos: Servos, fit: ServoFit, joint: str) -> ServoValues:
+    """Return a servo as MuJoCo has it, with the firmware gain of the file."""
+    p, servo = fit.p, servos.known.servo(joint, "")
+    known = servo.gain * servo.kp, servo.supply, servo.duty_limit
+    rate, play = p.get("rate", np.inf), p.get("backlash", 0.0)
+    return ServoValues(p["a"], p["b"], *known, p["Ia"], p["Fv"], p["Fs"], rate, p["delay"], play)
+
+
+def mjcf_of(servos: Servos, fits: dict[str, ServoFit], folder: Path, position: bool = False) -> str:
+    """Return the robot's MJCF with the servos that were found."""
+    place = {servos.place(joint): values_of(servos, fit, joint) for joint, fit in fits.items()}
+    return with_servos(servos.robot, place, folder, servos.mounting, position)
+
+
+def in_mujoco(servos: Servos, text: str, folder: Path, fits: dict[str, ServoFit], path: Path) -> dict[str, float]:
+    """Return the mean absolute error [rad] of each joint, a log's commands given to the written file in plain MuJoCo."""
+    columns, known = servos.logs[path], servos.known
+    places = [servos.place(joint) for joint in fits]
+    offset = np.zeros(servos.links.n)
+    offset[places] = [fit.p["offset"] for fit in fits.values()]
+    if any(known.servo(joint, path.name).kp != known.servo(joint, "").kp for joint in fits):
+        raise ExperimentError(f"{path.name} has another kp than the file that was written")
+    if servos.links_of(path) is not servos.links:
+        raise ExperimentError(f"{path.name} is of another robot than the file that was written")
+    on = None if columns.on is None else columns.on[:, places] > 0.5
+    sent = Commands(columns.t, (columns.command + offset)[:, places], places, on)
+    q = replay(servos.robot, text, folder, sent, columns.q[0] + offset)
+    error = np.abs(q - columns.q - offset).mean(axis=0)
+    return {joint: float(error[j]) for joint, j in zip(fits, places, strict=True)}

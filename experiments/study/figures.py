@@ -9,9 +9,8 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from idbench.experiments.reports.html import svg
-from idbench.experiments.study.answer import value
+from idbench.experiments.study.answer import in_words, value
 from idbench.experiments.study.axis import Axis
-from idbench.experiments.study.requirement import in_words
 from idbench.experiments.study.statistics import RIGHT, Cell
 from idbench.experiments.style import FORMS, SIGMAS
 from idbench.identify import Array

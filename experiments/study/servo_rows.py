@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from idbench.experiments.servo.identification import known_servos
 from idbench.experiments.servo.joints import Joints, JointsLog
-from idbench.experiments.servo.known import known_servos
 from idbench.experiments.study.statistics import BOUNDS
 from idbench.identify import MotionLog
 from idbench.identify.files.servo_log import ServoColumns

@@ -10,8 +10,8 @@ import numpy as np
 
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.identification.simulators import RobotPlant, ScenarioLoop
+from idbench.experiments.study.axis import Method
 from idbench.experiments.study.bound import bounds_of
-from idbench.experiments.study.method import Method
 from idbench.experiments.study.servo_rows import SERVO, rows_of
 from idbench.experiments.study.statistics import BOUNDS
 from idbench.experiments.study.study import Study

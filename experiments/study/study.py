@@ -15,8 +15,7 @@ from idbench.experiments.errors import StudyError
 from idbench.experiments.identification.defaults import CHAIN, ESTIMATOR
 from idbench.experiments.identification.parameters import Parameters
 from idbench.experiments.identification.robot_model import RobotModel
-from idbench.experiments.study.axis import FRICTION, Axis, Setting
-from idbench.experiments.study.method import Method, combinations, methods_of, servo_methods, whole_first
+from idbench.experiments.study.axis import FRICTION, Axis, Method, Setting, combinations, methods_of, servo_methods, whole_first
 from idbench.experiments.study.servo_rows import SERVO, names_of
 from idbench.identify import MODELS, AbstractModel
 from idbench.sim.drives import ServoDrive

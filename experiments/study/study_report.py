@@ -11,11 +11,11 @@ import tomli_w
 from idbench.experiments.reports.html import rendered
 from idbench.experiments.study.answer import answer, grouped, headline, method, percent, short, value, where
 from idbench.experiments.study.axis import Axis
+from idbench.experiments.study.cluster import versions
 from idbench.experiments.study.comparison import differences
 from idbench.experiments.study.figures import bars_figure, cost_figure, coverage_figure, error_figure, typical_figure
 from idbench.experiments.study.statistics import BOUNDS, Cell
 from idbench.experiments.study.study import Study
-from idbench.experiments.study.versions import versions
 from idbench.experiments.text import percent as signed
 
 WORST = 10

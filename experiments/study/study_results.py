@@ -12,14 +12,13 @@ from rich.text import Text
 from idbench.experiments.errors import ResultsError
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.summaries import write_summary
+from idbench.experiments.results.writing import write_summary
 from idbench.experiments.study.answer import answer, method, percent, settings_of, short, value
 from idbench.experiments.study.axis import FRICTION
-from idbench.experiments.study.shard_file import arrays
+from idbench.experiments.study.cluster import versions
 from idbench.experiments.study.statistics import BOUNDS, Cell, cells
-from idbench.experiments.study.store import Store
+from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study_report import report
-from idbench.experiments.study.versions import versions
 from idbench.experiments.text import new_table, print_table
 
 MOST_REASONS = 3

@@ -3,35 +3,34 @@
 ``BLOCKS`` is the table of blocks that fit a robot of any number of joints, or refuse the wrong one.
 """
 
-from idbench.identify.basis.armature import Armature as Armature
-from idbench.identify.basis.balancer import Balancer as Balancer
 from idbench.identify.basis.basis import Basis as Basis
 from idbench.identify.basis.block import AbstractBlock as AbstractBlock
 from idbench.identify.basis.block import AbstractConservativeBlock as AbstractConservativeBlock
-from idbench.identify.basis.coupled import Coupled as Coupled
-from idbench.identify.basis.friction.asymmetric_viscous import AsymmetricViscousFriction as AsymmetricViscousFriction
-from idbench.identify.basis.friction.cogging import Cogging as Cogging
-from idbench.identify.basis.friction.coulomb import CoulombFriction as CoulombFriction
+from idbench.identify.basis.friction.laws import ArctanFriction as ArctanFriction
+from idbench.identify.basis.friction.laws import AsymmetricViscousFriction as AsymmetricViscousFriction
+from idbench.identify.basis.friction.laws import Cogging as Cogging
+from idbench.identify.basis.friction.laws import CoulombFriction as CoulombFriction
+from idbench.identify.basis.friction.laws import Offset as Offset
+from idbench.identify.basis.friction.laws import TanhFriction as TanhFriction
+from idbench.identify.basis.friction.laws import TemperatureFriction as TemperatureFriction
+from idbench.identify.basis.friction.laws import ViscousFriction as ViscousFriction
+from idbench.identify.basis.friction.laws import arctan, tanh
 from idbench.identify.basis.friction.load import LoadFriction as LoadFriction
-from idbench.identify.basis.friction.offset import Offset as Offset
-from idbench.identify.basis.friction.power_law import PowerFriction as PowerFriction
-from idbench.identify.basis.friction.power_law import power
+from idbench.identify.basis.friction.shape import PowerFriction as PowerFriction
 from idbench.identify.basis.friction.shape import Shape as Shape
 from idbench.identify.basis.friction.shape import ShapedFriction as ShapedFriction
-from idbench.identify.basis.friction.smooth_coulomb import ArctanFriction as ArctanFriction
-from idbench.identify.basis.friction.smooth_coulomb import TanhFriction as TanhFriction
-from idbench.identify.basis.friction.smooth_coulomb import arctan, tanh
-from idbench.identify.basis.friction.stribeck import StribeckFriction as StribeckFriction
-from idbench.identify.basis.friction.stribeck import free_stribeck, stribeck
-from idbench.identify.basis.friction.temperature import TemperatureFriction as TemperatureFriction
-from idbench.identify.basis.friction.viscous import ViscousFriction as ViscousFriction
+from idbench.identify.basis.friction.shape import StribeckFriction as StribeckFriction
+from idbench.identify.basis.friction.shape import free_stribeck, power, stribeck
 from idbench.identify.basis.joint_law import AbstractFriction as AbstractFriction
 from idbench.identify.basis.joint_law import AbstractJointLaw as AbstractJointLaw
+from idbench.identify.basis.joint_law import Armature as Armature
+from idbench.identify.basis.of_joints import Coupled as Coupled
 from idbench.identify.basis.of_joints import OfJoints as OfJoints
 from idbench.identify.basis.parameter import Parameter as Parameter
-from idbench.identify.basis.spring import Spring as Spring
-from idbench.identify.basis.tree_basis import tree_basis as tree_basis
+from idbench.identify.basis.springs import Balancer as Balancer
+from idbench.identify.basis.springs import Spring as Spring
 from idbench.identify.basis.tree_links import TreeLinks as TreeLinks
+from idbench.identify.basis.tree_links import tree_basis as tree_basis
 from idbench.identify.plugins import PluginTable
 
 BLOCKS: PluginTable[AbstractBlock] = PluginTable(

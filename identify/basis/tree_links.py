@@ -1,20 +1,123 @@
 """The links of any tree of hinges and slides."""
 
-from collections.abc import Callable, Set
+from collections.abc import Callable, Iterator, Set
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Self, TypeAlias, final
+from typing import NamedTuple, Self, TypeAlias, final
 
 import numpy as np
 
-from idbench.identify.basis.block import AbstractConservativeBlock, BlockColumns
-from idbench.identify.basis.body_regressor import KINDS, Wrench, energy
-from idbench.identify.basis.parameter import Parameter
-from idbench.identify.basis.terms import Term, is_zero, minus
-from idbench.identify.basis.twists import Twists
-from idbench.identify.data.kinematics import KinematicTree
+from idbench.identify.basis.basis import Basis
+from idbench.identify.basis.block import AbstractBlock, AbstractConservativeBlock, BlockColumns
+from idbench.identify.basis.friction.laws import CoulombFriction, ViscousFriction
+from idbench.identify.basis.friction.load import TiedFriction
+from idbench.identify.basis.joint_law import AbstractFriction, Armature
+from idbench.identify.basis.of_joints import Coupled, OfJoints
+from idbench.identify.basis.parameter import Kind, Parameter
+from idbench.identify.basis.springs import Spring
+from idbench.identify.basis.twists import (
+    ZERO,
+    Matrix,
+    Term,
+    Twist,
+    Twists,
+    Vector,
+    add,
+    cross,
+    dot,
+    is_zero,
+    minus,
+    plus,
+    scaled,
+    times,
+)
+from idbench.identify.data.kinematics import INERTIAL, KinematicTree
 from idbench.identify.errors import SettingError
 from idbench.identify.signals.state import State
+
+MX, M = INERTIAL.index("MX"), INERTIAL.index("M")
+
+_UNITS: dict[Kind, str] = {"inertia": "kg m^2", "first moment": "kg m", "mass": "kg"}
+
+_OF_LETTERS: tuple[Kind, ...] = ("inertia",) * 6 + ("first moment",) * 3 + ("mass",)
+
+KINDS: dict[str, tuple[Kind, str]] = {x: (kind, _UNITS[kind]) for x, kind in zip(INERTIAL, _OF_LETTERS, strict=True)}
+"""What the inertial parameters measure, and their units."""
+
+NOTHING: Matrix = (ZERO, ZERO, ZERO)
+
+
+class Wrench(NamedTuple):
+    """Force M a + A MS and moment J (XX ... ZZ) + MS x a of a link with mass M and first moments MS."""
+
+    a: Vector
+    A: Matrix
+    J: tuple[Vector, ...]
+
+    @classmethod
+    def inertial(cls, V: Twist, dV: Twist, up: Vector) -> Self:
+        """Return force and moment that move a link, with its weight: a = dv + w x v - g, Newton and Euler."""
+        v, w = V
+        squares = times(w.x, w.x), times(w.y, w.y), times(w.z, w.z)
+        xy, xz, yz = times(w.x, w.y), times(w.x, w.z), times(w.y, w.z)
+        d = dV.w
+        A = (
+            Vector(times(-1.0, plus(squares[1], squares[2])), minus(xy, d.z), plus(xz, d.y)),
+            Vector(plus(xy, d.z), times(-1.0, plus(squares[0], squares[2])), minus(yz, d.x)),
+            Vector(minus(xz, d.y), plus(yz, d.x), times(-1.0, plus(squares[0], squares[1]))),
+        )
+        J = (
+            Vector(d.x, xz, times(-1.0, xy)),
+            Vector(minus(d.y, xz), plus(d.x, yz), minus(squares[0], squares[1])),
+            Vector(plus(d.z, xy), minus(squares[2], squares[0]), minus(d.x, yz)),
+            Vector(times(-1.0, yz), d.y, xy),
+            Vector(minus(squares[1], squares[2]), minus(d.z, xy), plus(d.y, xz)),
+            Vector(yz, times(-1.0, xz), d.z),
+        )
+        return cls(add(dV.v, cross(w, v), up), A, J)
+
+    @classmethod
+    def momentum(cls, V: Twist) -> Self:
+        """Return momentum and angular momentum: a = v."""
+        w = V.w
+        minus_w = scaled(-1.0, w)
+        A = Vector(0.0, minus_w.z, w.y), Vector(w.z, 0.0, minus_w.x), Vector(minus_w.y, w.x, 0.0)
+        return cls(V.v, A, _inertia_times(w))
+
+    @classmethod
+    def weight(cls, up: Vector) -> Self:
+        """Return what holds a link against gravity: a = -g."""
+        return cls(up, NOTHING, (ZERO,) * 6)
+
+    def along(self, twist: Twist, parameter: int) -> Term:
+        """Return what a parameter, by its number in INERTIAL, adds to the power of force and moment along a unit motion."""
+        if parameter < MX:
+            return dot(twist.w, self.J[parameter])
+        if parameter == M:
+            return dot(twist.v, self.a)
+        x, y, z = ((0, 1, 2), (1, 2, 0), (2, 0, 1))[parameter - MX]
+        force = dot(Vector(*(row[x] for row in self.A)), twist.v)
+        return plus(force, minus(times(self.a[y], twist.w[z]), times(self.a[z], twist.w[y])))
+
+
+def _inertia_times(w: Vector) -> tuple[Vector, ...]:
+    return (
+        Vector(w.x, 0.0, 0.0),
+        Vector(w.y, w.x, 0.0),
+        Vector(w.z, 0.0, w.x),
+        Vector(0.0, w.y, 0.0),
+        Vector(0.0, w.z, w.y),
+        Vector(0.0, 0.0, w.z),
+    )
+
+
+def energy(V: Twist, up: Vector, height: Term) -> tuple[Term, ...]:
+    """Return what each parameter adds to kinetic plus potential energy."""
+    v, w = V
+    half = scaled(0.5, w)
+    squares = times(half.x, w.x), times(w.x, w.y), times(w.x, w.z), times(half.y, w.y), times(w.y, w.z), times(half.z, w.z)
+    return (*squares, *add(cross(v, w), up), plus(times(0.5, dot(v, v)), height))
+
 
 Pairs: TypeAlias = tuple[tuple[int, int], ...]
 
@@ -102,3 +205,49 @@ class TreeLinks(AbstractConservativeBlock):
 def _parameters(j: int) -> tuple[Parameter, ...]:
     """Return the ten parameters of a link."""
     return tuple(Parameter(x, j, *what) for x, what in KINDS.items())
+
+
+def tree_basis(tree: KinematicTree, laws: tuple[AbstractBlock, ...] = (ViscousFriction(), CoulombFriction())) -> Basis:
+    """Return links, armatures and springs where the tree has them, and laws of friction: the standard parameters, by joint.
+
+    Drives that turn with several joints have an armature and the laws of friction, too.
+
+    Friction laws are added as to any basis, as in ``tree_basis(tree) + Offset()``. Standard parameters cannot all be
+    identified: `BaseParameters` groups them.
+
+    Examples
+    --------
+    >>> from idbench.identify import BaseParameters, tree_basis
+    >>> from idbench.sim import kinematic_tree, load_robot
+    >>> tree = kinematic_tree(load_robot("scara"))
+    >>> basis = tree_basis(tree)
+    >>> len(basis.names), BaseParameters.of(tree, basis).names
+    (25, ('ZZR1', 'Fv1', 'Fs1', 'ZZ2', 'MX2', 'MY2', 'Fv2', 'Fs2'))
+    """
+    driven = tuple(j for j, joint in enumerate(tree.joints) if joint.armature)
+    sprung = {j: joint.spring for j, joint in enumerate(tree.joints) if joint.spring is not None}
+    rest = tuple(sprung.get(j, 0.0) for j in range(tree.n))
+    springs = (Spring(rest, tuple(sprung)),) if sprung else ()
+    blocks = TreeLinks(tree), Armature(driven), *springs, *laws, *_of_couplings(tree, laws)
+    parameters = [parameter for block in blocks for parameter in block.parameters(tree.n)]
+    kept = tuple(sorted(parameters, key=lambda p: -1 if p.joint is None else p.joint))
+    slides = tuple(j for j, joint in enumerate(tree.joints) if joint.kind == "slide")
+    return Basis(tree.n, blocks, kept, slides)
+
+
+def _of_couplings(tree: KinematicTree, laws: tuple[AbstractBlock, ...]) -> Iterator[AbstractBlock]:
+    """Yield what drives that turn with several joints have: rotor, spring, and laws of friction that all these joints have.
+
+    Those are laws of motion alone: a load is a joint's.
+    """
+    for coupling in tree.couplings:
+        if coupling.armature:
+            yield Coupled(Armature(), coupling)
+        if coupling.spring is not None:
+            yield Coupled(Spring((coupling.spring,)), coupling)
+        turned = set(np.flatnonzero(coupling.weights).tolist())
+        inner = [law.block if isinstance(law, OfJoints) and turned <= set(law.joints) else law for law in laws]
+        own = [law for law in inner if isinstance(law, AbstractFriction)]
+        yield from (Coupled(law, coupling) for law in own)
+        if any(isinstance(law, CoulombFriction) for law in own) and len(turned) > 1:
+            yield TiedFriction(coupling)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from idbench.identify.arrays import Array
-from idbench.identify.data.limits import Limits
+from idbench.identify.data.kinematics import Limits
 from idbench.identify.design.criteria import AbstractCriterion
 from idbench.identify.design.information import Information
 from idbench.identify.design.shapes import Shapes

@@ -12,11 +12,9 @@ from idbench.identify.estimators.least_squares.generalized_least_squares import 
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.settle import settled
 from idbench.identify.estimators.simulator import Simulation
-from idbench.identify.models.explicit import ExplicitModel
-from idbench.identify.models.model import AbstractModel
+from idbench.identify.models import AbstractModel, ExplicitModel
 from idbench.identify.one_thread import one_thread
-from idbench.identify.rows.chain import Chain
-from idbench.identify.rows.chains import idbench_chain
+from idbench.identify.rows.chain import Chain, idbench_chain
 from idbench.identify.telling import stage
 
 

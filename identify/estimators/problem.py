@@ -13,20 +13,16 @@ from idbench.identify.basis.basis import Basis
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import IdentificationError, LogError
 from idbench.identify.estimators.given_logs import require_logs, same_form
-from idbench.identify.estimators.log_rows import LogRows
-from idbench.identify.estimators.long_problem import Piece, bias_counts, pieces
+from idbench.identify.estimators.log_rows import LogRows, Piece, bias_counts, pieces
 from idbench.identify.estimators.simulator import Simulation
-from idbench.identify.models.explicit import ExplicitModel
-from idbench.identify.models.model import AbstractModel
+from idbench.identify.models import AbstractModel, ExplicitModel
 from idbench.identify.noise.propagation import NoiseLevels
-from idbench.identify.noise.repeats import repeats
 from idbench.identify.noise.restricted_likelihood import likely, likely_levels
 from idbench.identify.noise.row_weights import floor_of, reciprocal_root
-from idbench.identify.noise.spectral_levels import position_noise, spectral_levels
+from idbench.identify.noise.spectral_levels import position_noise, repeats, spectral_levels
 from idbench.identify.rows.chain import Chain
 from idbench.identify.rows.factors import Factors, Fit, triangular
-from idbench.identify.rows.long_logs import is_long
-from idbench.identify.rows.rows import Rows
+from idbench.identify.rows.rows import Rows, is_long
 from idbench.identify.signals.signals import Signals
 
 Weights = Literal["measured", "own"]

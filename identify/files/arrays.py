@@ -11,8 +11,7 @@ import scipy
 
 from idbench.identify.arrays import Array
 from idbench.identify.errors import LogError
-from idbench.identify.files.room import require_room
-from idbench.identify.files.table import LogTable
+from idbench.identify.files.table import LogTable, require_room
 
 BROKEN = (MemoryError, ValueError, EOFError, KeyError, TypeError, zipfile.BadZipFile, zlib.error, OSError)
 """What readers raise of files that are none of theirs."""

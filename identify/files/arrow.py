@@ -11,8 +11,7 @@ import numpy as np
 
 from idbench.identify.arrays import Array
 from idbench.identify.errors import LogError
-from idbench.identify.files.room import require_room
-from idbench.identify.files.table import LogTable
+from idbench.identify.files.table import LogTable, require_room
 
 if TYPE_CHECKING:
     import pyarrow as pa

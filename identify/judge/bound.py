@@ -9,7 +9,7 @@ from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.estimators.likelihood.cells import GAUSS, hermite
 from idbench.identify.estimators.likelihood.joint_fit import MASK, UNKNOWN
-from idbench.identify.estimators.likelihood.jumps import CREEP
+from idbench.identify.estimators.likelihood.reversals import CREEP
 from idbench.identify.noise.linearization import friction_jumps, observation, slopes
 from idbench.identify.noise.propagation import NoiseLevels
 

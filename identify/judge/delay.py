@@ -12,11 +12,9 @@ from idbench.identify.basis.basis import Basis
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import LogError, RangeError, SettingError
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.models.explicit import ExplicitModel
-from idbench.identify.rows.chain import Chain
-from idbench.identify.rows.chains import idbench_chain
-from idbench.identify.rows.long_logs import manageable
-from idbench.identify.rows.rows import Rows
+from idbench.identify.models import ExplicitModel
+from idbench.identify.rows.chain import Chain, idbench_chain
+from idbench.identify.rows.rows import Rows, manageable
 
 RANGE = (-0.02, 0.05)
 """Delays [s] that are looked at: a filtered measurement is late by some milliseconds, a slow controller by some tens."""

@@ -8,8 +8,8 @@ import numpy as np
 
 from idbench.identify.basis.basis import Basis
 from idbench.identify.basis.block import AbstractBlock
+from idbench.identify.basis.friction.laws import TanhFriction
 from idbench.identify.basis.friction.shape import ShapedFriction
-from idbench.identify.basis.friction.smooth_coulomb import TanhFriction
 from idbench.identify.basis.of_joints import OfJoints
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.settle import settled

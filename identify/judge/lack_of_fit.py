@@ -11,7 +11,7 @@ from idbench.identify.arrays import Array
 from idbench.identify.errors import IdentificationError
 from idbench.identify.estimators.log_rows import LogRows
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.models.explicit import ExplicitModel
+from idbench.identify.models import ExplicitModel
 from idbench.identify.rows.rows import Rows
 from idbench.identify.signals.signals import Signals
 

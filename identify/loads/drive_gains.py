@@ -6,14 +6,14 @@ import numpy as np
 import numpy.typing as npt
 
 from idbench.identify.arrays import Array
-from idbench.identify.basis.drive_gains import DriveGains
+from idbench.identify.basis.loads import DriveGains
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import IdentificationError, SettingError
 from idbench.identify.estimators.estimate import Estimate
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.settle import settled
 from idbench.identify.loads.loaded_robot import LoadedRobot
-from idbench.identify.models.explicit import ExplicitModel
+from idbench.identify.models import ExplicitModel
 
 ROUNDS = 20
 """At most; most logs take four."""

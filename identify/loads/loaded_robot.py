@@ -8,7 +8,7 @@ import numpy as np
 
 from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
-from idbench.identify.basis.payload import HELD_SHARE, PayloadLink
+from idbench.identify.basis.loads import HELD_SHARE, PayloadLink
 from idbench.identify.data.kinematics import INERTIAL, KinematicTree
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import LogError, SettingError
@@ -18,10 +18,9 @@ from idbench.identify.estimators.identification import estimate
 from idbench.identify.estimators.least_squares.generalized_least_squares import GeneralizedLeastSquares
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.settle import settled
-from idbench.identify.models.explicit import ExplicitModel
+from idbench.identify.models import ExplicitModel
 from idbench.identify.parameters.base_parameters import BaseParameters
-from idbench.identify.rows.chain import Chain
-from idbench.identify.rows.chains import idbench_chain
+from idbench.identify.rows.chain import Chain, idbench_chain
 
 LETTERS = tuple(f"{letters}L" for letters in INERTIAL)
 """Names of the parameters of a payload: inertia about the origin of the link's frame, first moments, mass."""

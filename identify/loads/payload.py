@@ -17,8 +17,8 @@ from idbench.identify.errors import IdentificationError, LogError
 from idbench.identify.estimators.estimate import Estimate
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot, marked, of_payload
-from idbench.identify.models.explicit import ExplicitModel
-from idbench.identify.parameters.pseudo_inertia import inertial, pseudo_inertia
+from idbench.identify.models import ExplicitModel
+from idbench.identify.parameters.bodies import inertial, pseudo_inertia
 
 REPEATED = 0.05
 """Rms distance of two motions [rad or m] up to which they count as one that was repeated."""

@@ -10,10 +10,9 @@ import numpy.typing as npt
 
 from idbench.identify.arrays import Array
 from idbench.identify.noise.band_matrix import Band
-from idbench.identify.noise.covariance import BandedCovariance
+from idbench.identify.noise.covariance import BandedCovariance, Whitening
 from idbench.identify.noise.linearization import Linearization
 from idbench.identify.noise.propagation import NoiseLevels, Paths, position_paths, torque_paths
-from idbench.identify.noise.whitening import Whitening
 from idbench.identify.rows.row_map import RowMap
 
 SEEN = 0.05

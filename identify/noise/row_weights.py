@@ -7,10 +7,92 @@ import numpy.typing as npt
 import scipy
 
 from idbench.identify.arrays import Array, combined
-from idbench.identify.models.model import AbstractModel
+from idbench.identify.models import AbstractModel
 from idbench.identify.noise.linearization import Linearization, smoothed
-from idbench.identify.noise.two_levels import two_levels
 from idbench.identify.rows.row_map import RowMap
+from idbench.identify.rows.rows import Rows
+from idbench.identify.signals.signals import Signals
+
+ROUNDS = 6
+
+FAINT = 1e-3
+"""Expectations below this share of the mean count as this: what is found there says more about the expectation."""
+
+
+def two_levels(x: Array, z: Array, squares: Array) -> tuple[Array, Array]:
+    """Return a and b, not negative, with which squares of expectation a x + b z are most likely, shape (...).
+
+    By least squares with errors in proportion to the expectation, round by round (Whittle's likelihood, of a spectrum).
+
+    Parameters
+    ----------
+    x, z, squares : Array, shape (..., r)
+        The two parts of the expectation, not negative, and what was found.
+    """
+    x, z, squares = np.broadcast_arrays(x, z, squares)
+    means = [np.mean(part, axis=-1, keepdims=True) for part in (x, z, squares)]
+    x, z, y = (np.divide(p, m, out=np.zeros_like(p), where=m > 0) for p, m in zip((x, z, squares), means, strict=True))
+    a = b = np.full(means[2].shape, 0.5)
+    for _ in range(ROUNDS):
+        size = np.maximum(a * x + b * z, FAINT)
+        a, b = _not_negative(x / size, z / size, y / size)
+    found = (np.divide(c * means[2], m, out=np.zeros_like(m), where=m > 0) for c, m in ((a, means[0]), (b, means[1])))
+    return next(found)[..., 0], next(found)[..., 0]
+
+
+def _not_negative(x: Array, z: Array, y: Array) -> tuple[Array, Array]:
+    """Return a and b, not negative, of the least squares a x + b z = y along the last axis, which they keep with length 1."""
+    xx, xz, zz, xy, zy = (np.sum(p * q, axis=-1, keepdims=True) for p, q in ((x, x), (x, z), (z, z), (x, y), (z, y)))
+    determinant = xx * zz - xz**2
+    regular = determinant > 1e-12 * xx * zz
+    of_x, of_z = (np.divide(s, m, out=np.zeros_like(s), where=m > 0) for s, m in ((xy, xx), (zy, zz)))
+    a = np.divide(xy * zz - zy * xz, determinant, out=np.where(zz > 0, 0.0, of_x), where=regular)
+    b = np.divide(zy * xx - xy * xz, determinant, out=of_z.copy(), where=regular)
+    return np.where(b < 0, of_x, np.maximum(a, 0.0)), np.where(a < 0, of_z, np.maximum(b, 0.0))
+
+
+SURE = 4.0
+"""Speed over the noise of the velocity at which a joint is certain to move the way it seems to."""
+
+
+def unbiased(rows: Rows, noisier: Rows) -> Rows:
+    """Return the rows of one log with W less what noise of the positions adds to it on average.
+
+    Columns hold squares of velocities and sines of positions, so that noise does not average out of them. More noise n of the
+    same size, put in with either sign, shows how much: W(q + n) + W(q - n) - 2 W(q) holds the squares alone, and its half is,
+    on average, what the log's own noise has added. (One noise is enough: only its squares are left to chance.)
+
+    Parameters
+    ----------
+    rows : Rows
+        Of one log.
+    noisier : Rows
+        Those of `with_more_noise`.
+    """
+    return replace(rows, W=2 * rows.W - np.mean(noisier.W, axis=0))
+
+
+def with_more_noise(signals: Signals, level: Array) -> Signals:
+    """Return the signals of two logs, with more noise in the positions, put in with either sign, and with the same mask.
+
+    Every run meets the same noise; which joint gets which part of it depends on how far it moves, not on the order of joints.
+    Joints that hardly move get none: their encoder's error is constant, and |qd|, of Coulomb friction, has no square.
+
+    Parameters
+    ----------
+    signals : Signals
+        Of one log.
+    level : Array, shape (..., joint)
+        Standard deviation of the positions' noise [rad].
+    """
+    log, rng = signals.log, np.random.default_rng(0)
+    moves = np.abs(smoothed(signals.state.qd, log.fs)) > SURE * signals.gain * level[..., None]
+    drawn = np.broadcast_to(rng.standard_normal(log.q.shape[-2:]), log.q.shape)
+    far = np.argsort(np.argsort(np.std(log.q, axis=-2, keepdims=True)))
+    noise = np.swapaxes(moves * level[..., None], -1, -2) * np.take_along_axis(drawn, far, axis=-1)
+    q = np.stack([log.q + noise, log.q - noise])
+    return replace(signals, log=replace(log, q=q, tau=np.broadcast_to(log.tau, q.shape)), weights_of=signals)
+
 
 MIN_RATIO, MAX_RATIO = 0.01, 10.0
 """Range of b/a: residuals of some hundred rows do not show less, and more is as good as equal weights."""

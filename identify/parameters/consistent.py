@@ -13,8 +13,7 @@ from idbench.identify.basis.parameter import NOT_NEGATIVE
 from idbench.identify.data.kinematics import INERTIAL
 from idbench.identify.errors import IdentificationError
 from idbench.identify.parameters.base_parameters import BaseParameters
-from idbench.identify.parameters.bodies import Bodies
-from idbench.identify.parameters.priors import Prior, entropic_terms
+from idbench.identify.parameters.bodies import Bodies, Prior, entropic_terms
 
 NEAR = 1e-4
 """What a step to twice the given model costs, beside one sigma of the estimate: nothing, where the estimate knows anything."""

@@ -1,6 +1,6 @@
 """From a log to a linear system: every choice of signal processing, in Hz, s and rad/s."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from typing import final
 
@@ -9,15 +9,17 @@ import numpy as np
 from idbench.identify.basis.basis import Basis
 from idbench.identify.data.motion_log import MotionLog, TorqueChannel
 from idbench.identify.errors import LogError, SettingError, require_not_negative
-from idbench.identify.models.model import AbstractModel
-from idbench.identify.rows.grid import Grid
+from idbench.identify.models import AbstractModel
+from idbench.identify.plugins import Table
+from idbench.identify.rows.operators import FirLowPass, IirLowPass, Samples
 from idbench.identify.rows.operators.operator import AbstractOperator
+from idbench.identify.rows.row_map import Grid
 from idbench.identify.rows.rows import Rows
-from idbench.identify.signals.differentiators.differentiator import AbstractDifferentiator
-from idbench.identify.signals.masks.mask import AbstractMask
-from idbench.identify.signals.prefilters.prefilter import AbstractPrefilter
+from idbench.identify.signals.differentiators import AbstractDifferentiator, CentralDifference
+from idbench.identify.signals.masks import AbstractMask, NoMask, ReversalMask
+from idbench.identify.signals.prefilters import AbstractPrefilter, ButterworthPrefilter, NoPrefilter
 from idbench.identify.signals.signals import Signals
-from idbench.identify.signals.torques.torque import AbstractAlignment
+from idbench.identify.signals.torques import AbstractAlignment, AsLogged, ByChannel
 
 
 @final
@@ -96,3 +98,39 @@ class Chain:
                 f"trim = {self.trim:g} s is shorter than the {halo:.3g} s that this chain looks: raise it, or leave it out"
             )
         return self.trim
+
+
+SCHOOL = 0.1
+"""Speed [rad/s] up to which the paper's school leaves the SCARA's instants out."""
+
+
+def paper_chain() -> Chain:
+    """The paper's own steps: Butterworth on q and tau, 2-point differences, Matlab's IIR decimate (sections 6.2, 7.2)."""
+    return Chain(ButterworthPrefilter(8.0), CentralDifference(2), AsLogged(), NoMask(), IirLowPass(4.0))
+
+
+def idbench_chain() -> Chain:
+    """No prefilter, 6th-order differences, torque aligned by its channel, reversals masked, FIR low-pass."""
+    return Chain(NoPrefilter(), CentralDifference(6), ByChannel(), ReversalMask(), FirLowPass())
+
+
+def paper_masked_chain() -> Chain:
+    """The paper's own steps, with the instants near reversals and standstill left out, as its school does."""
+    return replace(paper_chain(), mask=ReversalMask(SCHOOL))
+
+
+def unfiltered_chain() -> Chain:
+    """As idbench, without a filter: every sample is a row."""
+    return replace(idbench_chain(), operator=Samples())
+
+
+CHAINS: Table[Chain] = Table(
+    "chains",
+    Chain,
+    {
+        "paper": paper_chain,
+        "paper_masked": paper_masked_chain,
+        "idbench": idbench_chain,
+        "unfiltered": unfiltered_chain,
+    },
+)

@@ -7,8 +7,8 @@ from typing import Self, final
 import numpy as np
 
 from idbench.identify.errors import ExcitationError, IdentificationError
+from idbench.identify.servo.closed_loop import Servo
 from idbench.identify.servo.run import ServoRun
-from idbench.identify.servo.servo import Servo
 
 TILTS = 0.01
 """Share of gravity that turns with the joint, of its typical torque, from which on an offset of the position shows."""

@@ -1,13 +1,104 @@
 """The identification of a servo: rows, then the closed loop, law by law and finer from stage to stage."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple, final
 
+import numpy as np
+
+from idbench.identify.arrays import Array
+from idbench.identify.one_thread import one_thread
+from idbench.identify.servo.closed_loop import Servo, ServoLoop
 from idbench.identify.servo.fit import ServoFit
-from idbench.identify.servo.friction import simpler
-from idbench.identify.servo.parameters import parameters_of
+from idbench.identify.servo.parameters import limits_of, parameters_of, simpler
 from idbench.identify.servo.run import ServoRun
-from idbench.identify.servo.servo import Servo
 from idbench.identify.servo.stages import Stages
+
+APART = 0.01
+"""By how much an offset is changed to see what that does to other joints [rad]."""
+
+INSEPARABLE = 100.0
+"""Condition number from which on offsets cannot be told apart: what gravity says of one, another can make up for."""
+
+
+@final
+class Joint(NamedTuple):
+    """The fit of a joint, and the offsets of others that its loads assume."""
+
+    fit: ServoFit
+    """The fit."""
+    per_offset: dict[int, Array]
+    """By how much its free parameters change per rad of the offset of another joint, shape (p,), by the number of that
+    joint."""
+
+
+def per_offset(fit: ServoFit, other: Sequence[ServoRun]) -> Array:
+    """Return by how much the free parameters of a fit change per rad of another joint's offset, shape (p,).
+
+    Parameters
+    ----------
+    fit : ServoFit
+        The fit of one joint.
+    other : sequence of ServoRun
+        The runs that it looked at, with their loads if the offset of the other joint is larger by `APART`.
+    """
+    found, size = fit.found, np.sqrt((fit.found.sensitivity**2).mean(axis=(0, 1)))
+    size = np.where(size > 0, size, 1.0)
+    with one_thread():
+        q, moved = (ServoLoop(fit.servo, runs, fit.loop.h).simulate(fit.p)[0] for runs in (fit.loop.runs, other))
+    w = (1 + np.abs(found.residual) / (3 * fit.scale)) ** -2
+    free = found.beginning.free_of(found.sensitivity / size, w) * w[..., None]
+    curvature = np.einsum("rti,rtj->ij", free, found.sensitivity / size)
+    pull = np.einsum("rti,rt->i", free, (q - moved) / APART * fit.loop.kept)
+    return np.asarray(np.linalg.pinv(curvature, 1e-12) @ pull / size)
+
+
+def together(joints: Mapping[int, Joint], assumed: Mapping[int, float]) -> dict[int, ServoFit]:
+    """Return fits whose offsets agree with each other, and whose covariances contain the errors of all offsets.
+
+    The free parameters of joint j are linear in the offsets o of the others, near those that its loads assume:
+    theta_j + B_jk (o_k - assumed_k). Its own offset is one of them, so that the offsets solve a linear system. Where gravity
+    does not tell them apart, fits stay as they are. Joints whose torques have no scale have no part in it.
+
+    Parameters
+    ----------
+    joints : mapping of int to Joint
+        By the number of the joint.
+    assumed : mapping of int to float
+        Offsets [rad].
+    """
+    sources = [k for k in assumed if k in joints and "offset" in joints[k].fit.free]
+    own = {k: joints[k].fit.free.index("offset") for k in sources}
+    B = {j: np.stack([_of(joint, k) for k in sources], axis=-1) for j, joint in joints.items()} if sources else {}
+    A = np.array([B[k][own[k]] for k in sources]).reshape(len(sources), len(sources))
+    coupled = np.eye(len(sources)) - A
+    if not sources or np.linalg.cond(coupled) > INSEPARABLE:
+        return {j: joint.fit for j, joint in joints.items()}
+    agreed = np.linalg.inv(coupled)
+    ahead = agreed @ np.array([joints[k].fit.p["offset"] - assumed[k] for k in sources])
+    return {j: _moved(joint.fit, B[j] @ ahead, _covariance(j, joints, B[j] @ agreed, own)) for j, joint in joints.items()}
+
+
+def _of(joint: Joint, k: int) -> Array:
+    return joint.per_offset.get(k, np.zeros(len(joint.fit.free)))
+
+
+def _covariance(j: int, joints: Mapping[int, Joint], per_error: Array, own: Mapping[int, int]) -> Array:
+    """Return that of joint j, `per_error` being what an error of each offset does to its parameters, shape (p, source)."""
+    more, all_of = np.eye(len(per_error)), np.zeros((len(per_error), len(per_error)))
+    for column, (k, place) in zip(per_error.T, own.items(), strict=True):
+        if k == j:
+            more[:, place] += column
+        else:
+            all_of += np.outer(column, column) * joints[k].fit.covariance[place, place]
+    return np.asarray(more @ joints[j].fit.covariance @ more.T + all_of)
+
+
+def _moved(fit: ServoFit, by: Array, covariance: Array) -> ServoFit:
+    low, high = limits_of(fit.free)
+    moved = np.clip(np.array([fit.p[name] for name in fit.free]) + by, low, high)
+    p = {**fit.p, **dict(zip(fit.free, moved.tolist(), strict=True))}
+    return replace(fit, found=replace(fit.found, p=p), of_all=covariance)
 
 
 def identify_servo(

@@ -10,11 +10,11 @@ from idbench.identify.arrays import Array
 from idbench.identify.blame import expect
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import PluginError
-from idbench.identify.signals.differentiators.differentiator import AbstractDifferentiator
-from idbench.identify.signals.masks.mask import AbstractMask
-from idbench.identify.signals.prefilters.prefilter import AbstractPrefilter
+from idbench.identify.signals.differentiators import AbstractDifferentiator
+from idbench.identify.signals.masks import AbstractMask
+from idbench.identify.signals.prefilters import AbstractPrefilter
 from idbench.identify.signals.state import State
-from idbench.identify.signals.torques.torque import AbstractAlignment, Torque
+from idbench.identify.signals.torques import AbstractAlignment, Torque
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,13 +10,12 @@ import numpy.typing as npt
 from idbench.identify.blame import expect
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import PluginError
-from idbench.sim.controllers.controller import AbstractLaw, Task
+from idbench.sim.controllers import AbstractLaw, Task
 from idbench.sim.drives.drive import AbstractAmplifier, every
-from idbench.sim.encoders.encoder import AbstractReader
-from idbench.sim.engine.clock import Clock
+from idbench.sim.encoders import AbstractReader
+from idbench.sim.engine.clock import Clock, History
 from idbench.sim.engine.failures import Failures
 from idbench.sim.engine.geared_plant import plant_of
-from idbench.sim.engine.history import History
 from idbench.sim.engine.run import Run
 from idbench.sim.engine.watch import Step, Watcher
 from idbench.sim.errors import ScenarioError

@@ -2,6 +2,10 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from idbench.sim.robot.motors import Array
+
 
 @dataclass(frozen=True)
 class Clock:
@@ -37,3 +41,41 @@ class Clock:
         """Return for how many steps, this one included, neither a sample is taken nor a command begins to act."""
         _, after = self.command(step)
         return min(self.per_sample - after, self.per_sample - step % self.per_sample)
+
+
+class History:
+    """Positions and velocities of the last physics steps, as many as `reach`.
+
+    Parameters
+    ----------
+    reach : int
+        Steps to look back.
+    nsim, n : int
+        Number of simulations and joints.
+    h : float
+        Physics step [s].
+    """
+
+    def __init__(self, reach: int, nsim: int, n: int, h: float) -> None:
+        self._h, self._size, self._sim = h, reach + 2, np.arange(nsim)
+        self._q, self._qd = np.zeros((2, self._size, nsim, n))
+        self._last = -1
+
+    def put(self, step: int, q: Array, qd: Array) -> None:
+        """Remember the state at the beginning of physics step `step`."""
+        self._q[step % self._size], self._qd[step % self._size] = q, qd
+        self._last = step
+
+    def at(self, x: Array) -> Array:
+        """Return positions [rad], shape (nsim, joint), at the instants `x`, shape (nsim,), counted in physics steps.
+
+        Between steps by the cubic that has their positions and velocities; before the first step, the first.
+        """
+        x = np.maximum(x, 0.0)
+        before = np.minimum(np.floor(x).astype(np.int64), self._last)
+        after = np.minimum(before + 1, self._last)
+        s = (x - before)[:, None]
+        q0, q1 = (self._q[k % self._size, self._sim] for k in (before, after))
+        v0, v1 = (self._qd[k % self._size, self._sim] * self._h for k in (before, after))
+        rise = q1 - q0
+        return q0 + s * (v0 + s * ((3 * rise - 2 * v0 - v1) + s * (v0 + v1 - 2 * rise)))

@@ -3,12 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.data.motion_log import MotionLog, TorqueChannel
+from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import standard_parameters
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.trajectories import Reference
+from idbench.sim.trajectories.trajectory import require_in_range
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,3 +57,18 @@ class Run:
     def alone(self, i: int = 0) -> MotionLog:
         """Return the log of simulation `i` by itself."""
         return self.log.run((i,))
+
+
+def ideal_log(robot: Robot, reference: Reference) -> MotionLog:
+    """Return the log of a robot that follows `reference` exactly, with exact sensors.
+
+    The torque at every instant is MuJoCo's inverse dynamics plus the friction law Fs sign(qd); it is instantaneous.
+
+    Raises
+    ------
+    ScenarioError
+        If the motion is not one of the robot's joints, or leaves their ranges.
+    """
+    require_in_range(robot, reference.q)
+    tau = inverse_dynamics(robot, reference.q, reference.qd, reference.qdd) + coulomb_torque(robot, reference.qd)
+    return MotionLog(reference.fs, reference.q, tau, TorqueChannel("instantaneous"))

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
-from idbench.identify.data.limits import Limits
+from idbench.identify.data.kinematics import Limits
 from idbench.identify.plugins import did_you_mean
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.motors import Array

@@ -4,7 +4,7 @@ from idbench.identify.plugins import PluginTable
 from idbench.sim.trajectories.fourier import Fourier as Fourier
 from idbench.sim.trajectories.point_to_point import PointToPoint as PointToPoint
 from idbench.sim.trajectories.quintic import Quintic as Quintic
-from idbench.sim.trajectories.random_moves import RandomMoves as RandomMoves
+from idbench.sim.trajectories.quintic import RandomMoves as RandomMoves
 from idbench.sim.trajectories.recorded import Recorded as Recorded
 from idbench.sim.trajectories.reference import Reference as Reference
 from idbench.sim.trajectories.steps import RandomSteps as RandomSteps

@@ -12,10 +12,9 @@ from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import NotNegative, Positive, Seed, Share, Truth, Whole, settings
 from idbench.sim.trajectories.point_to_point import PointToPoint
-from idbench.sim.trajectories.random_moves import room
+from idbench.sim.trajectories.quintic import draw_waypoint, room
 from idbench.sim.trajectories.reference import AbstractMotion, Reference
 from idbench.sim.trajectories.trajectory import AbstractTrajectory
-from idbench.sim.trajectories.waypoints import draw_waypoint
 
 
 @final

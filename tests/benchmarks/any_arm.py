@@ -23,7 +23,7 @@ from idbench.identify import (
     identify_each,
     tree_basis,
 )
-from idbench.sim.engine.ideal_log import ideal_log
+from idbench.sim.engine.run import ideal_log
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import kinematic_tree
 from idbench.sim.trajectories import RandomMoves

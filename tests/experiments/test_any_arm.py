@@ -7,10 +7,10 @@ import pytest
 
 from idbench.experiments.identification.consistent_robot import Written
 from idbench.experiments.identification.fit import fit
-from idbench.experiments.identification.held_out import on_log
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.judgement.held_out import on_log
 from idbench.identify import MODELS
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.robot.robot import Robot

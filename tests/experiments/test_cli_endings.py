@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-import idbench.experiments.recording.table1_recording
+import idbench.experiments.recording.comparison_recording
 from idbench.experiments.cli import main
 from idbench.experiments.cli.interruption import noticing
 from idbench.experiments.results.manifest import NAME as MANIFEST
@@ -25,7 +25,7 @@ def test_interruption_of_a_view_is_quiet_and_loses_no_result(out, capfd, monkeyp
     def interrupted(*args):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(idbench.experiments.recording.table1_recording, "record_table1", interrupted)
+    monkeypatch.setattr(idbench.experiments.recording.comparison_recording, "record_table1", interrupted)
     assert main(["table1", "--out", str(out)]) == 130
     printed = capfd.readouterr()
     assert "interrupted" in printed.err
@@ -128,7 +128,7 @@ def test_an_interrupt_while_a_module_is_loaded_is_as_quiet(tmp_path, module, sta
 @pytest.mark.thorough
 def test_termination_leaves_nothing_half_written(tmp_path, start):
     """SIGTERM while the recording is written: the hidden folder goes, what was complete stays."""
-    code = "import sys; from idbench.experiments import cli; import idbench.experiments.recording.table1_recording as r\n"
+    code = "import sys; from idbench.experiments import cli; import idbench.experiments.recording.comparison_recording as r\n"
     code += "def slow(*args): print('recording', flush=True); import time; time.sleep(600)\n"
     code += "r.record_table1 = slow\nsys.exit(cli.main(['table1', '--out', 'results']))"
     process = start("-uc", code, cwd=tmp_path)
@@ -157,7 +157,7 @@ def test_a_failure_of_a_view_is_one_line_and_the_rest_is_there(out, monkeypatch,
     def full(*args):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(idbench.experiments.recording.table1_recording, "record_table1", full)
+    monkeypatch.setattr(idbench.experiments.recording.comparison_recording, "record_table1", full)
     assert "the recording: No space left on device; what was found is printed, and in" in complaint("table1", "--out", str(out))
     assert listed(out) == KEPT
     assert list(out.parent.iterdir()) == [out]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from idbench.experiments.cli import main
-from idbench.experiments.reports.leading import leading
+from idbench.experiments.reports.estimates import leading
 
 
 def test_the_best_leads_and_of_equals_the_first():

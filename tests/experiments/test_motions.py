@@ -10,7 +10,7 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.paper.motions import COMPARED, Errors, Pace, Table1Motions
 from idbench.experiments.paper.table1 import PAPER
 from idbench.identify import IirLowPass, ReversalMask
-from idbench.identify.rows.chains import CHAINS
+from idbench.identify.rows.chain import CHAINS
 
 
 @pytest.fixture(scope="module")

@@ -297,7 +297,7 @@ def test_a_pipe_is_not_waited_for(csv, complaint):
 
 def test_a_small_file_that_unpacks_to_more_than_there_is(tmp_path, complaint, monkeypatch):
     np.savez_compressed(tmp_path / "big.npz", t=np.zeros(200_000), q1=np.zeros(200_000), tau1=np.zeros(200_000))
-    monkeypatch.setattr("idbench.identify.files.room.memory", lambda: 1e-3)
+    monkeypatch.setattr("idbench.identify.files.table.memory", lambda: 1e-3)
     assert "3 arrays of 0.0048 GB: reading them takes 0.0144 GB" in complaint("log", str(tmp_path / "big.npz"))
 
 
@@ -328,7 +328,7 @@ def test_little_memory_is_told(start):
 
 def test_progress_is_told_by_model_and_estimator(csv, monkeypatch, capfd):
     """A line for each stage where there is no terminal, at most every so often; none on standard output."""
-    monkeypatch.setattr("idbench.experiments.cli.progress.EVERY", 0.002)
+    monkeypatch.setattr("idbench.experiments.cli.page.EVERY", 0.002)
     assert main([*IDENTIFY, "--estimator", "GLS", "--no-rerun"]) == 0
     out, err = capfd.readouterr()
     assert "identifying: " in err

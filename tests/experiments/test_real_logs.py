@@ -229,7 +229,7 @@ def test_what_is_written_makes_the_torques_that_were_identified(idbench, logs, t
 
 @pytest.mark.parametrize("robot", ["scara", "puma560", "panda"])
 def test_the_function_of_true_parameters_is_mujocos_inverse_dynamics(robot, tmp_path):
-    from idbench.experiments.exports.controller import python_text
+    from idbench.experiments.exports.exports import python_text
     from idbench.experiments.identification.fit import Fit
     from idbench.experiments.identification.logs import Logs
     from idbench.experiments.identification.request import Request

@@ -71,7 +71,7 @@ def test_a_view_that_fails_leaves_everything_else(view, error, idbench, logs, tm
 @pytest.mark.parametrize("error", [broken, refused], ids=["fault", "refusal"])
 def test_a_held_out_log_that_cannot_be_judged_leaves_the_others(error, idbench, logs, tmp_path, monkeypatch):
     """The second of three; the table was printed, the summary is there, one line names what is missing."""
-    from idbench.experiments.identification import held_out
+    from idbench.experiments.judgement import held_out
 
     real, calls = held_out.validate, []
 

@@ -17,7 +17,7 @@ import pytest
 
 from idbench.experiments.cli import main
 from idbench.experiments.recording.folder import known
-from idbench.identify.files.servo_file import ServoFile
+from idbench.identify.files.servo_log import ServoFile
 from idbench.identify.servo import JointLoad, ServoRun
 from idbench.identify.servo.closed_loop import ServoLoop
 from idbench.identify.servo.parameters import SERVO_PARAMETERS

@@ -12,8 +12,8 @@ from idbench.experiments.study.servo_rows import _joints
 from idbench.identify import IdentificationError
 from idbench.identify.files.servo_log import ServoColumns
 from idbench.identify.servo import Servo, UnscaledError, identify_again, identify_servo
+from idbench.identify.servo.identification import APART, per_offset
 from idbench.identify.servo.stages import looked_at
-from idbench.identify.servo.together import APART, per_offset
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.robot.mounting import PLAIN
 from idbench.sim.robot.servos import links

@@ -351,7 +351,7 @@ def test_a_check_that_ends_is_an_answer(monkeypatch, capsys):
 
 def test_rows_are_read_only(logs):
     from idbench.identify import ExplicitModel, Problem, idbench_chain, scara
-    from idbench.sim.engine.ideal_log import ideal_log
+    from idbench.sim.engine.run import ideal_log
     from idbench.sim.robot.robot import Robot
 
     robot = Robot.load("scara")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from idbench.experiments.identification.suited_mask import masked_laws
+from idbench.experiments.identification.friction_choice import masked_laws
 from idbench.identify import BLOCKS, CHAINS, ExplicitModel, Problem, ReversalMask, scara
 from idbench.identify.basis.of_joints import OfJoints
 from idbench.sim.engine.simulation import simulate

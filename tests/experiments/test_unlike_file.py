@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from idbench.experiments.cli import main
-from idbench.experiments.identification.unlike_file import without_shapes
+from idbench.experiments.identification.log_warnings import without_shapes
 from idbench.identify import BLOCKS, ExplicitModel, MotionLog, NoMask, Problem, TorqueChannel, idbench_chain, scara
 
 

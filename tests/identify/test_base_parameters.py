@@ -30,7 +30,7 @@ from idbench.identify import (
     tree_basis,
 )
 from idbench.identify.data.motion_log import MotionLog, TorqueChannel
-from idbench.sim.engine.ideal_log import ideal_log
+from idbench.sim.engine.run import ideal_log
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import kinematic_tree, standard_parameters
 from idbench.sim.trajectories import RandomMoves

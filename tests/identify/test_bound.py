@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from idbench.identify import Basis, CoulombFriction, NoiseLevels, ViscousFriction, cramer_rao, scara
-from idbench.identify.basis.armature import Armature
+from idbench.identify.basis.joint_law import Armature
 
 FS = 100.0
 

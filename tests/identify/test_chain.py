@@ -31,7 +31,7 @@ from idbench.identify import (
     paper_chain,
     scara,
 )
-from idbench.sim.engine.ideal_log import ideal_log
+from idbench.sim.engine.run import ideal_log
 
 CHANNELS = [
     TorqueChannel("instantaneous"),

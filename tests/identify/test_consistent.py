@@ -7,7 +7,7 @@ import pytest
 
 from idbench.identify import BaseParameters, IdentificationError, consistent_parameters, tree_basis
 from idbench.identify.data.kinematics import INERTIAL
-from idbench.identify.parameters.pseudo_inertia import inertial, pseudo_inertia
+from idbench.identify.parameters.bodies import inertial, pseudo_inertia
 from idbench.sim.robot.rewrite import rewritten
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import kinematic_tree, standard_parameters

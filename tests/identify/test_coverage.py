@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from idbench.identify import ESTIMATORS, MODELS, MotionLog, TorqueChannel, identify_each, scara
-from idbench.sim.engine.ideal_log import ideal_log
+from idbench.sim.engine.run import ideal_log
 from idbench.sim.trajectories import RandomMoves, Reference
 
 RUNS, BATCH, FS = 1500, 250, 100.0

@@ -16,13 +16,11 @@ from idbench.identify import (
     identify,
     scara,
 )
-from idbench.identify.data.limits import Limits
+from idbench.identify.data.kinematics import Limits
 from idbench.identify.design.criteria import CRITERIA, LogSigma, sigmas_of
-from idbench.identify.design.greedy import Greedy
-from idbench.identify.design.information import Information
+from idbench.identify.design.information import Information, predicted_information
 from idbench.identify.design.plan import Plan
-from idbench.identify.design.predicted import predicted_information
-from idbench.identify.design.search import Search
+from idbench.identify.design.search import Greedy, Search
 from idbench.identify.design.shapes import Shapes
 from idbench.identify.errors import SettingError
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.special import eval_chebyt
 
 from idbench.identify import ButterworthPrefilter, FirLowPass, IirLowPass, LogError, SettingError
-from idbench.identify.rows.grid import Grid
+from idbench.identify.rows.row_map import Grid
 
 FS = 100.0
 T = np.arange(4000) / FS

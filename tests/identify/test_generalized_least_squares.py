@@ -23,8 +23,8 @@ from idbench.identify.noise.band_matrix import Band, Cholesky
 from idbench.identify.noise.noisy_rows import NoisyRows
 from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.noise.restricted_likelihood import likely_levels
-from idbench.identify.noise.unbiased import unbiased, with_more_noise
-from idbench.identify.rows import long_logs
+from idbench.identify.noise.row_weights import unbiased, with_more_noise
+from idbench.identify.rows import rows
 
 EVERY = {name: MODELS.create(name) for name in MODELS.builtin}
 GLS = GeneralizedLeastSquares()
@@ -168,8 +168,8 @@ def test_two_logs_are_worth_two_and_long_ones_come_in_pieces(log, monkeypatch):
     sigma = identify(single, scara(), EVERY["explicit"], estimator=GLS).own_sigma
     double = identify([single, single], scara(), EVERY["explicit"], estimator=GLS)
     np.testing.assert_allclose(np.sqrt(2) * double.own_sigma, sigma, rtol=0.1)
-    monkeypatch.setattr(long_logs, "LONG", 1e4)
-    monkeypatch.setattr(long_logs, "PIECE", 4e3)
+    monkeypatch.setattr(rows, "LONG", 1e4)
+    monkeypatch.setattr(rows, "PIECE", 4e3)
     pieces = identify(single, scara(), EVERY["explicit"], estimator=GLS)
     assert pieces.problem.long
     np.testing.assert_allclose(pieces.own_sigma, sigma, rtol=0.25)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import idbench.identify.rows.long_logs
+import idbench.identify.rows.rows
 from idbench.identify import (
     CHAINS,
     ESTIMATORS,
@@ -23,14 +23,14 @@ from idbench.identify import (
     validate,
 )
 from idbench.identify.judge.delay import estimate_delay
-from idbench.identify.rows.long_logs import is_long, manageable, piece_of
+from idbench.identify.rows.rows import is_long, manageable, piece_of
 
 
 @pytest.fixture
 def short(monkeypatch):
     """Logs of more than 1000 samples of two joints count as long, pieces have 500 samples."""
-    monkeypatch.setattr(idbench.identify.rows.long_logs, "LONG", 4000)
-    monkeypatch.setattr(idbench.identify.rows.long_logs, "PIECE", 2000)
+    monkeypatch.setattr(idbench.identify.rows.rows, "LONG", 4000)
+    monkeypatch.setattr(idbench.identify.rows.rows, "PIECE", 2000)
 
 
 @pytest.fixture
@@ -47,7 +47,7 @@ def test_estimates_are_those_of_all_rows(estimator, noisy, short, monkeypatch):
     solver = ESTIMATORS.create(estimator)
     assert is_long([noisy])
     cut = identify_each(noisy, scara(), MODEL, estimator=solver)
-    monkeypatch.setattr(idbench.identify.rows.long_logs, "LONG", 1e9)
+    monkeypatch.setattr(idbench.identify.rows.rows, "LONG", 1e9)
     whole = identify_each(noisy, scara(), MODEL, estimator=solver)
     for name, estimate in whole.items():
         found = cut[name]
@@ -67,7 +67,7 @@ def test_pieces_have_the_rows_of_the_log(chain, noisy, short, monkeypatch):
     made, model = CHAINS.create(chain), MODELS.create("implicit")
     made = made if made.mask == NoMask() else replace(made, mask=ReversalMask(0.1))  # whose speeds do not follow a piece
     cut = [noisy.part(*piece) for piece in made.pieces(noisy, piece_of(noisy))]
-    monkeypatch.setattr(idbench.identify.rows.long_logs, "LONG", 1e9)
+    monkeypatch.setattr(idbench.identify.rows.rows, "LONG", 1e9)
     by_piece = Rows.stack([Problem((piece,), scara(), model, made).rows for piece in cut])
     whole = Problem((noisy,), scara(), model, made).rows
     assert by_piece.W.shape == whole.W.shape
@@ -78,7 +78,7 @@ def test_pieces_have_the_rows_of_the_log(chain, noisy, short, monkeypatch):
 def test_a_trim_of_its_own_is_kept(noisy, short, monkeypatch):
     made = replace(idbench_chain(), trim=3.0)
     cut = Problem((noisy,), scara(), MODELS.create("explicit"), made).factors
-    monkeypatch.setattr(idbench.identify.rows.long_logs, "LONG", 1e9)
+    monkeypatch.setattr(idbench.identify.rows.rows, "LONG", 1e9)
     whole = Problem((noisy,), scara(), MODELS.create("explicit"), made).factors
     np.testing.assert_array_equal(cut.rows, whole.rows)
     squares, expected = (np.swapaxes(factors.R, -1, -2) @ factors.R for factors in (cut, whole))
@@ -89,7 +89,7 @@ def test_a_fit_of_several_long_logs_is_that_of_all_their_rows(noisy, short, monk
     parts = [noisy.part(0, 2400), noisy.part(2200, 4600)]
     weighted = WeightedLeastSquares()  # GLS takes pieces for independent
     cut = identify_each(parts, scara(), MODEL, estimator=weighted)
-    monkeypatch.setattr(idbench.identify.rows.long_logs, "LONG", 1e9)
+    monkeypatch.setattr(idbench.identify.rows.rows, "LONG", 1e9)
     whole = identify_each(parts, scara(), MODEL, estimator=weighted)
     for name in ("explicit", "implicit"):
         assert cut[name].row_count == whole[name].row_count
@@ -97,7 +97,7 @@ def test_a_fit_of_several_long_logs_is_that_of_all_their_rows(noisy, short, monk
 
 
 def test_what_needs_rows_takes_the_beginning_of_a_long_log(noisy, truth, monkeypatch):
-    monkeypatch.setattr(idbench.identify.rows.long_logs, "LONG", 4 * 2000)
+    monkeypatch.setattr(idbench.identify.rows.rows, "LONG", 4 * 2000)
     beginning = noisy.part(0, 2000)
     assert estimate_delay(noisy, scara()).delay == estimate_delay(beginning, scara()).delay
     judged = (

@@ -24,7 +24,7 @@ from idbench.identify.estimators.likelihood.cells import GAUSS, Cells, hermite
 from idbench.identify.estimators.likelihood.normal_equations import Noise, NormalEquations
 from idbench.identify.estimators.likelihood.reversals import Turns
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.rows.chains import idbench_chain
+from idbench.identify.rows.chain import idbench_chain
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.scenario.scenario_file import load
 from idbench.sim.trajectories import RandomMoves

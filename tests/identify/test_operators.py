@@ -16,7 +16,7 @@ from idbench.identify import (
     SettingError,
     Windows,
 )
-from idbench.identify.models.equations import Equations
+from idbench.identify.models import Equations
 from idbench.identify.rows.operators import OPERATORS, Samples
 
 FS = 100.0

@@ -27,7 +27,7 @@ from idbench.identify import (
     identify,
     scara,
 )
-from idbench.identify.rows import long_logs
+from idbench.identify.rows import rows
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def test_a_basis_may_be_exchanged_and_signals_stay(log):
 
 def test_an_estimator_that_needs_rows_is_refused_a_log_too_long_for_them(log, monkeypatch):
     """It would have been handed triangular factors, and would have returned another X without a word."""
-    monkeypatch.setattr(long_logs, "LONG", 1000)
+    monkeypatch.setattr(rows, "LONG", 1000)
     problem = Problem((log,), scara(), ExplicitModel(), idbench_chain())
     with pytest.raises(IdentificationError, match="IRLS needs rows, and the rows of 4600 samples"):
         estimate(problem, ESTIMATORS.create("IRLS"))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from idbench.identify import MODELS, MotionLog, TorqueChannel, identify, scara
-from idbench.identify.noise.repeats import repeats
+from idbench.identify.noise.spectral_levels import repeats
 
 FS, SECONDS = 100.0, 40.0
 T = np.arange(0, SECONDS, 1 / FS)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from idbench.identify import CHAINS, ESTIMATORS, ExplicitModel, MotionLog, Problem, TorqueChannel, scara
-from idbench.identify.judge.slow_motion import slow_motion
+from idbench.identify.judge.band import slow_motion
 from idbench.identify.signals.state import State
 
 X = np.array([3.5, 0.5, 0.5, 0.06, 0.12, 0.005, 0.1, 0.2])

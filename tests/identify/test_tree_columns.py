@@ -159,7 +159,7 @@ def loaded(trees, monkeypatch):
         module = ModuleType(f"idbench.identify.basis.{name}")
         monkeypatch.setitem(sys.modules, module.__name__, module)
         exec(compile(ast.fix_missing_locations(tree), name, "exec"), module.__dict__)
-        module.__dict__.setdefault("plus", sys.modules["idbench.identify.basis.terms"].plus)  # what `minus` may become
+        module.__dict__.setdefault("plus", sys.modules["idbench.identify.basis.twists"].plus)  # what `minus` may become
     return sys.modules["idbench.identify.basis.tree_links"].TreeLinks
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from idbench.identify.noise.two_levels import two_levels
+from idbench.identify.noise.row_weights import two_levels
 
 
 @pytest.fixture

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 
 from idbench.identify import PluginError
-from idbench.sim.controllers import AbstractController
-from idbench.sim.controllers.controller import AbstractLaw
-from idbench.sim.encoders import AbstractEncoder
-from idbench.sim.encoders.encoder import AbstractReader
+from idbench.sim.controllers import AbstractController, AbstractLaw
+from idbench.sim.encoders import AbstractEncoder, AbstractReader
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.settings import settings
 

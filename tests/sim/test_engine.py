@@ -142,13 +142,12 @@ def test_an_error_of_mujoco_ends_its_simulation_alone(short, monkeypatch):
 
 @pytest.mark.parametrize(("part", "message"), [("drive", "the drive gives"), ("friction", "the friction gives")])
 def test_a_torque_that_is_not_finite_is_blamed_on_its_part(short, monkeypatch, part, message):
-
     import idbench.sim.drives.ideal_drive
-    import idbench.sim.frictions.coulomb_law
+    import idbench.sim.frictions.static
 
     owner, name = {
         "drive": (idbench.sim.drives.ideal_drive._Amplifier, "step"),
-        "friction": (idbench.sim.frictions.coulomb_law._Contact, "torque"),
+        "friction": (idbench.sim.frictions.static._CoulombContact, "torque"),
     }[part]
     before, calls = getattr(owner, name), []
 

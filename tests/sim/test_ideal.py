@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 
 from idbench import models
-from idbench.sim.engine.ideal_log import ideal_log
+from idbench.sim.engine.run import ideal_log
 from idbench.sim.robot.inverse_dynamics import BLOCK, inverse_dynamics
 from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario_file import load

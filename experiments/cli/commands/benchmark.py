@@ -8,19 +8,16 @@ from typing import Any
 from rich.text import Text
 
 from idbench.experiments.benchmark.definition import FILE, SHIPPED, read_definition, shipped
-from idbench.experiments.benchmark.report import report
-from idbench.experiments.benchmark.tables import print_rows
+from idbench.experiments.benchmark.tables import print_rows, report
 from idbench.experiments.cli.commands.benchmark_set import set_row
 from idbench.experiments.cli.options.benchmark import Benchmark
-from idbench.experiments.cli.page import Page, new_page, shown
-from idbench.experiments.cli.progress import Told, stages_of
-from idbench.experiments.errors import ExperimentError
-from idbench.experiments.faults import is_told, reason
-from idbench.experiments.faults import report as report_fault
+from idbench.experiments.cli.page import Page, Told, new_page, shown, stages_of
+from idbench.experiments.errors import ExperimentError, is_told, reason
+from idbench.experiments.errors import report as report_fault
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.summaries import write_summary
-from idbench.experiments.study.versions import require_versions, versions
+from idbench.experiments.results.writing import write_summary
+from idbench.experiments.study.cluster import require_versions, versions
 
 Made = dict[str, Any] | str
 """A row, or why there is none."""
@@ -99,7 +96,7 @@ def _workers(options: Benchmark) -> Iterator[Run]:
     if not options.workers and not options.scheduler:
         yield lambda sets, out, told: _here(sets, out, options.force, told)
         return
-    from idbench.experiments.study.dask_client import connected
+    from idbench.experiments.study.cluster import connected
 
     with connected(options.scheduler, options.workers or 1, "give the same command again") as client:
         from distributed import KilledWorker, as_completed

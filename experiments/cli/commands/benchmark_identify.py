@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from idbench.experiments.benchmark.definition import FILE, IN_FOLDER, Definition
-from idbench.experiments.benchmark.for_tools import what_tools_read, write_for_tools
 from idbench.experiments.benchmark.row import row_of
 from idbench.experiments.benchmark.set_fit import SetFit
-from idbench.experiments.benchmark.tools import predictions
+from idbench.experiments.benchmark.tools import predictions, what_tools_read, write_for_tools
 from idbench.experiments.cli.app import parsed
 from idbench.experiments.cli.commands.identify import fit_of, loaded_logs
 from idbench.experiments.cli.commands.requests import read_options, request_of
@@ -23,7 +22,7 @@ from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.reading import ReadLog, file_of, read_as
 from idbench.experiments.identification.request import Request
 from idbench.identify import MotionLog
-from idbench.identify.judge.leaks import seen
+from idbench.identify.judge.excitation import seen
 from idbench.identify.judge.validation import split
 
 

@@ -13,7 +13,7 @@ from idbench.experiments.cli.app import parsed
 from idbench.experiments.cli.commands.servo_inputs import held_of, servos_of
 from idbench.experiments.cli.options.servo import IdentifyServo
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.results.summaries import finite
+from idbench.experiments.results.writing import finite
 from idbench.experiments.servo.identification import Servos, summary_of
 from idbench.experiments.servo.servo_text import verdicts
 from idbench.identify import Array

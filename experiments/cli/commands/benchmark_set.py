@@ -8,10 +8,9 @@ from idbench.experiments.benchmark.definition import read_definition
 from idbench.experiments.benchmark.files import files_of, kept_row, made_of_files, require_files
 from idbench.experiments.cli.commands.benchmark_identify import identified
 from idbench.experiments.cli.commands.benchmark_servo import servos_identified
-from idbench.experiments.errors import ExperimentError, ResultsError
-from idbench.experiments.faults import reason
+from idbench.experiments.errors import ExperimentError, ResultsError, reason
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.summaries import write_summary
+from idbench.experiments.results.writing import write_summary
 
 COMMANDS: Mapping[str, Any] = {"identify": identified, "servo": servos_identified}
 """What makes the row of a set, by the command of its definition: of folder, definition and results."""

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 from idbench.experiments.cli.command_text import command_of
 from idbench.experiments.cli.options.excite import Excite
-from idbench.experiments.cli.page import new_page, shown
-from idbench.experiments.cli.progress import progress_of
+from idbench.experiments.cli.page import new_page, progress_of, shown
 from idbench.experiments.cli.saving import Files, saved, write_scenario
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.excite.design import Design
@@ -19,9 +18,9 @@ from idbench.experiments.excite.sequence import MotionSequence
 from idbench.experiments.identification.reading import ReadOptions, file_of, read
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel, absolute
-from idbench.experiments.identification.warnings import FILE, warnings_of_robot
+from idbench.experiments.judgement.warnings import FILE, warnings_of_robot
 from idbench.experiments.recording.audience import Audience
-from idbench.experiments.reports.excite_printed import print_excited, print_sequence
+from idbench.experiments.reports.excite import print_excited, print_sequence
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.identify import MotionLog, TorqueChannel
 from idbench.identify.files.log_file import write_log
@@ -33,7 +32,7 @@ from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import load
 
 if TYPE_CHECKING:
-    from idbench.experiments.results.streams import Streams
+    from idbench.experiments.recording.folder import Streams
 
 LONGEST, FASTEST = 3600.0, 10000.0
 """Time of a motion, repeated [s], and sampling frequency [Hz] above which they are taken for a slip."""

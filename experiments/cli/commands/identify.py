@@ -14,26 +14,24 @@ from idbench.experiments.cli.commands.follow import Follower
 from idbench.experiments.cli.commands.identify_views import Shown, require_layer, require_targets, view_all
 from idbench.experiments.cli.commands.requests import chooses_band, read_options, request_of
 from idbench.experiments.cli.options.identify import Identify
-from idbench.experiments.cli.page import Page, new_page, shown
-from idbench.experiments.cli.progress import stages_of
+from idbench.experiments.cli.page import Page, new_page, shown, stages_of
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.identification.checks import checks
 from idbench.experiments.identification.fit import Fit, fit
 from idbench.experiments.identification.friction_choice import summary, words
-from idbench.experiments.identification.iterations import iterations
-from idbench.experiments.identification.judgement import Judgement, judge
 from idbench.experiments.identification.load import load, with_held_out
 from idbench.experiments.identification.log_warnings import warnings_of_log
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.reading import file_of, stated_by
 from idbench.experiments.identification.request import Request
+from idbench.experiments.judgement.checks import checks
+from idbench.experiments.judgement.judgement import Judgement, judge
 from idbench.experiments.recording.audience import Audience
-from idbench.experiments.reports.conclusion import conclusion
-from idbench.experiments.reports.leading import shown_whole
+from idbench.experiments.reports.estimates import conclusion, shown_whole
+from idbench.experiments.reports.iterations import iterations
 from idbench.experiments.reports.printed import print_fit, print_held_out
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.summaries import write_summary
+from idbench.experiments.results.writing import write_summary
 from idbench.identify import IdentificationError
 from idbench.identify.files.log_file import write_log
 from idbench.sim.robot.robot import Robot

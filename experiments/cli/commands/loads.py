@@ -12,8 +12,7 @@ from rich.text import Text
 from idbench.experiments.cli.command_text import command_of
 from idbench.experiments.cli.commands.requests import read_options
 from idbench.experiments.cli.options.loads import IdentifyGains, IdentifyPayload, LoadOptions
-from idbench.experiments.cli.page import Page, new_page, shown
-from idbench.experiments.cli.progress import progress_of, stages_of
+from idbench.experiments.cli.page import Page, new_page, progress_of, shown, stages_of
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.friction_choice import chosen_friction, words
 from idbench.experiments.identification.load import in_band, load
@@ -26,8 +25,7 @@ from idbench.experiments.loads.loads_text import body_of, gains_summary, payload
 from idbench.experiments.loads.simulated import Pairs, Score
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.summaries import write_summary
-from idbench.experiments.results.writing import require_free, write_text
+from idbench.experiments.results.writing import require_free, write_summary, write_text
 from idbench.experiments.text import new_table, print_titled
 from idbench.identify import Array, IdentificationError
 from idbench.identify.loads.drive_gains import identify_drive_gains

@@ -10,7 +10,7 @@ from rich.text import Text
 from idbench.experiments.cli.options.log import ShowLog
 from idbench.experiments.cli.page import Page, new_page, shown
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.identification.log_facts import LogFacts
+from idbench.experiments.identification.logs import LogFacts
 from idbench.experiments.identification.reading import columns_of
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.writing import new_file, require_free, write_text

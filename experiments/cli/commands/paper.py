@@ -11,8 +11,7 @@ from idbench.experiments.cli.commands.inner import doubt_window, recording_of, r
 from idbench.experiments.cli.options.paper import Search as SearchOptions
 from idbench.experiments.cli.options.paper import Table1 as Table1Options
 from idbench.experiments.cli.options.paper import Table2 as Table2Options
-from idbench.experiments.cli.page import new_page, shown
-from idbench.experiments.cli.progress import progress_of
+from idbench.experiments.cli.page import new_page, progress_of, shown
 from idbench.experiments.cli.saving import saved
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.paper.motions import Table1Motions
@@ -20,8 +19,7 @@ from idbench.experiments.paper.motions_report import picture, print_motions
 from idbench.experiments.paper.search import Search
 from idbench.experiments.paper.table1 import CHAINS_COMPARED, SCENARIO, Table1
 from idbench.experiments.paper.table1_text import print_table1
-from idbench.experiments.paper.table2 import Table2
-from idbench.experiments.paper.table2_text import print_table2
+from idbench.experiments.paper.table2 import Table2, print_table2
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.writing import require_free, write_text
 from idbench.identify.files.log_file import write_log
@@ -58,9 +56,9 @@ def compare(options: Table1Options) -> None:
         files, hint = {"log.parquet": partial(write_log, table.log)}, options.watching.hint(folder.out)
         with saved(page, folder, table.summary(), files, hint) as attempts:
             if options.watching.rerun:
-                from idbench.experiments.recording import table1_recording
+                from idbench.experiments.recording import comparison_recording
 
-                attempts.recording(lambda: table1_recording.record_table1(table, audience))
+                attempts.recording(lambda: comparison_recording.record_table1(table, audience))
 
 
 def _over_motions(options: Table1Options, motions: int) -> None:
@@ -115,7 +113,7 @@ def table2(options: Table2Options) -> None:
         files = {f"log{i}.parquet": partial(write_log, table.run.alone(i)) for i in range(len(table.run.seeds))}
         with saved(page, folder, summary, files, watching.hint(folder.out)) as attempts:
             if recording:
-                from idbench.experiments.recording.table2_recording import finish_table2
+                from idbench.experiments.recording.comparison_recording import finish_table2
 
                 attempts.recording(lambda: finish_table2(recording, table))
                 doubt_window(page, options.inner, recording)

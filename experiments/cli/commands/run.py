@@ -10,8 +10,7 @@ from rich.text import Text
 from idbench.experiments.cli.command_text import command_of
 from idbench.experiments.cli.commands.inner import doubt_window, recording_of, require_window
 from idbench.experiments.cli.options.run import Run
-from idbench.experiments.cli.page import Page, new_page, shown
-from idbench.experiments.cli.progress import stages_of
+from idbench.experiments.cli.page import Page, new_page, shown, stages_of
 from idbench.experiments.cli.saving import Files, saved, write_scenario
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.log_warnings import warnings_of_log
@@ -19,13 +18,13 @@ from idbench.experiments.identification.parameters import Parameters
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel, absolute
 from idbench.experiments.identification.scenario_run import ScenarioRun
-from idbench.experiments.identification.warnings import FILE, LOG, warnings_of_robot
+from idbench.experiments.judgement.warnings import FILE, LOG, warnings_of_robot
 from idbench.experiments.plugin_tables import plugin_conflicts
-from idbench.experiments.reports.leading import shown_whole
+from idbench.experiments.reports.estimates import shown_whole
 from idbench.experiments.reports.printed import print_fit
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.servo.known import servo_toml, write_commands
-from idbench.experiments.study.method import Method, of_currents
+from idbench.experiments.servo.identification import servo_toml, write_commands
+from idbench.experiments.study.axis import Method, of_currents
 from idbench.identify import CHAINS
 from idbench.identify.files.log_file import write_log
 from idbench.sim.drives import IdealDrive, ServoDrive
@@ -153,7 +152,7 @@ def _alone(scenario: str, study: Path | None, index: int | None) -> str:
 
 def _again(page: Page, folder: Path | None, index: int | None, method: int | None) -> tuple[Scenario, Method]:
     """Return the scenario of a run of a study, which is reproduced, and the method by which it is identified."""
-    from idbench.experiments.study.again import compare_again
+    from idbench.experiments.study.run_study import compare_again
     from idbench.experiments.study.store import Store
 
     if folder is None or index is None:

@@ -11,31 +11,30 @@ from rich.text import Text
 from idbench.experiments.cli.command_text import command_of
 from idbench.experiments.cli.commands.servo_inputs import files_read, held_of, servos_of
 from idbench.experiments.cli.options.servo import IdentifyServo
-from idbench.experiments.cli.page import Page, new_page, shown
-from idbench.experiments.cli.progress import stages_of
+from idbench.experiments.cli.page import Page, new_page, shown, stages_of
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.summaries import write_summary
-from idbench.experiments.results.writing import require_free, write_text
+from idbench.experiments.results.writing import require_free, write_summary, write_text
 from idbench.experiments.servo.identification import Servos, lacks_summary, summary_of
-from idbench.experiments.servo.servo_function import servo_function
 from idbench.experiments.servo.servo_text import (
+    in_mujoco,
     inexpressible,
+    mjcf_of,
     print_choice,
     print_errors,
     print_servos,
+    servo_function,
     verdicts,
     warnings_of,
     without_servo,
 )
-from idbench.experiments.servo.written import in_mujoco, mjcf_of
 from idbench.identify.servo import ServoFit
 from idbench.identify.servo.choice import FrictionChoice
 
 if TYPE_CHECKING:
-    from idbench.experiments.results.streams import Streams
+    from idbench.experiments.recording.folder import Streams
 
 
 def servo(options: IdentifyServo) -> None:

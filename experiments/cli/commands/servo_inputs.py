@@ -8,11 +8,10 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.servo.identification import AUTO, Servos
 from idbench.identify import SettingError
-from idbench.identify.files.servo_file import ServoFile
-from idbench.identify.files.servo_log import ServoColumns, order, read_servo_log
+from idbench.identify.files.servo_log import ServoColumns, ServoFile, order, read_servo_log
 from idbench.identify.servo import SERVO_FRICTIONS
+from idbench.identify.servo.fit import require_possible
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
-from idbench.identify.servo.refusals import require_possible
 from idbench.sim.robot.robot import Robot
 
 

@@ -10,15 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from idbench.experiments.cli.options.study import Study
-from idbench.experiments.cli.page import new_page, shown
-from idbench.experiments.cli.progress import runs_of
+from idbench.experiments.cli.page import new_page, runs_of, shown
 from idbench.experiments.errors import StudyError
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.study.run_study import local_pool, run_missing
-from idbench.experiments.study.shard_file import arrays
 from idbench.experiments.study.statistics import cells
-from idbench.experiments.study.store import Store
+from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study_file import load_study, names
 from idbench.experiments.study.study_results import write_results
 

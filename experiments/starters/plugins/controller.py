@@ -2,7 +2,7 @@
 
 from typing import final
 
-from idbench.sim.controllers.controller import AbstractController, AbstractLaw, Error, Task
+from idbench.sim.controllers import AbstractController, AbstractLaw, Error, Task
 from idbench.sim.robot.motors import Array
 from idbench.sim.settings import Positive, settings
 

@@ -5,7 +5,7 @@ from typing import final
 
 import numpy as np
 
-from idbench.sim.encoders.encoder import AbstractEncoder, AbstractReader
+from idbench.sim.encoders import AbstractEncoder, AbstractReader
 from idbench.sim.robot.motors import Array
 from idbench.sim.settings import NotNegative, settings
 

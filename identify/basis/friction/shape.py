@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, NamedTuple, Self, final
+from typing import Any, ClassVar, NamedTuple, Self, final
 
 import numpy as np
 
@@ -127,3 +127,61 @@ def _joints(n: int, X: Array, letters: str, known: Mapping[Parameter, Array | No
         if parameter.symbol == letters and x is not None:
             found[..., parameter.joint] = np.where(np.isfinite(x), x, found[..., parameter.joint])
     return found
+
+
+@final
+@dataclass(frozen=True)
+class PowerFriction(AbstractFriction):
+    """Fp |qd|^exponent sign(qd): below 1, as of greased gears, it flattens at speed; in the place of viscous friction."""
+
+    symbol: ClassVar[str] = "Fp"
+    unit: ClassVar[str] = "N m"
+
+    exponent: Array | float = 0.5
+    """1 is viscous friction, 0 Coulomb's."""
+
+    def force(self, q: Array, qd: Array) -> Array:
+        """Return |qd|^exponent sign(qd)."""
+        del q
+        return np.abs(qd) ** self.exponent * np.sign(qd)
+
+
+def power() -> ShapedFriction:
+    """Friction of an unknown power of the velocity, Fp |qd|^ap sign(qd)."""
+    return ShapedFriction(PowerFriction(), (Shape("exponent", "ap", "1", 0.5, (0.1, 2.0)),))
+
+
+@final
+@dataclass(frozen=True)
+class StribeckFriction(AbstractFriction):
+    """What friction near standstill has above that of sliding, Fst exp(-(|qd|/vs)^exponent) sign(qd).
+
+    B. Armstrong-Helouvry, P. Dupont and C. Canudas de Wit, Automatica 30 (1994) 1083-1138.
+    """
+
+    symbol: ClassVar[str] = "Fst"
+    unit: ClassVar[str] = "N m"
+
+    vs: Array | float = 0.1
+    """Stribeck velocity [rad/s]."""
+    exponent: Array | float = 2.0
+    """2 is Gaussian, 1 Tustin's."""
+
+    def force(self, q: Array, qd: Array) -> Array:
+        """Return exp(-(|qd|/vs)^exponent) sign(qd)."""
+        del q
+        return np.exp(-((np.abs(qd) / self.vs) ** self.exponent)) * np.sign(qd)
+
+
+SPEED = Shape("vs", "vs", "rad/s", 0.1, (0.02, 1.0))
+EXPONENT = Shape("exponent", "ds", "1", 1.0, (0.5, 3.0))
+
+
+def stribeck() -> ShapedFriction:
+    """Stribeck friction of unknown Stribeck velocity vs, Fst exp(-(qd/vs)^2) sign(qd)."""
+    return ShapedFriction(StribeckFriction(), (SPEED,))
+
+
+def free_stribeck() -> ShapedFriction:
+    """Stribeck friction of unknown velocity and exponent, Fst exp(-(|qd|/vs)^ds) sign(qd)."""
+    return ShapedFriction(StribeckFriction(), (SPEED, EXPONENT))

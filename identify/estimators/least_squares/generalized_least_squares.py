@@ -6,10 +6,9 @@ from typing import ClassVar, final
 import numpy as np
 
 from idbench.identify.arrays import frozen
-from idbench.identify.estimators.estimate import Estimate
+from idbench.identify.estimators.estimate import Estimate, bias_covariance
 from idbench.identify.estimators.estimator import AbstractEstimator, Need
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.estimators.propagated import bias_covariance
 from idbench.identify.estimators.solution import OfWhitenedRows
 from idbench.identify.rows.factors import Factor, Status
 

@@ -15,7 +15,7 @@ from idbench.identify.estimators.likelihood.normal_equations import Noise, Norma
 from idbench.identify.estimators.likelihood.reversals import Turns, stretches
 from idbench.identify.noise.linearization import friction_jumps, smoothed
 from idbench.identify.noise.propagation import NoiseLevels
-from idbench.identify.signals.masks.reversal import ReversalMask
+from idbench.identify.signals.masks import ReversalMask
 
 ROUNDS, STEPS = 12, 12
 """Rounds at most, in each of which mask and levels are frozen, and Gauss-Newton steps of each."""

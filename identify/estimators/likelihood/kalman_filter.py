@@ -15,7 +15,7 @@ from idbench.identify.estimators.likelihood.cells import Cells
 from idbench.identify.estimators.likelihood.joint_fit import MASK, UNKNOWN
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.simulating.simulated_rounds import small_steps, starting_point
-from idbench.identify.models.explicit import ExplicitModel
+from idbench.identify.models import ExplicitModel
 from idbench.identify.noise.linearization import friction_jumps
 from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.rows.factors import Status

@@ -11,8 +11,7 @@ from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.errors import IdentificationError
 from idbench.identify.estimators.likelihood.cells import GAUSS, Cells, hermite
-from idbench.identify.estimators.likelihood.jumps import Inside, Jumps, signed
-from idbench.identify.estimators.likelihood.reversals import Turns
+from idbench.identify.estimators.likelihood.reversals import Inside, Jumps, Turns, signed
 from idbench.identify.noise.band_matrix import solve_lower
 from idbench.identify.noise.linearization import observation, slopes
 

@@ -7,10 +7,38 @@ from idbench.identify.arrays import Array
 from idbench.identify.estimators.estimate import Estimate
 from idbench.identify.estimators.estimator import Need
 from idbench.identify.estimators.problem import Problem
+from idbench.identify.estimators.simulating.residual_scatter import scatter
 from idbench.identify.estimators.simulating.row_products import Kinds, Solved, solve_with
-from idbench.identify.estimators.simulating.simulated_rounds import AbstractSimulating
+from idbench.identify.estimators.simulating.simulated_rounds import AbstractSimulating, rates
 from idbench.identify.estimators.simulating.steps import SecantSteps
 from idbench.identify.estimators.solution import Given
+
+
+@final
+@dataclass(frozen=True)
+class DirectInverse(AbstractSimulating):
+    """Direct and inverse dynamic identification (DIDIM): least squares of the measured torques on the simulated robot's rows.
+
+    The robot with the parameters of the round before is simulated in its closed loop; measured positions take no part. The rows
+    of both have the mask of the log. It makes the simulated torques those of the log, as CLIE does, with one simulation a round
+    (M. Gautier, A. Janot and P.-O. Vandanjon, "A new closed-loop output error method for parameter identification of robot
+    dynamics", IEEE Trans. Control Systems Technology 21 (2013) 428-444). A wrong controller in the simulation makes it wrong.
+    """
+
+    settled: float = 0.1
+    acronym: ClassVar[str] = "DIDIM"
+    needs: ClassVar[frozenset[Need]] = frozenset({"rows", "loop"})
+
+    def solve(self, problem: Problem) -> Estimate:
+        """Return the estimate of every run."""
+        rounds, rows, kinds = self.begun(problem), problem.rows, Kinds.of_rows(problem)
+
+        def step(X: Array) -> Solved:
+            W = problem.at(rounds.simulated(X).logs).W
+            return solve_with(kinds, rows.Y, W, W)
+
+        found = rounds.until_settled(step, rounds.start(), SecantSteps())
+        return rounds.estimate(found, calibrated=scatter(found, kinds, rates(problem)))
 
 
 @final

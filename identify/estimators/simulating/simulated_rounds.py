@@ -17,7 +17,7 @@ from idbench.identify.estimators.simulating.row_products import Solved
 from idbench.identify.estimators.simulating.steps import Steps
 from idbench.identify.estimators.simulator import AbstractLoop, Simulated
 from idbench.identify.estimators.solution import AbstractSolution
-from idbench.identify.models.explicit import ExplicitModel
+from idbench.identify.models import ExplicitModel
 from idbench.identify.telling import stage
 
 SMALL = 1e-3

@@ -4,9 +4,8 @@ from abc import ABC, abstractmethod
 from typing import final
 
 from idbench.identify.arrays import Array
-from idbench.identify.models.equations import Equations
-from idbench.identify.rows.grid import Grid
-from idbench.identify.rows.row_map import RowMap
+from idbench.identify.models import Equations
+from idbench.identify.rows.row_map import Grid, RowMap
 
 
 class AbstractOperator(ABC):

@@ -1,13 +1,87 @@
 """Integrals over consecutive windows."""
 
+from abc import abstractmethod
 from dataclasses import dataclass
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 
 from idbench.identify.arrays import Array
-from idbench.identify.errors import SettingError, require_positive
-from idbench.identify.rows.operators.weak_form import AbstractWeakForm, Kernels
+from idbench.identify.errors import SettingError, require_positive, require_whole
+from idbench.identify.models import Equations
+from idbench.identify.rows.operators.low_pass import AbstractLowPass
+from idbench.identify.rows.operators.operator import AbstractOperator
+from idbench.identify.rows.row_map import Grid, Kernel, RowMap, Window
+
+
+@final
+@dataclass(frozen=True)
+class Samples(AbstractLowPass):
+    """No filter: every sample is a row, with all the noise that derivatives make."""
+
+    def step(self, fs: float) -> int:
+        """Return 1."""
+        del fs
+        return 1
+
+    def halo(self, fs: float) -> float:
+        """Return 0."""
+        del fs
+        return 0.0
+
+    def window(self, fs: float, grid: Grid) -> Window:
+        """Return the samples themselves."""
+        return Kernel(self.response(fs), 0, grid)
+
+    def response(self, fs: float) -> Array:
+        """Return a single one."""
+        del fs
+        return np.ones(1)
+
+
+class Kernels(NamedTuple):
+    """Weights of the samples k - before, k - before + 1, ... in the row of sample k."""
+
+    integral: Array
+    """Weights of B tau and c."""
+
+    derivative: Array
+    """Weights of e, which give the integral of s e without differentiating."""
+
+
+class AbstractWeakForm(AbstractOperator):
+    """Rows that are integrals over a stretch of time, s e integrated by parts, so that no velocity is differentiated.
+
+    A stretch that touches a masked instant is left out whole, and one weight holds for the rest, the mean over it: weights
+    inside a stretch would have to be differentiated too.
+    """
+
+    @abstractmethod
+    def kernels(self, fs: float) -> Kernels:
+        """Return the weights of both integrals, of equal length, for signals sampled at `fs` [Hz]."""
+
+    @final
+    def halo(self, fs: float) -> float:
+        """Return half the length of a stretch."""
+        return len(self.kernels(fs).integral) / 2 / fs
+
+    @final
+    def map(self, equations: Equations, weight: Array, grid: Grid) -> RowMap:
+        """Return the integrals, weighted; a row is void if its stretch touches a masked instant."""
+        kernels = self.kernels(equations.signals.fs)
+        length = len(kernels.integral)
+        before = (length - 1) // 2
+        integral, derivative = (Kernel(kernel, before, grid) for kernel in kernels)
+        touched = Kernel(np.ones(length), before, grid).apply((weight == 0).astype(np.float64))
+        mean = Kernel(np.full(length, 1 / length), before, grid).apply(weight)
+        outside = mean * (touched == 0)
+        ones, by_parts = np.ones_like(weight), derivative if equations.e else None
+        return RowMap(equations.signals, equations.B, grid, integral, by_parts, ones, outside, kernels.integral)
+
+    @final
+    def response(self, fs: float) -> Array:
+        """Return the weights of B tau."""
+        return self.kernels(fs).integral
 
 
 @final
@@ -48,3 +122,41 @@ def _simpson(intervals: int) -> Array:
     if intervals % 2:
         weights[-4:] += np.array([3, 9, 9, 3]) / 8
     return weights
+
+
+@final
+@dataclass(frozen=True)
+class ModulatingFunctions(AbstractWeakForm):
+    """Products with phi(t) = (1 - (t/H)^2)^degree over |t| < H, of unit area: the weak form, beyond the paper.
+
+    After M. Shinbrot, "On the analysis of linear and nonlinear systems", Trans. ASME 79 (1957) 547-552.
+    """
+
+    support: float = 0.4
+    """2 H [s], where a function is not zero."""
+    spacing: float = 0.1
+    """Time [s] between consecutive functions."""
+    degree: int = 6
+    """Smoothness: phi and its first degree - 1 derivatives vanish at both ends, which makes plain sums accurate."""
+
+    def __post_init__(self) -> None:
+        require_positive(support=self.support, spacing=self.spacing)
+        require_whole(2, degree=self.degree)  # of degree 1 they have a kink at their ends
+
+    def step(self, fs: float) -> int:
+        """Return the samples between functions, at least 1."""
+        return max(1, round(self.spacing * fs))
+
+    def kernels(self, fs: float) -> Kernels:
+        """Return phi, and -d phi/dt from the integration by parts."""
+        half = self.support * fs / 2
+        if half < self.degree:
+            raise SettingError(
+                f"modulating functions over {self.support:g} s hold {2 * half:g} samples at fs = {fs:g} Hz, "
+                f"too few for degree {self.degree}: use a longer support"
+            )
+        reach = int(half)
+        u = np.arange(-reach, reach + 1) / half
+        phi = (1 - u**2) ** self.degree
+        slope = -2 * self.degree * u * (1 - u**2) ** (self.degree - 1) * fs / half
+        return Kernels(phi / phi.sum(), -slope / phi.sum())

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from idbench.experiments.benchmark.definition import SHIPPED, read_definition, shipped
-from idbench.experiments.benchmark.for_tools import prepared
 from idbench.experiments.benchmark.tables import share
+from idbench.experiments.benchmark.tools import prepared
 from idbench.experiments.cli import main
 from idbench.experiments.cli.commands.benchmark_set import set_row
 from idbench.identify import MotionLog, TorqueChannel

@@ -18,7 +18,7 @@ from idbench.experiments.recording.views import Shelf
 def copied(recorded, tmp_path):
     """Return a results folder that may be changed."""
     from idbench.experiments.results.folder import ResultsFolder
-    from idbench.experiments.results.summaries import write_summary
+    from idbench.experiments.results.writing import write_summary
     from idbench.identify.files.log_file import write_log
 
     folder = ResultsFolder(tmp_path / "run", "run", "idbench run short")
@@ -100,7 +100,7 @@ def test_what_is_wrong_is_told(copied, tmp_path, complaint):
 
 
 def test_files_of_two_recordings_are_not_mixed(copied, table1, tmp_path):
-    from idbench.experiments.recording.table1_recording import record_table1
+    from idbench.experiments.recording.comparison_recording import record_table1
 
     name, stream = record_table1(table1)[0]
     stream.write(tmp_path / name)

@@ -6,7 +6,7 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from idbench.experiments.errors import ResultsError
-from idbench.experiments.recording.table1_recording import record_table1
+from idbench.experiments.recording.comparison_recording import record_table1
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from idbench.experiments.cli import main
-from idbench.sim.encoders import IncrementalEncoder
-from idbench.sim.encoders.encoder import AbstractEncoder
+from idbench.sim.encoders import AbstractEncoder, IncrementalEncoder
 from idbench.sim.errors import ScenarioError
 
 

@@ -172,7 +172,7 @@ def test_a_scheduler_may_be_anywhere(file, tmp_path, undisturbed, bare):
 
 
 def test_an_unreachable_scheduler_leaves_nothing(file, tmp_path, complaint, monkeypatch):
-    monkeypatch.setattr("idbench.experiments.study.dask_client.PATIENCE", 1.0)
+    monkeypatch.setattr("idbench.experiments.study.cluster.PATIENCE", 1.0)
     printed = complaint("study", str(file), "--scheduler", "tcp://127.0.0.1:9", "--out", str(tmp_path / "out"))
     assert "cannot reach the scheduler tcp://127.0.0.1:9" in printed
     assert not (tmp_path / "out").exists()

@@ -5,13 +5,12 @@ from distributed import LocalCluster
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from idbench.experiments.errors import StudyError
-from idbench.experiments.study import cluster, dask_client
-from idbench.experiments.study.again import compare_again
-from idbench.experiments.study.cluster import cluster_pool, compute
+from idbench.experiments.study import cluster
+from idbench.experiments.study.cluster import cluster_pool, compute, versions
+from idbench.experiments.study.run_study import compare_again
 from idbench.experiments.study.shard import run_shard
 from idbench.experiments.study.store import Store
 from idbench.experiments.study.study_file import study_from
-from idbench.experiments.study.versions import versions
 
 
 @pytest.mark.thorough
@@ -75,7 +74,7 @@ def test_a_worker_with_another_version_is_refused(small):
 
 
 def test_workers_with_another_version_are_refused_before_anything_is_run(small, monkeypatch):
-    monkeypatch.setattr(dask_client, "ready", lambda: {"idbench": "0.0"})
+    monkeypatch.setattr(cluster, "ready", lambda: {"idbench": "0.0"})
     with pytest.raises(StudyError, match=r"worker tcp.* has idbench 0\.0 \(here "), cluster_pool(small, None, 1):
         pass
 

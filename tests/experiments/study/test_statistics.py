@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from idbench.experiments.study.answer import answer
+from idbench.experiments.study.answer import answer, requirements
 from idbench.experiments.study.comparison import SURE, differences
-from idbench.experiments.study.requirement import requirements
 from idbench.experiments.study.statistics import Cell, cells
 from idbench.experiments.study.study_report import WORST, worst_runs
 

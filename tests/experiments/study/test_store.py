@@ -4,7 +4,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from idbench.experiments.errors import ResultsError, StudyError
-from idbench.experiments.study import versions as module
+from idbench.experiments.study import cluster as module
 from idbench.experiments.study.shard import Shard, run_shard
 from idbench.experiments.study.store import Store
 

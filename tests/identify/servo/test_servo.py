@@ -6,7 +6,7 @@ import pytest
 
 from idbench.identify import ExcitationError, IdentificationError, LogError, SettingError
 from idbench.identify.servo import JointLoad, Servo, ServoRun, identify_servo
-from idbench.identify.servo.pieces import pieces
+from idbench.identify.servo.run import pieces
 
 SERVO = Servo(0.166, supply=12.0, duty_limit=0.97)
 MASS, LENGTH, H, DELAY = 0.6, 0.12, 5e-4, 0.02

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from idbench.identify.servo import Servo, ServoFit
+from idbench.identify.servo.identification import Joint, together
 from idbench.identify.servo.search import Found
-from idbench.identify.servo.together import Joint, together
 
 RNG = np.random.default_rng(0)
 FREE = ("a", "offset", "lead")

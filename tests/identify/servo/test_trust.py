@@ -8,9 +8,8 @@ import pytest
 
 from idbench.identify import ExcitationError
 from idbench.identify.servo import SERVO_FRICTIONS, JointLoad, Servo, ServoRun, UnscaledError, identify_again, identify_servo
-from idbench.identify.servo.choice import choose_friction
+from idbench.identify.servo.choice import choose_friction, lacks_of
 from idbench.identify.servo.closed_loop import ServoLoop, count_of
-from idbench.identify.servo.lack import lacks_of
 from idbench.identify.servo.search import Search
 
 SERVO = Servo(0.166, 16.0, supply=12.0, duty_limit=0.97)

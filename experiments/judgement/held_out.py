@@ -1,0 +1,164 @@
+"""A fit on a log that it was not fitted to: torques, the identified robot simulated, and a verdict on each model."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import ceil
+from typing import Any, final
+
+import numpy as np
+
+from idbench.experiments.identification.consistent_robot import Written
+from idbench.experiments.identification.fit import Fit, fit
+from idbench.experiments.judgement.verdict import Verdict
+from idbench.experiments.results.writing import finite
+from idbench.identify import Array, Basis, IdentificationError, MotionLog, Problem, State, Validation, split, validate
+from idbench.identify.arrays import combined
+from idbench.identify.basis.parameter import FRICTION, NOT_NEGATIVE, Parameter
+from idbench.identify.rows.rows import manageable
+from idbench.sim.engine.replay import Replay, replay
+from idbench.sim.errors import BenchError
+from idbench.sim.robot.robot import Robot
+
+BANDWIDTH = 5.0
+"""Of the loop that holds the simulated robot to the log [rad/s]: weak, so that errors of the model show."""
+
+SHAPE = "shape of friction"
+"""Kind of parameters that enter nonlinearly."""
+
+LONGEST = 60.0
+"""Time [s] that is simulated, from the beginning of the held-out log."""
+
+
+def on_log(result: Fit, name: str, log: MotionLog) -> "HeldOut":
+    """Return a fit on another log; of a long one on its beginning."""
+    return HeldOut(result, manageable([log])[0], f"held-out log {name}")
+
+
+def on_last_quarter(result: Fit) -> "HeldOut":
+    """Return a fit of all but the last quarter of the longest log, on that quarter."""
+    logs, k = result.logs, result.logs.longest
+    rest, end = split(logs.fitted[k])
+    fitted = (*logs.fitted[:k], rest, *logs.fitted[k + 1 :])
+    laws = "" if result.choice is None else ", with the laws of friction that all of it chose"
+    title = f"the last quarter of {logs.longest_name}, by a fit of the rest{laws}"
+    return HeldOut(fit(result.request, replace(logs, fitted=fitted)), manageable([end])[0], title)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """A fit on a log that it was not fitted to."""
+
+    fit: Fit
+    """The fit."""
+    log: MotionLog
+    """The log."""
+    title: str
+    """What to call it."""
+
+    @cached_property
+    def problem(self) -> Problem:
+        """The log as a problem, by the robot and the chain of the fit."""
+        return Problem((self.log,), self.fit.basis, self.fit.problem.model, self.fit.processing)
+
+    @cached_property
+    def torques(self) -> dict[str, Validation]:
+        """How well each model predicts the torques."""
+        return {model: validate(self.problem, e.X, e.covariance) for model, e in self.fit.estimates.items()}
+
+    @cached_property
+    def replays(self) -> dict[str, Replay | str]:
+        """What the robot with each model's parameters does with the torques of the log, or why that is not known."""
+        return {model: self._replay(model) for model in self.fit.estimates}
+
+    @cached_property
+    def verdicts(self) -> dict[str, Verdict]:
+        """What to think of each model."""
+        return {
+            model: Verdict.of(self.fit, validation, unsimulated=why if isinstance(why := self.replays[model], str) else "")
+            for model, validation in self.torques.items()
+        }
+
+    def _replay(self, model: str) -> Replay | str:
+        try:
+            robot, log, qd = self.driven(model)
+            return replay(robot, log, qd, BANDWIDTH)
+        except (BenchError, IdentificationError) as error:
+            return str(error)
+
+    def driven(self, model: str) -> tuple[Robot, MotionLog, Array]:
+        """Return the robot with a model's parameters, what drives it, and velocities of the log [rad/s].
+
+        Raises
+        ------
+        BenchError, IdentificationError
+            If there is no such robot.
+        """
+        written, (log, qd) = Written(self.fit, model), self._replayed
+        basis, estimate = self.fit.basis, self.fit.estimates[model].X.tolist()
+        lost = {p for p in basis.parameters if p.name in written.lost}
+        X = dict(zip(basis.parameters, estimate, strict=True))
+        negative = {p.joint for p, x in X.items() if p.kind in FRICTION & NOT_NEGATIVE and x < 0}
+        joints = {p.joint for p in lost if p.kind in FRICTION and p.joint is not None} & negative
+        # Sizes of laws are those at their shapes.
+        apart = {p: x for p, x in X.items() if (p in lost or (p.joint in joints and p.kind in FRICTION)) and p.kind != SHAPE}
+        log = _without(_without(log, qd, basis, apart), qd, *self._grouped(written))
+        return written.without_friction(joints) if joints else written.robot, log, qd
+
+    def _grouped(self, written: Written) -> tuple[Basis, dict[Parameter, float]]:
+        """Return standard parameters that have no place in a simulated robot and stand in no base parameter of their own."""
+        standard, alone = self.fit.robot_model.grouping.standard, set(self.fit.basis.names)
+        return standard, {p: written.lost[p.name] for p in standard.parameters if p.name in written.lost.keys() - alone}
+
+    @cached_property
+    def _replayed(self) -> tuple[MotionLog, Array]:
+        """What is simulated, and its velocities; without the ends, where differences are none."""
+        log, chain = self.log.part(0, round(LONGEST * self.log.fs)), self.fit.processing
+        edge = ceil((chain.prefilter.halo(log.fs) + chain.differentiator.halo(log.fs)) * log.fs)
+        qd = np.swapaxes(chain.signals(log).state.qd, -1, -2)
+        return log.part(edge, log.samples - edge), qd[edge : log.samples - edge]
+
+    def position_error(self, model: str) -> Array | None:
+        """Return the rms of logged - simulated position [rad], shape (joint,)."""
+        simulated = self.replays[model]
+        return None if isinstance(simulated, str) else np.sqrt(np.mean((self._replayed[0].q - simulated.q) ** 2, axis=0))
+
+    def summary(self) -> dict[str, Any]:
+        """Return what a summary.json says of it."""
+        return {
+            "on": self.title,
+            "models": {model: {**self.verdicts[model].summary(), **self._of(model)} for model in self.torques},
+            "failures": self.fit.failures,
+        }
+
+    def _of(self, model: str) -> dict[str, Any]:
+        validation, off = self.torques[model], self.position_error(model)
+        numbers = {
+            "torque_error_rms": validation.rms,
+            "torque_error_percent": validation.percent,
+            "noise_rms": validation.noise,
+            "sigma_rms": validation.open,
+            "unexplained_percent": validation.percent_of_level(validation.excess),
+            "R2": validation.R2,
+            "standing_error_rms": validation.standing,
+            "residual_correlation": validation.correlation,
+            "residual_correlation_bound": validation.bound,
+        }
+        found: dict[str, Any] = {name: [finite(x) for x in values] for name, values in numbers.items()}
+        return {**found, "position_error_rms": None if off is None else off.tolist()}
+
+
+def _without(log: MotionLog, qd: Array, basis: Basis, laws: Mapping[Parameter, float]) -> MotionLog:
+    """Return a log without the torques of what has no place in a simulated robot: some laws of friction, balancers.
+
+    What other laws leave of viscous or Coulomb friction may be negative, which no simulated robot can have, either: it then has
+    no friction at that joint.
+    """
+    if not laws:
+        return log
+    q, v, conditions = log.q.T, np.ascontiguousarray(qd.T), {name: x.T for name, x in log.conditions.items()}
+    state = State(q, v, lambda _: np.gradient(v, 1 / log.fs, axis=-1), conditions)
+    friction, X = basis.of(list(laws)), np.array(list(laws.values()))
+    tau = log.tau * np.asarray(log.torque.gain) - combined(friction.explicit(state), X, np.zeros(q.shape)).T
+    return replace(log, tau=tau, torque=replace(log.torque, gain=1.0))

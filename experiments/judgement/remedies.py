@@ -1,0 +1,107 @@
+"""What is most likely to mend an identification that is not good, tried out: the likely cause first."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import final
+
+import numpy as np
+
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.friction_choice import chosen_friction
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.judgement.held_out import HeldOut
+from idbench.experiments.judgement.warnings import wrong_sign
+from idbench.experiments.text import error_percentage
+from idbench.identify import IdentificationError, RangeError, WeightedLeastSquares, estimate, validate
+from idbench.identify.judge.delay import estimate_delay
+from idbench.identify.telling import stage
+from idbench.sim.errors import BenchError
+
+NEGLIGIBLE = 2e-3
+"""Share of a sampling period by which a delay may be off without a word: a hundredth of the SCARA's Fv1 at 100 Hz."""
+
+SURE = 4.0
+"""A delay that differs from the stated one by more than so many sigma is reported."""
+
+WORTH, TOLERABLE = 0.7, 20.0
+"""Options are recommended if they bring the error below this share of what it was, and below so many per cent."""
+
+AUTO = "--friction auto"
+
+DRASTIC = 1 / 3
+"""Below this share of what it was they are recommended whatever is left."""
+
+
+def delay_advice(result: Fit) -> Iterator[str]:
+    """Yield the torque delay that the log itself shows, where it differs from the assumed one."""
+    logs = result.logs.fitted
+    assumed = logs[0].torque.delay
+    if wrong_sign(result):
+        return
+    try:
+        measured = estimate_delay(list(logs), result.basis, result.processing)
+    except RangeError as error:
+        yield f"the delay of the torque is far from the assumed one, or unrelated to this motion: {error}"
+        return
+    except IdentificationError:
+        return
+    if abs(measured.delay - assumed) > max(SURE * measured.sigma, NEGLIGIBLE / logs[0].fs):
+        yield (
+            f"the log shows a torque delay of {1e3 * measured.delay:.3g} ms (sigma {1e3 * measured.sigma:.1g}), where "
+            f"{1e3 * assumed:.3g} ms is assumed: --torque-delay estimate"
+        )
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Remedies:
+    """Options of identification, tried on a held-out log."""
+
+    held_out: HeldOut
+    """The fit that is to be mended, on a held-out log."""
+
+    def options(self) -> Iterator[str]:
+        """Yield options with which the error falls, and how far."""
+        request = self.held_out.fit.request
+        before = least = self._worst(request)
+        for option, make in self._others().items():
+            if option == AUTO and least < TOLERABLE:  # what is well enough is not worth the time
+                continue
+            try:
+                with stage(f"trying {option}"):
+                    after = self._worst(replace(request, robot_model=make()))
+            except (IdentificationError, ExperimentError, BenchError):
+                continue
+            if option == AUTO and after > WORTH * least:  # it finds what the others say, too
+                continue
+            least = min(least, after)
+            if after < min(WORTH * before, TOLERABLE) or after < DRASTIC * before:
+                fall = f"from {error_percentage(before)} to {error_percentage(after)}"
+                yield f"with {option} the worst joint's error falls {fall}"
+
+    def _others(self) -> dict[str, Callable[[], RobotModel]]:
+        """Return the options, and what makes the robot that each describes."""
+        request, found = self.held_out.fit.request, dict[str, Callable[[], RobotModel]]()
+        robot_model = request.robot_model
+        asked, mounting, joints = robot_model.asked, robot_model.mounting, robot_model.robot.joints
+        if not all(joint.armature for joint in robot_model.tree.joints):
+            found["--armature all"] = lambda: replace(robot_model, asked=replace(asked, armature="all"))
+        if "offset" not in asked.add:
+            found["--add offset"] = lambda: replace(robot_model, asked=replace(asked, add=(*asked.add, "offset")))
+        if len(joints) > 1 and not robot_model.tree.couplings:
+            drive = f"motor{len(joints)}", ((joints[-2], 1.0), (joints[-1], 1.0))
+            option = f"--coupling {drive[0]}={joints[-2]}+{joints[-1]}"
+            found[option] = lambda: replace(robot_model, mounting=replace(mounting, couplings=(drive,)))
+        if robot_model.laws.standard and asked.friction == ("standard",):
+            found[AUTO] = lambda: chosen_friction(request, self.held_out.fit.logs.fitted, most=1)[0].robot_model
+        return found
+
+    def _worst(self, request: Request) -> float:
+        """Return the largest error [%] of the explicit model on the held-out log."""
+        problem = request.problem(self.held_out.fit.logs.fitted)
+        solver = WeightedLeastSquares() if request.simulates else request.solver  # simulation takes far too long to try with
+        X = estimate(problem, solver).X
+        unseen = replace(self.held_out, fit=replace(self.held_out.fit, request=request, problem=problem)).problem
+        return float(np.nanmax(validate(unseen, X).percent))

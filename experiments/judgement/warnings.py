@@ -1,0 +1,240 @@
+"""What is suspicious about what was identified from a log, and what would help."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.log_warnings import resting, unlike_file, warnings_of_base
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.identify import MotionLog, brisk_shares, showing_moves
+from idbench.identify.basis.parameter import NOT_NEGATIVE
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.tree import kinematic_tree, unmodelled
+
+WELL_EXPLAINED = 0.95
+"""Share of a torque's variance that a model of the right robot explains on any log that is worth identifying."""
+
+USELESS = 0.5
+"""Share of a torque that one sigma of the parameters may make before the estimate is called useless; what is recommended
+instead makes a fifth of it at most."""
+
+ENOUGH = 4
+"""Rows for each parameter beyond which a large sigma is no matter of too few of them."""
+
+MUCH_LONGER = 100
+"""Times from which on the length of a log is not what is wrong with it."""
+
+FAR = 4.0
+"""Errors of more than so many sigma are marked: normal ones come once in 16 000."""
+
+WEAK = 0.5
+"""Share of its value that the sigma of a parameter may have before it is marked as weak."""
+
+LINK_SIDE = 3.0
+"""A rotor's inertia this many sigma below zero is impossible: the torques do not contain the rotor."""
+
+OPEN = 0.02
+"""Share of a joint's torque on a brisk motion that one sigma of a parameter may make before it counts as left open."""
+
+
+LOG, DELAY, FILE, MOTION, MODEL = "the log", "the torque's delay", "the robot's file", "the motion", "the model"
+"""Subjects of warnings, in the order in which to check them: the first may cause the others."""
+
+
+def warnings_of_result(fit: Fit) -> dict[str, list[str]]:
+    """Return what no healthy identification shows, and what the log leaves open, by what it is about."""
+    log, motion, model = [*wrong_sign(fit), *unlike_file(fit)], list[str](), list[str]()
+    negative = {name: _negative(fit, name) for name in fit.estimates}
+    linked = list(_link_side(fit)) if not log else []
+    model += linked
+    if any(negative.values()) and not log and not linked:
+        models: dict[tuple[str, ...], list[str]] = {}
+        for name, names in negative.items():
+            models.setdefault(tuple(names), []).append(name)
+        each = (f"{', '.join(names)} below zero in the {' and the '.join(of)} model" for names, of in models.items() if names)
+        model.append(f"{'; '.join(each)}: is the torque's meaning or delay wrong?")
+    for name in fit.estimates:
+        little = list(_too_little(fit, name))
+        motion += little
+        model += [] if little else list(_badly_explained(fit, name))
+    if not (log or motion or model):
+        motion = _left_open(fit)
+    return {LOG: log, MOTION: motion, MODEL: model}
+
+
+def _link_side(fit: Fit) -> Iterator[str]:
+    """Yield whether torques look like those of the links, behind gears and rotors: these take rotors out, as it were."""
+    estimate = next(iter(fit.estimates.values()))
+    rotors = [
+        name
+        for p, name, x, sigma in zip(fit.basis.parameters, estimate.names, estimate.X, estimate.standard_errors, strict=True)
+        if p.kind == "rotor inertia" and x < -LINK_SIDE * sigma
+    ]
+    if rotors:
+        yield (
+            f"{', '.join(rotors)} more than {LINK_SIDE:g} sigma below zero: are these torques measured at the links, behind "
+            "the gears? Then add --armature none; if not, their meaning or delay is wrong"
+        )
+
+
+FLAGS = {
+    "!": "below zero, but must be positive",
+    "*": f"off by more than {FAR:g} sigma",
+    "?": f"sigma above {100 * WEAK:g} % of its value",
+}
+"""What is doubtful of a parameter."""
+
+
+def doubtful(fit: Fit) -> dict[str, list[tuple[str, str, str]]]:
+    """Return, of each model, a mark for every parameter's estimate, its error and its sigma; blank where nothing is wrong."""
+    marks = {}
+    for model, estimate in fit.estimates.items():
+        negative, sigma = _negative(fit, model), estimate.standard_errors
+        off = np.zeros(len(sigma)) if fit.truth is None else np.abs(estimate.X - list(fit.truth.values()))
+        marks[model] = [
+            ("!" if name in negative else " ", "*" if error > FAR * s > 0 else " ", "?" if s > WEAK * abs(x) else " ")
+            for name, x, error, s in zip(estimate.names, estimate.X, off, sigma, strict=True)
+        ]
+    return marks
+
+
+def used(marks: Mapping[str, Sequence[Sequence[str]]]) -> list[str]:
+    """Return the flags that occur among the marks of all models, in the order of `FLAGS`."""
+    there = {mark for of_model in marks.values() for of_row in of_model for mark in of_row}
+    return [flag for flag in FLAGS if flag in there]
+
+
+def _negative(fit: Fit, model: str) -> list[str]:
+    """Return parameters that must be positive and are significantly negative."""
+    estimate = fit.estimates[model]
+    friction = zip(fit.basis.parameters, estimate.X, estimate.standard_errors, strict=True)
+    return [p.name for p, x, sigma in friction if p.kind in NOT_NEGATIVE and _surely_negative(x, sigma)]
+
+
+def _too_little(fit: Fit, name: str) -> Iterator[str]:
+    """Yield why an estimate says nothing, where its sigma alone makes much of a torque, and what would help."""
+    estimate, shares = fit.estimates[name], fit.left_open[name]
+    worst = int(np.nan_to_num(shares, nan=np.inf).argmax())
+    if shares[worst] < USELESS or estimate.row_count > ENOUGH * len(estimate.names):  # else it is the model that is wrong
+        return
+    others = [other for other, open_ in fit.left_open.items() if np.nan_to_num(open_, nan=np.inf).max() < USELESS / 5]
+    times = min(1000, int(np.ceil((shares[worst] / (USELESS / 5)) ** 2))) if np.isfinite(shares[worst]) else 1000
+    longer = f"a log {times} times as long" if times < MUCH_LONGER else "a log that moves all joints, and longer"
+    yield (
+        f"the {name} model identifies too little: {int(estimate.row_count)} rows for {len(estimate.names)} parameters, Cond(W) "
+        f"{float(estimate.condition_number):.2g}, one sigma of its parameters makes {100 * shares[worst]:.0f} % of the torque "
+        f"of {fit.robot_model.robot.joints[worst]}: take {f'the {others[0]} model' if others else longer}"
+        + (f", or {longer}" if others else "")
+    )
+
+
+def _badly_explained(fit: Fit, name: str) -> Iterator[str]:
+    """Yield which torques a model does not explain: the log is suspected, unless another model explains them."""
+    joints = fit.robot_model.robot.joints
+    shares = dict(enumerate(fit.explained[name]))
+    if nothing := [joints[j] for j, share in shares.items() if np.isnan(share)]:
+        yield (
+            f"no torque of {', '.join(nothing)} is left to explain: the mask leaves no row, or the torque never changes; "
+            "nothing is identified of it, move it faster"
+        )
+    poor = {j: share for j, share in shares.items() if share < WELL_EXPLAINED}
+    if not poor:
+        return
+    poorly = ", ".join(f"{_share(share)} of tau{j + 1}" for j, share in poor.items())
+    others = [o for o, shares in fit.explained.items() if all(shares[j] >= WELL_EXPLAINED for j in poor)]
+    if others:
+        yield (
+            f"the {name} model explains {poorly}, where the {others[0]} model explains at least {100 * WELL_EXPLAINED:.0f} %: "
+            f"noise of the velocities, or too little motion of {', '.join(joints[j] for j in poor)}; take the {others[0]} model"
+        )
+    else:
+        yield f"the {name} model explains {poorly}: are units, signs, order of columns and the torque's delay right?"
+
+
+def _share(share: float) -> str:
+    return f"{100 * share:.0f} %" if share > 0 else "nothing"
+
+
+def hidden_notes(fit: Fit) -> list[str]:
+    """Return which parameters the logs do not show, and what would show them."""
+    if not fit.hidden:
+        return []
+    moves = helpful_moves(fit.robot_model, fit.logs.fitted[0], fit.hidden)
+    return [f"this log does not excite {', '.join(fit.hidden)}: left out, as if zero{f' ({moves})' if moves else ''}"]
+
+
+def warnings_of_robot(robot: Robot) -> list[str]:
+    """Return what of a robot's file no parameter describes."""
+    found = unmodelled(robot)
+    messages = [f"the file of robot {robot.name!r} has {', '.join(found)}, which no parameter describes"] if found else []
+    messages += [f"the file of robot {robot.name!r} has {note}" for note in robot.notes]
+    return [*messages, *warnings_of_base(kinematic_tree(robot))]
+
+
+def wrong_sign(fit: Fit) -> list[str]:
+    """Return which torques have the wrong sign: those that drive their joint by friction."""
+    model, estimate = next(iter(fit.estimates.items()))
+    values = zip(fit.basis.parameters, estimate.X, estimate.standard_errors, strict=True)
+    known = {(p.kind, p.joint): (x, sigma) for p, x, sigma in values}
+    nothing = (0.0, 0.0)
+    wrong = [
+        joint
+        for j, joint in enumerate(fit.robot_model.robot.joints)
+        if known.get(("viscous friction", j), nothing)[0] < 0 and _surely_negative(*known.get(("Coulomb friction", j), nothing))
+    ]
+    if not wrong:
+        return []
+    work = _work(fit.logs.fitted[0])
+    balance = f", and the torques of the log take out {-work:.3g} J in all" if work < 0 else ""
+    return [
+        f"friction drives {', '.join(wrong)} in the {model} model{balance}: does the torque have the wrong sign (it must be "
+        "that on the joint, positive where it speeds up a positive motion)?"
+    ]
+
+
+def _surely_negative(x: float, sigma: float) -> bool:
+    return x < -2 * sigma
+
+
+def _work(log: MotionLog) -> float:
+    """Return the work of all torques [J]."""
+    tau = log.tau * np.asarray(log.torque.gain)
+    return float(np.sum((tau[1:] + tau[:-1]) / 2 * np.diff(log.q, axis=0)))
+
+
+def _left_open(fit: Fit) -> list[str]:
+    """Return which base parameters the log leaves open so far that a brisk motion shows it, and the moves to make."""
+    robot_model, (model, estimate) = fit.robot_model, next(iter(fit.estimates.items()))
+    shares = brisk_shares(robot_model.tree, fit.basis, estimate.X, estimate.standard_errors)
+    names = [name for name, share in zip(fit.basis.names, shares, strict=True) if share > OPEN]
+    if not names:
+        return []
+    return [f"one sigma of these parameters is above {100 * OPEN:g} % of a brisk motion's torque ({model} model): "
+            f"{_moves(robot_model, names)}"]  # fmt: skip
+
+
+def helpful_moves(robot_model: RobotModel, log: MotionLog, names: Sequence[str]) -> str:
+    """Return what would show parameters that a log hides: joints that never move, or else moves; empty if that is not known."""
+    if still := resting(log, robot_model.tree):
+        return f"{', '.join(still)} never moves in this log: move it"
+    return _moves(robot_model, names)
+
+
+def _moves(robot_model: RobotModel, names: Sequence[str]) -> str:
+    """Return parameters by the joints that show them when they move."""
+    moves: dict[tuple[int, ...], list[str]] = {}
+    for name, joints in showing_moves(robot_model.tree, robot_model.grouping, names).items():
+        moves.setdefault(joints, []).append(name)
+    each = [f"{', '.join(shown)} (move {_joints(robot_model, joints)})" for joints, shown in sorted(moves.items(), key=_size)]
+    return "; ".join(each)
+
+
+def _size(move: tuple[tuple[int, ...], list[str]]) -> int:
+    return len(move[0])
+
+
+def _joints(robot_model: RobotModel, joints: Sequence[int]) -> str:
+    return (
+        "all joints" if len(joints) == robot_model.robot.n > 1 else " with ".join(robot_model.robot.joints[j] for j in joints)
+    )

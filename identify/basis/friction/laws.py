@@ -1,0 +1,162 @@
+"""Constant offset of a torque."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, final
+
+import numpy as np
+
+from idbench.identify.arrays import Array
+from idbench.identify.basis.friction.shape import Shape, ShapedFriction
+from idbench.identify.basis.joint_law import AbstractFriction, AbstractJointLaw
+from idbench.identify.basis.parameter import Kind
+from idbench.identify.errors import require_positive
+from idbench.identify.signals.state import State
+
+
+@final
+@dataclass(frozen=True)
+class ViscousFriction(AbstractFriction):
+    """Viscous friction, Fv qd."""
+
+    symbol: ClassVar[str] = "Fv"
+    unit: ClassVar[str] = "N m s/rad"
+    kind: ClassVar[Kind] = "viscous friction"
+
+    def force(self, q: Array, qd: Array) -> Array:
+        """Return qd."""
+        del q
+        return qd
+
+
+@final
+@dataclass(frozen=True)
+class AsymmetricViscousFriction(AbstractFriction):
+    """Asymmetric viscous friction, Fva |qd|: Fv + Fva forwards and Fv - Fva backwards; with `offset`, the asymmetric law."""
+
+    symbol: ClassVar[str] = "Fva"
+    unit: ClassVar[str] = "N m s/rad"
+
+    def force(self, q: Array, qd: Array) -> Array:
+        """Return |qd|."""
+        del q
+        return np.abs(qd)
+
+
+@final
+@dataclass(frozen=True)
+class CoulombFriction(AbstractFriction):
+    """Coulomb friction, Fs sign(qd)."""
+
+    symbol: ClassVar[str] = "Fs"
+    unit: ClassVar[str] = "N m"
+    kind: ClassVar[Kind] = "Coulomb friction"
+
+    def force(self, q: Array, qd: Array) -> Array:
+        """Return sign(qd)."""
+        del q
+        return np.sign(qd)
+
+
+START, RANGE = 0.2, (0.01, 5.0)
+
+
+@final
+@dataclass(frozen=True)
+class TanhFriction(AbstractFriction):
+    """Ft tanh(qd/vt): Coulomb friction without its jump, in the place of it."""
+
+    symbol: ClassVar[str] = "Ft"
+    unit: ClassVar[str] = "N m"
+    replaces: ClassVar[str] = "Fs"
+
+    vt: Array | float = 0.1
+    """Velocity over which it rises [rad/s]."""
+
+    def force(self, q: Array, qd: Array) -> Array:
+        """Return tanh(qd/vt)."""
+        del q
+        return np.tanh(qd / self.vt)
+
+
+@final
+@dataclass(frozen=True)
+class ArctanFriction(AbstractFriction):
+    """Fat 2/pi arctan(qd/vat): Coulomb friction without its jump, in the place of it; it rises longer than tanh."""
+
+    symbol: ClassVar[str] = "Fat"
+    unit: ClassVar[str] = "N m"
+    replaces: ClassVar[str] = "Fs"
+
+    vat: Array | float = 0.1
+    """Velocity at which it has risen by half [rad/s]."""
+
+    def force(self, q: Array, qd: Array) -> Array:
+        """Return 2/pi arctan(qd/vat)."""
+        del q
+        return 2 / np.pi * np.arctan(qd / self.vat)
+
+
+def tanh() -> ShapedFriction:
+    """Coulomb friction that rises over an unknown velocity, Ft tanh(qd/vt); in the place of `coulomb`."""
+    return ShapedFriction(TanhFriction(), (Shape("vt", "vt", "rad/s", START, RANGE),))
+
+
+def arctan() -> ShapedFriction:
+    """Coulomb friction that rises over an unknown velocity, Fat 2/pi arctan(qd/vat); in the place of `coulomb`."""
+    return ShapedFriction(ArctanFriction(), (Shape("vat", "vat", "rad/s", START, RANGE),))
+
+
+@final
+@dataclass(frozen=True)
+class Cogging(AbstractJointLaw):
+    """Cogging of a known period, Cs sin(periods q) + Cc cos(periods q)."""
+
+    asks: ClassVar[str] = "the number of periods in a turn of the joint, such as cogging:12"
+
+    periods: float = 12.0
+    """In a turn of the joint: slots and poles of the motor, times the ratio of its gear."""
+
+    def __post_init__(self) -> None:
+        require_positive(periods=self.periods)
+
+    def letters(self) -> Mapping[str, tuple[Kind, str]]:
+        """Return Cs and Cc."""
+        return {"Cs": ("other", "N m"), "Cc": ("other", "N m")}
+
+    def torques(self, state: State) -> Mapping[str, Array]:
+        """Return sine and cosine."""
+        return {"Cs": np.sin(self.periods * state.q), "Cc": np.cos(self.periods * state.q)}
+
+
+@final
+@dataclass(frozen=True)
+class TemperatureFriction(AbstractJointLaw):
+    """Friction that changes with the logged temperature T, (FvT qd + FsT sign(qd)) (T - reference)."""
+
+    reference: float = 25.0
+    """Temperature at which Fv and Fs are what they are alone [deg C]."""
+
+    def letters(self) -> Mapping[str, tuple[Kind, str]]:
+        """Return FvT and FsT."""
+        return {"FvT": ("friction", "N m s/rad/K"), "FsT": ("friction", "N m/K")}
+
+    def torques(self, state: State) -> Mapping[str, Array]:
+        """Return (T - reference) times qd, and times its sign."""
+        above = state.condition("temperature") - self.reference
+        return {"FvT": above * state.qd, "FsT": above * np.sign(state.qd)}
+
+
+@final
+@dataclass(frozen=True)
+class Offset(AbstractFriction):
+    """Constant torque, off: an amplifier's offset, or Coulomb friction that differs with the direction."""
+
+    symbol: ClassVar[str] = "off"
+    unit: ClassVar[str] = "N m"
+    kind: ClassVar[Kind] = "offset"
+
+    def force(self, q: Array, qd: Array) -> Array:
+        """Return ones."""
+        del q
+        return np.ones_like(qd)

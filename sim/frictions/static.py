@@ -1,0 +1,225 @@
+"""Friction that changes as the drives warm up."""
+
+from typing import Annotated, final
+
+import numpy as np
+from mujoco.batch import Batch
+from pydantic import Field
+
+from idbench.sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.settings import EachNotNegative, EachNotNegativeOrNone, EachNumber, Number, Positive, per_joint, settings
+
+
+@final
+@settings
+class CoulombViscous(AbstractFrictionLaw):
+    """Fs sign(qd) + Fv qd; near standstill MuJoCo's soft constraint decides."""
+
+    viscous: EachNotNegativeOrNone = None
+    """Fv [N m s/rad], of all joints or of each; without it the robot's own."""
+    coulomb: EachNotNegativeOrNone = None
+    """Fs [N m], of all joints or of each; without it the robot's own."""
+
+    @property
+    def steady(self) -> bool:
+        """True."""
+        return True
+
+    def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
+        """Return nothing more than MuJoCo's."""
+        del plant, Fs, h
+        return _CoulombContact()
+
+
+class _CoulombContact(AbstractContact):
+    def torque(self, qd: Array) -> Array | float:
+        del qd
+        return 0.0
+
+
+@final
+@settings
+class Stribeck(AbstractFrictionLaw):
+    """Stribeck: Fs (1 + (static - 1) exp(-(qd/velocity)^2)) sign(qd) + Fv qd."""
+
+    static: Annotated[Number, Field(ge=1)] = 1.5
+    """Friction at the brink of motion, in multiples of Fs."""
+    velocity: Positive = 0.1
+    """Stribeck velocity [rad/s]: above it the rise is gone."""
+    viscous: EachNotNegativeOrNone = None
+    """Fv [N m s/rad], of all joints or of each; without it the robot's own."""
+    coulomb: EachNotNegativeOrNone = None
+    """Fs [N m], of all joints or of each; without it the robot's own."""
+
+    @property
+    def steady(self) -> bool:
+        """False."""
+        return False
+
+    def truth(self, robot: Robot) -> dict[str, float]:
+        """Return Fst and vs."""
+        rise = (self.static - 1) * robot.model.dof_frictionloss
+        return {f"Fst{j + 1}": float(x) for j, x in enumerate(rise)} | {f"vs{j + 1}": self.velocity for j in range(robot.n)}
+
+    def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
+        """Return the law, which sets MuJoCo's Coulomb friction anew in every step: its constraint keeps standing joints."""
+        del h
+        return _StribeckContact(self, plant.expand("dof_frictionloss"), Fs)
+
+
+class _StribeckContact(AbstractContact):
+    def __init__(self, settings: Stribeck, frictionloss: Array, Fs: Array) -> None:
+        self._settings, self._frictionloss, self._Fs = settings, frictionloss, Fs.copy()
+
+    def torque(self, qd: Array) -> Array | float:
+        rise = (self._settings.static - 1) * np.exp(-((qd / self._settings.velocity) ** 2))
+        self._frictionloss[:] = self._Fs * (1 + rise)
+        return 0.0
+
+
+@final
+@settings
+class Asymmetric(AbstractFrictionLaw):
+    """Forwards Fs + offset and Fv + difference, backwards Fs - offset and Fv - difference."""
+
+    offset: EachNumber = (0.0,)
+    """Half of what Coulomb friction forwards has above that backwards [N m], of all joints or of each."""
+    difference: EachNumber = (0.0,)
+    """Half of what viscous friction forwards has above that backwards [N m s/rad], of all joints or of each."""
+    edge: Positive = 0.002
+    """Speed over which the offset rises [rad/s]: a joint that stands is not pushed."""
+    viscous: EachNotNegativeOrNone = None
+    """Fv [N m s/rad], of all joints or of each; without it the robot's own."""
+    coulomb: EachNotNegativeOrNone = None
+    """Fs [N m], of all joints or of each; without it the robot's own."""
+
+    @property
+    def steady(self) -> bool:
+        """False."""
+        return False
+
+    def truth(self, robot: Robot) -> dict[str, float]:
+        """Return off and Fva."""
+        pairs = (("off", self._each("offset", robot.n)), ("Fva", self._each("difference", robot.n)))
+        return {f"{letters}{j + 1}": float(x) for letters, values in pairs for j, x in enumerate(values)}
+
+    def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
+        """Return what the directions differ by; MuJoCo makes the rest."""
+        del plant, h
+        n = Fs.shape[-1]
+        return _AsymmetricContact(self._each("offset", n), self._each("difference", n), self.edge)
+
+    def _each(self, name: str, n: int) -> Array:
+        return per_joint(getattr(self, name), n, f"friction.{name}")
+
+
+class _AsymmetricContact(AbstractContact):
+    def __init__(self, offset: Array, difference: Array, edge: float) -> None:
+        self._offset, self._difference, self._edge = offset, difference, edge
+
+    def torque(self, qd: Array) -> Array | float:
+        speed = np.abs(qd)
+        found: Array = -self._offset * np.tanh(speed / self._edge) - self._difference * speed
+        return found
+
+
+@final
+@settings
+class LoadDependent(AbstractFrictionLaw):
+    """(Fs + share |load|) sign(qd) + Fv qd, the load being all torque but friction, of gravity and inertia of links and rotors.
+
+    The friction in it is that of the physics step before.
+    """
+
+    share: EachNotNegative = (0.1,)
+    """Friction over load, of all joints or of each."""
+    viscous: EachNotNegativeOrNone = None
+    """Fv [N m s/rad], of all joints or of each; without it the robot's own."""
+    coulomb: EachNotNegativeOrNone = None
+    """Fs [N m], of all joints or of each; without it the robot's own."""
+
+    @property
+    def steady(self) -> bool:
+        """False."""
+        return False
+
+    def truth(self, robot: Robot) -> dict[str, float]:
+        """Return Fl."""
+        return {f"Fl{j + 1}": float(x) for j, x in enumerate(per_joint(self.share, robot.n, "friction.share"))}
+
+    def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
+        """Return the law, which sets MuJoCo's Coulomb friction anew in every step: its constraint keeps standing joints."""
+        del h
+        return _LoadContact(plant, Fs, per_joint(self.share, Fs.shape[-1], "friction.share"))
+
+
+class _LoadContact(AbstractContact):
+    def __init__(self, plant: Batch, Fs: Array, share: Array) -> None:
+        self._frictionloss, self._Fs, self._share = plant.expand("dof_frictionloss"), Fs.copy(), share
+        self._frictions = [plant.bind(f"qfrc_{name}") for name in ("passive", "constraint")]
+        self._tau = np.zeros(Fs.shape)
+
+    def driven(self, tau: Array) -> None:
+        """Receive what the joints carry, friction included."""
+        self._tau = tau
+
+    def torque(self, qd: Array) -> Array | float:
+        del qd
+        self._frictionloss[:] = self._Fs + self._share * np.abs(np.sum([self._tau, *self._frictions], axis=0))
+        return 0.0
+
+
+@final
+@settings
+class Warming(AbstractFrictionLaw):
+    """Fs sign(qd) + (Fv + slope (T - reference)) qd while the drives warm up from `cold` to `warm`; T is in the log."""
+
+    slope: EachNumber = (-0.001,)
+    """Change of Fv with the temperature [N m s/rad/K], of all joints or of each."""
+    reference: Number = 45.0
+    """Temperature at which Fv is what the robot has [deg C]."""
+    cold: Number = 25.0
+    """Temperature at the beginning [deg C]."""
+    warm: Number = 45.0
+    """Temperature in the end [deg C]."""
+    time: Positive = 60.0
+    """Time constant of the warming [s]."""
+    viscous: EachNotNegativeOrNone = None
+    """Fv [N m s/rad], of all joints or of each; without it the robot's own."""
+    coulomb: EachNotNegativeOrNone = None
+    """Fs [N m], of all joints or of each; without it the robot's own."""
+
+    @property
+    def steady(self) -> bool:
+        """False."""
+        return False
+
+    def truth(self, robot: Robot) -> dict[str, float]:
+        """Return FvT."""
+        return {f"FvT{j + 1}": float(x) for j, x in enumerate(per_joint(self.slope, robot.n, "friction.slope"))}
+
+    def conditions(self, t: Array, n: int) -> dict[str, Array]:
+        """Return the temperature, the same of all joints."""
+        return {"temperature": np.tile(self.at(t)[:, None], n)}
+
+    def at(self, t: Array | float) -> Array:
+        """Return the temperature at instants t [s]."""
+        return np.asarray(self.warm + (self.cold - self.warm) * np.exp(-np.asarray(t) / self.time))
+
+    def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
+        """Return what the temperature adds."""
+        del plant
+        return _TemperatureContact(self, per_joint(self.slope, Fs.shape[-1], "friction.slope"), h)
+
+
+class _TemperatureContact(AbstractContact):
+    def __init__(self, settings: Warming, slope: Array, h: float) -> None:
+        self._settings, self._slope, self._h, self._steps = settings, slope, h, 0
+
+    def torque(self, qd: Array) -> Array | float:
+        above = self._settings.at((self._steps + 0.5) * self._h) - self._settings.reference
+        self._steps += 1
+        found: Array = -self._slope * above * qd
+        return found
