@@ -78,6 +78,29 @@ class Table(Mapping[str, Callable[[], T]], Generic[T]):
             self._loaded[short] = getattr(import_module(module), short)
         return short
 
+    def name_of(self, part: T | type[T] | str) -> str:
+        """Return the name of a part given as an object, a class or a name; the table has the object from now on.
+
+        Raises
+        ------
+        PluginError
+            If it is not of the kind of this table.
+        """
+        if isinstance(part, str):
+            return part
+        made = part() if isinstance(part, type) else part
+        if not isinstance(made, self.kind):
+            raise PluginError(f"{made!r:.60} is none of the {self.point}: give a name, or an object of {self.kind.__name__}")
+        for name, factory in {**self._builtin, **self._loaded}.items():
+            if isinstance(factory, type) and type(made) is factory and made == factory():
+                return name
+        name = type(made).__name__
+        known = self._loaded.get(name)
+        if name in self._builtin or (known is not None and known() != made):
+            name = repr(made)  # settings of its own tell it from others of its class
+        self._loaded[name] = lambda: made
+        return name
+
     def create(self, name: str) -> T:
         """Return the part `name` with its default settings.
 

@@ -39,6 +39,7 @@ ALLOWED_IN = {
     "experiments/starters/starters.py": {"jinja2"},
     "experiments/starters/plugins/friction.py": {"mujoco"},
     "experiments/study/study.py": {"pydantic"},
+    "experiments/requests/table.py": {"pydantic"},
     "experiments/servo/identification.py": {"tomli_w"},
     "experiments/study/store.py": {"pyarrow", "tomli_w"},
     "experiments/study/run_study.py": {"threadpoolctl"},

@@ -1,13 +1,14 @@
 """What a set is: a folder with logs, a robot, and a benchmark.toml that states what is fitted and what is held out."""
 
-import shlex
-import threading
 import tomllib
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
 from idbench.experiments.errors import ExperimentError
+from idbench.experiments.requests.jobs import IdentifyRequest, ServoRequest
+from idbench.experiments.requests.table import as_table, request_from
 from idbench.sim.errors import ScenarioError
 from idbench.sim.settings import NotNegative, make, settings
 
@@ -17,27 +18,11 @@ FILE = "benchmark.toml"
 SHIPPED = Path(__file__).parent / "sets"
 """Definitions that ship; their data do not."""
 
-WORDS = "options of `idbench {}`, but for logs, --validate and results"
+REQUESTS: Mapping[str, type[IdentifyRequest | ServoRequest]] = {"identify": IdentifyRequest, "servo": ServoRequest}
+"""What a set may ask for, by the name of the table that states it."""
 
-IN_FOLDER = threading.Lock()
-"""Held while this process is in the folder of a set: options name files there, and other threads have sets of their own."""
-
-TAKEN = (
-    "-h",
-    "--help",
-    "--help-all",
-    "--validate",
-    "--out",
-    "--force",
-    "--json",
-    "--write",
-    "--write-mjcf",
-    "--follow",
-    "--live",
-    "--serve",
-    "--label",
-)
-"""Options that a set does not state."""
+TAKEN = ("log", "validate", "label")
+"""Keys of a request that a set states itself, or that say nothing about it."""
 
 
 @settings
@@ -50,10 +35,10 @@ class Definition:
     """Logs that are fitted together; * stands for any letters."""
     held_out: tuple[str, ...] = ()
     """Logs on which the fit is judged. Default: the last quarter of the longest log, which is then not fitted."""
-    command: Literal["identify", "servo"] = "identify"
-    """The command that identifies them: from torques, or, of servos, from commands and positions alone."""
-    options: str = ""
-    """How they are identified: options of that command, as on the command line."""
+    identify: dict[str, Any] | None = None
+    """How torques and positions are identified: keys of `idbench.fit`, such as robot or friction; files of this folder."""
+    servo: dict[str, Any] | None = None
+    """How servos are identified, from commands and positions alone: robot, servo, friction."""
     repeats: tuple[str, ...] = ()
     """Logs that are also fitted one by one, to compare their parameters. Default: those of the fit."""
     free_run: NotNegative = 0.0
@@ -74,16 +59,20 @@ class Definition:
             raise ValueError(
                 f"fit must name at least one log, and each log must have a name: {', '.join(map(repr, self.files))}"
             )
-        if taken := [word for word in self.words if word.partition("=")[0].replace("_", "-") in TAKEN]:
-            raise ValueError(f"options must not have {taken[0]}: they are {WORDS.format(self.command)}")
+        if (self.identify is None) == (self.servo is None):
+            raise ValueError("give one table, [identify] or [servo]: how the logs are identified")
 
     @property
-    def words(self) -> list[str]:
-        """The options as words; ValueError if a quotation mark has no other."""
-        try:
-            return shlex.split(self.options)
-        except ValueError as error:
-            raise ValueError(f"options = {self.options!r:.60}: {error}; each quotation mark needs another") from error
+    def job(self) -> str:
+        """The name of what identifies them."""
+        return "servo" if self.identify is None else "identify"
+
+    def request(self, folder: Path) -> IdentifyRequest | ServoRequest:
+        """Return what the set asks for, its files in a folder; ExperimentError if a key is unknown, or a value wrong."""
+        table = self.servo if self.identify is None else self.identify
+        asked = request_from(REQUESTS[self.job], table or {}, f"{FILE}, [{self.job}]", folder, TAKEN)
+        fit, held_out = (tuple(folder / name for name in names) for names in (self.fit, self.held_out))
+        return replace(asked, log=fit, validate=held_out)
 
     @property
     def every_repeat(self) -> tuple[str, ...]:
@@ -107,6 +96,7 @@ def read_definition(folder: Path) -> Definition:
     path = folder / FILE
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
+        _refuse_options(content)
         made: Definition = make(Definition, content, "")
         fit, held_out, repeats = (_named(folder, names) for names in (made.fit, made.held_out, made.repeats))
         made = replace(made, fit=fit, held_out=held_out, repeats=repeats)
@@ -116,7 +106,20 @@ def read_definition(folder: Path) -> Definition:
         raise ExperimentError(f"cannot read {path}: {error.strerror}") from error
     except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError, ScenarioError) as error:
         raise ExperimentError(f"{path}: {error}") from error
+    _ = made.request(folder)
     return made
+
+
+def _refuse_options(content: Mapping[str, Any]) -> None:
+    """Raise ScenarioError with the line that stands for the options of a command line, which sets stated before."""
+    if (words := content.get("options")) is None:
+        return
+    job = "servo" if content.get("command") == "servo" else "identify"
+    try:
+        keys = as_table(REQUESTS[job], words)
+    except (ValueError, AttributeError, TypeError):
+        keys = "..."
+    raise ScenarioError(f"options and command are not read any more: a file names no code; write {job} = {{{keys}}} instead")
 
 
 def _named(folder: Path, names: tuple[str, ...]) -> tuple[str, ...]:

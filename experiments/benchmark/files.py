@@ -10,15 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from idbench import experiments, identify, sim
-from idbench.experiments.benchmark.definition import Definition
+from idbench.experiments.benchmark.definition import FILE, Definition
 from idbench.experiments.benchmark.tools import PREDICTED
 from idbench.experiments.errors import ExperimentError
+from idbench.experiments.requests.table import files_named
 from idbench.identify.files.layout import LogLayout
 
 PACKAGES = (identify, sim, experiments)
-
-BESIDE = (".toml", ".urdf", ".xml")
-"""What names of files end with that may say something of a set."""
 
 
 def require_files(folder: Path, definition: Definition) -> None:
@@ -30,14 +28,13 @@ def require_files(folder: Path, definition: Definition) -> None:
 
 
 def files_of(folder: Path, definition: Definition) -> tuple[Path, ...]:
-    """Return the files that a row follows from: logs, whole folders of them, files beside them, robots."""
+    """Return the files that a row follows from: all that the request names, and what these name; layouts beside logs."""
     logs = [folder / name for name in definition.files]
-    places = {folder, *(log.parent for log in logs)}
-    beside = [path for place in places for path in place.iterdir() if path.suffix in BESIDE]
     inside = [path for log in logs if log.is_dir() for path in log.rglob("*")]
     layouts = [found for log in logs if log.is_file() and (found := LogLayout.beside(log))]
     named = [path.parent / name for layout, path in layouts for name in layout.files]
-    return tuple(sorted({path for path in (*logs, *beside, *inside, *named) if path.is_file()}))
+    every = {folder / FILE, *logs, *inside, *(path for _, path in layouts), *named}
+    return tuple(sorted({path for path in every if path.is_file()} | {*files_named(definition.request(folder))}))
 
 
 def made_of_files(folder: Path, definition: Definition, out: Path) -> dict[str, str]:

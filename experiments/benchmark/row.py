@@ -2,22 +2,37 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from idbench.experiments.benchmark.definition import Definition
 from idbench.experiments.benchmark.free_runs import free_runs
 from idbench.experiments.benchmark.repeats import repeats
 from idbench.experiments.benchmark.set_fit import SetFit
-from idbench.experiments.benchmark.tools import judged
+from idbench.experiments.benchmark.tools import judged, predictions, what_tools_read, write_for_tools
 from idbench.experiments.errors import is_told, reason
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.judgement.judgement import Unjudged, judge
 from idbench.experiments.judgement.verdict import WORDS
+from idbench.experiments.requests.jobs import IdentifyRequest
 from idbench.experiments.results.writing import finite
 from idbench.identify.judge.excitation import seen
+
+Made = tuple[dict[str, Any], Callable[[Path], None]]
+"""The row of a set, and what writes the files that other tools read into a folder."""
+
+
+def identified_row(folder: Path, definition: Definition, out: Path) -> Made:
+    """Return the row of a set of torques and positions, and what writes the files of other tools into a folder."""
+    asked = definition.request(folder)
+    assert isinstance(asked, IdentifyRequest)
+    made = SetFit.of(folder, definition, asked)
+    row = row_of(made, predictions(out))
+    return {**row, "tools_read": what_tools_read(made)}, partial(write_for_tools, made)
 
 
 def row_of(made: SetFit, predicted: Mapping[str, Path]) -> dict[str, Any]:
@@ -63,7 +78,7 @@ def _estimate(fit: Fit) -> dict[str, list[Any]]:
 def _logs(on: Sequence[HeldOut | Unjudged], made: SetFit) -> list[dict[str, Any]]:
     """Return what the row says of each log, with the samples of it that the fit has seen."""
     found, names = [_log(one, made.fit) for one in on], list(made.fit.logs.held_out or {})
-    for name, count in made.seen().items():
+    for name, count in made.seen.items():
         for log, own in zip(found, names, strict=False):
             if own == name and "samples_seen" in log:
                 log["samples_seen"] = max(log["samples_seen"], count)
@@ -89,7 +104,7 @@ def _log(one: HeldOut | Unjudged, fit: Fit) -> dict[str, Any]:
 
 
 def _repeats(made: SetFit) -> dict[str, Any]:
-    logs = made.repeated()
+    logs = made.repeated
     if len(logs) < 2:
         return {}
     found = repeats(made.fit.request, list(logs.values()), list(logs))

@@ -8,6 +8,7 @@ from contextlib import suppress
 from tyro.extras import SubcommandApp
 
 from idbench.experiments.cli.interruption import INTERRUPTED, Notice, TerminatedError, importing, noticing, terminating
+from idbench.experiments.cli.typed import typed, untyped
 from idbench.experiments.errors import ExperimentError, is_told, reason, report, visible
 
 DESCRIPTION = "A MuJoCo testbench for the dynamic identification of robots."
@@ -95,7 +96,7 @@ def parsed(words: list[str]) -> Callable[[], None] | None:
     words = without_short(words)
     require_once(words)
     with refused(words, COMMANDS):
-        made: Callable[[], None] = APP.cli(prog="idbench", description=DESCRIPTION, args=words)
+        made: Callable[[], None] = untyped(APP.cli(prog="idbench", description=DESCRIPTION, args=words))
     return made
 
 
@@ -104,7 +105,7 @@ def command(name: str) -> Callable[[type], type]:
 
     def register(options: type) -> type:
         COMMANDS[name] = options
-        APP.command(name=name)(options)
+        APP.command(name=name)(typed(options))
         return options
 
     return register

@@ -6,6 +6,8 @@ from pathlib import Path
 from shlex import quote
 from typing import Any, get_type_hints
 
+from idbench.experiments.cli.typed import word_of
+
 
 def command_of(name: str, options: Any, positional: str, left_out: tuple[str, ...], *, absolute: bool = False) -> str:
     """Return what was asked as a command: all that differs from the defaults, but for fields that are left out.
@@ -35,8 +37,7 @@ def _options(part: Any, left_out: tuple[str, ...], absolute: bool) -> Iterator[s
         value = getattr(part, field.name)
         if field.name in left_out or (field.default is not MISSING and value == field.default):
             continue
-        names = [mark.name for mark in getattr(hints[field.name], "__metadata__", ()) if getattr(mark, "name", None)]
-        option = f"--{names[0] if names else field.name.replace('_', '-')}"
+        option = f"--{word_of(hints[field.name]).option or field.name.replace('_', '-')}"
         if is_dataclass(value):
             yield from _options(value, left_out, absolute)
         elif isinstance(value, bool):

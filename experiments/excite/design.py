@@ -10,8 +10,8 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.excite.excitation import EXCITATIONS, AbstractExcitation
 from idbench.experiments.excite.limit_use import FS, Inspector, LimitUse
 from idbench.experiments.excite.planning import plan_for
-from idbench.experiments.identification.parameters import Parameters
 from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.requests.shared import Parameters
 from idbench.identify import CHAINS, Array, MotionLog, NoiseLevels
 from idbench.identify.data.kinematics import Limits
 from idbench.identify.design.criteria import CRITERIA, AbstractCriterion, LogSigma

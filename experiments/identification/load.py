@@ -97,7 +97,8 @@ def with_held_out(loaded: Loaded, paths: Sequence[Path], options: ReadOptions, t
     """
     known = loaded.read[0].channel  # as it was logged; its gain is of its own file
     delay, sought = str(known.delay) if options.delay else None, options.delay == "estimate"
-    options, held_out, said = replace(options, delay=delay, fallback=replace(known, gain=1.0)), {}, list[tuple[str, str]]()
+    options = replace(options, delay=delay, fallback=replace(known, gain=1.0))
+    held_out, every, said = dict[str, MotionLog](), list[ReadLog](), list[tuple[str, str]]()
     require_different(paths)
     for given in paths:
         path = file_of(given)
@@ -111,7 +112,8 @@ def with_held_out(loaded: Loaded, paths: Sequence[Path], options: ReadOptions, t
         if any(_within(one.longest, log) for log in loaded.logs()):
             raise ExperimentError(f"--validate {path} holds the motion that is identified: give another motion, or none")
         held_out[str(given)] = one.longest
-    return Logs(loaded.logs(), loaded.names, held_out, (*loaded.notes, *of_each(said)), truth, sought)
+        every.append(one)
+    return Logs(loaded.logs(), loaded.names, held_out, (*loaded.notes, *of_each(said)), truth, sought, tuple(every))
 
 
 def require_different(paths: Sequence[Path]) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from idbench.identify.data.velocities import white_noise
 from idbench.identify.judge.band import content_end
 from idbench.identify.judge.delay import DelayEstimate, estimate_delay
 from idbench.identify.rows.rows import is_long
+
+if TYPE_CHECKING:
+    from idbench.experiments.identification.reading import ReadLog
 
 STILL = 1e-3
 """A joint is at rest while its velocity is below this share of its largest."""
@@ -115,6 +118,8 @@ class Logs:
     """The true parameters, where they are known."""
     delay_sought: bool = False
     """Whether the delay of the torques was estimated, and may be estimated again with more laws of friction."""
+    read_held_out: tuple["ReadLog", ...] = ()
+    """Held-out logs as they were read."""
 
     def delayed(self, basis: Basis, chain: Chain) -> tuple["Logs", bool]:
         """Return the logs with the delay that explains their torques best with other laws, and whether it moved by a sigma.

@@ -11,9 +11,9 @@ import numpy as np
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.logs import with_delay
-from idbench.experiments.identification.read_options import ColumnOptions
 from idbench.experiments.identification.request import Request
-from idbench.experiments.option_types import Meaning
+from idbench.experiments.requests.shared import ColumnOptions
+from idbench.experiments.requests.words import Meaning
 from idbench.identify import Array, AsLogged, LogError, MotionLog, RangeError, SettingError, TimeError, TorqueChannel
 from idbench.identify.data.log_columns import LogColumns
 from idbench.identify.data.resample import Repaired

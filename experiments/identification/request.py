@@ -6,10 +6,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.identification.choices import Consistency, Start
-from idbench.experiments.identification.defaults import CHAIN, ESTIMATOR
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.identification.simulators import RobotPlant, ScenarioLoop
+from idbench.experiments.requests.shared import CHAIN, ESTIMATOR
+from idbench.experiments.requests.words import Consistency, Start
 from idbench.identify import CHAINS, ESTIMATORS, MODELS, AbstractEstimator, Chain, ExplicitModel, MotionLog, Problem, Simulation
 from idbench.identify.blame import blamed
 from idbench.identify.estimators.settle import settled

@@ -8,7 +8,7 @@ from typing import Self, final
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.friction_laws import FrictionLaws, balancers, law_of
-from idbench.experiments.identification.parameters import Parameters
+from idbench.experiments.requests.shared import Parameters
 from idbench.identify import BLOCKS, AbstractJointLaw, BaseParameters, Basis, KinematicTree, tree_basis
 from idbench.identify.parameters.base_parameters import in_letters_of_the_paper
 from idbench.sim.frictions import AbstractFrictionLaw

@@ -9,8 +9,8 @@ from typing import TypeAlias
 import numpy as np
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.identification.parameters import Parameters
 from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.requests.shared import Parameters
 from idbench.identify import Array, IdentificationError
 from idbench.identify.data.kinematics import INERTIAL
 from idbench.identify.loads.drive_gains import identify_drive_gains

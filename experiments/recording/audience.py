@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.option_types import Count, Real, Url
 from idbench.experiments.recording.viewers import answers, reachable, served, spawned
+from idbench.experiments.requests.words import Count, Real, Url
 
 if TYPE_CHECKING:
     import rerun as rr

@@ -7,7 +7,6 @@ from pathlib import Path
 from rerun.chunk import RrdReader
 
 from idbench.experiments.errors import ResultsError
-from idbench.experiments.identification.defaults import CHAIN
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.identification.scenario_run import ScenarioRun
@@ -19,6 +18,7 @@ from idbench.experiments.recording.lanes import about
 from idbench.experiments.recording.live_layer import LiveIdentification
 from idbench.experiments.recording.motion_layer import Base
 from idbench.experiments.recording.stream import Stream
+from idbench.experiments.requests.shared import CHAIN
 from idbench.identify import measured_state
 from idbench.identify.rows.rows import is_long
 from idbench.sim.engine.run import Run

@@ -10,7 +10,7 @@ import numpy as np
 
 from idbench.experiments.errors import ExperimentError, StudyError
 from idbench.experiments.identification.chain_settings import replaced
-from idbench.experiments.identification.defaults import CHAIN, ESTIMATOR
+from idbench.experiments.requests.shared import CHAIN, ESTIMATOR
 from idbench.identify import CHAINS, ESTIMATORS, AbstractEstimator, Chain
 from idbench.sim.settings import Number, Whole, settings
 

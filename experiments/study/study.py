@@ -12,9 +12,8 @@ import numpy as np
 from pydantic import Field
 
 from idbench.experiments.errors import StudyError
-from idbench.experiments.identification.defaults import CHAIN, ESTIMATOR
-from idbench.experiments.identification.parameters import Parameters
 from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.requests.shared import CHAIN, ESTIMATOR, Parameters
 from idbench.experiments.study.axis import FRICTION, Axis, Method, Setting, combinations, methods_of, servo_methods, whole_first
 from idbench.experiments.study.servo_rows import SERVO, names_of
 from idbench.identify import MODELS, AbstractModel

@@ -45,7 +45,7 @@ def test_interruption_of_the_work_leaves_nothing(out, capfd, monkeypatch):
 def test_a_real_interrupt_ends_the_process_without_a_traceback(tmp_path, start):
     """Ctrl-C at some instant of a long search."""
     code = "import sys; from idbench.experiments.paper.search import Search; from idbench.experiments import cli\n"
-    code += "from idbench.experiments.cli.commands import paper\n"
+    code += "from idbench.experiments.paper import job as paper\n"
     code += "paper.Search = lambda seed: print('searching') or Search(seed=seed, tolerance=0.0, rounds=10**6)\n"
     code += "sys.exit(cli.main(['table1', '--seed', '1', '--out', 'results']))"
     process = start("-uc", code, cwd=tmp_path)
@@ -85,7 +85,7 @@ def test_an_interrupt_that_comes_out_as_another_error_is_one(tmp_path, start):
     code = """if True:
         import sys, time
         from idbench.experiments import cli
-        from idbench.experiments.cli.commands import paper
+        from idbench.experiments.paper import job as paper
         def half_loaded(seed):
             print("searching")
             try:

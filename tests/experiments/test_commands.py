@@ -9,7 +9,7 @@ import pytest
 import tomli_w
 
 from idbench.experiments.cli import main
-from idbench.experiments.cli.options.identify import Identify
+from idbench.experiments.cli.options.jobs import Identify
 from idbench.experiments.paper import table2
 from idbench.experiments.paper.attribution import imperfections
 from idbench.experiments.paper.table2 import PAPER, Table2

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from idbench.experiments.identification.defaults import CHAIN, ESTIMATOR
+from idbench.experiments.requests.shared import CHAIN, ESTIMATOR
 from idbench.identify import CHAINS, ESTIMATORS, MODELS, identify, scara
 
 

@@ -124,8 +124,8 @@ def test_the_log_says_which_law(tmp_path, monkeypatch, capsys):
 )
 def test_simulated_laws_are_identified(friction, name, tolerance):
     """Without noise, to what the physics step leaves of loads, and reversals of slow joints."""
-    from idbench.experiments.identification.parameters import Parameters
     from idbench.experiments.identification.robot_model import RobotModel
+    from idbench.experiments.requests.shared import Parameters
     from idbench.identify import ExplicitModel, identify
 
     trajectory = {"kind": "random", "moves": 10, "durations": [2.0, 2.0], "rest": 1.0}

@@ -103,7 +103,7 @@ def part(log, target, k):
 
 
 def test_a_fault_before_the_results_is_told_with_its_report(idbench, logs, monkeypatch, tmp_path):
-    monkeypatch.setattr("idbench.experiments.cli.commands.identify.fit", broken)
+    monkeypatch.setattr("idbench.experiments.identification.job.fit", broken)
     code, out, err = idbench("identify", logs / "first.parquet", *WORDS, "--out", "found")
     assert (code, out) == (1, "")
     assert len(err.splitlines()) == 1

@@ -2,9 +2,9 @@
 
 import pytest
 
-from idbench.experiments.cli.commands.servo_inputs import held_of
-from idbench.experiments.cli.options.servo import IdentifyServo
+from idbench.experiments.cli.options.jobs import IdentifyServo
 from idbench.experiments.errors import ExperimentError
+from idbench.experiments.servo.job import held_of
 
 
 def test_a_joint_has_what_is_held_for_it_before_what_is_held_for_all():

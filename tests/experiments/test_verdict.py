@@ -8,12 +8,12 @@ import pytest
 from idbench.experiments.identification.fit import fit
 from idbench.experiments.identification.log_warnings import warnings_of_log
 from idbench.experiments.identification.logs import Logs
-from idbench.experiments.identification.parameters import Parameters
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.judgement.held_out import on_log
 from idbench.experiments.judgement.remedies import Remedies, delay_advice
 from idbench.experiments.judgement.warnings import warnings_of_result
+from idbench.experiments.requests.shared import Parameters
 from idbench.identify import MotionLog
 from idbench.identify.files.log_file import read_log
 

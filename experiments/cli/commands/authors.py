@@ -4,7 +4,7 @@ from pathlib import Path
 
 from rich.text import Text
 
-from idbench.experiments.cli.options.authors import Check, New
+from idbench.experiments.cli.options.tools import Check, New
 from idbench.experiments.cli.page import new_page, stages_of
 from idbench.experiments.contracts.contract import Example
 from idbench.experiments.contracts.contracts import found, keeps

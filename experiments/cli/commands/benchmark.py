@@ -8,9 +8,9 @@ from typing import Any
 from rich.text import Text
 
 from idbench.experiments.benchmark.definition import FILE, SHIPPED, read_definition, shipped
+from idbench.experiments.benchmark.set_row import set_row
 from idbench.experiments.benchmark.tables import print_rows, report
-from idbench.experiments.cli.commands.benchmark_set import set_row
-from idbench.experiments.cli.options.benchmark import Benchmark
+from idbench.experiments.cli.options.jobs import Benchmark
 from idbench.experiments.cli.page import Page, Told, new_page, shown, stages_of
 from idbench.experiments.errors import ExperimentError, is_told, reason
 from idbench.experiments.errors import report as report_fault

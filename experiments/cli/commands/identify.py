@@ -5,23 +5,19 @@ from collections.abc import Sequence
 from contextlib import ExitStack, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from rich.text import Text
 
 from idbench.experiments.cli.command_text import command_of
 from idbench.experiments.cli.commands.follow import Follower
 from idbench.experiments.cli.commands.identify_views import Shown, require_layer, require_targets, view_all
-from idbench.experiments.cli.commands.requests import chooses_band, read_options, request_of
-from idbench.experiments.cli.options.identify import Identify
+from idbench.experiments.cli.options.jobs import Identify
+from idbench.experiments.cli.own_parts import with_own_parts
 from idbench.experiments.cli.page import Page, new_page, shown, stages_of
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.identification.fit import Fit, fit
+from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.friction_choice import summary, words
-from idbench.experiments.identification.load import load, with_held_out
-from idbench.experiments.identification.log_warnings import warnings_of_log
-from idbench.experiments.identification.logs import Logs
-from idbench.experiments.identification.reading import file_of, stated_by
+from idbench.experiments.identification.job import files_of, fit_of, loaded_logs, read_options, request_of
 from idbench.experiments.identification.request import Request
 from idbench.experiments.judgement.checks import checks
 from idbench.experiments.judgement.judgement import Judgement, judge
@@ -32,9 +28,7 @@ from idbench.experiments.reports.printed import print_fit, print_held_out
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.writing import write_summary
-from idbench.identify import IdentificationError
 from idbench.identify.files.log_file import write_log
-from idbench.sim.robot.robot import Robot
 
 LEFT_OUT = ("out", "force", "json", "watching", "write", "write_mjcf", "follow")
 """Options that make no difference to an identification."""
@@ -45,13 +39,9 @@ NOT_MADE_AGAIN = tuple(name for name in LEFT_OUT if name != "out")
 
 def identify(options: Identify) -> None:
     """Identify logs, judge the result, save and show it."""
-    if not options.log:
-        raise ExperimentError("name a log, or several of one fit")
-    for path in (*options.log, *options.validate):
-        file_of(path)
-    page, stated = new_page(machine=options.json), stated_by(options.log[0])
-    request = request_of(options, stated)
-    command, read = command_of("identify", options, "log", NOT_MADE_AGAIN), _read(options, request)
+    page, options = new_page(machine=options.json), with_own_parts(options)
+    request = request_of(options)
+    command, read = command_of("identify", options, "log", NOT_MADE_AGAIN), files_of(options)
     whole = command_of("identify", options, "log", LEFT_OUT, absolute=True)
     folder = ResultsFolder(options.out, "identify", whole, options.force, read) if options.out else None
     require_targets(options, request.robot_model, folder, read)
@@ -62,7 +52,7 @@ def identify(options: Identify) -> None:
         audience = stack.enter_context(options.watching.audience())
         options = _followed(stack, options, request, audience)
         with stages_of("identifying"):
-            result = _fitted(options, request, stated)
+            result = fit_of(*loaded_logs(options, request))
         _show_fit(page, result, options, read[0])
         _save(folder, page, result)
         kept = f"the estimates are printed{f', and with the logs in {folder.out}' if folder else ''}"
@@ -88,14 +78,6 @@ def _judged(result: Fit, options: Identify) -> Judgement:
         return judge(result)
 
 
-def _read(options: Identify, request: Request) -> tuple[Path, ...]:
-    """Return the files that are read."""
-    logs = [file_of(path).absolute() for path in (*options.log, *options.validate)]
-    named = (options.chain_file, options.reading.layout, *options.loop)
-    more = [Path(name) for name in named if name is not None]
-    return (*logs, Robot.path(request.robot_model.name), *(path.absolute() for path in more if path.suffix))
-
-
 def _followed(stack: ExitStack, options: Identify, request: Request, audience: Audience | None) -> Identify:
     """Follow the log until it is complete, if that is asked for; return the options with the complete log."""
     if options.follow is None:
@@ -108,33 +90,6 @@ def _followed(stack: ExitStack, options: Identify, request: Request, audience: A
     follower.follow(options.follow)
     folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="idbench-"))
     return replace(options, log=(follower.complete(Path(folder)),))
-
-
-def _fitted(options: Identify, request: Request, stated: dict[str, Any]) -> Fit:
-    """Return the fit of logs."""
-    return fit_of(*loaded_logs(options, request, stated))
-
-
-def loaded_logs(options: Identify, request: Request, stated: dict[str, Any]) -> tuple[Request, Logs]:
-    """Return the request with the band that suits the logs, and the logs."""
-    loaded = load(options.log, read_options(options), request, band=chooses_band(options))
-    return loaded.request, with_held_out(loaded, options.validate, read_options(options), _truth(stated, request))
-
-
-def fit_of(request: Request, logs: Logs) -> Fit:
-    """Return the fit of logs; what goes wrong says what is suspicious about them, too."""
-    try:
-        return fit(request, logs)
-    except IdentificationError as error:
-        doubts = dict.fromkeys(doubt for log in logs.fitted for doubt in warnings_of_log(log, request.robot_model.tree))
-        why = f"; what is suspicious: {'; '.join(doubts)}" if doubts else ""
-        raise ExperimentError(f"{error}{why}") from error
-
-
-def _truth(stated: dict[str, Any], request: Request) -> dict[str, float] | None:
-    """Return the truth that the folder of a run states, if it is of the same parameters."""
-    truth: dict[str, float] | None = stated.get("truth")
-    return truth if truth and tuple(truth) == request.robot_model.basis.names else None
 
 
 def _show_fit(page: Page, result: Fit, options: Identify, log: Path) -> None:

@@ -7,7 +7,7 @@ from typing import final
 
 from rich.text import Text
 
-from idbench.experiments.cli.options.identify import Identify
+from idbench.experiments.cli.options.jobs import Identify
 from idbench.experiments.cli.page import Page
 from idbench.experiments.errors import ExperimentError, ResultsError
 from idbench.experiments.exports.exports import EXPORTS

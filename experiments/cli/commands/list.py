@@ -4,7 +4,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from idbench.experiments.cli.options.authors import List
+from idbench.experiments.cli.options.tools import List
 from idbench.experiments.cli.page import new_page
 from idbench.experiments.plugin_tables import TABLES, plugin_conflicts
 from idbench.identify.plugins import PluginTable

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rich.text import Text
 
-from idbench.experiments.cli.options.log import ShowLog
+from idbench.experiments.cli.options.tools import ShowLog
 from idbench.experiments.cli.page import Page, new_page, shown
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.logs import LogFacts

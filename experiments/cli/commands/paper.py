@@ -1,6 +1,7 @@
 """The commands about the paper's tables: the comparison, the search for its trajectory, the experiment repeated."""
 
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
 
@@ -8,23 +9,20 @@ from rich.console import Console
 
 from idbench.experiments.cli.command_text import command_of
 from idbench.experiments.cli.commands.inner import doubt_window, recording_of, require_window
-from idbench.experiments.cli.options.paper import Search as SearchOptions
-from idbench.experiments.cli.options.paper import Table1 as Table1Options
-from idbench.experiments.cli.options.paper import Table2 as Table2Options
+from idbench.experiments.cli.options.jobs import Search as SearchOptions
+from idbench.experiments.cli.options.jobs import Table1 as Table1Options
+from idbench.experiments.cli.options.jobs import Table2 as Table2Options
 from idbench.experiments.cli.page import new_page, progress_of, shown
 from idbench.experiments.cli.saving import saved
 from idbench.experiments.errors import ExperimentError
+from idbench.experiments.paper.job import Searching, searched, table1_of, table2_of
 from idbench.experiments.paper.motions import Table1Motions
 from idbench.experiments.paper.motions_report import picture, print_motions
-from idbench.experiments.paper.search import Search
-from idbench.experiments.paper.table1 import CHAINS_COMPARED, SCENARIO, Table1
 from idbench.experiments.paper.table1_text import print_table1
-from idbench.experiments.paper.table2 import Table2, print_table2
+from idbench.experiments.paper.table2 import print_table2
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.writing import require_free, write_text
 from idbench.identify.files.log_file import write_log
-from idbench.sim.robot.robot import Robot
-from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import load, to_toml
 
 LEFT_OUT = ("out", "force", "json", "watching")
@@ -43,15 +41,13 @@ def _folder(options: Table1Options | Table2Options, experiment: str) -> ResultsF
 
 def compare(options: Table1Options) -> None:
     """Reproduce the comparison."""
-    if options.seed is not None and options.scenario is not None:
-        raise ExperimentError(f"--seed {options.seed} and --scenario {options.scenario} name two trajectories: give one")
     if options.motions is not None:
         _over_motions(options, options.motions)
         return
-    chains = CHAINS_COMPARED if options.chain == "all" else (options.chain,)
     folder, page = _folder(options, "table1"), new_page(machine=options.json)
     with options.watching.audience() as audience, shown(page), folder.held():
-        table = Table1(load(options.scenario or SCENARIO) if options.seed is None else _searched(options.seed), chains)
+        with _searching() as told:
+            table = table1_of(options, told)
         print_table1(page, table)
         files, hint = {"log.parquet": partial(write_log, table.log)}, options.watching.hint(folder.out)
         with saved(page, folder, table.summary(), files, hint) as attempts:
@@ -80,8 +76,10 @@ def search(options: SearchOptions) -> None:
     """Search a trajectory."""
     if options.out is not None:
         require_free(options.out, "--out", force=options.force)
-    scenario, page = _searched(options.seed), new_page()
+    page = new_page()
     with shown(page):
+        with _searching() as told:
+            scenario = searched(options.seed, told)
         if options.out is None:
             page.out(to_toml(scenario).rstrip("\n"))
             return
@@ -89,12 +87,11 @@ def search(options: SearchOptions) -> None:
         page.out(f"{options.out}: {scenario.origin}")
 
 
-def _searched(seed: int) -> Scenario:
-    with Console(stderr=True).status("searching a trajectory ...") as status:
-        return Search(seed=seed).run(
-            Robot.load("scara"),
-            lambda number, distance: status.update(f"searching: round {number}, {distance:.1%} from the paper's Cond(W)"),
-        )
+@contextmanager
+def _searching() -> Iterator[Searching]:
+    """Give what shows how far a search for a trajectory is."""
+    with Console(stderr=True).status("") as status:
+        yield lambda number, distance: status.update(f"searching: round {number}, {distance:.1%} from the paper's Cond(W)")
 
 
 def table2(options: Table2Options) -> None:
@@ -106,7 +103,7 @@ def table2(options: Table2Options) -> None:
         recording = recording_of(described, audience, options.inner) if watching.rerun else None
         with (
             progress_of("simulating") as progress,
-            closing(Table2(described, progress, recording.watch if recording else None)) as table,
+            closing(table2_of(options, progress, recording.watch if recording else None)) as table,
         ):
             print_table2(page, table)
             summary = table.summary()

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rich.text import Text
 
-from idbench.experiments.cli.options.log import Export, Resample
+from idbench.experiments.cli.options.tools import Export, Resample
 from idbench.experiments.cli.page import new_page, shown
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.reading import channel_of, columns_of, stated_by

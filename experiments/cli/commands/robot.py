@@ -8,7 +8,7 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
-from idbench.experiments.cli.options.robot import DescribeRobot
+from idbench.experiments.cli.options.tools import DescribeRobot
 from idbench.experiments.cli.page import new_page
 from idbench.experiments.identification.robot_model import RobotModel, absolute
 from idbench.experiments.judgement.warnings import FILE, warnings_of_robot

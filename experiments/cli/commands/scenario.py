@@ -1,6 +1,6 @@
 """The command that writes scenarios."""
 
-from idbench.experiments.cli.options.scenario import WriteScenario
+from idbench.experiments.cli.options.tools import WriteScenario
 from idbench.experiments.cli.page import new_page
 from idbench.experiments.results.writing import require_free, write_text
 from idbench.sim.scenario.scenario_file import designed, load, names, to_toml

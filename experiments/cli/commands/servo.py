@@ -9,8 +9,7 @@ import numpy as np
 from rich.text import Text
 
 from idbench.experiments.cli.command_text import command_of
-from idbench.experiments.cli.commands.servo_inputs import files_read, held_of, servos_of
-from idbench.experiments.cli.options.servo import IdentifyServo
+from idbench.experiments.cli.options.jobs import IdentifyServo
 from idbench.experiments.cli.page import Page, new_page, shown, stages_of
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.recording.audience import Audience
@@ -18,6 +17,7 @@ from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.writing import require_free, write_summary, write_text
 from idbench.experiments.servo.identification import Servos, lacks_summary, summary_of
+from idbench.experiments.servo.job import files_of, held_of, servos_of
 from idbench.experiments.servo.servo_text import (
     in_mujoco,
     inexpressible,
@@ -44,7 +44,7 @@ def servo(options: IdentifyServo) -> None:
         if path is not None:
             if path.suffix != ending:
                 raise ExperimentError(f"{option} {path}: its name must end with {ending}")
-            require_free(path, option, force=options.force, read=files_read(options))
+            require_free(path, option, force=options.force, read=files_of(options))
     with options.watching.audience() as audience, shown(page), folder.held() if folder else nullcontext():
         servos, others = servos_of(options)
         page.found |= {"experiment": "servo", "robot": servos.robot, "friction": options.friction, "joints": {}}
@@ -118,7 +118,7 @@ def _write(page: Page, options: IdentifyServo, servos: Servos, others: Servos | 
     assert path is not None
     place = path.absolute().parent
     text = mjcf_of(servos, found, place, options.position)
-    write_text(path, text, "--write-mjcf", force=options.force, read=files_read(options))
+    write_text(path, text, "--write-mjcf", force=options.force, read=files_of(options))
     page.print(Text(f"written to {path}: the robot with its servos, to be commanded with angles of the file"), soft_wrap=True)
     page.warn({"the written file": [*inexpressible(found), *without_servo(servos.links.joints, found)]})
     judged = others or servos
@@ -138,7 +138,7 @@ def _write_function(page: Page, options: IdentifyServo, servos: Servos, found: d
     assert path is not None
     known = {joint: (servos.known.servo(joint, ""), fit) for joint, fit in found.items()}
     text = servo_function(Path(servos.robot).name, known, [log.name for log in servos.logs])
-    write_text(path, text, "--write", force=options.force, read=files_read(options))
+    write_text(path, text, "--write", force=options.force, read=files_of(options))
     page.print(Text(f"written to {path}: the servos as a Python file"), soft_wrap=True)
 
 
@@ -153,7 +153,7 @@ def _folder(options: IdentifyServo) -> ResultsFolder | None:
     if options.out is None:
         return None
     command = command_of("servo", options, "log", ("out", "force", "json", "write_mjcf", "write", "watching"), absolute=True)
-    folder = ResultsFolder(options.out, "servo", command, options.force, files_read(options))
+    folder = ResultsFolder(options.out, "servo", command, options.force, files_of(options))
     folder.check()
     return folder
 

@@ -5,7 +5,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from idbench.experiments.cli.options.view import View
+from idbench.experiments.cli.options.tools import View
 from idbench.experiments.cli.page import new_page
 from idbench.experiments.errors import ExperimentError, ResultsError
 from idbench.experiments.recording.comparison_recording import compare

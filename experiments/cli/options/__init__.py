@@ -2,21 +2,7 @@
 
 from importlib import import_module
 
-FILES = (
-    "run",
-    "identify",
-    "view",
-    "paper",
-    "log",
-    "robot",
-    "excite",
-    "loads",
-    "servo",
-    "study",
-    "benchmark",
-    "scenario",
-    "authors",
-)
+FILES = ("jobs", "tools")
 """Each registers its commands, in the order of the help: first those that people need first."""
 
 for _file in FILES:

@@ -13,7 +13,7 @@ DEFINITION = """
 title = "A SCARA"
 fit = ["one.parquet", "two.parquet"]
 held_out = ["new.parquet"]
-options = "--robot scara --model explicit"
+identify = {robot = "scara", model = "explicit"}
 """
 
 

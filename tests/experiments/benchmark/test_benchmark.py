@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -9,10 +10,11 @@ import numpy as np
 import pytest
 
 from idbench.experiments.benchmark.definition import SHIPPED, read_definition, shipped
+from idbench.experiments.benchmark.files import files_of
+from idbench.experiments.benchmark.set_row import set_row
 from idbench.experiments.benchmark.tables import share
 from idbench.experiments.benchmark.tools import prepared
 from idbench.experiments.cli import main
-from idbench.experiments.cli.commands.benchmark_set import set_row
 from idbench.identify import MotionLog, TorqueChannel
 from idbench.identify.files.log_file import write_log
 from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
@@ -125,8 +127,8 @@ def test_samples_are_counted_before_they_are_resampled(scara_set, scara_logs, tm
         head = "t,q1,q2,tau1,tau2"
         np.savetxt(scara_set / f"{name}.csv", rows, delimiter=",", header=head, comments="")
     text = (scara_set / "benchmark.toml").read_text().replace(".parquet", ".csv")
-    more = "--robot scara --torque held --torque-delay 0 --resample"
-    (scara_set / "benchmark.toml").write_text(text.replace("--robot scara", more))
+    more = 'robot = "scara", torque = "held", torque_delay = 0, resample = true'
+    (scara_set / "benchmark.toml").write_text(text.replace('robot = "scara"', more))
     assert main(["benchmark", "arm", "--out", "found"]) == 0
     log = row_of(tmp_path / "found")["logs"][0]
     # Nine tenths of the rows of each are kept, by chance: four fifths are in both.
@@ -138,9 +140,13 @@ def test_samples_are_counted_before_they_are_resampled(scara_set, scara_logs, tm
     [
         ("fitt = []", "fit"),
         ("fit = []", "at least one log"),
-        ('options = "--out x"', "--out"),
-        ('options = "--robto scara"', "--robto"),
-        ('options = "--robot \\"scara"', "quotation"),
+        ('identify = {out = "x"}', "unknown key 'out'"),
+        ('identify = {log = "x.csv"}', "unknown key 'log'"),
+        ('identify = {robto = "scara"}', "unknown key 'robto' (did you mean 'robot'?)"),
+        ('identify = {robot = "scara", cutoff = "fast"}', "cutoff = 'fast': must be a valid number"),
+        ('identify = {robot = "scara", torque = "late"}', "torque = 'late': must be 'held', 'instantaneous' or 'averaged'"),
+        ('servo = {robot = "scara"}', "give one table, [identify] or [servo]"),
+        ('options = "--robot \\"scara"', "write identify = {...} instead"),
         ('held_out = ["gone.csv"]\nget = "ask them"', "gone.csv; get the data with: ask them"),
         ("free_run = -1.0", "free_run"),
         ("title = 3", "title"),
@@ -155,6 +161,76 @@ def test_wrong_definitions_are_refused_by_name(scara_set, tmp_path, monkeypatch,
     said = capfd.readouterr().err
     assert words in said
     assert "Traceback" not in said
+
+
+CODE = [
+    'options = "--robot scara --model evil:X"',
+    'options = "--robot scara --chain os:abort"',
+    'options = "--robot scara --chain=evil:X"',
+    'options = ["--chain", "evil:X"]',
+    'options = "--robot scara"\nidentify = {robot = "scara"}',
+    *(
+        f'identify = {{robot = "scara", {key} = "{name}"}}'
+        for key in ("model", "chain", "estimator")
+        for name in ("evil:X", "evil")
+    ),
+    'identify = {robot = "scara", model = ["evil:X"]}',
+    *(
+        f'identify = {{robot = "scara", {key} = "{law}"}}'
+        for key in ("friction", "add")
+        for law in ("evil:X", "standard+evil:X")
+    ),
+    'identify = {robot = "scara", friction = ["1=evil:X"]}',
+    'identify = {robot = "scara", balancer = "evil:X"}',
+    'identify = {robot = "evil:X"}',
+    'identify = {robot = "scara", chain_file = "chain.toml"}',
+    'identify = {robot = "scara", loop = "evil:X"}',
+    'servo = {robot = "evil:X", servo = "evil:X"}',
+]
+"""Every spelling of code that a set could try."""
+
+
+@pytest.mark.parametrize("change", CODE)
+def test_a_set_names_no_code(scara_set, tmp_path, monkeypatch, capfd, change):
+    """A module beside the set, and on the search path, is not imported, whatever the set says."""
+    monkeypatch.chdir(scara_set)
+    monkeypatch.syspath_prepend(str(scara_set))
+    (scara_set / "evil.py").write_text("raise SystemExit('evil ran')\n")
+    (scara_set / "chain.toml").write_text('chain = "evil:X"\n')
+    kept = (scara_set / "benchmark.toml").read_text().replace('identify = {robot = "scara", model = "explicit"}\n', "")
+    (scara_set / "benchmark.toml").write_text(f"{kept}{change}\n")
+    assert main(["benchmark", str(scara_set), "--out", str(tmp_path / "found")]) == 2
+    captured = capfd.readouterr()
+    assert "evil ran" not in captured.err + captured.out
+    assert "evil" not in sys.modules
+    assert "Traceback" not in captured.err
+
+
+def test_a_set_of_before_is_told_the_line_that_replaces_its_options(scara_set, tmp_path, complaint):
+    old = 'options = "--robot scara --armature all --add offset --gravity 0 0 9.81 --cutoff 3 --resample"\n'
+    kept = (scara_set / "benchmark.toml").read_text().replace('identify = {robot = "scara", model = "explicit"}\n', old)
+    (scara_set / "benchmark.toml").write_text(kept)
+    said = complaint("benchmark", str(scara_set), "--out", str(tmp_path / "found"))
+    line = 'identify = {robot = "scara", armature = "all", add = "offset", gravity = [0.0, 0.0, 9.81], '
+    line += "cutoff = 3.0, resample = true}"
+    assert f"write {line} instead" in said
+    (scara_set / "benchmark.toml").write_text(kept.replace(old, f"{line}\n"))
+    _ = read_definition(scara_set)
+
+
+def test_a_row_follows_from_the_files_that_its_files_name(scara_set):
+    """A robot in a subfolder, what it includes, and its meshes: another file is another row."""
+    inner = scara_set / "robots" / "parts"
+    inner.mkdir(parents=True)
+    (scara_set / "robots" / "arm.xml").write_text(
+        '<mujoco><compiler meshdir="parts"/><include file="parts/body.xml"/></mujoco>'
+    )
+    (inner / "body.xml").write_text('<mujoco><asset><mesh file="hand.stl"/></asset></mujoco>')
+    (inner / "hand.stl").write_text("a mesh")
+    text = (scara_set / "benchmark.toml").read_text().replace('robot = "scara"', 'robot = "robots/arm.xml"')
+    (scara_set / "benchmark.toml").write_text(text)
+    names = {path.name for path in files_of(scara_set, read_definition(scara_set))}
+    assert {"arm.xml", "body.xml", "hand.stl", "one.parquet", "new.parquet", "benchmark.toml"} <= names
 
 
 def test_one_set_that_fails_leaves_the_others(scara_set, tmp_path, monkeypatch, capfd):
@@ -238,7 +314,7 @@ def test_a_row_is_made_again_when_its_data_change_and_repeats_keep_the_delay(sca
         write_log(late, scara_set / "data" / f"{name}.parquet")
     (scara_set / "benchmark.toml").write_text(
         'title = "late"\nfit = ["data/one.parquet", "data/two.parquet"]\nheld_out = ["data/new.parquet"]\n'
-        'options = "--robot scara --model explicit --torque-delay estimate"\nfree_run = 0.2\n'
+        'identify = {robot = "scara", model = "explicit", torque_delay = "estimate"}\nfree_run = 0.2\n'
     )
     assert main(["benchmark", "arm", "--out", "found"]) == 0
     row = row_of(tmp_path / "found")

@@ -13,10 +13,9 @@ from idbench.sim.scenario.scenario_file import load, to_toml
 
 DEFINITION = """
 title = "A servo"
-command = "servo"
 fit = ["fit-*.parquet"]
 held_out = ["new.parquet"]
-options = "--robot pendulum --servo servo.toml --friction coulomb"
+servo = {robot = "pendulum", servo = "servo.toml", friction = "coulomb"}
 """
 
 
@@ -35,8 +34,8 @@ def test_patterns_name_the_logs_that_are_there(tmp_path):
     ("change", "said"),
     [
         (('held_out = ["new.parquet"]', ""), "name a second log, or held_out"),
-        (("--friction coulomb", "--armature all"), "armature"),
-        (('command = "servo"', 'command = "servos"'), "command"),
+        (('friction = "coulomb"', 'armature = "all"'), "armature"),
+        (("servo = {", "servos = {"), "servos"),
         (('"fit-*.parquet"', '"other-*.parquet"'), "has no other-*.parquet"),
     ],
 )

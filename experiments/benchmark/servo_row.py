@@ -1,35 +1,33 @@
 """A set of servos, as a benchmark identifies it: positions of held-out logs, simulated from their commands alone."""
 
 import time
-from collections.abc import Callable, Mapping
-from contextlib import chdir
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from idbench.experiments.benchmark.definition import FILE, IN_FOLDER, Definition
-from idbench.experiments.cli.app import parsed
-from idbench.experiments.cli.commands.servo_inputs import held_of, servos_of
-from idbench.experiments.cli.options.servo import IdentifyServo
+from idbench.experiments.benchmark.definition import FILE, Definition
+from idbench.experiments.benchmark.row import Made
 from idbench.experiments.errors import ExperimentError
+from idbench.experiments.requests.jobs import ServoRequest
 from idbench.experiments.results.writing import finite
 from idbench.experiments.servo.identification import Servos, summary_of
+from idbench.experiments.servo.job import held_of, servos_of
 from idbench.experiments.servo.servo_text import verdicts
 from idbench.identify import Array
 from idbench.identify.servo import ServoFit
 from idbench.identify.servo.choice import FrictionChoice
 
 
-def servos_identified(folder: Path, definition: Definition, out: Path) -> tuple[dict[str, Any], Callable[[Path], None]]:
+def servo_row(folder: Path, definition: Definition, out: Path) -> Made:
     """Return the row of a set, and what writes the files of other tools into a folder: nothing."""
     del out
     if not definition.held_out and len(definition.fit) < 2:
         raise ExperimentError(f"{FILE}: name a second log, or held_out: one alone says nothing of others")
-    begin = time.perf_counter()
-    with IN_FOLDER, chdir(folder):
-        command = _command(definition)
-        servos, others = servos_of(command)
+    begin, command = time.perf_counter(), definition.request(folder)
+    assert isinstance(command, ServoRequest)
+    servos, others = servos_of(command)
     assert others is not None
     every = dict(servos.identified(command.friction, command.find, held_of(command, servos.links.joints)))
     fits = {joint: found for joint, result in every.items() if isinstance(found := _fit(result), ServoFit)}
@@ -59,14 +57,6 @@ def servos_identified(folder: Path, definition: Definition, out: Path) -> tuple[
 
 def _nothing(folder: Path) -> None:
     """Write no files: what other tools of servos read differs from tool to tool."""
-
-
-def _command(definition: Definition) -> IdentifyServo:
-    held_out = ["--validate", *definition.held_out] if definition.held_out else []
-    command = parsed(["servo", *definition.fit, *definition.words, *held_out])
-    if not isinstance(command, IdentifyServo) or command.log != tuple(map(Path, definition.fit)):
-        raise ExperimentError(f"{FILE}: options = {definition.options!r:.60} must be options of `idbench servo`, no logs")
-    return command
 
 
 def _fit(result: ServoFit | FrictionChoice | str) -> ServoFit | str:

@@ -1,11 +1,11 @@
-"""What the command that identifies servos reads."""
+"""The job `servo`: a request becomes servos with their logs, what is known of them, and fits joint by joint."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
-from idbench.experiments.cli.options.servo import IdentifyServo
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import absolute
+from idbench.experiments.requests.jobs import ServoRequest
 from idbench.experiments.servo.identification import AUTO, Servos
 from idbench.identify import SettingError
 from idbench.identify.files.servo_log import ServoColumns, ServoFile, order, read_servo_log
@@ -15,33 +15,33 @@ from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.sim.robot.robot import Robot
 
 
-def servos_of(options: IdentifyServo) -> tuple[Servos, Servos | None]:
+def servos_of(asked: ServoRequest) -> tuple[Servos, Servos | None]:
     """Return the servos with the logs of the fit, and with those that it does not see."""
-    for name, given in (("--robot", options.robot), ("--servo", options.servo)):
+    for name, given in (("--robot", asked.robot), ("--servo", asked.servo)):
         if given is None:
             raise ExperimentError(f"{name} is missing; see idbench servo --help")
-    if not options.log:
+    if not asked.log:
         raise ExperimentError("name the logs of commands and positions")
-    if options.friction not in (*SERVO_FRICTIONS, AUTO):
-        raise ExperimentError(f"--friction {options.friction} is unknown; known: {', '.join(SERVO_FRICTIONS)}, {AUTO}")
-    assert options.robot is not None
-    assert options.servo is not None
-    known, mounting = ServoFile.read(options.servo), options.mounting.mounting
-    logs, held = options.log, options.validate
+    if asked.friction not in (*SERVO_FRICTIONS, AUTO):
+        raise ExperimentError(f"--friction {asked.friction} is unknown; known: {', '.join(SERVO_FRICTIONS)}, {AUTO}")
+    assert asked.robot is not None
+    assert asked.servo is not None
+    known, mounting = ServoFile.read(asked.servo), asked.mounting.mounting
+    logs, held = asked.log, asked.validate
     if not held and len(logs) > 1:
         logs, held = logs[:-1], logs[-1:]
-    servos = Servos(absolute(options.robot), mounting, known, {})
-    made = servos.of_logs({path: _ordered(path, options, servos.links.joints) for path in logs})
-    others = {path: _ordered(path, options, servos.links.joints) for path in held}
+    servos = Servos(absolute(asked.robot), mounting, known, {})
+    made = servos.of_logs({path: _ordered(path, asked, servos.links.joints) for path in logs})
+    others = {path: _ordered(path, asked, servos.links.joints) for path in held}
     return made, servos.of_logs(others) if others else None
 
 
-def held_of(options: IdentifyServo, joints: Sequence[str]) -> dict[str, dict[str, float]]:
+def held_of(asked: ServoRequest, joints: Sequence[str]) -> dict[str, dict[str, float]]:
     """Return the parameters that are known, by joint: what names a joint goes before what names none."""
     try:
-        values = {name: float(value) for name, value in _stated("--hold", options.hold).items()}
+        values = {name: float(value) for name, value in _stated("--hold", asked.hold).items()}
     except ValueError:
-        raise ExperimentError(f"--hold {' '.join(options.hold)}: give letters and numbers, such as a=0.5") from None
+        raise ExperimentError(f"--hold {' '.join(asked.hold)}: give letters and numbers, such as a=0.5") from None
     split = {name: name.rpartition(".") for name in values}
     if unknown := [joint for joint, _, _ in split.values() if joint and joint not in joints]:
         raise ExperimentError(f"--hold {unknown[0]}: no such joint; joints are {', '.join(joints)}")
@@ -58,14 +58,14 @@ def held_of(options: IdentifyServo, joints: Sequence[str]) -> dict[str, dict[str
     }
 
 
-def files_read(options: IdentifyServo) -> tuple[Path, ...]:
+def files_of(asked: ServoRequest) -> tuple[Path, ...]:
     """Return the files that are read, which nothing may be written over."""
-    robot = [] if options.robot is None else [Robot.path(options.robot)]
-    return (*robot, *([options.servo] if options.servo else []), *options.log, *options.validate)
+    robot = [] if asked.robot is None else [Robot.path(asked.robot)]
+    return (*robot, *([asked.servo] if asked.servo else []), *asked.log, *asked.validate)
 
 
-def _ordered(path: Path, options: IdentifyServo, joints: Sequence[str]) -> ServoColumns:
-    columns = read_servo_log(path, _stated("--columns", options.columns), _stated("--units", options.units))
+def _ordered(path: Path, asked: ServoRequest, joints: Sequence[str]) -> ServoColumns:
+    columns = read_servo_log(path, _stated("--columns", asked.columns), _stated("--units", asked.units))
     place = order(columns, joints, path)
     on, voltage = (None if x is None else x[:, place] for x in (columns.on, columns.voltage))
     return ServoColumns(columns.t, columns.q[:, place], columns.command[:, place], on, voltage, tuple(joints))

@@ -1,19 +1,19 @@
 """One set of a benchmark, as a worker makes it: read, fitted, judged, saved."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from idbench.experiments.benchmark.definition import read_definition
+from idbench.experiments.benchmark.definition import Definition, read_definition
 from idbench.experiments.benchmark.files import files_of, kept_row, made_of_files, require_files
-from idbench.experiments.cli.commands.benchmark_identify import identified
-from idbench.experiments.cli.commands.benchmark_servo import servos_identified
+from idbench.experiments.benchmark.row import Made, identified_row
+from idbench.experiments.benchmark.servo_row import servo_row
 from idbench.experiments.errors import ExperimentError, ResultsError, reason
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.writing import write_summary
 
-COMMANDS: Mapping[str, Any] = {"identify": identified, "servo": servos_identified}
-"""What makes the row of a set, by the command of its definition: of folder, definition and results."""
+ROWS: Mapping[str, Callable[[Path, Definition, Path], Made]] = {"identify": identified_row, "servo": servo_row}
+"""What makes the row of a set, by the name of its request: of folder, definition and results."""
 
 
 def set_row(folder: Path, out: Path, force: bool) -> dict[str, Any]:
@@ -33,7 +33,7 @@ def set_row(folder: Path, out: Path, force: bool) -> dict[str, Any]:
         return kept
     results = ResultsFolder(out, "benchmark-set", f"idbench benchmark {folder.name}", force, files_of(folder, definition))
     with results.held():
-        made, write = COMMANDS[definition.command](folder, definition, out)
+        made, write = ROWS[definition.job](folder, definition, out)
         row = {"set": folder.name, **made, "made_of": made_of}
         try:
             with results.complete() as hidden:

@@ -1,0 +1,172 @@
+"""Options of the commands that do a job: its request, and where the results go."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar, final
+
+from idbench.experiments.cli.app import command
+from idbench.experiments.cli.command import Command
+from idbench.experiments.recording.audience import Watching
+from idbench.experiments.requests import jobs
+from idbench.experiments.requests.words import File, Files, Folder, Json, Seconds, Window
+
+
+@dataclass(frozen=True, kw_only=True)
+class WrittenOptions:
+    """Where results go."""
+
+    out: Folder = None
+    """Folder for the results."""
+    force: bool = False
+    """Replace existing files, including results of other commands."""
+    json: Json = False
+    """Print summary and warnings as JSON; human-readable text goes to the error stream."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordedOptions(WrittenOptions):
+    """Where results go, and how they are watched."""
+
+    watching: Watching = Watching()  # noqa: RUF009  # frozen
+    """Live viewing and recording."""
+
+
+@command("run")
+@final
+@dataclass(frozen=True, kw_only=True)
+class Run(jobs.RunRequest, RecordedOptions, Command, action="run:run"):
+    """Simulate a scenario in closed loop, identify it with all models, and record it."""
+
+    out: Folder = None
+    """Folder for summary.json, recording.rrd, log.parquet and scenario.toml. Default: runs/<scenario>."""
+    inner: Window = None
+    """Interval [s] in which signals inside the control loop are recorded at the full rate of the drive, such as 10 10.5."""
+    yes: bool = False
+    """Allow more than a thousand million physics steps."""
+
+
+@command("identify")
+@final
+@dataclass(frozen=True, kw_only=True)
+class Identify(jobs.IdentifyRequest, RecordedOptions, Command, action="identify:identify"):
+    """Identify a log, or several logs in one fit: columns t, q1, ..., tau1, ... in SI units, or as log.toml states."""
+
+    essential: ClassVar[tuple[str, ...]] = (
+        "log", "robot", "torque", "torque_delay", "friction", "armature", "resample", "estimator", "validate", "write", "out",
+    )  # fmt: skip
+    """Options of the short help."""
+
+    follow: Seconds = None
+    """Identify a CSV log while it is being written, until it has not grown for this time, then as a whole. --live or --serve
+    show estimates and residuals as they develop."""
+    write_mjcf: File = None
+    """Write the robot's MJCF file with the identified inertias, armatures and frictions of the first model, made physically
+    consistent (extra `consistent`)."""
+    write: Files = ()
+    """Files to write: .urdf or .xml, the identified robot; .json, base parameters with covariance and regressor; .py, the
+    inverse dynamics as a function that needs only NumPy."""
+
+
+@command("table1")
+@final
+@dataclass(frozen=True, kw_only=True)
+class Table1(jobs.Table1Request, RecordedOptions, Command, action="paper:compare"):
+    """Reproduce the paper's simulation comparison (Table 1) and record it."""
+
+    out: Folder = None
+    """Folder for summary.json, recording.rrd and log.parquet. Default: runs/table1."""
+
+
+@command("table2")
+@final
+@dataclass(frozen=True, kw_only=True)
+class Table2(jobs.Table2Request, RecordedOptions, Command, action="paper:table2"):
+    """Repeat the paper's experiment (Table 2) on the virtual robot, and attribute its errors; takes two minutes."""
+
+    out: Path = Path("runs/table2")
+    """Folder for summary.json, recording.rrd and the logs of the realizations."""
+    inner: Window = None
+    """Interval [s] in which signals inside the control loop are recorded at the full rate of the drive, such as 10 10.5."""
+
+
+@command("search")
+@final
+@dataclass(frozen=True, kw_only=True)
+class Search(Command, action="paper:search"):
+    """Search a trajectory with the paper's condition numbers. (`idbench excite` designs better ones.)"""
+
+    seed: int = 0
+    """The same seed gives the same trajectory."""
+    out: File = None
+    """Scenario file (TOML) to write. Default: print it."""
+    force: bool = False
+    """Replace an existing file."""
+
+
+@command("excite")
+@final
+@dataclass(frozen=True, kw_only=True)
+class Excite(jobs.ExciteRequest, RecordedOptions, Command, action="excite:excite"):
+    """Design an exciting trajectory within the robot's limits."""
+
+    out: Folder = None
+    """Folder for motion.csv, scenario.toml, summary.json, report.html and recording.rrd. Default: runs/excited-<robot>."""
+
+
+@command("payload")
+@final
+@dataclass(frozen=True, kw_only=True)
+class IdentifyPayload(jobs.PayloadRequest, WrittenOptions, Command, action="loads:payload"):
+    """Identify what the gripper holds: mass, first moments, inertia, from logs with it and logs without it."""
+
+    write_mjcf: File = None
+    """Write the robot's file with the payload as a physically consistent body."""
+
+
+@command("gains")
+@final
+@dataclass(frozen=True, kw_only=True)
+class IdentifyGains(jobs.GainsRequest, WrittenOptions, Command, action="loads:gains"):
+    """Identify the torque constants of the drives, gears included, from logs of currents with and without a known payload.
+
+    Currents are read with --gain as a first guess, or with 1.
+    """
+
+
+@command("servo")
+@final
+@dataclass(frozen=True, kw_only=True)
+class IdentifyServo(jobs.ServoRequest, RecordedOptions, Command, action="servo:servo"):
+    """Identify position-controlled joints (Feetech, Dynamixel) from commands and positions alone; write them for MuJoCo."""
+
+    write_mjcf: File = None
+    """Write the robot's MJCF file with these servos as `dcmotor` actuators, and measure it on a log in plain MuJoCo."""
+    write: File = None
+    """Write the servos as a Python file (class `Servo`), for your own simulator."""
+    position: bool = False
+    """Write `position` actuators instead, for older versions of MuJoCo."""
+
+
+@command("study")
+@final
+@dataclass(frozen=True, kw_only=True)
+class Study(jobs.StudyRequest, RecordedOptions, Command, action="study:study"):
+    """Run a study: simulate a scenario over a grid and many seeds, and identify each run. Without a name: list the studies."""
+
+    out: Folder = None
+    """Folder of the study. Default: runs/<study>."""
+    yes: bool = False
+    """Allow more than a hundred thousand runs."""
+
+
+@command("benchmark")
+@final
+@dataclass(frozen=True, kw_only=True)
+class Benchmark(jobs.BenchmarkRequest, WrittenOptions, Command, action="benchmark:benchmark"):
+    """Identify sets of real logs, and judge each on logs that it was not fitted to. Without a name: list the sets."""
+
+    out: Folder = None
+    """Folder of the results. Rows that it has already, of the same definition, files and version, are not made again. Torques
+    that other tools have put there (predicted-TOOL.npz) are judged. Default: runs/benchmark."""
+    force: bool = False
+    """Make all rows again, and replace files that idbench did not write."""

@@ -1,0 +1,154 @@
+"""Options of the commands that show and prepare."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal, final
+
+from idbench.experiments.cli.app import command
+from idbench.experiments.cli.command import Command
+from idbench.experiments.requests.shared import ColumnOptions, MountingOptions, Parameters
+from idbench.experiments.requests.words import Delay, File, Folder, Hertz, Json, Log, ThisRobot, ThisScenario, Torque, Word
+
+
+@command("view")
+@final
+@dataclass(frozen=True)
+class View(Command, action="view:view"):
+    """Open the recording of a results folder in the rerun viewer, or overlay those of several."""
+
+    folders: Annotated[tuple[Path, ...], Word("DIR|FILE", positional=True)] = ()
+    """Results folders, or a recording (.rrd). Default: the latest of runs/."""
+    tab: str = ""
+    """Tab to show first: overview, friction, drive, filters, noise, excitation, parameters, iterations, torques, compare, study
+    or table2."""
+    save: File = None
+    """Write the recording and its layers to one file (.rrd) instead of opening them."""
+    force: bool = False
+    """Replace an existing file."""
+
+
+@command("log")
+@final
+@dataclass(frozen=True)
+class ShowLog(Command, action="log:show_log"):
+    """Show the contents of a log: columns, units, rate, clock, ranges, noise, encoders. Needs no robot."""
+
+    log: Log
+    """The file: CSV and other text, Parquet, NumPy, Matlab, a ROS bag; or its log.toml."""
+    reading: ColumnOptions = ColumnOptions()  # noqa: RUF009  # frozen
+    """What the columns are; guessed from names and values if not stated."""
+    write: bool = False
+    """Write this description to NAME.toml beside the log, to be corrected. Other commands read the log as it states."""
+    picture: File = None
+    """Write a picture (PNG or SVG): motion, torques, spectra, time steps."""
+    force: bool = False
+    """Guess again and replace an existing description."""
+    json: Json = False
+    """Print as JSON; human-readable text goes to the error stream."""
+
+
+@command("resample")
+@final
+@dataclass(frozen=True)
+class Resample(Command, action="resample:resample"):
+    """Resample a log at a fixed frequency and repair its clock: repeated rows, jitter, missing samples, gaps."""
+
+    log: Log
+    """The log, with arbitrary time steps."""
+    out: Path
+    """File to write, CSV or Parquet. A log with gaps becomes several numbered files."""
+    fs: Hertz = None
+    """Sampling frequency [Hz]. Default: that of the log."""
+    reading: ColumnOptions = ColumnOptions()  # noqa: RUF009  # frozen
+    """What the columns are."""
+    torque: Torque = None
+    """What a torque sample means. Required unless the file states it. A held torque becomes averaged."""
+    torque_delay: Delay = None
+    """Delay from a sample to the torque that it stands for, in seconds."""
+    force: bool = False
+    """Replace an existing file."""
+
+
+@command("export")
+@final
+@dataclass(frozen=True)
+class Export(Command, action="resample:export"):
+    """Write the logs of a results folder as CSV."""
+
+    folder: Log
+    """Results folder, such as runs/table2."""
+    out: Folder = None
+    """Folder to write to. Default: the results folder."""
+    force: bool = False
+    """Replace existing files."""
+
+
+@command("robot")
+@final
+@dataclass(frozen=True)
+class DescribeRobot(Command, action="robot:describe"):
+    """Show what is identifiable: joints, base parameters, and a torque budget."""
+
+    name: ThisRobot
+    """Name of a shipped robot, or its file: MJCF, URDF, or a table of Denavit-Hartenberg parameters (.toml)."""
+    json: Json = False
+    """Print joints and parameters as JSON; human-readable text goes to the error stream."""
+    parameters: Parameters = Parameters()  # noqa: RUF009  # frozen
+    """Which parameters are identified."""
+    mounting: MountingOptions = MountingOptions()  # noqa: RUF009  # frozen
+    """How the robot is mounted."""
+
+
+@command("scenario")
+@final
+@dataclass(frozen=True)
+class WriteScenario(Command, action="scenario:write"):
+    """Write a scenario to a file, with every setting explained. Without a name: list the shipped scenarios."""
+
+    name: ThisScenario = None
+    """Name of a scenario, or a file."""
+    out: File = None
+    """File (TOML) to write. Default: print it."""
+    force: bool = False
+    """Replace an existing file."""
+
+
+@command("new")
+@final
+@dataclass(frozen=True)
+class New(Command, action="authors:begin"):
+    """Create a scenario, a study, a plug-in package (templates that run), an example arm with logs, or a set of public logs."""
+
+    what: Annotated[Literal["scenario", "study", "plugin", "example", "set"], Word(positional=True)]
+    """What to create. Of a set, of those that `idbench benchmark` lists, it is the definition; it says how to get the logs."""
+    name: Annotated[str, Word(positional=True)]
+    """Its name."""
+    kind: Annotated[str, Word("KIND")] = "estimator"
+    """Kind of plug-in: estimator, block (an identified friction law), friction (of the simulated robot), trajectory,
+    controller, drive or encoder."""
+    like: Annotated[str, Word("SCENARIO")] = "ideal"
+    """Scenario to copy."""
+    out: File = None
+    """File or folder to write. Default: NAME.toml, or NAME."""
+
+
+@command("check")
+@final
+@dataclass(frozen=True)
+class Check(Command, action="authors:check"):
+    """Check whether a plug-in satisfies the contract of its kind."""
+
+    plugin: Annotated[str, Word(positional=True)]
+    """Its name in `idbench list`, with its table if ambiguous (drives/ideal); or MODULE:CLASS."""
+    json: Json = False
+    """Print the checks and their results as JSON; human-readable text goes to the error stream."""
+
+
+@command("list")
+@final
+@dataclass(frozen=True)
+class List(Command, action="list:list_plugins"):
+    """List all parts that can be combined, built-in and plug-ins."""
+
+    json: Json = False
+    """Print as JSON."""

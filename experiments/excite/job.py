@@ -1,0 +1,153 @@
+"""The job `excite`: a request becomes a design, and that an exciting motion, or a sequence of them."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.excite.design import Design
+from idbench.experiments.excite.excited import Excited
+from idbench.experiments.excite.sequence import MotionSequence
+from idbench.experiments.identification.reading import ReadOptions, file_of, read
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.robot_model import RobotModel, absolute
+from idbench.experiments.requests.jobs import ExciteRequest
+from idbench.identify import MotionLog, TorqueChannel
+from idbench.sim.encoders import IncrementalEncoder
+from idbench.sim.limits.motion_limits import MotionLimits, limits_of
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.measurement import TorqueMeasurement
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.scenario.scenario_file import load
+
+LONGEST, FASTEST = 3600.0, 10000.0
+"""Time of a motion, repeated [s], and sampling frequency [Hz] above which they are taken for a slip."""
+
+BITS, TORQUE_NOISE, QUIET, LOUD = 17.0, (0.05,), 1e-6, 1e6
+"""Noise without a scenario: resolution of the encoders [bits], rms of the torques [N m]; and the least and most of that."""
+
+
+def excited(asked: ExciteRequest, progress: Callable[[float], None]) -> tuple[Excited, MotionSequence | None]:
+    """Return the motion that is designed, the last of a sequence where one is asked for, and that sequence.
+
+    Raises
+    ------
+    ExperimentError, IdentificationError, BenchError
+        If something is wrong with the request, or no motion keeps the limits.
+    """
+    design, share = designed(asked), _percent(asked.until)
+    if not share:
+        return Excited.of(design, progress), None
+    sequence = MotionSequence.of(design, share, progress)
+    return sequence.last, sequence
+
+
+def files_of(asked: ExciteRequest) -> tuple[Path, ...]:
+    """Return the files that are read, which nothing may be written over."""
+    return (Robot.path(asked.robot), *asked.log, *([asked.limits] if asked.limits else []))
+
+
+def designed(asked: ExciteRequest) -> Design:
+    """Return what is asked for, checked."""
+    if asked.fs is not None:
+        _require_between("fs", asked.fs, 10, FASTEST)
+    scenario = _scenario(asked)
+    _require_between("duration", asked.duration, 0, LONGEST)
+    _require_between("frequency", asked.frequency, 0, scenario.fs / 4)
+    _require_between("repeat", asked.repeat, 1, max(1.0, LONGEST // asked.duration))
+    if asked.seed < 0:
+        raise ExperimentError(f"--seed {asked.seed} must be at least 0")
+    if asked.until is not None and asked.log:
+        raise ExperimentError("--until simulates its own logs: leave --log out")
+    robot_model, limits = RobotModel(absolute(asked.robot), asked.parameters), _limits(asked)
+    limits_of(robot_model.robot, limits)  # what is missing is said before the parameters are grouped
+    robot_model.require_linear()
+    if len(asked.torque_noise) not in (0, 1, robot_model.robot.n):
+        count = len(asked.torque_noise)
+        raise ExperimentError(
+            f"--torque-noise has {count} values for {robot_model.robot.n} joints: give one for all, or one per joint"
+        )
+    return Design(
+        robot=absolute(asked.robot),
+        scenario=scenario,
+        kind=asked.kind,
+        duration=asked.duration,
+        frequency=asked.frequency,
+        asked=limits,
+        repeat=asked.repeat,
+        seed=asked.seed,
+        weights=_weights(asked.weigh),
+        criterion=asked.criterion,
+        logs=tuple(_log(path, robot_model) for path in asked.log),
+        parameters=asked.parameters,
+    )
+
+
+def _require_between(name: str, value: float, least: float, most: float) -> None:
+    if not (least <= value <= most and value > 0):
+        above = f"at least {least:g}" if least else "above 0"
+        raise ExperimentError(f"--{name} {value:g} must be {above} and at most {most:g}")
+
+
+def _limits(asked: ExciteRequest) -> MotionLimits:
+    """Return what a motion must keep: asked before the file of --limits."""
+    limits = MotionLimits.read(asked.limits)
+    for name in ("velocity", "acceleration"):
+        values: tuple[float, ...] = getattr(asked, name)
+        if wrong := [x for x in values if not 0 < x < float("inf")]:
+            raise ExperimentError(f"--{name} {wrong[0]:g} must be a number above 0")
+        if values:
+            limits = replace(limits, **{name: values})  # type: ignore[arg-type]  # of one of these names
+    return limits
+
+
+def _scenario(asked: ExciteRequest) -> Scenario:
+    """Return what says how noisy the log will be, and how the motion is simulated: asked before the scenario's own."""
+    scenario = load(asked.noise or "ideal")
+    bits = asked.encoder_bits if asked.encoder_bits is not None or asked.noise else BITS
+    noise = asked.torque_noise or (() if asked.noise else TORQUE_NOISE)
+    if bits is not None:
+        _require_between("encoder-bits", bits, 4, 40)
+        scenario = replace(scenario, encoder=IncrementalEncoder(lines=(max(1, round(2**bits / 4)),)))
+    if noise:
+        if not all(QUIET <= x <= LOUD for x in noise):
+            given = " ".join(f"{x:g}" for x in noise)
+            raise ExperimentError(f"--torque-noise {given} must be at least {QUIET:g} and at most {LOUD:g} N m")
+        scenario = replace(scenario, torque=TorqueMeasurement(noise=noise))
+    elif not max(scenario.torque.noise):
+        raise ExperimentError(f"scenario {asked.noise} has no torque noise: add --torque-noise, such as 0.05")
+    return scenario if asked.fs is None else replace(scenario, fs=asked.fs)
+
+
+def _weights(given: tuple[str, ...]) -> Mapping[str, float]:
+    """Return weights by the names of parameters; raise ExperimentError if one is no number above 0."""
+    found = dict[str, float]()
+    for text in given:
+        name, _, value = text.partition("=")
+        if name in found:
+            raise ExperimentError(f"--weigh gives {name} twice")
+        try:
+            found[name] = float(value)
+        except ValueError:
+            found[name] = -1.0
+        if not 1e-6 <= found[name] <= 1e6:
+            raise ExperimentError(f"--weigh {text}: give a parameter and a weight from 1e-6 to 1e6, such as LMY2=4")
+    return found
+
+
+def _percent(text: str | None) -> float | None:
+    """Return a share given in percent."""
+    if text is None:
+        return None
+    try:
+        share = float(text.removesuffix("%")) / 100
+    except ValueError:
+        share = -1.0
+    if not 0 < share < 1:
+        raise ExperimentError(f"--until {text}: give a share between 0 and 100 %, such as 0.1%")
+    return share
+
+
+def _log(path: Path, robot_model: RobotModel) -> MotionLog:
+    """Return an earlier log: of its torques nothing counts, so that their meaning is not asked for."""
+    return read(file_of(path), ReadOptions(fallback=TorqueChannel("held")), Request(robot_model)).longest

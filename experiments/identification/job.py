@@ -1,0 +1,127 @@
+"""The job `identify`: a request becomes logs, a fit, and a judgement."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.chain_settings import chain_of
+from idbench.experiments.identification.fit import Fit, fit
+from idbench.experiments.identification.load import Loaded, in_band, load, with_held_out
+from idbench.experiments.identification.log_warnings import warnings_of_log
+from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.reading import ReadOptions, file_of, stated_by
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.robot_model import SCARA, RobotModel, absolute
+from idbench.experiments.requests.jobs import IdentifyRequest
+from idbench.experiments.requests.shared import CHAIN, LogRequest
+from idbench.identify import ESTIMATORS, MODELS, IdentificationError
+from idbench.identify.signals.masks import NoMask
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.scenario_file import load as load_scenario
+
+
+def identified(asked: IdentifyRequest) -> Fit:
+    """Return the fit of the logs of a request; `judge` says how good it is on logs that it was not fitted to.
+
+    Raises
+    ------
+    ExperimentError, IdentificationError, BenchError
+        If something is wrong with the request, its files, or the logs.
+    """
+    return fit_of(*loaded_logs(asked, request_of(asked)))
+
+
+def read_options(asked: LogRequest) -> ReadOptions:
+    """Return how logs are read."""
+    return ReadOptions(asked.torque, asked.torque_delay, asked.unwrap, columns=asked.reading)
+
+
+def request_of(asked: IdentifyRequest) -> Request:
+    """Return what is asked for, checked before any log is read; the robot by default that which the folder of a run states."""
+    if not asked.log:
+        raise ExperimentError("name a log, or several of one fit")
+    for path in (*asked.log, *asked.validate):
+        file_of(path)
+    _require_label(asked.label)
+    robot = stated_by(asked.log[0]).get("robot", SCARA) if asked.robot is None else absolute(asked.robot)
+    own = asked.log[0] / "scenario.toml"
+    loops = asked.loop or ([str(own)] if len(asked.log) == 1 and own.is_file() else [])
+    request = Request(
+        RobotModel(robot, asked.parameters, asked.mounting.mounting),
+        tuple(MODELS) if asked.model in (None, "all") else (asked.model,),
+        asked.chain,
+        asked.estimator,
+        name=asked.label,
+        loops=tuple(map(load_scenario, loops)),
+        start=asked.start,
+        consistent=asked.consistent,
+        mask_speed=asked.mask_speed,
+    )
+    if asked.loop and "loop" not in request.solver.needs:
+        raise ExperimentError(
+            f"--loop: {asked.estimator} simulates no loop; leave it out, or use --estimator IV, DIDIM, CLIE or CLOE"
+        )
+    return _with_chain(asked, request)
+
+
+def files_of(asked: IdentifyRequest) -> tuple[Path, ...]:
+    """Return the files that are read, which nothing may be written over."""
+    logs = [file_of(path).absolute() for path in (*asked.log, *asked.validate)]
+    named = (asked.chain_file, asked.reading.layout, *asked.loop)
+    more = [Path(name) for name in named if name is not None]
+    robot = stated_by(asked.log[0]).get("robot", SCARA) if asked.robot is None else absolute(asked.robot)
+    return (*logs, Robot.path(robot), *(path.absolute() for path in more if path.suffix))
+
+
+def read_logs(asked: IdentifyRequest, request: Request) -> Loaded:
+    """Return the logs of the fit, and the request with the band that suits them."""
+    return load(asked.log, read_options(asked), request, band=_chooses_band(asked))
+
+
+def loaded_logs(asked: IdentifyRequest, request: Request) -> tuple[Request, Logs]:
+    """Return the request with the band that suits the logs, and the logs, those that are held out among them."""
+    loaded = read_logs(asked, request)
+    truth = _truth(stated_by(asked.log[0]), request)
+    return loaded.request, with_held_out(loaded, asked.validate, read_options(asked), truth)
+
+
+def fit_of(request: Request, logs: Logs) -> Fit:
+    """Return the fit of logs; what goes wrong says what is suspicious about them, too."""
+    try:
+        return fit(request, logs)
+    except IdentificationError as error:
+        doubts = dict.fromkeys(doubt for log in logs.fitted for doubt in warnings_of_log(log, request.robot_model.tree))
+        why = f"; what is suspicious: {'; '.join(doubts)}" if doubts else ""
+        raise ExperimentError(f"{error}{why}") from error
+
+
+def _truth(stated: Mapping[str, Any], request: Request) -> dict[str, float] | None:
+    """Return the truth that the folder of a run states, if it is of the same parameters."""
+    truth: dict[str, float] | None = stated.get("truth")
+    return truth if truth and tuple(truth) == request.robot_model.basis.names else None
+
+
+def _chooses_band(asked: IdentifyRequest) -> bool:
+    """Return whether the band is to suit the logs: nothing states it."""
+    return asked.cutoff is None and asked.chain_file is None and asked.chain == CHAIN
+
+
+def _with_chain(asked: IdentifyRequest, request: Request) -> Request:
+    """Return a request with the chain that options and files state."""
+    if asked.chain_file is not None and asked.cutoff is not None:
+        raise ExperimentError("--cutoff and --chain-file both say the band: give one")
+    if asked.chain_file is not None:
+        name, chain = chain_of(asked.chain_file)
+        return replace(request, chain=name, method=(chain, ESTIMATORS.create(request.estimator)))
+    if asked.parameters.armature == "none" and asked.chain == CHAIN and not asked.mask_speed:
+        # Behind the gears next to no friction is left that turns with the velocity: nothing to mask.
+        request = replace(request, method=(replace(request.processing, mask=NoMask()), request.solver))
+    return request if asked.cutoff is None else in_band(request, asked.cutoff)
+
+
+def _require_label(label: str) -> None:
+    if label and (not re.fullmatch(r"[A-Za-z0-9][\w.-]*", label) or label == "inner"):
+        raise ExperimentError(f"--label {label!r} must be of letters, digits, dots, hyphens and underscores, and not 'inner'")

@@ -1,0 +1,182 @@
+"""The jobs `payload` and `gains`: a request becomes logs with a payload and without it, and what follows from them."""
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.friction_choice import chosen_friction, words
+from idbench.experiments.identification.job import read_options
+from idbench.experiments.identification.load import in_band, load
+from idbench.experiments.identification.reading import file_of
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.robot_model import RobotModel, absolute
+from idbench.experiments.loads.judgement import LoadJudgement
+from idbench.experiments.loads.known_load import known_of
+from idbench.experiments.loads.simulated import Pairs
+from idbench.experiments.requests.jobs import GainsRequest, LoadRequest, PayloadRequest
+from idbench.identify import Array, IdentificationError
+from idbench.identify.loads.drive_gains import GainEstimate, identify_drive_gains
+from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot
+from idbench.identify.loads.payload import WAYS, Payload, with_known_robot
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.scenario_file import load as load_scenario
+
+RUNS = 20
+"""Simulated pairs of runs."""
+
+
+@dataclass(frozen=True, eq=False)
+class PayloadFit:
+    """What the gripper holds, by one way or several."""
+
+    judgement: LoadJudgement
+    """The robot with its logs, to be judged."""
+    found: dict[str, Payload | str]
+    """The payload by the name of the way, or why that gives none."""
+    notes: tuple[str, ...]
+    """What was read, done and assumed."""
+
+    @property
+    def leading(self) -> Payload:
+        """The payload by the first way that gives one."""
+        return next(p for p in self.found.values() if isinstance(p, Payload))
+
+
+@dataclass(frozen=True, eq=False)
+class GainsFit:
+    """The torque constants of the drives, gears included."""
+
+    judgement: LoadJudgement
+    """The robot with its logs, to be judged by the gains that were found."""
+    found: GainEstimate
+    """The gains."""
+    given: Array
+    """Those with which the logs were read, shape (joint,)."""
+    notes: tuple[str, ...]
+    """What was read, done and assumed."""
+
+    @property
+    def gains(self) -> Array:
+        """The gains to read logs with: those that the logs show, otherwise the given ones, shape (joint,)."""
+        return np.where(self.found.shown, self.found.gains, self.given)
+
+
+def payload_of(asked: PayloadRequest) -> PayloadFit:
+    """Return what the gripper holds.
+
+    Raises
+    ------
+    ExperimentError, IdentificationError, BenchError
+        If something is wrong with the request or its logs, or no way gives a payload.
+    """
+    if asked.before is not None and asked.unloaded:
+        raise ExperimentError("--before and --unloaded both say what the robot is: give one")
+    judgement, notes = _loaded(asked)
+    robot = judgement.robot
+    if asked.before is None:
+        return PayloadFit(judgement, _by_ways(robot, asked), notes)
+    names, X, C = _before(asked.before)
+    if missing := [name for name in names if name not in robot.robot.names]:
+        raise ExperimentError(
+            f"--before {asked.before} is of another robot, or of other laws of friction: this one has no "
+            f"{', '.join(missing[:3])}"
+        )
+    judgement = replace(judgement, before=dict(zip(names, X.tolist(), strict=True)))
+    return PayloadFit(judgement, {"fixed": with_known_robot(robot, names, X, C)}, notes)
+
+
+def gains_of(asked: GainsRequest) -> GainsFit:
+    """Return the torque constants of the drives.
+
+    Raises
+    ------
+    ExperimentError, IdentificationError, BenchError
+        If something is wrong with the request or its logs.
+    """
+    if asked.known.mass is None:
+        raise ExperimentError("--mass is missing: the gains follow from a payload whose mass is known")
+    judgement, notes = _loaded(asked)
+    robot = judgement.robot
+    found = identify_drive_gains(robot)
+    given = np.broadcast_to(robot.loaded[0].torque.gain, (robot.tree.n,)) * judgement.gain
+    found = replace(found, gains=found.gains * judgement.gain, sigma=found.sigma * judgement.gain)
+    made = GainsFit(judgement, found, given, notes)
+    return replace(made, judgement=judgement.with_gains(made.gains / given))
+
+
+def simulated_pairs(asked: LoadRequest) -> Pairs:
+    """Return simulated runs with the payload of a scenario and without it."""
+    if asked.log or asked.unloaded:
+        raise ExperimentError("--simulate needs no logs: leave them out")
+    scenario = load_scenario(str(asked.simulate))
+    if asked.robot is not None:
+        scenario = replace(scenario, robot=absolute(asked.robot))
+    return Pairs(scenario, RUNS if asked.runs is None else asked.runs, asked.parameters)
+
+
+def files_of(asked: LoadRequest) -> tuple[Path, ...]:
+    """Return the files that are read, which nothing may be written over."""
+    robot = [] if asked.robot is None else [Robot.path(asked.robot)]
+    logs = [file_of(path) for path in (*asked.log, *asked.unloaded)]
+    before = getattr(asked, "before", None)
+    return (*robot, *logs, *([before] if before else ()))
+
+
+def _loaded(asked: LoadRequest) -> tuple[LoadJudgement, tuple[str, ...]]:
+    """Return the robot with its logs, to be judged, and what was done to them."""
+    if not asked.log:
+        raise ExperimentError("name the logs with the payload, or --simulate SCENARIO")
+    if asked.robot is None:
+        raise ExperimentError("--robot is missing: the file that describes the arm, or the name of one that ships")
+    known = known_of(asked.known.mass, asked.known.at, asked.known.inertia)
+    robot_model = RobotModel(absolute(asked.robot), asked.parameters, asked.mounting.mounting)
+    request = Request(robot_model, models=("explicit",), estimator=asked.estimator, mask_speed=asked.mask_speed)
+    if asked.cutoff is not None:
+        request = in_band(request, asked.cutoff)
+    paths, band = (*asked.unloaded, *asked.log), asked.cutoff is None
+    loaded = load(paths, read_options(asked), request, band=band, more=len(LETTERS))
+    request, notes, first = loaded.request, list(loaded.notes), len(asked.unloaded)
+    without, with_it = loaded.logs(slice(first)), loaded.logs(slice(first, None))
+    if robot_model.laws.auto:
+        request, choice = chosen_friction(request, without or with_it)
+        notes += words(choice, request.robot_model.laws.names, robot_model.robot.joints)
+    robot_model = request.robot_model
+    standard = robot_model.grouping.standard
+    robot = LoadedRobot(robot_model.tree, standard, without, with_it, request.processing, request.solver, known)
+    return LoadJudgement(robot, request, loaded.names, np.array(loaded.read[-1].columns.gain or 1.0)), tuple(notes)
+
+
+def _by_ways(robot: LoadedRobot, asked: PayloadRequest) -> dict[str, Payload | str]:
+    """Return the payload by the ways that are asked for, or why one has none; raise if none has."""
+    if not robot.without:
+        raise ExperimentError("give logs without the payload (--unloaded), or the robot as it was identified before (--before)")
+    found = dict[str, Payload | str]()
+    for way in WAYS if asked.way == "all" else (asked.way,):
+        try:
+            found[way] = WAYS[way](robot)
+        except IdentificationError as error:
+            found[way] = str(error)
+    if not any(isinstance(each, Payload) for each in found.values()):
+        raise ExperimentError(str(next(iter(found.values()))))
+    return found
+
+
+def _before(path: Path) -> tuple[tuple[str, ...], Array, Array]:
+    """Return names, values and covariance of base parameters in a file."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        parameters = content["parameters"]
+        names = tuple(str(p["name"]) for p in parameters)
+        X, C = np.array([float(p["value"]) for p in parameters]), np.array(content["covariance"], dtype=np.float64)
+        if C.shape != (len(names),) * 2 or any(p["column"] is None for p in parameters):
+            raise ValueError("no base parameters with their covariance")
+    except OSError as error:
+        raise ExperimentError(f"--before {path}: {error.strerror}") from error
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        raise ExperimentError(
+            f"--before {path} holds no base parameters of an arm ({error}): make it by idbench identify ... --write FILE.json"
+        ) from error
+    return names, X, C

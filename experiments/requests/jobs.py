@@ -1,0 +1,260 @@
+"""The requests, one a job: what Python, the command line, studies and files of sets can ask for."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from idbench.experiments.requests.shared import CHAIN, ESTIMATOR, LogRequest, MountingOptions, Parameters
+from idbench.experiments.requests.words import (
+    Consistency,
+    Count,
+    Each,
+    File,
+    Files,
+    Folder,
+    Letters,
+    Logs,
+    Percent,
+    Real,
+    Robot,
+    Scenario,
+    Scenarios,
+    Six,
+    Start,
+    Texts,
+    ThisRobot,
+    ThisScenario,
+    Url,
+    Vector,
+    Way,
+    Weights,
+    Word,
+)
+
+
+@dataclass(frozen=True)
+class IdentifyRequest(LogRequest):
+    """Identify a log, or several logs in one fit."""
+
+    log: Logs = ()
+    """Log files: CSV and other text, Parquet, NumPy, Matlab, ROS bags. Times must be uniform to 1 %, otherwise use --resample.
+    Or the folder of a run; its recording gets a layer of this identification."""
+    chain: str = CHAIN
+    """Chain of signal processing, or MODULE:NAME of your own."""
+    chain_file: File = None
+    """TOML file with settings of the chain: chain = "idbench", then tables such as [operator] with cutoff = 20.0."""
+    model: str | None = None
+    """all, explicit, implicit, power, or MODULE:CLASS of your own. Default: all; for robots of many joints the screen shows the
+    best one."""
+    loop: Scenarios = ()
+    """Scenario of the control loop of each log, for IV, DIDIM, CLIE and CLOE: robot, motion, controller, timing, drive.
+    Default: that of the run's folder."""
+    start: Start = "least-squares"
+    """Where estimators that simulate or filter start: at the least-squares estimate, or at the robot's file."""
+    consistent: Consistency = "no"
+    """Move estimates to the nearest physically consistent parameters, in the metric of their covariance (extra `consistent`).
+    Unidentifiable parameters are held near the file by the constant pull-back or the entropic distance."""
+    validate: Files = ()
+    """Held-out logs on which the result is validated. Default: the last quarter of the log, predicted by a fit of the rest."""
+    label: str = ""
+    """Name of this identification in a recording. Default: chain and estimator."""
+
+
+@dataclass(frozen=True)
+class KnownOptions:
+    """What is known of the payload."""
+
+    mass: Real = None
+    """Its mass [kg]."""
+    at: Vector = None
+    """Its centre of mass in the frame of the last link [m]."""
+    inertia: Six = None
+    """Its inertia about the centre of mass, in the axes of that frame [kg m^2]."""
+
+
+@dataclass(frozen=True)
+class LoadRequest(LogRequest):
+    """Logs of a robot with a payload, and without it."""
+
+    log: Logs = ()
+    """Logs with the payload."""
+    unloaded: Files = ()
+    """Logs without the payload."""
+    known: KnownOptions = KnownOptions()  # frozen
+    """What is known of the payload."""
+    simulate: Scenario = None
+    """Simulate a scenario with and without its payload instead of reading logs, and compare the result with the true values."""
+    runs: Count = None
+    """Number of simulations. Default: 20."""
+
+
+@dataclass(frozen=True)
+class PayloadRequest(LoadRequest):
+    """Identify what the gripper holds."""
+
+    before: File = None
+    """A robot identified earlier (`idbench identify --write FILE.json`), instead of logs without the payload."""
+    way: Way = "together"
+    """together: all logs in one fit (best); fixed: first the robot, then the payload; apart: two fits, subtracted; difference:
+    of the torques of one repeated motion; all: compare them."""
+
+
+@dataclass(frozen=True)
+class GainsRequest(LoadRequest):
+    """Identify the torque constants of the drives, gears included, with a payload of known mass."""
+
+
+@dataclass(frozen=True)
+class ServoRequest:
+    """Identify position-controlled joints from commands and positions alone."""
+
+    log: Logs = ()
+    """Logs of commands and positions: columns t, q1, ..., command1, ... in SI units; on1, ..., voltage1, ... if logged."""
+    robot: Robot = None
+    """Name of a shipped robot, or its file: MJCF or URDF. Its links, a known mass included, set the scale of all torques."""
+    servo: File = None
+    """servo.toml: model = "STS3215" or gain = 0.166, then kp, supply, duty_limit, counts; [joints.NAME] and [logs."FILE"] for
+    what differs."""
+    friction: Annotated[str, Word("LAW")] = "load"
+    """Friction law: coulomb, stribeck, load, load-stribeck, directional, quadratic, gear; auto compares them, and takes the
+    simplest that no other predicts significantly better."""
+    find: Letters = ()
+    """Further parameters to be found: lead, dead_band, backlash, Mg, Fo."""
+    hold: Texts = ()
+    """Known parameters, of all joints or of one: Ia=0.02 wrist_roll.a=0.5 (N m/V)."""
+    columns: Texts = ()
+    """Names of columns: q=position_* command=goal_* on=torque_enable (* stands for numbers or names of joints)."""
+    units: Texts = ()
+    """Units: t=ms q=deg command=deg."""
+    mounting: MountingOptions = MountingOptions()  # noqa: RUF009  # frozen
+    """How the robot is mounted."""
+    validate: Files = ()
+    """Held-out logs, simulated from their commands alone. Default: the last log, where there are several."""
+
+
+@dataclass(frozen=True)
+class ExciteRequest:
+    """Design an exciting trajectory within the robot's limits."""
+
+    robot: ThisRobot
+    """Name of a shipped robot, or its file (MJCF or URDF)."""
+    duration: float = 10.0
+    """Duration of the motion [s], without the moves from and to home and the rest."""
+    kind: str = "fourier"
+    """fourier: a finite Fourier series; moves: fifth-order point-to-point moves; or a plug-in (idbench list)."""
+    frequency: float = 1.0
+    """Highest frequency of the series, or moves per second [Hz]."""
+    repeat: int = 1
+    """How often the motion is repeated."""
+    log: Files = ()
+    """Earlier logs of the robot, whose information is taken into account."""
+    noise: Scenario = None
+    """Scenario (name, or TOML file) that states encoders, torque noise and drive."""
+    encoder_bits: Real = None
+    """Resolution of the encoders per turn [bits]. Default: that of --noise, or 17."""
+    torque_noise: Each = ()
+    """White torque noise, rms [N m], for all joints or for each. Default: that of --noise, or 0.05."""
+    fs: Real = None
+    """Sampling frequency of controller and log [Hz]. Default: that of --noise, or 100."""
+    limits: File = None
+    """Limits of the motion (TOML): ranges, velocities, torques, boxes around the robot. Default: those of the robot's file."""
+    velocity: Each = ()
+    """Largest speed [rad/s, m/s], for all joints or for each. Overrides --limits and the file. MJCF files usually have none."""
+    acceleration: Each = ()
+    """Largest acceleration [rad/s^2, m/s^2], for all joints or for each."""
+    weigh: Weights = ()
+    """Weights of parameters in the mean of ln sigma, such as LMY2=4."""
+    criterion: str = "sigma"
+    """sigma: the mean of ln sigma, after the determinant; determinant: only that; for comparison: condition, birdy,
+    smallest."""
+    until: Percent = None
+    """Design, run and identify motions on the simulated robot until one sigma of each parameter contributes less than this
+    share of a brisk motion's torque, such as 0.1%."""
+    seed: int = 0
+    """Seed of random motions and of the search. The same seed gives the same motion."""
+    parameters: Parameters = Parameters()  # noqa: RUF009  # frozen
+    """Which parameters are identified."""
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """Simulate a scenario in closed loop, and identify it."""
+
+    scenario: ThisScenario = None
+    """Name of a shipped scenario, or its file (TOML)."""
+    chain: str = CHAIN
+    """Chain of signal processing, or MODULE:NAME of your own."""
+    estimator: str = ESTIMATOR
+    """GLS, ML, ML-delay, ML-reversals, OLS, WLS, IRLS, TLS, RLS, IV, DIDIM, CLIE, CLOE, OE, UKF, or a plug-in; see
+    docs/estimators.md."""
+    start: Start = "least-squares"
+    """Where estimators that simulate or filter start: at the least-squares estimate, or at the robot's file."""
+    consistent: Consistency = "no"
+    """Move estimates to the nearest physically consistent parameters, in the metric of their covariance (extra `consistent`).
+    Unidentifiable parameters are held near the file by the constant pull-back or the entropic distance."""
+    study: Annotated[Path | None, Word("DIR", Path, option="from")] = None
+    """Repeat one run of a study, given by its folder, instead of a scenario."""
+    index: Count = None
+    """Number of that run. Its rows must have the same bits."""
+    method: Count = None
+    """Which of the study's combinations of chain, estimator and settings is shown. Default: the first."""
+    robot: Robot = None
+    """Another robot: name of a shipped one, or a file (MJCF or URDF). A trajectory that does not fit it is replaced by random
+    moves."""
+    parameters: Parameters = Parameters()  # noqa: RUF009  # frozen
+    """Which parameters are identified."""
+
+
+@dataclass(frozen=True)
+class StudyRequest:
+    """Simulate a scenario over a grid and many seeds, and identify each run."""
+
+    study: Annotated[str | None, Word("STUDY", str, positional=True, file=True)] = None
+    """Name of a shipped study, or its file (TOML)."""
+    resume: Folder = None
+    """Folder of an interrupted study: run what is missing, and make the report again."""
+    seeds: Count = None
+    """Independent runs per combination, instead of the study's number."""
+    shard: Count = None
+    """Largest number of runs simulated together. Results do not depend on it."""
+    threads: Count = None
+    """Shards at a time. Default: all processors."""
+    workers: Count = None
+    """Run in this number of processes instead (extra `cluster`)."""
+    scheduler: Url = None
+    """Run on a Dask scheduler instead, such as tcp://host:8786 (extra `cluster`)."""
+
+
+@dataclass(frozen=True)
+class Table1Request:
+    """Reproduce the paper's simulation comparison."""
+
+    chain: str = "all"
+    """Chain of signal processing: all, or one by name (paper, paper_masked, idbench, ...)."""
+    motions: Count = None
+    """Show the errors over this number of random motions of the paper's class (runs/table1-motions). 3500 take about five
+    minutes."""
+    seed: Count = None
+    """Search another trajectory from this seed."""
+    scenario: Scenario = None
+    """Another scenario: a name, or a file (TOML) as `idbench search` writes it."""
+
+
+@dataclass(frozen=True)
+class Table2Request:
+    """Repeat the paper's experiment on the virtual robot, and attribute its errors."""
+
+    scenario: str = "table2"
+    """Name of a scenario, or a file (TOML)."""
+
+
+@dataclass(frozen=True)
+class BenchmarkRequest:
+    """Identify sets of real logs, and judge each on logs that it was not fitted to."""
+
+    sets: Logs = ()
+    """Folders with a benchmark.toml and its data; `idbench new set NAME` writes a definition that ships."""
+    workers: Count = None
+    """Run in this number of processes (extra `cluster`)."""
+    scheduler: Url = None
+    """Run on a Dask scheduler, such as tcp://host:8786, whose workers see the same files (extra `cluster`)."""

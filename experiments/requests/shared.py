@@ -1,0 +1,112 @@
+"""What requests of several jobs have in common: columns of a log, the mounting of a robot, its parameters."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Literal, final
+
+from idbench.experiments.requests.words import Delay, Each, File, Hertz, Joints, Laws, Names, Robot, Texts, Torque, Vector, Word
+
+if TYPE_CHECKING:
+    from idbench.sim.robot.mounting import Mounting
+
+CHAIN, ESTIMATOR = "idbench", "GLS"
+"""What is taken where nothing else is asked for, as `identify` has it; here, since the command line's help loads no more."""
+
+
+@final
+@dataclass(frozen=True)
+class Parameters:
+    """Which parameters are identified."""
+
+    armature: Literal["file", "all", "none"] = "file"
+    """Joints with a rotor inertia: those that have one in the robot's file, all, or none (torques measured at the links;
+    reversals are then not masked)."""
+    add: Names = ()
+    """Friction laws in addition to viscous and Coulomb friction, such as offset, a constant torque of each joint."""
+    without: Names = ()
+    """Parameters to leave out, as if they were zero."""
+    friction: Laws = ("standard",)
+    """Friction laws: standard (viscous and Coulomb), none (torques measured at the links), asymmetric, or a sum such as
+    standard+load+stribeck; for one joint: 2=standard+load. auto chooses those that predict held-out stretches best. `idbench
+    list` lists them."""
+    balancer: Annotated[tuple[str, ...], Word("JOINT=a:M,b:M,...")] = ()
+    """Springs and gas springs between two points, by their geometry from a drawing, such as 2=a:0.2,b:0.8,zero:-1.66 with
+    volume:0.58 for gas [m, rad]: F0, Kb and Fg are identified."""
+
+
+@final
+@dataclass(frozen=True)
+class ColumnOptions:
+    """What the columns are."""
+
+    layout: File = None
+    """Another log.toml that describes the columns. `idbench log FILE --write` makes one."""
+    columns: Texts = ()
+    """Names of columns: t=time q=position_* tau=effort_* (* stands for numbers or names of joints; or a list with commas)."""
+    units: Texts = ()
+    """Units: t=ms q=deg tau=mNm, or tau=A with --gain."""
+    rows: Texts = ()
+    """Use only rows in which columns have these values: episode_index=3."""
+    gain: Each = ()
+    """Torque per logged unit (N m/A): one for all joints, or one each."""
+    resample: bool = False
+    """Make times uniform: remove repeated rows, use a steady clock where stamps jitter, interpolate missing samples, split at
+    gaps, use logged velocities where they are more accurate. Every step is reported."""
+
+    @property
+    def stated(self) -> bool:
+        """Whether they say anything of columns."""
+        return bool(self.layout or self.columns or self.units or self.gain or self.rows)
+
+
+@final
+@dataclass(frozen=True)
+class MountingOptions:
+    """How the robot is mounted."""
+
+    joints: Joints = ()
+    """Joints of the log, in the order of its columns, if the robot has more (grippers, mobile bases)."""
+    lock: Annotated[tuple[str, ...], Word("JOINT=VALUE")] = ()
+    """Joints that do not move, and their positions [rad, m]."""
+    coupling: Annotated[tuple[str, ...], Word("NAME=JOINT+JOINT")] = ()
+    """Drives whose motor turns with several joints, with rotor and friction of their own: motor6=joint_5+joint_6, or with
+    factors, m2=a-0.5*b. In an MJCF file these are fixed tendons."""
+    gravity: Vector = None
+    """Gravity in the frame of the robot's base [m/s^2], for a base on a wall or ceiling. Default: the file's."""
+
+    @property
+    def mounting(self) -> "Mounting":
+        """The mounting; RobotError if a lock or a coupling is none."""
+        from idbench.sim.robot.mounting import Mounting, coupled, locked
+
+        return Mounting(self.joints, locked(self.lock), self.gravity, coupled(self.coupling))
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogRequest:
+    """How logs are read and identified."""
+
+    robot: Robot = None
+    """Name of a shipped robot, or its file: MJCF, URDF, or a table of Denavit-Hartenberg parameters (.toml). Default: scara, or
+    the robot of the run."""
+    torque: Torque = None
+    """What a torque sample means: held for one period from its sample on (a controller's command), the torque at that instant
+    (a measurement), or the mean over the period. Required unless the file states it."""
+    torque_delay: Delay = None
+    """Delay from a sample to the torque that it stands for, in seconds, or `estimate` to estimate it from the log."""
+    unwrap: bool = False
+    """Unwrap 2 pi jumps of the angles."""
+    reading: ColumnOptions = ColumnOptions()  # frozen
+    """What the columns are."""
+    mounting: MountingOptions = MountingOptions()  # frozen
+    """How the robot is mounted."""
+    parameters: Parameters = Parameters()  # frozen
+    """Which parameters are identified."""
+    mask_speed: Each = ()
+    """Speed below which a joint counts as resting or reversing, for all joints or for each [rad/s, m/s]; such instants are
+    masked. Default: 5 % of its rms speed or 4 times the noise of its velocity, raised up to 20 % where its friction differs
+    significantly from that of faster motion."""
+    cutoff: Hertz = None
+    """Cut-off of the low-pass [Hz]. Default: 5, or what a short log needs."""
+    estimator: str = ESTIMATOR
+    """GLS, ML, ML-delay, ML-reversals, OLS, WLS, IRLS, TLS, RLS, IV, DIDIM, CLIE, CLOE, OE, UKF, or a plug-in; see
+    docs/estimators.md."""

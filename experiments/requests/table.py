@@ -1,0 +1,180 @@
+"""Requests from tables of keys: TOML files and keyword arguments; every value is checked by the type of its field."""
+
+import json
+import shlex
+import tomllib
+from collections.abc import Container, Iterator, Mapping
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
+from xml.etree import ElementTree
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
+
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.requests.words import Word
+from idbench.identify.plugins import did_you_mean
+
+Request = TypeVar("Request")
+
+Place = tuple[str, ...]
+"""Where a key is: the names of the group and the field."""
+
+
+def keys_of(request: Any) -> dict[str, tuple[Place, Any]]:
+    """Return the keys of a request, those of its groups among them: where each is, and its type."""
+    found = dict[str, tuple[Place, Any]]()
+    for name, hint in get_type_hints(request, include_extras=True).items():
+        inner = get_args(hint)[0] if get_origin(hint) is Annotated else hint
+        if hasattr(inner, "__dataclass_fields__"):
+            found |= {key: ((name, *place), type_) for key, (place, type_) in keys_of(inner).items()}
+        elif name in request.__dataclass_fields__:
+            found[name] = (name,), hint
+    return found
+
+
+def request_from(
+    request: type[Request], table: Mapping[str, Any], where: str, folder: Path | None = None, taken: Container[str] = ()
+) -> Request:
+    """Return a request with the values of a table.
+
+    Parameters
+    ----------
+    request : type
+        Its class.
+    table : mapping
+        Values by the keys of the request.
+    where : str
+        What messages call the table.
+    folder : Path, optional
+        Where files are that the table names.
+    taken : container of str
+        Keys that the table does not have.
+
+    Raises
+    ------
+    ExperimentError
+        If a key is unknown, or a value not of its type: it names the value and what is allowed.
+    """
+    known = {key: place for key, place in keys_of(request).items() if key not in taken}
+    values, groups = dict[str, Any](), dict[str, dict[str, Any]]()
+    for key, value in table.items():
+        if key not in known:
+            raise ExperimentError(f"{where}: unknown key {key!r}{did_you_mean(key, known)}; known: {', '.join(known)}")
+        place, hint = known[key]
+        checked = _in_folder(_checked(f"{where}: {key}", hint, value), hint, folder)
+        (groups.setdefault(place[0], {}) if len(place) > 1 else values)[place[-1]] = checked
+    defaults = {f.name: f.default for f in fields(request)}  # type: ignore[arg-type]  # a dataclass
+    return request(**values, **{name: replace(defaults[name], **inner) for name, inner in groups.items()})  # type: ignore[type-var]
+
+
+def files_named(request: Any, folder: Path = Path()) -> tuple[Path, ...]:
+    """Return the files that a request names, and those that these name in turn: parts of robots, meshes, scenarios."""
+    found, todo = set[Path](), [folder / path for path in _named(request)]
+    while todo:
+        path = todo.pop()
+        if path not in found and path.is_file():
+            found.add(path)
+            todo += _named_by(path)
+    return tuple(sorted(found))
+
+
+def as_table(request: Any, words: str) -> str:
+    """Return options of a command line as keys in one line of TOML; nothing that they name is loaded."""
+    known, found, key = keys_of(request), dict[str, Any](), ""
+    for word in shlex.split(words):
+        if word.startswith("--"):
+            key, mark, value = word[2:].partition("=")
+            key, off = key.replace("-", "_").removeprefix("no_"), key.startswith("no-")
+            found[key] = [value] if mark else not off
+        elif key:
+            found[key] = [*(found[key] if isinstance(found[key], list) else []), word]
+    made = {name: _as_value(known[name][1], value) for name, value in found.items() if name in known}
+    return ", ".join(f"{name} = {json.dumps(value)}" for name, value in made.items())
+
+
+def _as_value(hint: Any, words: Any) -> Any:
+    """Return words of an option as a value of a type; as they are where they are none."""
+    if isinstance(words, bool):
+        return words
+    several = get_origin(_plain(hint)) is tuple or "tuple" in str(_plain(hint))
+    number = "float" in str(_plain(hint)) or "int" in str(_plain(hint))
+    try:
+        values = [float(word) if number else word for word in words]
+    except ValueError:
+        values = words
+    return values if several and len(values) > 1 else values[0] if values else ""
+
+
+def _plain(hint: Any) -> Any:
+    return get_args(hint)[0] if get_origin(hint) is Annotated else hint
+
+
+def _checked(where: str, hint: Any, value: Any) -> Any:
+    """Return a value as the type of its field has it: one for several, and a number for a text that may be one, are taken."""
+    plain = str(_plain(hint))
+    if "tuple" in plain and isinstance(value, str | int | float | Path) and not isinstance(value, bool):
+        value = (value,)
+    if _plain(hint) in (str, str | None) and isinstance(value, int | float | Path) and not isinstance(value, bool):
+        value = str(value)
+    try:
+        return TypeAdapter(hint, config=ConfigDict(arbitrary_types_allowed=True)).validate_python(value)
+    except ValidationError as error:
+        detail = error.errors(include_url=False)[0]
+        said = str(detail["msg"]).replace("Input should be", "must be")
+        raise ExperimentError(f"{where} = {detail['input']!r:.60}: {said}") from None
+
+
+def _in_folder(value: Any, hint: Any, folder: Path | None) -> Any:
+    """Return a file's name from the folder of the table; names of what ships stay."""
+    if folder is None or not _names_file(hint):
+        return value
+    if isinstance(value, tuple):
+        return tuple(_in_folder(each, hint, folder) for each in value)
+    if isinstance(value, Path):
+        return folder / value
+    return str(folder / value) if value and Path(value).suffix else value
+
+
+def _names_file(hint: Any) -> bool:
+    return any(isinstance(mark, Word) and mark.file for mark in getattr(hint, "__metadata__", ()))
+
+
+def _named(request: Any) -> Iterator[Path]:
+    """Yield the files that a request names."""
+    for place, hint in keys_of(type(request)).values():
+        value = request
+        for name in place:
+            value = getattr(value, name)
+        if _names_file(hint) and value:
+            yield from map(Path, value if isinstance(value, tuple) else (value,))
+
+
+def _named_by(path: Path) -> Iterator[Path]:
+    """Yield the files that a robot, a scenario or a layout names: they are there, or nobody reads them."""
+    try:
+        texts = set(_texts(path))
+    except (ElementTree.ParseError, tomllib.TOMLDecodeError, UnicodeDecodeError, OSError, RecursionError):
+        return
+    for text in texts:
+        for place in (path.parent, *(path.parent / other for other in texts if len(other) < 200)):
+            try:
+                if (place / text).is_file():
+                    yield place / text
+            except (OSError, ValueError):  # too long, or no name
+                break
+
+
+def _texts(path: Path) -> Iterator[str]:
+    """Yield what may name files: attributes of XML that do, all texts of TOML."""
+    if path.suffix in (".xml", ".urdf"):
+        for _, element in ElementTree.iterparse(path):
+            names = ("file", "filename", "meshdir", "texturedir", "assetdir")
+            yield from (element.attrib[name].removeprefix("package://") for name in names if name in element.attrib)
+    elif path.suffix == ".toml":
+        todo: list[Any] = [tomllib.loads(path.read_text(encoding="utf-8"))]
+        while todo:
+            part = todo.pop()
+            todo += part.values() if isinstance(part, dict) else part if isinstance(part, list) else ()
+            if isinstance(part, str):
+                yield part

@@ -1,0 +1,65 @@
+"""Types of requests, with what a value is called where it is typed; no library of command lines is needed for them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal, final
+
+
+@final
+@dataclass(frozen=True)
+class Word:
+    """How a value is typed."""
+
+    metavar: str = ""
+    """What it is called."""
+    made: Callable[[str], Any] | None = None
+    """What one word becomes; without it, the word None would mean that nothing is given."""
+    known: tuple[str, ...] = ()
+    """The words that there are."""
+    option: str = ""
+    """Name of its option, where that is not the field's."""
+    positional: bool = False
+    """Whether it is typed without a name."""
+    flag: bool = False
+    """Whether it is switched on alone, never off."""
+    file: bool = False
+    """Whether it names a file: what a file names is looked for beside that file."""
+
+
+File = Annotated[Path | None, Word("FILE", Path, file=True)]
+Folder = Annotated[Path | None, Word("DIR", Path)]
+Hertz = Annotated[float | None, Word("HZ", float)]
+Seconds = Annotated[float | None, Word("SECONDS", float)]
+Real = Annotated[float | None, Word("FLOAT", float)]
+Count = Annotated[int | None, Word("N", int)]
+Robot = Annotated[str | None, Word("NAME|FILE", str, file=True)]
+ThisRobot = Annotated[str, Word(positional=True, file=True)]
+Scenario = Annotated[str | None, Word("SCENARIO", str, file=True)]
+ThisScenario = Annotated[str | None, Word("SCENARIO", str, positional=True, file=True)]
+Url = Annotated[str | None, Word("URL", str)]
+Delay = Annotated[str | None, Word("SECONDS|estimate", str)]
+Percent = Annotated[str | None, Word("PERCENT")]
+Meaning = Literal["held", "instantaneous", "averaged"]
+Torque = Annotated[Meaning | None, Word("held|instantaneous|averaged", str, ("held", "instantaneous", "averaged"))]
+Start = Literal["least-squares", "file"]
+"""Where estimators begin that simulate or filter: at the least-squares estimate, or at the parameters of the robot's file."""
+Consistency = Literal["no", "pullback", "entropic"]
+"""Whether estimates are made physically consistent, and by which distance unidentifiable parameters are held."""
+Way = Literal["all", "together", "fixed", "apart", "difference"]
+Logs = Annotated[tuple[Path, ...], Word(positional=True, file=True)]
+Log = Annotated[Path, Word(positional=True, file=True)]
+Files = Annotated[tuple[Path, ...], Word("FILE", file=True)]
+Each = Annotated[tuple[float, ...], Word("FLOAT")]
+Window = Annotated[tuple[float, float] | None, Word("FROM TO")]
+Vector = Annotated[tuple[float, float, float] | None, Word("X Y Z")]
+Six = Annotated[tuple[float, float, float, float, float, float] | None, Word("XX YY ZZ XY XZ YZ")]
+Scenarios = Annotated[tuple[str, ...], Word("SCENARIO", file=True)]
+Texts = Annotated[tuple[str, ...], Word("NAME=VALUE")]
+Weights = Annotated[tuple[str, ...], Word("NAME=WEIGHT")]
+Names = Annotated[tuple[str, ...], Word("NAME")]
+Letters = Annotated[tuple[str, ...], Word("LETTER")]
+Joints = Annotated[tuple[str, ...], Word("JOINT")]
+Laws = Annotated[tuple[str, ...], Word("[JOINT=]LAW+LAW")]
+Json = Annotated[bool, Word(flag=True)]
+"""Whether standard output is for a program: what summary.json has, and warnings; text goes to the error stream."""
