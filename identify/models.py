@@ -24,9 +24,9 @@ class Equations:
     B: Multipliers
     """(row of an instant, joint) -> what the row multiplies the torque of the joint by."""
     c: Columns
-    """(row, place in X) -> column that is used as it is, and column that is still to be differentiated, shape (..., time)."""
+    """(row, place in X) -> column that is used as it is, shape (..., time)."""
     e: Columns
-    """(row, place in X) -> column that is used as it is, and column that is still to be differentiated, shape (..., time)."""
+    """(row, place in X) -> column that is still to be differentiated, shape (..., time)."""
     names: tuple[str, ...]
     """Names of the parameters X."""
 

@@ -62,9 +62,9 @@ class ReadOptions:
     """How a log is read."""
 
     torque: Meaning | None = None
-    """What its torque means, and its delay, as options say."""
+    """What a torque sample means, where options say it."""
     delay: str | None = None
-    """What its torque means, and its delay, as options say."""
+    """Delay of the torque [s], or `estimate`, where options say it."""
     unwrap: bool = False
     """Whether 2 pi jumps of the angles are undone."""
     fallback: TorqueChannel | None = None

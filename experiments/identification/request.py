@@ -32,9 +32,9 @@ class Request:
     models: tuple[str, ...] = ("explicit", "implicit", "power")
     """Names of the models."""
     chain: str = CHAIN
-    """Their names."""
+    """Name of the chain."""
     estimator: str = ESTIMATOR
-    """Their names."""
+    """Name of the estimator."""
     method: tuple[Chain, AbstractEstimator] | None = None
     """Both with settings of their own, instead of those that have the names."""
     trim: float | None = None

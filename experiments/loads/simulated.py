@@ -42,11 +42,11 @@ class Score:
     names: tuple[str, ...]
     """What was estimated."""
     truth: Array
-    """True values, errors, and these in sigma, shape (run, p)."""
+    """True values, shape (run, p)."""
     error: Array
-    """True values, errors, and these in sigma, shape (run, p)."""
+    """Errors, shape (run, p)."""
     z: Array
-    """True values, errors, and these in sigma, shape (run, p)."""
+    """Errors in standard errors, shape (run, p)."""
     seconds: float
     """A run took."""
     failures: tuple[str, ...] = ()

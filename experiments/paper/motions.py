@@ -43,15 +43,15 @@ class Pace:
     shortest: float = 1.3
     """Least time of a move [s]."""
     motion: float = 40.0
-    """Time of all moves, and at rest at either end [s]."""
+    """Time of all moves [s]."""
     rest: float = 3.0
-    """Time of all moves, and at rest at either end [s]."""
+    """Time at rest at either end [s]."""
     fs: float = 100.0
     """Sampling frequency [Hz]; moves last whole samples."""
     clearance: float = 0.2
-    """Least distance to the ends of the joints' ranges, and of every joint in every move [rad]."""
+    """Least distance to the ends of the joints' ranges [rad]."""
     smallest_move: float = 0.1
-    """Least distance to the ends of the joints' ranges, and of every joint in every move [rad]."""
+    """Least distance of every joint in every move [rad]."""
     velocity: float = 7.0
     """Limit of the joints' speed [rad/s]."""
 

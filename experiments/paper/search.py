@@ -54,9 +54,9 @@ class Search:
     tolerance: float = 0.01
     """It ends when both condition numbers are within this share of the paper's."""
     rounds: int = 300
-    """It gives up after so many rounds of so many candidates."""
+    """Rounds after which it gives up."""
     candidates: int = 16
-    """It gives up after so many rounds of so many candidates."""
+    """Candidates of a round."""
 
     def __post_init__(self) -> None:
         if self.seed < 0:

@@ -42,9 +42,9 @@ class PaperColumn:
     """What the paper's Table 1 prints for one model."""
 
     estimate: tuple[float, ...]
-    """X and %e of the eight parameters."""
+    """X of the eight parameters."""
     error: tuple[float, ...]
-    """X and %e of the eight parameters."""
+    """%e of the eight parameters."""
     condition_number: float
     """Cond(W)."""
     rows: int

@@ -45,11 +45,11 @@ class PaperColumn:
     """What the paper's Table 2 prints for a model."""
 
     estimate: tuple[float, ...]
-    """Its columns."""
+    """X of the eight parameters."""
     two_sigma: tuple[float, ...]
-    """Its columns."""
+    """2 sigma of each."""
     relative_sigma_percent: tuple[float, ...]
-    """Its columns."""
+    """%sigma of each."""
     condition_number: float
     """Cond(W)."""
 

@@ -32,9 +32,9 @@ class AbstractScale(ABC):
     name: str
     """What it shows, with its unit."""
     low: float
-    """Its ends."""
+    """Its lower end."""
     high: float
-    """Its ends."""
+    """Its upper end."""
 
     def at(self, x: npt.ArrayLike) -> Array:
         """Return where values lie, 0 at the low end and 1 at the high one; what is beyond an end lies there."""

@@ -26,9 +26,9 @@ class Difference:
     """Whether two ways of identification differ, on the same runs."""
 
     better: Cell
-    """The two, by their typical errors."""
+    """The one of smaller typical error."""
     worse: Cell
-    """The two, by their typical errors."""
+    """The other."""
     ratio: float
     """Typical error of the worse over that of the better: the geometric mean, over the parameters, of the rms over the runs."""
     p: float

@@ -44,13 +44,13 @@ class Cell:
     run: np.typing.NDArray[np.int64]
     """Numbers of the runs that gave an estimate, shape (runs,)."""
     X: Array
-    """Of those runs, shape (runs, p)."""
+    """Estimates of those runs, shape (runs, p)."""
     sigma: Array
-    """Of those runs, shape (runs, p)."""
+    """Their standard errors, shape (runs, p)."""
     paper_sigma: Array
-    """Of those runs, shape (runs, p)."""
+    """Standard errors by the paper's formula, shape (runs, p)."""
     truth: Array
-    """Of those runs, shape (runs, p)."""
+    """True values, shape (runs, p)."""
     failures: Mapping[str, np.typing.NDArray[np.int64]]
     """Reasons of the others, as the first of them has it, and the runs that failed so: reasons that differ in numbers alone are
     one."""

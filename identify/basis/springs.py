@@ -70,9 +70,9 @@ class Balancer(AbstractConservativeBlock):
     joint: int = 1
     """Of the robot, from 0."""
     a: float = 0.2
-    """Distances of the points from the axis [m]."""
+    """Distance of the point on the link from the axis [m]."""
     b: float = 0.6
-    """Distances of the points from the axis [m]."""
+    """Distance of the fixed point from the axis [m]."""
     zero: float = 0.0
     """Position of the joint at which both points lie in one direction from the axis [rad]."""
     volume: float | None = None

@@ -35,14 +35,11 @@ class Clock:
     t: Array
     """Their times [s], shape (row,)."""
     repeated: int
-    """Rows left out: those that repeat the row before while the robot moves, those whose time does not increase, those with a
-    NaN or an infinity."""
+    """Rows left out because they repeat the row before while the robot moves."""
     backward: int
-    """Rows left out: those that repeat the row before while the robot moves, those whose time does not increase, those with a
-    NaN or an infinity."""
+    """Rows left out because their time does not increase."""
     broken: int
-    """Rows left out: those that repeat the row before while the robot moves, those whose time does not increase, those with a
-    NaN or an infinity."""
+    """Rows left out because they have a NaN or an infinity."""
     word: str
     """Which clock is right: "stamps", "steady" (a sample every period, some never logged) or "rows" (a sample a row)."""
     jitter: float

@@ -81,15 +81,15 @@ class Jump:
     """A step of a position that the motion around it does not explain."""
 
     joint: int
-    """Where it is, from 0."""
+    """Number of the joint, from 0."""
     sample: int
-    """Where it is, from 0."""
+    """Number of the sample, from 0."""
     size: float
     """By how far [rad, m]."""
     speed: float
-    """Its speed, and that below which nearly all steps of the joint are [rad/s, m/s]."""
+    """Its speed [rad/s, m/s]."""
     usual: float
-    """Its speed, and that below which nearly all steps of the joint are [rad/s, m/s]."""
+    """Speed below which nearly all steps of the joint are [rad/s, m/s]."""
     back: bool
     """Whether the position comes back at once: a wild sample, not a slip."""
 

@@ -158,15 +158,15 @@ class Limits:
     position: Array
     """Lowest and highest [rad], finite, shape (joint, 2)."""
     velocity: Array
-    """[rad/s], [rad/s^2], [rad/s^3]; velocities finite, shape (joint,)."""
+    """Largest speed, finite [rad/s], shape (joint,)."""
     acceleration: Array
-    """[rad/s], [rad/s^2], [rad/s^3]; velocities finite, shape (joint,)."""
+    """Largest acceleration [rad/s^2], shape (joint,)."""
     jerk: Array
-    """[rad/s], [rad/s^2], [rad/s^3]; velocities finite, shape (joint,)."""
+    """Largest jerk [rad/s^3], shape (joint,)."""
     torque: Array
-    """Largest, and on average over the motion [N m], shape (joint,)."""
+    """Largest torque [N m], shape (joint,)."""
     rms_torque: Array
-    """Largest, and on average over the motion [N m], shape (joint,)."""
+    """Largest rms torque of the motion [N m], shape (joint,)."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "position", frozen(self.position))

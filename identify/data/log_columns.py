@@ -16,9 +16,9 @@ class LogColumns:
     t: Array
     """Shape (time,) [s]."""
     q: Array
-    """[rad], [N m], shape (time, joint)."""
+    """Positions [rad], shape (time, joint)."""
     tau: Array
-    """[rad], [N m], shape (time, joint)."""
+    """Torques [N m], shape (time, joint)."""
     torque: TorqueChannel | None
     """What the file says of its torque."""
     joints: tuple[str, ...] = ()

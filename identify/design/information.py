@@ -74,9 +74,9 @@ class Information:
     inertia: Array
     """Of the robot, on average over postures [kg m^2], shape (joint, joint)."""
     fs: float
-    """Frequencies of the log and of the states [Hz]."""
+    """Sampling frequency of the log [Hz]."""
     rate: float
-    """Frequencies of the log and of the states [Hz]."""
+    """Frequency of the states [Hz]."""
     cutoff: float
     """End of the pass band [Hz]."""
 

@@ -48,9 +48,9 @@ class Plan:
     limits: Limits
     """What it must keep."""
     states: Shapes
-    """The unit motions at the states whose rows count, and at more instants, where limits are kept."""
+    """The unit motions at the states whose rows count."""
     instants: Shapes
-    """The unit motions at the states whose rows count, and at more instants, where limits are kept."""
+    """The unit motions at more instants, where limits are kept."""
     X: Array
     """Parameters as far as they are known, shape (p,)."""
     known: Array

@@ -53,11 +53,11 @@ class LogLayout:
     """Which columns of a log's files are times, positions, velocities and torques, and in which units."""
 
     t: Source = Source(("t",))  # frozen
-    """Times, positions, torques."""
+    """Where times are."""
     q: Source = Source(("q*",))  # frozen
-    """Times, positions, torques."""
+    """Where positions are."""
     tau: Source = Source(("tau*",))  # frozen
-    """Times, positions, torques."""
+    """Where torques are."""
     qd: Source = Source()  # frozen
     """Velocities; without columns if there are none."""
     joints: tuple[str, ...] = ()

@@ -134,9 +134,9 @@ class ServoColumns:
     t: Array
     """Shape (time,) [s]."""
     q: Array
-    """Shape (time, joint) [rad]."""
+    """Positions [rad], shape (time, joint)."""
     command: Array
-    """Shape (time, joint) [rad]."""
+    """Commanded positions [rad], shape (time, joint)."""
     on: Array | None
     """Above 0.5 where torque is enabled, shape (time, joint)."""
     voltage: Array | None

@@ -36,9 +36,9 @@ class GainEstimate:
     """Gains of drives."""
 
     gains: Array
-    """Torque over what was logged, in the unit of the logs' own gain, and standard deviations, shape (joint,)."""
+    """Torque over what was logged, in the unit of the logs' own gain, shape (joint,)."""
     sigma: Array
-    """Torque over what was logged, in the unit of the logs' own gain, and standard deviations, shape (joint,)."""
+    """Their standard errors, shape (joint,)."""
     found: Estimate
     """Robot, what was unknown of the payload, and kg, the gains in multiples of those of the logs."""
 

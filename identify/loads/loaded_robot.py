@@ -35,9 +35,9 @@ class LoadedRobot:
     standard: Basis
     """Its standard parameters, laws of friction included."""
     without: tuple[MotionLog, ...]
-    """What was logged without and with the payload."""
+    """Logs without the payload."""
     loaded: tuple[MotionLog, ...]
-    """What was logged without and with the payload."""
+    """Logs with the payload."""
     chain: Chain = field(default_factory=idbench_chain)
     """Signal processing."""
     estimator: AbstractEstimator = field(default_factory=GeneralizedLeastSquares)

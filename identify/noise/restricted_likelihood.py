@@ -104,9 +104,9 @@ class _Slope:
     """How the likelihood of rows depends on the squares of its levels. Leading axes are runs."""
 
     found: Array
-    """r' C^-1 C_i C^-1 r, and the trace of P C_i, shape (..., i)."""
+    """r' C^-1 C_i C^-1 r, shape (..., i)."""
     expected: Array
-    """r' C^-1 C_i C^-1 r, and the trace of P C_i, shape (..., i)."""
+    """The trace of P C_i, shape (..., i)."""
     bend: Array
     """Average information, times 2: y' P C_i P C_j P y, shape (..., i, i)."""
     moves: Array

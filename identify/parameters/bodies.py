@@ -53,9 +53,9 @@ class Terms:
     linear: Array
     """Of the objective, shape (p + own,)."""
     G: Array
-    """H - G (x, own) lies in the cones, shape (rows, p + own), (rows,)."""
+    """Matrix of the cones: H - G (x, own) lies in them, shape (rows, p + own)."""
     h: Array
-    """H - G (x, own) lies in the cones, shape (rows, p + own), (rows,)."""
+    """Their right side, shape (rows,)."""
     cones: list[Any]
     """Of the solver."""
 

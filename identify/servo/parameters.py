@@ -61,9 +61,9 @@ class ServoParameter(NamedTuple):
     share: float = 0.01
     """Step as a share of that scale."""
     low: float = 0.0
-    """Smallest and largest value."""
+    """Smallest value."""
     high: float = float("inf")
-    """Smallest and largest value."""
+    """Largest value."""
 
 
 NEGATIVE = float("-inf")

@@ -27,11 +27,11 @@ class JointLoad:
     inertia: Array
     """J [kg m^2], shape (time,) or ()."""
     sine: Array
-    """Shape (time,) or () [N m]."""
+    """Torque per sine of the joint's angle [N m], shape (time,) or ()."""
     cosine: Array
-    """Shape (time,) or () [N m]."""
+    """Torque per cosine of the joint's angle [N m], shape (time,) or ()."""
     rest: Array
-    """Shape (time,) or () [N m]."""
+    """Torque that does not depend on the angle [N m], shape (time,) or ()."""
 
     def __post_init__(self) -> None:
         for name in ("inertia", "sine", "cosine", "rest"):

@@ -19,9 +19,9 @@ class State:
     """
 
     q: Array
-    """[rad], [rad/s], shape (..., joint, time)."""
+    """Positions [rad], shape (..., joint, time)."""
     qd: Array
-    """[rad], [rad/s], shape (..., joint, time)."""
+    """Velocities [rad/s], shape (..., joint, time)."""
     s: Callable[[Array], Array]
     """d/dt along the last axis; only asked for accelerations."""
     conditions: Mapping[str, Array] = field(default_factory=dict)

@@ -11,9 +11,9 @@ class Loop(NamedTuple):
     """A sampled PI current loop with feedforward of the back-EMF, of one winding."""
 
     kp: float
-    """Gains [V/A]."""
+    """Proportional gain [V/A]."""
     ki: float
-    """Gains [V/A]."""
+    """Integral gain, times the sampling period [V/A]."""
     most: float
     """Largest voltage that it asks for [V]."""
     known: float

@@ -14,10 +14,10 @@ class Pulse(NamedTuple):
     """A stretch of a period in which the voltage is not the base voltage."""
 
     start: Array
-    """[s]."""
+    """Its beginning [s]."""
 
     end: Array
-    """[s]."""
+    """Its end [s]."""
 
     level: Array
     """Voltage, in bus voltages."""
@@ -37,9 +37,9 @@ class Modulator(NamedTuple):
     """unipolar: two legs, each with the same carrier and opposite references (phase-shifted, two pulses a period); bipolar: the
     legs switch together, always one up and one down; sign_magnitude: one leg rests at the bus's end."""
     period: float
-    """[s]. Each transistor turns on `dead_time` after its partner has been turned off."""
+    """Period of the modulation [s]."""
     dead_time: float
-    """[s]. Each transistor turns on `dead_time` after its partner has been turned off."""
+    """Time between a transistor turning off and its partner turning on [s]."""
 
     def pattern(self, m: Array, forward: Array) -> Pattern:
         """Return the pulses for the modulation index `m`, mean voltage over bus voltage, -1 to 1.

@@ -13,11 +13,11 @@ class Winding(NamedTuple):
     """A winding between the legs of an H-bridge."""
 
     V: Array
-    """Bus voltage [V], resistance [ohm], inductance [H], shape (sim, joint)."""
+    """Bus voltage [V], shape (sim, joint)."""
     R: Array
-    """Bus voltage [V], resistance [ohm], inductance [H], shape (sim, joint)."""
+    """Resistance [ohm], shape (sim, joint)."""
     L: Array
-    """Bus voltage [V], resistance [ohm], inductance [H], shape (sim, joint)."""
+    """Inductance [H], shape (sim, joint)."""
 
 
 class Passage(NamedTuple):

@@ -28,9 +28,9 @@ class Run:
     log: MotionLog
     """What the robot logged; shape (nsim, time, joint)."""
     q: Array
-    """True positions [rad] and velocities [rad/s] at the instants of the log, shape (nsim, time, joint)."""
+    """True positions at the instants of the log [rad], shape (nsim, time, joint)."""
     qd: Array
-    """True positions [rad] and velocities [rad/s] at the instants of the log, shape (nsim, time, joint)."""
+    """True velocities at the instants of the log [rad/s], shape (nsim, time, joint)."""
     tau: Array
     """True mean torque of the motors between an instant of the log and the next, ripple included [N m], shape (nsim, time,
     joint)."""

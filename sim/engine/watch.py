@@ -40,13 +40,13 @@ class Stretch:
     measured: Array
     """Positions as the encoders give them [rad]."""
     q: Array
-    """True positions [rad] and velocities [rad/s]."""
+    """True positions [rad]."""
     qd: Array
-    """True positions [rad] and velocities [rad/s]."""
+    """True velocities [rad/s]."""
     tau: Array
-    """True mean torque of the motors until the next sample, and what was commanded: torque [N m] or position [rad]."""
+    """True mean torque of the motors until the next sample [N m]."""
     command: Array
-    """True mean torque of the motors until the next sample, and what was commanded: torque [N m] or position [rad]."""
+    """What was commanded: torque [N m] or position [rad]."""
     logged: Array
     """The torque that comes into the log [N m]."""
     electric: Electric | None

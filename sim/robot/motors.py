@@ -27,9 +27,9 @@ class Motors:
     """One direct-drive DC motor a joint."""
 
     R: Array
-    """Resistance [ohm] and inductance [H] between the terminals, shape (joint,)."""
+    """Resistance between the terminals [ohm], shape (joint,)."""
     L: Array
-    """Resistance [ohm] and inductance [H] between the terminals, shape (joint,)."""
+    """Inductance between the terminals [H], shape (joint,)."""
     K: Array
     """Torque constant [N m/A], equal to the back-EMF constant [V s/rad], shape (joint,)."""
     V: Array
@@ -37,11 +37,11 @@ class Motors:
     I: Array  # noqa: E741  # the letter of a current
     """Largest current [A]; infinite where the model gives none, shape (joint,)."""
     cogging: Array
-    """Cogging torque cogging * sin(order * q + phase) [N m, cycles a turn, rad], shape (joint,)."""
+    """Amplitude of the cogging torque cogging * sin(order * q + phase) [N m], shape (joint,)."""
     order: Array
-    """Cogging torque cogging * sin(order * q + phase) [N m, cycles a turn, rad], shape (joint,)."""
+    """Its cycles per turn, shape (joint,)."""
     phase: Array
-    """Cogging torque cogging * sin(order * q + phase) [N m, cycles a turn, rad], shape (joint,)."""
+    """Its phase [rad], shape (joint,)."""
 
     @classmethod
     def of(cls, model: mujoco.MjModel) -> Self:

@@ -32,9 +32,9 @@ class Shape:
     """One geom."""
 
     name: str
-    """Its name and the body that carries it."""
+    """Its name."""
     body: str
-    """Its name and the body that carries it."""
+    """The body that carries it."""
     kind: Kind
     """Sphere, capsule, ellipsoid, cylinder, box or mesh; capsules and cylinders along z, all but meshes centred."""
     size: Array
@@ -46,9 +46,9 @@ class Shape:
     rgba: Array
     """Colour, 0 to 1, shape (4,)."""
     vertices: Array
-    """Of a mesh, in its own frame; empty otherwise, shape (vertex, 3) [m] and (face, 3)."""
+    """Of a mesh, in its own frame [m], shape (vertex, 3); empty otherwise."""
     faces: npt.NDArray[np.int32]
-    """Of a mesh, in its own frame; empty otherwise, shape (vertex, 3) [m] and (face, 3)."""
+    """Of a mesh, by the numbers of its vertices, shape (face, 3); empty otherwise."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,21 +44,21 @@ class ServoValues:
     """A servo as MuJoCo has it."""
 
     a: float
-    """kt/R [N m/V] and kt^2/R [N m s/rad]."""
+    """kt/R [N m/V]."""
     b: float
-    """kt/R [N m/V] and kt^2/R [N m s/rad]."""
+    """kt^2/R [N m s/rad]."""
     gain: float
     """Duty per rad, firmware gain included."""
     supply: float
-    """V [V], and the largest duty."""
+    """Supply voltage [V]."""
     duty_limit: float
-    """V [V], and the largest duty."""
+    """Largest duty."""
     armature: float
-    """Of the joint: Ia, Fv, Fs."""
+    """Ia of the joint [kg m^2]."""
     damping: float
-    """Of the joint: Ia, Fv, Fs."""
+    """Fv of the joint [N m s/rad]."""
     frictionloss: float
-    """Of the joint: Ia, Fv, Fs."""
+    """Fs of the joint [N m]."""
     rate: float
     """Rate limit of the target [rad/s]; infinite if there is none."""
     delay: float

@@ -16,11 +16,11 @@ class Reference:
     fs: float
     """[Hz]."""
     q: Array
-    """[rad], [rad/s], [rad/s^2], shape (time, joint), or (time, nsim, joint) for many simulations."""
+    """Positions [rad], shape (time, joint), or (time, nsim, joint) for many simulations."""
     qd: Array
-    """[rad], [rad/s], [rad/s^2], shape (time, joint), or (time, nsim, joint) for many simulations."""
+    """Velocities [rad/s], of the same shape."""
     qdd: Array
-    """[rad], [rad/s], [rad/s^2], shape (time, joint), or (time, nsim, joint) for many simulations."""
+    """Accelerations [rad/s^2], of the same shape."""
 
 
 class AbstractMotion(ABC):

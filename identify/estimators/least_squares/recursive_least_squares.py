@@ -54,9 +54,9 @@ class Recursive:
     t: Array
     """Shape (instant,) [s]."""
     X: Array
-    """Parameters and their standard deviation, as far as the rows that are final at `t` determine them, shape (instant, p)."""
+    """Parameters, as far as the rows that are final at `t` determine them, shape (instant, p)."""
     sigma: Array
-    """Parameters and their standard deviation, as far as the rows that are final at `t` determine them, shape (instant, p)."""
+    """Their standard errors, shape (instant, p)."""
 
 
 def recursive_least_squares(estimate: Estimate, t: Array, halo: float = 0.0) -> Recursive:

@@ -30,19 +30,18 @@ class Noise:
     """Standard deviations of what a log's cells say, shape (joint, cell) where they vary."""
 
     mean: Array
-    """Of the mean torque, and of half the difference of both Gauss points [N m], shape (joint, cell)."""
+    """Level of the mean torque of both Gauss points [N m], shape (joint, cell)."""
     half: Array
-    """Of the mean torque, and of half the difference of both Gauss points [N m], shape (joint, cell)."""
+    """Level of half the difference of both Gauss points [N m], shape (joint, cell)."""
     position: Array
     """Of the positions [rad], shape (joint,)."""
     known: npt.NDArray[np.bool_]
     """Where the sign of friction is known, shape (joint, cell)."""
     velocity: Array
-    """Of the velocities that differences of the positions give, infinite where torques say more, and these velocities [rad/s],
-    shape (node, joint)."""
+    """Level of the velocities that differences of the positions give [rad/s], infinite where torques say more, shape (node,
+    joint)."""
     wanted: Array
-    """Of the velocities that differences of the positions give, infinite where torques say more, and these velocities [rad/s],
-    shape (node, joint)."""
+    """These velocities [rad/s], shape (node, joint)."""
     turns: Turns
     """Reversals inside the cells, and which cells have a level of their own beside them."""
 

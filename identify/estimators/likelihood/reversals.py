@@ -22,9 +22,9 @@ class Inside:
     """Reversals inside cells, as a motion has them."""
 
     joint: Ints
-    """Which joint, and where, shape (reversal,)."""
+    """The joint that reverses, shape (reversal,)."""
     cell: Ints
-    """Which joint, and where, shape (reversal,)."""
+    """The cell in which it does, shape (reversal,)."""
     share: Array
     """Share of the cell that lies before the reversal, shape (reversal,)."""
     slope: Array
@@ -53,9 +53,9 @@ class Jumps:
     """
 
     cell: Ints
-    """Where, shape (reversal,)."""
+    """The cell of the reversal, shape (reversal,)."""
     joint: Ints
-    """Where, shape (reversal,)."""
+    """Its joint, shape (reversal,)."""
     change: Array
     """Columns afterwards less those before, shape (point, reversal, joint, p)."""
     share: Array
@@ -118,9 +118,9 @@ class Forces:
     """What accelerates a joint in some cells, shape (cell,) each."""
 
     ahead: Array
-    """Its acceleration [rad/s^2] if friction is that of a motion ahead, or back."""
+    """Acceleration if friction is that of a motion ahead [rad/s^2]."""
     back: Array
-    """Its acceleration [rad/s^2] if friction is that of a motion ahead, or back."""
+    """Acceleration if friction is that of a motion back [rad/s^2]."""
     inertia: Array
     """Torque over acceleration [kg m^2], the other joints free."""
 
