@@ -44,7 +44,7 @@ ALLOWED_IN = {
     "experiments/study/store.py": {"pyarrow", "tomli_w"},
     "experiments/study/run_study.py": {"threadpoolctl"},
     "experiments/study/cluster.py": {"dask", "distributed", "threadpoolctl"},
-    "experiments/cli/commands/benchmark.py": {"distributed"},
+    "experiments/benchmark/job.py": {"distributed"},
     "experiments/benchmark/tables.py": {"matplotlib"},
     "experiments/benchmark/tools.py": {"scipy"},
     "experiments/study/statistics.py": {"scipy"},

@@ -13,11 +13,9 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.requests.jobs import ServoRequest
 from idbench.experiments.results.writing import finite
 from idbench.experiments.servo.identification import Servos, summary_of
-from idbench.experiments.servo.job import held_of, servos_of
-from idbench.experiments.servo.servo_text import verdicts
+from idbench.experiments.servo.job import servos_identified
 from idbench.identify import Array
 from idbench.identify.servo import ServoFit
-from idbench.identify.servo.choice import FrictionChoice
 
 
 def servo_row(folder: Path, definition: Definition, out: Path) -> Made:
@@ -27,14 +25,10 @@ def servo_row(folder: Path, definition: Definition, out: Path) -> Made:
         raise ExperimentError(f"{FILE}: name a second log, or held_out: one alone says nothing of others")
     begin, command = time.perf_counter(), definition.request(folder)
     assert isinstance(command, ServoRequest)
-    servos, others = servos_of(command)
-    assert others is not None
-    every = dict(servos.identified(command.friction, command.find, held_of(command, servos.links.joints)))
-    fits = {joint: found for joint, result in every.items() if isinstance(found := _fit(result), ServoFit)}
-    if not fits:
-        raise ExperimentError("; ".join(dict.fromkeys(map(str, every.values()))))
+    made = servos_identified(command)
     seconds = time.perf_counter() - begin
-    elsewhere = others.errors(fits)
+    servos, others, fits = made.servos, made.others, made.fits
+    assert others is not None
     row = {
         "title": definition.title,
         "joints": list(servos.links.joints),
@@ -43,11 +37,11 @@ def servo_row(folder: Path, definition: Definition, out: Path) -> Made:
         "parameters": sum(len(fit.p) for fit in fits.values()),
         "estimate": {joint: summary_of(fit) for joint, fit in fits.items()},
         "seconds": seconds,
-        "logs": _logs(others, elsewhere, servos.links.joints),
+        "logs": _logs(others, made.errors["held out"], servos.links.joints),
         "published": definition.published,
-        "notes": [f"{joint}: {why}" for joint, why in every.items() if isinstance(why, str)],
+        "notes": [f"{joint}: {why}" for joint, why in made.every.items() if isinstance(why, str)],
         "verdict": None,
-        "verdicts": verdicts(fits, servos.errors(fits), elsewhere),
+        "verdicts": made.verdicts,
         "repeats": {},
         "free_run": _free_runs(others, fits, servos.links.joints),
         "tools": {},
@@ -57,10 +51,6 @@ def servo_row(folder: Path, definition: Definition, out: Path) -> Made:
 
 def _nothing(folder: Path) -> None:
     """Write no files: what other tools of servos read differs from tool to tool."""
-
-
-def _fit(result: ServoFit | FrictionChoice | str) -> ServoFit | str:
-    return result.fit if isinstance(result, FrictionChoice) else result
 
 
 def _free_runs(servos: Servos, fits: Mapping[str, ServoFit], joints: tuple[str, ...]) -> list[dict[str, Any]]:

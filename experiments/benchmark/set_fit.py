@@ -69,7 +69,7 @@ def _others(
     first = loaded.read[0]
     options = replace(read_options(asked), delay=None, fallback=replace(first.channel, gain=1.0))
     return {
-        name: read_as(first.path, file_of(folder / name), options, loaded.request)
+        name: read_as(first.path, file_of(folder / name), options, loaded.request.robot_model)
         for name in definition.every_repeat
         if name not in names
     }

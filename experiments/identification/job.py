@@ -9,12 +9,14 @@ from typing import Any
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.chain_settings import chain_of
 from idbench.experiments.identification.fit import Fit, fit
+from idbench.experiments.identification.friction_choice import summary, words
 from idbench.experiments.identification.load import Loaded, in_band, load, with_held_out
 from idbench.experiments.identification.log_warnings import warnings_of_log
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.reading import ReadOptions, file_of, stated_by
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import SCARA, RobotModel, absolute
+from idbench.experiments.reports.iterations import iterations
 from idbench.experiments.requests.jobs import IdentifyRequest
 from idbench.experiments.requests.shared import CHAIN, LogRequest
 from idbench.identify import ESTIMATORS, MODELS, IdentificationError
@@ -39,18 +41,17 @@ def read_options(asked: LogRequest) -> ReadOptions:
     return ReadOptions(asked.torque, asked.torque_delay, asked.unwrap, columns=asked.reading)
 
 
-def request_of(asked: IdentifyRequest) -> Request:
+def request_of(asked: IdentifyRequest, robot_model: RobotModel | None = None) -> Request:
     """Return what is asked for, checked before any log is read; the robot by default that which the folder of a run states."""
-    if not asked.log:
+    if not asked.log and robot_model is None:
         raise ExperimentError("name a log, or several of one fit")
     for path in (*asked.log, *asked.validate):
         file_of(path)
     _require_label(asked.label)
-    robot = stated_by(asked.log[0]).get("robot", SCARA) if asked.robot is None else absolute(asked.robot)
-    own = asked.log[0] / "scenario.toml"
-    loops = asked.loop or ([str(own)] if len(asked.log) == 1 and own.is_file() else [])
+    own = [path / "scenario.toml" for path in asked.log]
+    loops = asked.loop or ([str(own[0])] if len(own) == 1 and own[0].is_file() else [])
     request = Request(
-        RobotModel(robot, asked.parameters, asked.mounting.mounting),
+        robot_model or RobotModel(_robot_of(asked), asked.parameters, asked.mounting.mounting),
         tuple(MODELS) if asked.model in (None, "all") else (asked.model,),
         asked.chain,
         asked.estimator,
@@ -72,13 +73,17 @@ def files_of(asked: IdentifyRequest) -> tuple[Path, ...]:
     logs = [file_of(path).absolute() for path in (*asked.log, *asked.validate)]
     named = (asked.chain_file, asked.reading.layout, *asked.loop)
     more = [Path(name) for name in named if name is not None]
-    robot = stated_by(asked.log[0]).get("robot", SCARA) if asked.robot is None else absolute(asked.robot)
-    return (*logs, Robot.path(robot), *(path.absolute() for path in more if path.suffix))
+    return (*logs, Robot.path(_robot_of(asked)), *(path.absolute() for path in more if path.suffix))
+
+
+def _robot_of(asked: IdentifyRequest) -> str:
+    """Return the robot that is named, or that of the run."""
+    return str(stated_by(asked.log[0]).get("robot", SCARA)) if asked.robot is None else absolute(asked.robot)
 
 
 def read_logs(asked: IdentifyRequest, request: Request) -> Loaded:
     """Return the logs of the fit, and the request with the band that suits them."""
-    return load(asked.log, read_options(asked), request, band=_chooses_band(asked))
+    return load(asked.log, read_options(asked), request, band=chooses_band(asked))
 
 
 def loaded_logs(asked: IdentifyRequest, request: Request) -> tuple[Request, Logs]:
@@ -98,13 +103,26 @@ def fit_of(request: Request, logs: Logs) -> Fit:
         raise ExperimentError(f"{error}{why}") from error
 
 
+def summary_of(made: Fit) -> dict[str, Any]:
+    """Return what a summary.json says of a fit."""
+    chosen = {} if made.choice is None else {"friction": summary(made.choice)}
+    return {**chosen, **made.summary(), "iterations": iterations(made), "notes": list(notes_of(made))}
+
+
+def notes_of(made: Fit) -> tuple[str, ...]:
+    """Return what was read, done and assumed, and which laws of friction were chosen."""
+    robot_model, choice = made.robot_model, made.choice
+    laws = () if choice is None else words(choice, robot_model.laws.names, robot_model.robot.joints)
+    return (*made.logs.notes, *laws)
+
+
 def _truth(stated: Mapping[str, Any], request: Request) -> dict[str, float] | None:
     """Return the truth that the folder of a run states, if it is of the same parameters."""
     truth: dict[str, float] | None = stated.get("truth")
     return truth if truth and tuple(truth) == request.robot_model.basis.names else None
 
 
-def _chooses_band(asked: IdentifyRequest) -> bool:
+def chooses_band(asked: IdentifyRequest) -> bool:
     """Return whether the band is to suit the logs: nothing states it."""
     return asked.cutoff is None and asked.chain_file is None and asked.chain == CHAIN
 
@@ -116,7 +134,7 @@ def _with_chain(asked: IdentifyRequest, request: Request) -> Request:
     if asked.chain_file is not None:
         name, chain = chain_of(asked.chain_file)
         return replace(request, chain=name, method=(chain, ESTIMATORS.create(request.estimator)))
-    if asked.parameters.armature == "none" and asked.chain == CHAIN and not asked.mask_speed:
+    if request.robot_model.asked.armature == "none" and asked.chain == CHAIN and not asked.mask_speed:
         # Behind the gears next to no friction is left that turns with the velocity: nothing to mask.
         request = replace(request, method=(replace(request.processing, mask=NoMask()), request.solver))
     return request if asked.cutoff is None else in_band(request, asked.cutoff)

@@ -69,20 +69,25 @@ def load(paths: Sequence[Path], options: ReadOptions, request: Request, *, band:
     """
     require_different(paths)
     with stage("reading logs"):
-        read_ = [read(file_of(path), options, request) for path in paths]
-    _require_other_samples(read_)
+        every = [read(file_of(path), options, request.robot_model) for path in paths]
+    return prepared(every, request, seek_delay=options.delay == "estimate", band=band, more=more)
+
+
+def prepared(every: Sequence[ReadLog], request: Request, *, seek_delay: bool, band: bool, more: int = 0) -> Loaded:
+    """Return logs of one fit that were read, with the band that suits them and, if it is sought, the delay of their torques."""
+    _require_other_samples(every)
     of_band = list[str]()
     if band:
         p, least = len(request.robot_model.basis.names) + more, request.processing.operator.cutoff  # type: ignore[attr-defined]
-        needed = Band.of([log for one in read_ for log in one.logs], p, least)
+        needed = Band.of([log for one in every for log in one.logs], p, least)
         if needed.cutoff > least:
             request, of_band = in_band(request, needed.cutoff), [needed.words(p, least)]
-    if options.delay == "estimate":
+    if seek_delay:
         with stage("the delay of the torques"):
-            read_ = with_delays(read_, request)
-    named = zip(read_, _names(read_), strict=True)
-    said = of_each((name, note) for one, name in named for note in one.notes) if len(read_) > 1 else read_[0].notes
-    return Loaded(request, tuple(read_), tuple(dict.fromkeys([*said, *of_band])))
+            every = with_delays(every, request)
+    named = zip(every, _names(every), strict=True)
+    said = of_each((name, note) for one, name in named for note in one.notes) if len(every) > 1 else every[0].notes
+    return Loaded(request, tuple(every), tuple(dict.fromkeys([*said, *of_band])))
 
 
 def in_band(request: Request, cutoff: float) -> Request:
@@ -97,23 +102,28 @@ def with_held_out(loaded: Loaded, paths: Sequence[Path], options: ReadOptions, t
     """
     known = loaded.read[0].channel  # as it was logged; its gain is of its own file
     delay, sought = str(known.delay) if options.delay else None, options.delay == "estimate"
-    options = replace(options, delay=delay, fallback=replace(known, gain=1.0))
-    held_out, every, said = dict[str, MotionLog](), list[ReadLog](), list[tuple[str, str]]()
+    options, every = replace(options, delay=delay, fallback=replace(known, gain=1.0)), dict[str, ReadLog]()
     require_different(paths)
     for given in paths:
         path = file_of(given)
         try:
-            one = read_as(loaded.read[0].path, path, options, loaded.request)
+            every[str(given)] = read_as(loaded.read[0].path, path, options, loaded.request.robot_model)
         except (LogError, ExperimentError) as error:
             words = f"--validate {error}" if str(path) in str(error) else f"--validate {path}: {error}"
             raise ExperimentError(words) from error
+    return judged_on(loaded, every, truth, sought)
+
+
+def judged_on(loaded: Loaded, every: Mapping[str, ReadLog], truth: Mapping[str, float] | None, delay_sought: bool) -> Logs:
+    """Return logs of a fit with held-out logs that were read, by name."""
+    said = list[tuple[str, str]]()
+    for name, one in every.items():
         pieces = [f"of its {len(one.logs)} pieces the longest is judged"] if len(one.logs) > 1 else []
-        said += [(path.name, note) for note in (*one.notes, *pieces)]
+        said += [(one.path.name, note) for note in (*one.notes, *pieces)]
         if any(_within(one.longest, log) for log in loaded.logs()):
-            raise ExperimentError(f"--validate {path} holds the motion that is identified: give another motion, or none")
-        held_out[str(given)] = one.longest
-        every.append(one)
-    return Logs(loaded.logs(), loaded.names, held_out, (*loaded.notes, *of_each(said)), truth, sought, tuple(every))
+            raise ExperimentError(f"--validate {name} holds the motion that is identified: give another motion, or none")
+    held_out, notes = {name: one.longest for name, one in every.items()}, (*loaded.notes, *of_each(said))
+    return Logs(loaded.logs(), loaded.names, held_out, notes, truth, delay_sought, tuple(every.values()))
 
 
 def require_different(paths: Sequence[Path]) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.logs import with_delay
 from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.requests.shared import ColumnOptions
 from idbench.experiments.requests.words import Meaning
 from idbench.identify import Array, AsLogged, LogError, MotionLog, RangeError, SettingError, TimeError, TorqueChannel
@@ -96,17 +97,25 @@ class ReadLog:
         return max(self.logs, key=lambda log: log.samples)
 
 
-def read(path: Path, options: ReadOptions, request: Request) -> ReadLog:
-    """Return the log, its torque read as the options say; its delay is that which is stated."""
-    columns, delay, joints = columns_of(path, options.columns), options.delay, request.robot_model.mounting.joints
-    columns = columns if columns.joints or len(joints) != columns.n else replace(columns, joints=joints)
-    before = columns.prefixed(request.robot_model.robot.joints)
-    try:
-        columns = columns.ordered(request.robot_model.robot.joints)
-    except LogError as error:
-        raise ExperimentError(
-            f"{path}: {error}; name the robot of the log with --robot{_joints_of(columns, request)}"
-        ) from error
+def read(path: Path, options: ReadOptions, robot_model: RobotModel | None) -> ReadLog:
+    """Return the log, its torque read as the options say; its delay is that which is stated.
+
+    Joints are in the order of the robot; without one in that of the file.
+    """
+    columns, delay, before = columns_of(path, options.columns), options.delay, ""
+    if robot_model is not None:
+        joints = robot_model.mounting.joints
+        columns = columns if columns.joints or len(joints) != columns.n else replace(columns, joints=joints)
+        before = columns.prefixed(robot_model.robot.joints)
+        try:
+            columns = columns.ordered(robot_model.robot.joints)
+        except LogError as error:
+            raise ExperimentError(
+                f"{path}: {error}; name the robot of the log with --robot{_joints_of(columns, robot_model)}"
+            ) from error
+    names = columns.joints if robot_model is None else robot_model.robot.joints
+    names = names or tuple(f"joint {j + 1}" for j in range(columns.n))
+    hinges = [True] * columns.n if robot_model is None else [joint.kind == "hinge" for joint in robot_model.tree.joints]
     stated = columns.torque or options.fallback
     meaning = options.torque or (stated.meaning if stated else None)
     if meaning is None:
@@ -118,14 +127,14 @@ def read(path: Path, options: ReadOptions, request: Request) -> ReadLog:
     _require_seconds(path, columns.t)
     if not np.any(columns.tau) and np.ptp(columns.q, axis=0).any():
         raise ExperimentError(f"{path}: all torques are 0: there is nothing to identify")
-    columns = replace(columns, q=_turned(path, columns.q, request, options.unwrap))
+    columns = replace(columns, q=_turned(path, columns.q, names, hinges, options.unwrap))
     assumed = delay is None and stated is None
     notes = [columns.said] if columns.said else []
     notes += [f"names of the log's joints have {before!r} before those of the robot's"] if before else []
     notes += ["no --torque-delay was given, 0 is assumed: `estimate` finds it"] if assumed else []
     if options.columns.resample or columns.t_tau is not None:
         repaired = Repaired.of(columns, channel)
-        words = [*repaired.words(request.robot_model.robot.joints), *notes]
+        words = [*repaired.words(names), *notes]
         return ReadLog(path, repaired.logs, columns, channel, repaired, tuple(words))
     try:
         log = MotionLog.at_times(columns.t, columns.q, columns.tau, channel, columns.conditions)
@@ -138,7 +147,34 @@ def read(path: Path, options: ReadOptions, request: Request) -> ReadLog:
     return ReadLog(path, (log,), columns, channel, None, tuple(notes))
 
 
-def read_as(first: Path, path: Path, options: ReadOptions, request: Request) -> ReadLog:
+def motion_log(path: Path, options: ReadOptions, robot_model: RobotModel | None = None) -> MotionLog:
+    """Return the log of a file, with the names of its joints; raise ExperimentError if it has several pieces."""
+    found = read(path, options, robot_model)
+    if len(found.logs) > 1:
+        raise ExperimentError(f"{path} has {len(found.logs)} pieces with gaps between them: give the file itself to the fit")
+    names = found.columns.joints if robot_model is None else robot_model.robot.joints
+    return replace(found.logs[0], joints=names)
+
+
+def given_log(name: str, log: MotionLog, robot_model: RobotModel) -> ReadLog:
+    """Return a log of Python as one that was read, its joints in the order of the robot."""
+    joints = robot_model.robot.joints
+    columns = LogColumns(log.t, log.q, log.tau, log.torque, log.joints)
+    try:
+        _ = columns.ordered(joints)
+    except LogError as error:
+        raise ExperimentError(f"{name}: {error}") from error
+    if log.joints and log.joints != joints:
+        place = [log.joints.index(joint) for joint in joints]
+        gain = np.asarray(log.torque.gain)
+        torque = replace(log.torque, gain=tuple(gain[place].tolist())) if gain.size > 1 else log.torque
+        conditions = {key: x[..., place] if x.shape[-1] > 1 else x for key, x in log.conditions.items()}
+        log = replace(log, q=log.q[..., place], tau=log.tau[..., place], torque=torque, conditions=conditions, joints=joints)
+    columns = LogColumns(log.t, log.q, log.tau, log.torque, joints)
+    return ReadLog(Path(name), (replace(log, joints=()),), columns, log.torque)
+
+
+def read_as(first: Path, path: Path, options: ReadOptions, robot_model: RobotModel | None) -> ReadLog:
     """Return a log, its columns as the file beside another log says where none is beside this one.
 
     Logs that idbench wrote say it themselves; so do those that do not have the columns of the other.
@@ -146,11 +182,11 @@ def read_as(first: Path, path: Path, options: ReadOptions, request: Request) -> 
     beside = LogLayout.beside(first)
     itself = path.suffix.lower() == LAYOUT_FILE or LogLayout.beside(path) is not None
     if beside is None or beside[0].files or options.columns.stated or itself or read_table(path).torque is not None:
-        return read(path, options, request)
+        return read(path, options, robot_model)
     try:
-        found = read(path, replace(options, columns=replace(options.columns, layout=beside[1])), request)
+        found = read(path, replace(options, columns=replace(options.columns, layout=beside[1])), robot_model)
     except (LogError, ExperimentError):
-        return read(path, options, request)
+        return read(path, options, robot_model)
     return replace(found, notes=(f"columns are what {beside[1].name} beside {first.name} says", *found.notes))
 
 
@@ -208,9 +244,9 @@ def columns_of(path: Path, options: ColumnOptions) -> LogColumns:
     return read_columns(path, replace(layout, gain=options.gain or layout.gain, rows={**layout.rows, **rows}))
 
 
-def _joints_of(columns: LogColumns, request: Request) -> str:
+def _joints_of(columns: LogColumns, robot_model: RobotModel) -> str:
     """Return how to say which joints a log has, where they are fewer than the robot's."""
-    known = request.robot_model.robot.joints
+    known = robot_model.robot.joints
     if columns.n >= len(known):
         return ""
     those = columns.joints if set(columns.joints) <= set(known) and columns.joints else known[: columns.n]
@@ -226,17 +262,17 @@ def _require_seconds(path: Path, t: Array) -> None:
         )
 
 
-def _turned(path: Path, q: Array, request: Request, unwrap: bool) -> Array:
+def _turned(path: Path, q: Array, names: Sequence[str], hinges: Sequence[bool], unwrap: bool) -> Array:
     """Return positions whose hinges do not jump by a turn, undone if that is wanted; raise ExperimentError if it is not."""
-    tree, q = request.robot_model.tree, q.copy()
-    for j, joint in enumerate(tree.joints):
+    q = q.copy()
+    for j, hinge in enumerate(hinges):
         jumps = np.abs(np.abs(np.diff(q[:, j])) - TURN) < NEARLY * TURN
-        if joint.kind != "hinge" or not jumps.any():
+        if not hinge or not jumps.any():
             continue
         if not unwrap:
             k = int(np.argmax(jumps))
             raise ExperimentError(
-                f"{path}: {joint.name} jumps from {q[k, j]:.4g} to {q[k + 1, j]:.4g} rad at sample {k + 1}: an angle that "
+                f"{path}: {names[j]} jumps from {q[k, j]:.4g} to {q[k + 1, j]:.4g} rad at sample {k + 1}: an angle that "
                 "starts anew at every turn? Add --unwrap to count the turns"
             )
         known = np.isfinite(q[:, j])

@@ -11,6 +11,7 @@ from idbench.experiments.identification.friction_laws import FrictionLaws, balan
 from idbench.experiments.requests.shared import Parameters
 from idbench.identify import BLOCKS, AbstractJointLaw, BaseParameters, Basis, KinematicTree, tree_basis
 from idbench.identify.parameters.base_parameters import in_letters_of_the_paper
+from idbench.identify.tables import html_table, text_table
 from idbench.sim.frictions import AbstractFrictionLaw
 from idbench.sim.robot.mounting import PLAIN, Mounting
 from idbench.sim.robot.robot import FILES, Robot
@@ -31,6 +32,18 @@ class RobotModel:
     """Which of its parameters are asked for."""
     mounting: Mounting = PLAIN
     """How it is mounted, and which of its joints move."""
+
+    def __repr__(self) -> str:
+        return text_table(*self._table())
+
+    def _repr_html_(self) -> str:
+        return html_table(*self._table())
+
+    def _table(self) -> tuple[str, list[str], list[list[str]]]:
+        made = self.grouping.groupings
+        rows = [[name, unit, made.get(name, "")] for name, unit in zip(self.basis.names, self.basis.units, strict=True)]
+        joints = ", ".join(self.robot.joints)
+        return f"{self.name}: joints {joints}; {len(rows)} identifiable parameters", ["", "unit", "made of"], rows
 
     @cached_property
     def robot(self) -> Robot:

@@ -1,18 +1,97 @@
 """The job `servo`: a request becomes servos with their logs, what is known of them, and fits joint by joint."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import Any, final
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.requests.jobs import ServoRequest
-from idbench.experiments.servo.identification import AUTO, Servos
-from idbench.identify import SettingError
+from idbench.experiments.servo.identification import AUTO, Servos, lacks_summary, summary_of
+from idbench.experiments.servo.joints import Identified
+from idbench.experiments.servo.servo_text import verdicts
+from idbench.identify import Array, SettingError
 from idbench.identify.files.servo_log import ServoColumns, ServoFile, order, read_servo_log
-from idbench.identify.servo import SERVO_FRICTIONS
+from idbench.identify.servo import SERVO_FRICTIONS, ServoFit
+from idbench.identify.servo.choice import FrictionChoice
 from idbench.identify.servo.fit import require_possible
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.sim.robot.robot import Robot
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ServosFit:
+    """Servos of a robot, identified and judged."""
+
+    servos: Servos
+    """The servos with the logs of the fit."""
+    others: Servos | None
+    """The same with held-out logs, if there are any."""
+    every: Mapping[str, ServoFit | str]
+    """The fit of each joint, or why it has none."""
+    choices: Mapping[str, FrictionChoice]
+    """The laws of friction that were compared, of joints that have a fit."""
+
+    @property
+    def fits(self) -> dict[str, ServoFit]:
+        """The fits of joints that have one."""
+        return {joint: fit for joint, fit in self.every.items() if isinstance(fit, ServoFit)}
+
+    @cached_property
+    def errors(self) -> dict[str, dict[str, Array]]:
+        """Mean absolute error of positions from commands alone [rad], by the kind of log and joint, shape (log,)."""
+        found = {"fitted": self.servos.errors(self.fits)}
+        return found | ({"held out": self.others.errors(self.fits)} if self.others else {})
+
+    @property
+    def verdicts(self) -> list[str]:
+        """What the errors mean."""
+        return verdicts(self.fits, self.errors["fitted"], self.errors.get("held out", {}))
+
+    def parameters(self) -> dict[str, Any]:
+        """Return what a summary.json says of the fits."""
+        laws = {joint: {"errors": choice.errors, "p": choice.p} for joint, choice in self.choices.items()}
+        return {
+            **({"laws": laws} if laws else {}),
+            "joints": {joint: summary_of(fit) for joint, fit in self.fits.items()},
+            "lack_of_fit": {joint: lacks_summary(fit) for joint, fit in self.fits.items()},
+        }
+
+    def summary(self) -> dict[str, Any]:
+        """Return what a summary.json says of the fits and of their errors."""
+        each = {what: {joint: [float(x) for x in e] for joint, e in of.items()} for what, of in self.errors.items()}
+        return self.parameters() | {"position_error": each, "verdict": self.verdicts}
+
+
+Heard = Callable[[str, Identified | str, ServosFit], None]
+"""Hears the result of a joint, and all results so far."""
+
+
+def servos_identified(asked: ServoRequest, heard: Heard | None = None) -> ServosFit:
+    """Return the servos of a robot, identified joint by joint.
+
+    Raises
+    ------
+    ExperimentError, IdentificationError, BenchError
+        If something is wrong with the request or its files, or no joint has a fit.
+    """
+    servos, others = servos_of(asked)
+    every, choices = dict[str, ServoFit | str](), dict[str, FrictionChoice]()
+    for joint, result in servos.identified(asked.friction, asked.find, held_of(asked, servos.links.joints)):
+        if isinstance(result, FrictionChoice):
+            choices[joint] = result
+        elif isinstance(result, str):
+            choices.pop(joint, None)
+        every[joint] = result.fit if isinstance(result, FrictionChoice) else result
+        if heard:
+            heard(joint, result, ServosFit(servos, others, dict(every), dict(choices)))
+    made = ServosFit(servos, others, every, choices)
+    if not made.fits:
+        raise ExperimentError("; ".join(dict.fromkeys(str(why) for why in every.values())))
+    return made
 
 
 def servos_of(asked: ServoRequest) -> tuple[Servos, Servos | None]:

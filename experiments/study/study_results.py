@@ -18,6 +18,7 @@ from idbench.experiments.study.axis import FRICTION
 from idbench.experiments.study.cluster import versions
 from idbench.experiments.study.statistics import BOUNDS, Cell, cells
 from idbench.experiments.study.store import Store, arrays
+from idbench.experiments.study.study import Study
 from idbench.experiments.study.study_report import report
 from idbench.experiments.text import new_table, print_table
 
@@ -33,8 +34,8 @@ def write_results(page: "Page", store: Store, folder: ResultsFolder, recording: 
     """Print the answer of a study, write summary.json into its folder, then report and recording, which may fail alone."""
     study, seconds = store.study, store.seconds()
     found = cells(arrays(store.table()), study.varied, study.parameters)
-    _print(page, store, found)
-    summary = _summary(store, found, seconds)
+    print_study(page, study, found)
+    summary = summary_of(study, found, seconds)
     page.found |= summary | {"folder": str(folder.out)}
     page.show()
     with folder.complete() as hidden:
@@ -49,12 +50,13 @@ def write_results(page: "Page", store: Store, folder: ResultsFolder, recording: 
         raise ResultsError(f"no run of study {study.name} gave an estimate: {_reasons(found)[0]}")
 
 
-def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:
-    axes = [short(field) for field in store.study.varied if field != FRICTION] or [""]
-    least = ["bound", "through reversals"] if store.study.bound else []
+def print_study(page: Console, study: Study, found: Sequence[Cell]) -> None:
+    """Print the table of a study, its answer, and why runs failed."""
+    axes = [short(field) for field in study.varied if field != FRICTION] or [""]
+    least = ["bound", "through reversals"] if study.bound else []
     often = ["simulations"] if any(cell.mean_simulations for cell in found) else []
     columns = [*axes[1:], "identified by", "runs", "failed", "typical error", *least, "within 2 sigma", *often]
-    grid = new_table(store.study.question, columns)
+    grid = new_table(study.question, columns)
     for cell in found:
         settings = [value(x) for x in settings_of(cell).values()] or [""]
         numbers = f"{cell.runs}", f"{cell.failed or ''}"
@@ -64,7 +66,7 @@ def _print(page: Console, store: Store, found: Sequence[Cell]) -> None:
         grid.add_row(*settings, method(cell, found), *numbers, *judged)
     grid.columns[0].header = axes[0]
     print_table(page, grid, len(axes) + 1)
-    page.print(Text(answer(found, store.study.edges)))
+    page.print(Text(answer(found, study.edges)))
     for reason in _reasons(found)[:MOST_REASONS]:
         page.print(Text(f"failed: {reason}"), soft_wrap=True)
 
@@ -87,17 +89,18 @@ def _reasons(found: Sequence[Cell]) -> list[str]:
     return [f"{count} times: {reason}" for reason, count in counts.most_common()]
 
 
-def _summary(store: Store, found: Sequence[Cell], seconds: dict[str, float]) -> dict[str, Any]:
+def summary_of(study: Study, found: Sequence[Cell], seconds: dict[str, float]) -> dict[str, Any]:
+    """Return what a summary.json says of a study."""
     return {
         "experiment": "study",
         "versions": versions(),
-        "seed": store.study.seed,
-        "study": store.study.content,
-        "scenario": store.study.scenario,
-        "answer": answer(found, store.study.edges),
-        "parameters": list(store.study.parameters),
+        "seed": study.seed,
+        "study": study.content,
+        "scenario": study.scenario,
+        "answer": answer(found, study.edges),
+        "parameters": list(study.parameters),
         "cells": [_cell(cell) for cell in found],
-        "seconds": {**seconds, "runs": store.study.size},
+        "seconds": {**seconds, "runs": study.size},
     }
 
 

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from idbench.identify.arrays import Array, frozen
 from idbench.identify.errors import LogError, SettingError, TimeError, require_finite, require_positive
+from idbench.identify.tables import html_table
 
 Meaning = Literal["instantaneous", "held", "averaged"]
 
@@ -81,6 +82,25 @@ class MotionLog:
     conditions: Mapping[str, Array] = field(default_factory=dict)
     """What else was logged that laws may need: ``temperature`` [deg C]; ``payload``, the share of the payload that is held;
     ``command`` of servos [rad], and ``on``, 1 where their torque is, shape (..., time, joint or 1)."""
+    joints: tuple[str, ...] = ()
+    """Names of the joints, where they are known."""
+
+    def __repr__(self) -> str:
+        runs = f"{np.prod(self.q.shape[:-2], dtype=int)} runs of " if self.q.ndim > 2 else ""
+        names = f" ({', '.join(self.joints)})" if self.joints else ""
+        what = f"{runs}{self.samples} samples of {self.n} joint{'s' if self.n > 1 else ''}{names}"
+        late = f", delay {1e3 * self.torque.delay:.4g} ms" if self.torque.delay else ""
+        return f"MotionLog: {what}, {self.samples / self.fs:.4g} s at {self.fs:.5g} Hz; torque {self.torque.meaning}{late}"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            [
+                self.joints[j] if self.joints else f"joint {j + 1}",
+                *(f"{x:.4g}" for x in (q.min(), q.max(), tau.min(), tau.max())),
+            ]
+            for j, (q, tau) in enumerate(zip(np.moveaxis(self.q, -1, 0), np.moveaxis(self.tau, -1, 0), strict=True))
+        ]
+        return html_table(repr(self), ["", "from [rad, m]", "to", "torque from", "to"], rows)
 
     def __post_init__(self) -> None:
         require_positive(fs=self.fs)
@@ -100,6 +120,8 @@ class MotionLog:
                     "impossible: are columns exchanged, or is this a mark for missing samples?"
                 )
         object.__setattr__(self, "conditions", {name: self._condition(name, x) for name, x in self.conditions.items()})
+        if len(self.joints) not in (0, self.n):
+            raise LogError(f"{len(self.joints)} names for {self.n} joints: {', '.join(self.joints)}")
         if np.size(self.torque.gain) not in (1, self.n):
             raise LogError(f"{np.size(self.torque.gain)} torque gains for {self.n} joints: give one, or one per joint")
 

@@ -16,6 +16,7 @@ from idbench.identify.estimators.solution import AbstractSolution, Given, OfWeig
 from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.rows.factors import Factor, Fit, Status
 from idbench.identify.rows.rows import Rows
+from idbench.identify.tables import html_table, significant, text_table
 
 
 def noise_covariance(problem: Problem, influence: Sequence[Array]) -> Array:
@@ -123,6 +124,21 @@ class Estimate:
         inverse = fit.factor.inverse(problem.factors.together.status == Status.OK)
         covariance = _paper_covariance(fit.factor, fit.X, inverse)
         return cls(problem, frozen(fit.X), frozen(covariance), OfWeightedRows(fit.weight, inverse, scaled))
+
+    def __repr__(self) -> str:
+        return text_table(*self._table())
+
+    def _repr_html_(self) -> str:
+        return html_table(*self._table())
+
+    def _table(self) -> tuple[str, list[str], list[list[str]]]:
+        """Return title, heads and rows of what is shown of it: of several runs the first."""
+        several = self.X.ndim > 1
+        X, sigma = (x.reshape(-1, x.shape[-1])[0] for x in (self.X, self.standard_errors))
+        of = f", the first of {self.X.size // max(self.X.shape[-1], 1)} runs" if several else ""
+        units = self.problem.basis.units
+        rows = [[name, *significant(x, s), unit] for name, x, s, unit in zip(self.names, X, sigma, units, strict=True)]
+        return f"{len(self.names)} parameters{of}", ["", "value", "sigma", "unit"], rows
 
     @property
     def names(self) -> tuple[str, ...]:

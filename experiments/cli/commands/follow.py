@@ -116,7 +116,7 @@ class Follower:
             copy = Path(folder) / self.path.name
             copy.write_bytes(lines)
             try:
-                return read(copy, replace(self.options, delay=self._delay), self.request).longest
+                return read(copy, replace(self.options, delay=self._delay), self.request.robot_model).longest
             except (ExperimentError, IdentificationError) as error:
                 complaint = str(error).replace(str(copy), str(self.path))
                 if lines.count(b"\n") > FEW and complaint != self._complaint:

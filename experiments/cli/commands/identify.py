@@ -16,14 +16,12 @@ from idbench.experiments.cli.own_parts import with_own_parts
 from idbench.experiments.cli.page import Page, new_page, shown, stages_of
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.identification.friction_choice import summary, words
-from idbench.experiments.identification.job import files_of, fit_of, loaded_logs, read_options, request_of
+from idbench.experiments.identification.job import files_of, fit_of, loaded_logs, notes_of, read_options, request_of, summary_of
 from idbench.experiments.identification.request import Request
 from idbench.experiments.judgement.checks import checks
 from idbench.experiments.judgement.judgement import Judgement, judge
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.reports.estimates import conclusion, shown_whole
-from idbench.experiments.reports.iterations import iterations
 from idbench.experiments.reports.printed import print_fit, print_held_out
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
@@ -95,15 +93,10 @@ def _followed(stack: ExitStack, options: Identify, request: Request, audience: A
 def _show_fit(page: Page, result: Fit, options: Identify, log: Path) -> None:
     """Show the estimates."""
     print_fit(page, result, ", ".join(map(str, options.log)), shown_whole(result, options.model is not None))
-    notes, choice, robot_model = list(result.logs.notes), result.choice, result.robot_model
-    if choice is not None:
-        notes += words(choice, robot_model.laws.names, robot_model.robot.joints)
-        page.found["friction"] = summary(choice)
-    for note in notes:
+    for note in notes_of(result):
         page.print(Text(note), soft_wrap=True)
     page.show()
-    page.found |= {"experiment": "identify", "log": log.name, "path": str(log), **result.summary()}
-    page.found |= {"iterations": iterations(result), "notes": notes}
+    page.found |= {"experiment": "identify", "log": log.name, "path": str(log), **summary_of(result)}
 
 
 def _show_judgement(page: Page, judgement: Judgement, whole: Sequence[str]) -> None:

@@ -1,6 +1,5 @@
 """The command that identifies servos."""
 
-from collections.abc import Mapping
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,12 +11,14 @@ from idbench.experiments.cli.command_text import command_of
 from idbench.experiments.cli.options.jobs import IdentifyServo
 from idbench.experiments.cli.page import Page, new_page, shown, stages_of
 from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.writing import require_free, write_summary, write_text
-from idbench.experiments.servo.identification import Servos, lacks_summary, summary_of
-from idbench.experiments.servo.job import files_of, held_of, servos_of
+from idbench.experiments.servo.identification import Servos
+from idbench.experiments.servo.job import ServosFit, files_of, servos_identified
+from idbench.experiments.servo.joints import Identified
 from idbench.experiments.servo.servo_text import (
     in_mujoco,
     inexpressible,
@@ -26,7 +27,6 @@ from idbench.experiments.servo.servo_text import (
     print_errors,
     print_servos,
     servo_function,
-    verdicts,
     warnings_of,
     without_servo,
 )
@@ -46,10 +46,14 @@ def servo(options: IdentifyServo) -> None:
                 raise ExperimentError(f"{option} {path}: its name must end with {ending}")
             require_free(path, option, force=options.force, read=files_of(options))
     with options.watching.audience() as audience, shown(page), folder.held() if folder else nullcontext():
-        servos, others = servos_of(options)
-        page.found |= {"experiment": "servo", "robot": servos.robot, "friction": options.friction, "joints": {}}
-        found = _identified(page, folder, options, servos)
-        _judge(page, servos, others, found)
+        page.found |= {"experiment": "servo", "robot": absolute(str(options.robot)), "friction": options.friction, "joints": {}}
+        made = _identified(page, folder, options)
+        servos, others, found = made.servos, made.others, made.fits
+        for what, each in made.errors.items():
+            print_errors(page, "fitted logs" if what == "fitted" else "held out logs", each)
+        page.found |= made.summary()
+        for line in made.verdicts:
+            page.print(Text(line), soft_wrap=True)
         page.show()
         _save(page, folder)
         with Attempts("the results are printed" + (f", and in {folder.out}" if folder else ""), folder) as attempts:
@@ -64,52 +68,26 @@ def servo(options: IdentifyServo) -> None:
             page.print(f"written to {folder.out}{options.watching.hint(folder.out)}", soft_wrap=True)
 
 
-def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo, servos: Servos) -> dict[str, ServoFit]:
-    """Return the fits that there are; print and save those of joints that are done if the others are not waited for."""
-    every, held = dict[str, ServoFit | str](), held_of(options, servos.links.joints)
+def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo) -> ServosFit:
+    """Return the fits; print and save those of joints that are done if the others are not waited for."""
+    last = list[ServosFit]()
+
+    def heard(joint: str, result: Identified | str, made: ServosFit) -> None:
+        if isinstance(result, FrictionChoice):
+            print_choice(page, joint, result)
+        last[:] = [made]
+        page.found |= made.parameters()
+        if page.found["joints"]:
+            _save(page, folder)
+
     try:
         with stages_of("identifying"):
-            for joint, result in servos.identified(options.friction, options.find, held):
-                if isinstance(result, FrictionChoice):
-                    print_choice(page, joint, result)
-                    page.found.setdefault("laws", {})[joint] = {"errors": result.errors, "p": result.p}
-                if isinstance(result, str):
-                    page.found.get("laws", {}).pop(joint, None)
-                every[joint] = result.fit if isinstance(result, FrictionChoice) else result
-                _take(page, folder, every)
+            made = servos_identified(options, heard)
     finally:
-        found = _fits(every)
-        if found:
-            print_servos(page, every)
-    if not found:
-        raise ExperimentError("; ".join(dict.fromkeys(str(why) for why in every.values())))
-    page.warn({"the servos": warnings_of(every)})
-    return found
-
-
-def _fits(every: Mapping[str, ServoFit | str]) -> dict[str, ServoFit]:
-    return {joint: fit for joint, fit in every.items() if isinstance(fit, ServoFit)}
-
-
-def _take(page: Page, folder: ResultsFolder | None, every: dict[str, ServoFit | str]) -> None:
-    page.found["joints"] = {joint: summary_of(fit) for joint, fit in _fits(every).items()}
-    page.found["lack_of_fit"] = {joint: lacks_summary(fit) for joint, fit in _fits(every).items()}
-    if page.found["joints"]:
-        _save(page, folder)
-
-
-def _judge(page: Page, servos: Servos, others: Servos | None, found: dict[str, ServoFit]) -> None:
-    """Print errors of positions from commands alone, on the logs of the fit and on others, and what they mean."""
-    fitted, elsewhere = servos.errors(found), others.errors(found) if others else {}
-    for what, each in (("fitted", fitted), ("held out", elsewhere)):
-        print_errors(page, f"{what} logs", each)
-    every = {"fitted": fitted} | ({"held out": elsewhere} if others else {})
-    page.found["position_error"] = {
-        what: {joint: [float(x) for x in e] for joint, e in each.items()} for what, each in every.items()
-    }
-    page.found["verdict"] = verdicts(found, fitted, elsewhere)
-    for line in page.found["verdict"]:
-        page.print(Text(line), soft_wrap=True)
+        if last and last[0].fits:
+            print_servos(page, last[0].every)
+    page.warn({"the servos": warnings_of(made.every)})
+    return made
 
 
 def _write(page: Page, options: IdentifyServo, servos: Servos, others: Servos | None, found: dict[str, ServoFit]) -> None:

@@ -1,0 +1,1 @@
+"""What a researcher types: `import idbench`, a robot, a log, a fit."""

@@ -1,0 +1,313 @@
+"""The functions of `idbench`: each makes a request of its arguments, and does what its command does."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from idbench.experiments.api.results import Identification, SimulatedRun
+from idbench.experiments.api.study_table import StudyTable
+from idbench.experiments.benchmark.job import rows_of
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.excite.excited import Excited
+from idbench.experiments.excite.job import excited
+from idbench.experiments.identification.job import chooses_band, fit_of, identified, read_options, request_of
+from idbench.experiments.identification.load import judged_on, prepared, with_held_out
+from idbench.experiments.identification.reading import ReadLog, file_of, given_log, motion_log, read
+from idbench.experiments.identification.request import Request
+from idbench.experiments.identification.robot_model import RobotModel, absolute
+from idbench.experiments.loads.job import GainsFit, PayloadFit, gains_of, payload_of
+from idbench.experiments.paper.job import table1_of, table2_of
+from idbench.experiments.paper.table1 import Table1
+from idbench.experiments.paper.table2 import Table2
+from idbench.experiments.requests import jobs
+from idbench.experiments.requests.shared import LogRequest, MountingOptions, Parameters
+from idbench.experiments.requests.table import keys_of, request_from
+from idbench.experiments.servo.job import ServosFit, servos_identified
+from idbench.experiments.study.job import LARGEST_SHARD, pool_of, runs_of_shard
+from idbench.experiments.study.run_study import run_missing
+from idbench.experiments.study.store import Store
+from idbench.experiments.study.study_file import load_study
+from idbench.identify import BLOCKS, CHAINS, ESTIMATORS, MODELS, MotionLog
+from idbench.identify.plugins import Table
+from idbench.sim.engine.simulation import simulate as simulated
+from idbench.sim.scenario.scenario import Scenario
+from idbench.sim.scenario.scenario_file import load as load_scenario
+
+AnyLog = MotionLog | str | Path
+Logs = AnyLog | Sequence[AnyLog]
+
+PARTS: Mapping[str, Table[Any]] = {"model": MODELS, "chain": CHAINS, "estimator": ESTIMATORS, "friction": BLOCKS, "add": BLOCKS}
+"""Keys whose values may be objects, or classes, in the place of names."""
+
+
+def load_robot(robot: str | Path, **keys: Any) -> RobotModel:
+    """Return a robot: its joints, and the parameters that can be identified.
+
+    Parameters
+    ----------
+    robot : str or Path
+        Name of a shipped robot, or its file: MJCF, URDF, or a table of Denavit-Hartenberg parameters (.toml).
+    **keys
+        Options of `idbench robot`: armature, friction, add, without, balancer; joints, lock, coupling, gravity.
+
+    Raises
+    ------
+    ExperimentError, BenchError, IdentificationError
+        If there is no such robot, or an option is unknown or wrong.
+
+    Examples
+    --------
+    >>> import idbench
+    >>> idbench.load_robot("scara", add="offset").basis.names[-2:]
+    ('off1', 'off2')
+    """
+    asked = request_from(LogRequest, _named(keys), "load_robot", taken=_others((Parameters, MountingOptions)))
+    made = RobotModel(absolute(str(robot)), asked.parameters, asked.mounting.mounting)
+    _ = made.basis
+    return made
+
+
+def read_log(path: str | Path, torque: str | None = None, robot: RobotModel | None = None, **keys: Any) -> MotionLog:
+    """Return the log of a file, or of the folder of a run.
+
+    Parameters
+    ----------
+    path : str or Path
+        CSV and other text, Parquet, NumPy, Matlab, a ROS bag.
+    torque : {"held", "instantaneous", "averaged"}, optional
+        What a torque sample means; needed unless the file states it.
+    robot : RobotModel, optional
+        Whose joints give the order of the columns; by default the order of the file, with the names that it has.
+    **keys
+        Options of `idbench identify` for reading: torque_delay, unwrap, resample, columns, units, rows, gain, layout.
+
+    Raises
+    ------
+    ExperimentError, LogError
+        If the file cannot be read, or makes no log.
+    """
+    table = keys if torque is None else {**keys, "torque": torque}
+    taken = _others((Parameters, MountingOptions), but=True) | {"robot", "mask_speed", "cutoff", "estimator"}
+    asked = request_from(LogRequest, table, "read_log", taken=taken)
+    if asked.torque_delay == "estimate":
+        raise ExperimentError("torque_delay: the robot is needed for it: idbench.fit(..., torque_delay='estimate')")
+    return motion_log(file_of(Path(path)), read_options(asked), robot)
+
+
+def fit(
+    log: Logs,
+    robot: RobotModel | str | Path | None = None,
+    *,
+    validate: Logs = (),
+    truth: Mapping[str, float] | None = None,
+    **keys: Any,
+) -> Identification:
+    """Return the fit of a log, or of several together, as `idbench identify` makes it.
+
+    Parameters
+    ----------
+    log : MotionLog, str, Path, or a sequence of them
+        The logs, or their files.
+    robot : RobotModel, str or Path, optional
+        The robot, its name or its file; by default the SCARA, or the robot of the run.
+    validate : MotionLog, str, Path, or a sequence of them
+        Held-out logs on which the fit is judged; by default the last quarter of the longest, predicted by a fit of the rest.
+    truth : mapping of str to float, optional
+        True parameters, where they are known.
+    **keys
+        Options of `idbench identify`: model, chain, estimator, friction, armature, torque, torque_delay, cutoff, consistent,
+        and so on. Models, chains, estimators and laws of friction may be names, objects or classes.
+
+    Raises
+    ------
+    ExperimentError, IdentificationError, BenchError
+        If an option is unknown or wrong, or nothing can be identified.
+
+    Examples
+    --------
+    >>> import idbench
+    >>> run = idbench.simulate("ideal")
+    >>> found = idbench.fit(run.log, run.robot, model="explicit", estimator="OLS")
+    >>> found.parameters["Fs1"].unit, round(found.parameters["Fs1"].value, 4)
+    ('N m', 0.5)
+    """
+    logs, held_out, model = _several(log), _several(validate), robot if isinstance(robot, RobotModel) else None
+    table = _named(keys) | ({} if robot is None or model else {"robot": robot})
+    paths = {name: tuple(map(Path, given)) for name, given in (("log", logs), ("validate", held_out)) if _files(given)}
+    asked = request_from(jobs.IdentifyRequest, table | paths, "fit", taken={"label"})
+    delay_given = asked.torque_delay != "estimate"
+    if model is None and _files(logs) and _files(held_out) and truth is None:
+        return Identification(identified(asked), delay_given)
+    model = _with_keys(model, asked, table) if model else _model_of(asked)
+    request = request_of(asked, model)
+    every = [_read(k, each, asked, model) for k, each in enumerate(logs)]
+    loaded = prepared(every, request, seek_delay=not delay_given, band=chooses_band(asked))
+    if _files(held_out):
+        found = with_held_out(loaded, asked.validate, read_options(asked), truth)
+    else:
+        others = {f"{k + 1}": _read(k, each, asked, model) for k, each in enumerate(held_out)}
+        found = judged_on(loaded, others, truth, not delay_given)
+    return Identification(fit_of(loaded.request, found), delay_given)
+
+
+def simulate(scenario: str | Path | Scenario, seed: int | None = None, **keys: Any) -> SimulatedRun:
+    """Return a scenario, simulated: its log, its robot, and the true parameters.
+
+    Parameters
+    ----------
+    scenario : str, Path or Scenario
+        Name of a shipped scenario (`idbench scenario` lists them), its file (TOML), or the scenario itself.
+    seed : int, optional
+        Seed of all that is random; by default that of the scenario. The same seed gives the same bits.
+    **keys
+        Which parameters the robot is to have: armature, friction, add, without, balancer.
+
+    Raises
+    ------
+    ExperimentError, BenchError
+        If there is no such scenario, or it cannot be simulated.
+    """
+    made = scenario if isinstance(scenario, Scenario) else load_scenario(str(scenario))
+    made = made if seed is None else replace(made, seed=seed)
+    asked = request_from(LogRequest, _named(keys), "simulate", taken=_others((Parameters,)))
+    return SimulatedRun(simulated(made), RobotModel(made.robot, asked.parameters))
+
+
+def study(
+    name: str | Path, *, seeds: int | None = None, out: str | Path | None = None, threads: int | None = None, **parts: Any
+) -> StudyTable:
+    """Return a study that was run: errors and coverage of every combination.
+
+    Parameters
+    ----------
+    name : str or Path
+        Name of a shipped study (`idbench study` lists them), or its file (TOML).
+    seeds : int, optional
+        Independent runs per combination, instead of the study's number.
+    out : str or Path, optional
+        Folder that keeps all runs; an interrupted study goes on there. By default nothing is kept.
+    threads : int, optional
+        Shards at a time; by default all processors.
+    **parts
+        models, chains, estimators, friction: names, objects or classes, instead of the study's.
+
+    Raises
+    ------
+    StudyError, ExperimentError, BenchError
+        If there is no such study, or it cannot be run.
+
+    Examples
+    --------
+    >>> import idbench
+    >>> table = idbench.study("encoder", seeds=2, chains=["idbench"], models=["explicit"], estimators=["OLS"])
+    >>> table.study.size == len(table.rows["run"])
+    True
+    """
+    tables = {f"{key}s": PARTS[key] for key in ("model", "chain", "estimator")} | {"friction": BLOCKS}
+    if unknown := sorted(parts.keys() - tables.keys()):
+        raise ExperimentError(f"study: unknown key {unknown[0]!r}; known: seeds, out, threads, {', '.join(tables)}")
+    changed: dict[str, Any] = {key: tuple(map(tables[key].name_of, _several(value))) for key, value in parts.items()}
+    described = load_study(str(name))
+    described = replace(described, **changed) if seeds is None else replace(described, **changed).with_seeds(seeds)
+    asked = jobs.StudyRequest(threads=threads)
+    with TemporaryDirectory(prefix="idbench-") as folder:
+        store = Store.new(described, Path(folder) / described.name if out is None else Path(out))
+        with store.held(), pool_of(asked, store) as pool:
+            if pool is not None:
+                run_missing(store, pool, min(LARGEST_SHARD, runs_of_shard(asked, store)), _unheard)
+        return StudyTable.of(store)
+
+
+def fit_payload(log: Logs, unloaded: Logs = (), **keys: Any) -> PayloadFit:
+    """Return what the gripper holds, as `idbench payload` finds it; files of logs, and its options by keyword."""
+    return payload_of(_asked(jobs.PayloadRequest, "fit_payload", keys, log=log, unloaded=unloaded))
+
+
+def fit_gains(log: Logs, unloaded: Logs = (), **keys: Any) -> GainsFit:
+    """Return the torque constants of the drives, as `idbench gains` finds them; files of logs, and its options by keyword."""
+    return gains_of(_asked(jobs.GainsRequest, "fit_gains", keys, log=log, unloaded=unloaded))
+
+
+def fit_servos(log: Logs, robot: str | Path, servo: str | Path, **keys: Any) -> ServosFit:
+    """Return servos, identified from commands and positions as `idbench servo` does; files, and its options by keyword."""
+    return servos_identified(_asked(jobs.ServoRequest, "fit_servos", {**keys, "robot": robot, "servo": servo}, log=log))
+
+
+def design(robot: str | Path, **keys: Any) -> Excited:
+    """Return an exciting trajectory within the robot's limits, as `idbench excite` designs it; its options by keyword."""
+    return excited(_asked(jobs.ExciteRequest, "design", {**keys, "robot": robot}), _unheard)[0]
+
+
+def benchmark(*sets: str | Path, out: str | Path = Path("runs") / "benchmark", force: bool = False) -> dict[str, Any]:
+    """Return the rows of sets of real logs, by name, as `idbench benchmark` makes them; or why a set has none."""
+    asked = _asked(jobs.BenchmarkRequest, "benchmark", {}, sets=sets)
+    return dict(rows_of(asked, Path(out), _unheard, force=force))
+
+
+def table1(**keys: Any) -> Table1:
+    """Return the paper's simulation comparison (Table 1); options of `idbench table1`: chain, seed, scenario."""
+    return table1_of(_asked(jobs.Table1Request, "table1", keys))
+
+
+def table2(**keys: Any) -> Table2:
+    """Return the paper's experiment on the virtual robot (Table 2); option: scenario."""
+    return table2_of(_asked(jobs.Table2Request, "table2", keys), _unheard)
+
+
+def _unheard(*_: object) -> None:
+    """Show no progress: `idbench.identify.telling.listening` hears it."""
+
+
+def _asked(request: type[Any], where: str, keys: Mapping[str, Any], **files: Any) -> Any:
+    given = {name: tuple(map(Path, _several(value))) for name, value in files.items()}
+    return request_from(request, {**_named(keys), **{name: value for name, value in given.items() if value}}, where)
+
+
+def _named(keys: Mapping[str, Any]) -> dict[str, Any]:
+    """Return keys with names in the place of objects and classes, which the tables have from now on."""
+    return {key: _names(PARTS[key], value) if key in PARTS else value for key, value in keys.items()}
+
+
+def _names(table: Table[Any], value: Any) -> Any:
+    return tuple(map(table.name_of, value)) if isinstance(value, list | tuple) else table.name_of(value)
+
+
+def _several(given: Any) -> tuple[Any, ...]:
+    one = isinstance(given, str | Path | MotionLog) or not isinstance(given, Iterable)
+    return (given,) if one else tuple(given)
+
+
+def _files(logs: Sequence[Any]) -> bool:
+    """Return whether logs are files; raise ExperimentError if some are and others are not."""
+    files = [isinstance(log, str | Path) for log in logs]
+    if any(files) and not all(files):
+        raise ExperimentError("give logs as files, or as MotionLog: not some of each")
+    return all(files)
+
+
+def _others(groups: Sequence[type], *, but: bool = False) -> set[str]:
+    """Return the keys of requests of logs that are not those of some groups; `but`: those that are."""
+    own = {key for group in groups for key in keys_of(group)}
+    return own if but else keys_of(LogRequest).keys() - own
+
+
+def _model_of(asked: jobs.IdentifyRequest) -> RobotModel:
+    return RobotModel(absolute(asked.robot or Request().robot_model.name), asked.parameters, asked.mounting.mounting)
+
+
+def _with_keys(model: RobotModel, asked: jobs.IdentifyRequest, table: Mapping[str, Any]) -> RobotModel:
+    """Return a robot with the parameters that keywords ask for beside its own."""
+    for group, name in ((Parameters, "parameters"), (MountingOptions, "mounting")):
+        given = {key: getattr(getattr(asked, name), key) for key in keys_of(group) if key in table}
+        if given and name == "mounting":
+            raise ExperimentError(f"fit: {', '.join(given)} is what the robot is loaded with: give it to load_robot")
+        model = replace(model, asked=replace(model.asked, **given)) if given else model
+    return model
+
+
+def _read(k: int, log: AnyLog, asked: jobs.IdentifyRequest, model: RobotModel) -> ReadLog:
+    if isinstance(log, MotionLog):
+        return given_log(f"log {k + 1}", log, model)
+    return read(file_of(Path(log)), read_options(asked), model)

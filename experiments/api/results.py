@@ -1,0 +1,251 @@
+"""Results as a Python session sees them: verdict first, then a table with units."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, final
+
+import numpy as np
+
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.exports.exports import EXPORTS
+from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.job import summary_of
+from idbench.experiments.identification.reading import given_log
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.judgement.checks import checks
+from idbench.experiments.judgement.judgement import Judgement, judge
+from idbench.experiments.judgement.verdict import Verdict
+from idbench.experiments.reports.estimates import conclusion
+from idbench.experiments.results.attempts import Attempts
+from idbench.experiments.results.writing import write_text
+from idbench.identify import Array, MotionLog, Problem, State, Validation, validate
+from idbench.identify.arrays import combined
+from idbench.identify.rows.rows import manageable
+from idbench.identify.tables import html_table, significant, text_table
+from idbench.sim.engine.run import Run
+
+
+@final
+@dataclass(frozen=True)
+class ParameterEstimate:
+    """One parameter with its standard error."""
+
+    name: str
+    """Its name, such as Fv1."""
+    value: float
+    """The estimate, in `unit`."""
+    sigma: float
+    """Its standard error, in `unit`."""
+    unit: str
+    """Its unit."""
+    truth: float | None = None
+    """The true value, where it is known."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Score:
+    """Errors of the predicted torques of a held-out log, while joints move."""
+
+    joints: tuple[str, ...]
+    """Names of the joints."""
+    units: tuple[str, ...]
+    """Units of their torques."""
+    validation: Validation
+    """The errors on the rows of the log."""
+    verdict: Verdict
+    """What they mean."""
+
+    @property
+    def rms(self) -> Array:
+        """Rms error of each joint's torque [N m, N], shape (joint,)."""
+        return self.validation.rms
+
+    @property
+    def percent(self) -> Array:
+        """The same in per cent of the rms torque, shape (joint,)."""
+        return self.validation.percent
+
+    def __repr__(self) -> str:
+        return text_table(*self._table())
+
+    def _repr_html_(self) -> str:
+        return html_table(*self._table())
+
+    def _table(self) -> tuple[str, list[str], list[list[str]]]:
+        each = zip(self.joints, self.rms, self.units, self.percent, strict=True)
+        rows = [[joint, f"{rms:.3g}", unit, f"{share:.2g}"] for joint, rms, unit, share in each]
+        return f"{self.verdict.word}: {'; '.join(self.verdict.reasons)}", ["", "rms error", "unit", "% of torque"], rows
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """Logs, identified: parameters with standard errors, predictions, and a verdict on held-out data."""
+
+    fit: Fit
+    """The fit: `fit.estimates` has the estimate of every model."""
+    delay_given: bool = True
+    """Whether the delay of the torques was given, not estimated: checks then look for another."""
+
+    @property
+    def robot(self) -> RobotModel:
+        """The robot, with the parameters that were identified."""
+        return self.fit.robot_model
+
+    @property
+    def model(self) -> str:
+        """The model whose parameters are shown: the first that has an estimate."""
+        return self.fit.leading
+
+    @property
+    def parameters(self) -> Mapping[str, ParameterEstimate]:
+        """The parameters by name."""
+        found, truth, units = self.fit.estimates[self.model], self.fit.truth or {}, self.fit.basis.units
+        each = zip(found.names, found.X.tolist(), found.standard_errors.tolist(), units, strict=True)
+        return {name: ParameterEstimate(name, x, sigma, unit, truth.get(name)) for name, x, sigma, unit in each}
+
+    @property
+    def correlation(self) -> Array:
+        """Correlations of the parameters, shape (p, p)."""
+        C = self.fit.estimates[self.model].covariance
+        sigma = np.sqrt(np.diagonal(C))
+        return np.asarray(C / np.outer(sigma, sigma))
+
+    @cached_property
+    def judgement(self) -> Judgement:
+        """The fit on each held-out log, or on the last quarter of the longest, predicted by a fit of the rest."""
+        return judge(self.fit)
+
+    @cached_property
+    def warnings(self) -> Mapping[str, Sequence[str]]:
+        """What to check, by what it is about."""
+        return checks(self.judgement, delay=self.delay_given)
+
+    @property
+    def verdict(self) -> str:
+        """The verdict on held-out data in one sentence, and what to check first."""
+        return conclusion(self.judgement, self.warnings)
+
+    def predict(self, q: Array, qd: Array, qdd: Array, model: str | None = None) -> Array:
+        """Return the torques of motions [N m, N], of the shape of q.
+
+        Parameters
+        ----------
+        q, qd, qdd : array_like, shape (..., joint)
+            Positions, velocities and accelerations [rad, rad/s, rad/s^2], joints in the order of the robot.
+        model : str, optional
+            The model whose parameters are used; by default the one that is shown.
+
+        Raises
+        ------
+        ExperimentError
+            If a shape is another, or the model has no estimate.
+        """
+        given = [np.asarray(x, dtype=np.float64) for x in (q, qd, qdd)]
+        n = self.fit.basis.n
+        if any(x.shape != given[0].shape for x in given) or given[0].shape[-1:] != (n,):
+            shapes = ", ".join(str(x.shape) for x in given)
+            raise ExperimentError(f"q, qd, qdd have the shapes {shapes}: give three of (..., {n}), one value a joint")
+        flat = [x.reshape(-1, n).T for x in given]
+        state = State(flat[0], flat[1], lambda _: flat[2])
+        tau = combined(self.fit.basis.explicit(state), self._of(model).X, np.zeros(flat[0].shape))
+        return tau.T.reshape(given[0].shape)
+
+    def score(self, log: MotionLog, model: str | None = None) -> Score:
+        """Return the errors of the torques predicted for a held-out log.
+
+        Raises
+        ------
+        ExperimentError, IdentificationError
+            If the log has other joints, or no rows on which torques can be judged.
+        """
+        robot, estimate = self.robot, self._of(model)
+        held_out = given_log("the held-out log", log, robot).longest
+        problem = Problem((manageable([held_out])[0],), self.fit.basis, self.fit.problem.model, self.fit.processing)
+        found = validate(problem, estimate.X, estimate.covariance)
+        units = tuple(robot.units(j)[0] for j in range(self.fit.basis.n))
+        return Score(robot.robot.joints, units, found, Verdict.of(self.fit, found))
+
+    def write(self, *paths: str | Path, force: bool = False) -> None:
+        """Write files for other software: .urdf or .xml, the identified robot; .json, parameters; .py, a function.
+
+        Raises
+        ------
+        ExperimentError, ResultsError
+            If a name ends with something else, a file is there that idbench did not write, or cannot be written.
+        """
+        for path in map(Path, paths):
+            if path.suffix not in EXPORTS:
+                raise ExperimentError(f"{path}: its name must end with {', '.join(EXPORTS)}")
+            _, render, check = EXPORTS[path.suffix]
+            check(self.robot, path)
+            text, _ = render(self.fit, self.model, path)
+            write_text(path, text, "write", force=force)
+
+    def report(self, path: str | Path, force: bool = False) -> None:
+        """Write the report: one HTML file with verdict, parameters, torques, residuals.
+
+        Raises
+        ------
+        ResultsError
+            If there is a file that idbench did not write, or it cannot be written.
+        """
+        from idbench.experiments.reports.page import report
+
+        with Attempts("the fit is kept") as attempts:
+            text = report(self.judgement, self.warnings, self.fit.logs.notes, "idbench.fit(...)", attempts)
+            write_text(Path(path), text, "report", force=force)
+
+    def summary(self) -> dict[str, Any]:
+        """Return what `idbench identify` writes into summary.json, but for the names of files."""
+        return summary_of(self.fit) | self.judgement.summary()
+
+    def _of(self, model: str | None) -> Any:
+        name = model or self.model
+        if name not in self.fit.estimates:
+            raise ExperimentError(f"there is no estimate of the {name} model; there are {', '.join(self.fit.estimates)}")
+        return self.fit.estimates[name]
+
+    def __repr__(self) -> str:
+        return f"{self.verdict}\n\n{text_table(*self._table())}"
+
+    def _repr_html_(self) -> str:
+        return html_table(self.verdict, *self._table()[1:])
+
+    def _table(self) -> tuple[str, list[str], list[list[str]]]:
+        known = self.fit.truth is not None
+        heads = [f"{self.model} model", "value", "sigma", "%sigma", "unit", *(["truth"] if known else [])]
+        return f"{self.fit.logs.title}, {self.fit.request.estimator}", heads, list(self._rows())
+
+    def _rows(self) -> Iterator[list[str]]:
+        for p in self.parameters.values():
+            share = f"{100 * p.sigma / abs(p.value):.2g}" if p.value else ""
+            yield [p.name, *significant(p.value, p.sigma), share, p.unit, *([] if p.truth is None else [f"{p.truth:.6g}"])]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class SimulatedRun:
+    """A scenario that was simulated: a log as a robot would give it, and the truth behind it."""
+
+    run: Run
+    """The simulation: true positions, velocities and torques."""
+    robot: RobotModel
+    """The robot, to identify the log with."""
+
+    @property
+    def log(self) -> MotionLog:
+        """What the robot logged."""
+        return self.run.alone()
+
+    @property
+    def truth(self) -> dict[str, float]:
+        """The true parameters of the robot, by name."""
+        return self.robot.truth(self.run.robots[0], self.run.scenario.friction)
+
+    def __repr__(self) -> str:
+        rows = [[name, f"{x:.6g}", unit] for (name, x), unit in zip(self.truth.items(), self.robot.basis.units, strict=True)]
+        return text_table(f"scenario {self.run.scenario.name}: {self.log!r}", ["", "truth", "unit"], rows)
