@@ -158,7 +158,9 @@ class PID(AbstractController):
 class _PIDLaw(AbstractLaw):
     def __init__(self, settings: PID, task: Task) -> None:
         w, M = per_joint(settings.bandwidth, task.nominal.n, "controller.bandwidth"), task.inertia
-        self._kp, self._kd, self._ki = 3 * M * w**2, 3 * M * w, M * w**3 / task.reference.fs
+        self._kp = 3 * M * w**2
+        self._kd = 3 * M * w
+        self._ki = M * w**3 / task.reference.fs
         self._sum = np.zeros((task.nsim, task.nominal.n))
         self._error = Error(task.reference, task.nsim, settings.cutoff)
         # What holds the arm at rest, which the integrator would have found before the motion begins.
@@ -192,7 +194,9 @@ class ComputedTorque(AbstractController):
 class _ComputedTorqueLaw(AbstractLaw):
     def __init__(self, settings: ComputedTorque, task: Task) -> None:
         w = per_joint(settings.bandwidth, task.nominal.n, "controller.bandwidth")
-        self._kp, self._kd, self._share = w**2, 2 * settings.damping * w, 1 + settings.model_error
+        self._kp = w**2
+        self._kd = 2 * settings.damping * w
+        self._share = 1 + settings.model_error
         self._reference, self._model = task.reference, task.model
         self._error = Error(task.reference, task.nsim, settings.cutoff)
 

@@ -103,7 +103,9 @@ class IncrementalEncoder(AbstractEncoder):
 
 class _Reader(AbstractReader):
     def __init__(self, settings: IncrementalEncoder, lines: Array, noise: Array, missed: Array) -> None:
-        self._settings, self._noise, self._missed = settings, noise, missed
+        self._settings = settings
+        self._noise = noise
+        self._missed = missed
         self._counts_per_rad = lines * settings.quadrature / (2 * np.pi)
         self._before: Array | None = None
         self._lost = np.zeros(noise.shape[1:])

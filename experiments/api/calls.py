@@ -133,7 +133,9 @@ def fit(
     >>> found.parameters["Fs1"].unit, round(found.parameters["Fs1"].value, 4)
     ('N m', 0.5)
     """
-    logs, held_out, model = _several(log), _several(validate), robot if isinstance(robot, RobotModel) else None
+    logs = _several(log)
+    held_out = _several(validate)
+    model = robot if isinstance(robot, RobotModel) else None
     table = _named(keys) | ({} if robot is None or model else {"robot": robot})
     paths = {name: tuple(map(Path, given)) for name, given in (("log", logs), ("validate", held_out)) if _files(given)}
     asked = request_from(jobs.IdentifyRequest, table | paths, "fit", taken={"label"})

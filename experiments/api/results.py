@@ -103,7 +103,9 @@ class Identification:
     @property
     def parameters(self) -> Mapping[str, ParameterEstimate]:
         """The parameters by name."""
-        found, truth, units = self.fit.estimates[self.model], self.fit.truth or {}, self.fit.basis.units
+        found = self.fit.estimates[self.model]
+        truth = self.fit.truth or {}
+        units = self.fit.basis.units
         each = zip(found.names, found.X.tolist(), found.standard_errors.tolist(), units, strict=True)
         return {name: ParameterEstimate(name, x, sigma, unit, truth.get(name)) for name, x, sigma, unit in each}
 

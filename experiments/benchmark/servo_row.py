@@ -27,7 +27,9 @@ def servo_row(folder: Path, definition: Definition, out: Path) -> Made:
     assert isinstance(command, ServoRequest)
     made = servos_identified(command)
     seconds = time.perf_counter() - begin
-    servos, others, fits = made.servos, made.others, made.fits
+    servos = made.servos
+    others = made.others
+    fits = made.fits
     assert others is not None
     row = {
         "title": definition.title,

@@ -80,7 +80,9 @@ HEADS = (
 def overview(rows: Sequence[Row]) -> Iterator[list[str]]:
     """Yield the cells of each set: how well torques of held-out logs are predicted, and what the protocol asks for."""
     for row in rows:
-        percent, R2, free = share(row, row["logs"]), worst_R2(row), free_run(row)
+        percent = share(row, row["logs"])
+        R2 = worst_R2(row)
+        free = free_run(row)
         yield [
             row["title"],
             str(len(row["joints"])),

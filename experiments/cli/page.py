@@ -75,7 +75,9 @@ def _bar(console: Console, what: str) -> Iterator[Told]:
 @contextmanager
 def _lines(console: Console, what: str) -> Iterator[Told]:
     """Print a line every EVERY seconds, also while a stage takes longer."""
-    done, now, start = threading.Event(), [""], time.monotonic()
+    done = threading.Event()
+    now = [""]
+    start = time.monotonic()
 
     def tick() -> None:
         while not done.wait(EVERY):
@@ -118,7 +120,9 @@ class Page(Console):
             emoji=False,
         )
         self.machine, self.found = machine, dict[str, Any]()
-        self._failure, self._gone, self._ended = "", False, False
+        self._failure = ""
+        self._gone = False
+        self._ended = False
 
     @property
     def encoding(self) -> str:

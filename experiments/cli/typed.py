@@ -12,9 +12,13 @@ from idbench.experiments.requests.words import Word
 
 def typed(request: type, shown: Container[str] | None = None) -> type:
     """Return a request with the marks of the library on its fields; the help has all of them, or those that are `shown`."""
-    hints, marked, defaults = get_type_hints(request, include_extras=True), dict[str, Any](), dict[str, Any]()
+    hints = get_type_hints(request, include_extras=True)
+    marked = dict[str, Any]()
+    defaults = dict[str, Any]()
     for each in fields(request):
-        hint, default, hidden = hints[each.name], each.default, shown is not None and each.name not in shown
+        hint = hints[each.name]
+        default = each.default
+        hidden = shown is not None and each.name not in shown
         made, marks = _plain(hint), _marks(hint, default)
         if (inner := group_of(hint)) is not None:
             made, marks = typed(inner, shown), [tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes]

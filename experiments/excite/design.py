@@ -217,7 +217,9 @@ class Design:
 
     def random_motions(self, count: int = RANDOM) -> tuple[list[Array], int]:
         """Return coefficients of random motions that keep the limits, and how many were drawn."""
-        rng, kept, drawn = np.random.default_rng([self.seed, 1]), list[Array](), 0
+        rng = np.random.default_rng([self.seed, 1])
+        kept = list[Array]()
+        drawn = 0
         while len(kept) < count and drawn < DRAWS:
             c, drawn = self.excitation.random(rng, self.plan, self.duration, self.frequency), drawn + 1
             if self.plan.excess(c) == 0:

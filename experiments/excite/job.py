@@ -22,7 +22,10 @@ from idbench.sim.scenario.scenario_file import load
 LONGEST, FASTEST = 3600.0, 10000.0
 """Time of a motion, repeated [s], and sampling frequency [Hz] above which they are taken for a slip."""
 
-BITS, TORQUE_NOISE, QUIET, LOUD = 17.0, (0.05,), 1e-6, 1e6
+BITS = 17.0
+TORQUE_NOISE = (0.05,)
+QUIET = 1e-6
+LOUD = 1e6
 """Noise without a scenario: resolution of the encoders [bits], rms of the torques [N m]; and the least and most of that."""
 
 

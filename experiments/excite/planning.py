@@ -60,7 +60,9 @@ def plan_for(design: "Design") -> Plan:
 
 def _information(design: "Design", rate: float, noise: bool) -> Information:
     """Return the information of motions, with their noise, or as if all rows were alike."""
-    basis, fs, n = design.robot_model.basis, design.scenario.fs, design.robot_model.robot.n
+    basis = design.robot_model.basis
+    fs = design.scenario.fs
+    n = design.robot_model.robot.n
     levels = design.levels if noise else NoiseLevels(np.ones(n), np.zeros(n))
     return Information(basis, levels, _inertia(design), fs, rate, min(PASS, fs / 2))
 

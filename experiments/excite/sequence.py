@@ -57,7 +57,9 @@ class MotionSequence:
 
         After ROUNDS motions, or Ctrl-C, it ends with what there is.
         """
-        rounds, logs, weights = list[Round](), design.logs, design.weights
+        rounds = list[Round]()
+        logs = design.logs
+        weights = design.weights
         try:
             for number in range(ROUNDS):
                 asked = replace(design, logs=logs, seed=design.seed + number, weights=weights)

@@ -11,7 +11,7 @@ from idbench.experiments.excite.limit_use import LimitUse
 from idbench.identify import Array
 from idbench.identify.data.kinematics import Limits
 from idbench.identify.design.plan import POWER, Plan
-from idbench.identify.design.search import Search
+from idbench.identify.design.search import DesignSearch
 
 STARTS, BASINS = 5, 12
 """Least starts of the search, and starts times joints: few joints take little time."""
@@ -44,13 +44,13 @@ CLOSER = 1.005
 """Factor by which limits become narrower than what they are exceeded by."""
 
 
-def searched(design: Design, random: Sequence[Array], progress: Callable[[float], None] | None = None) -> Search:
+def searched(design: Design, random: Sequence[Array], progress: Callable[[float], None] | None = None) -> DesignSearch:
     """Return the search of the best motion, begun with the best of random ones and those of the kind's own."""
     rng, starts = np.random.default_rng([design.seed, 2]), max(STARTS, BASINS // design.robot_model.robot.n)
     own = design.excitation.starts(rng, design.plan, design.duration, design.frequency, starts - bool(random))
     cheapest = sorted(random, key=lambda c: design.plan.value(c)[0])[:1]
     total = sum((stage.keep or starts) * stage.steps for stage in STAGES)
-    search, plan = Search([*own, *cheapest], total, progress), design.plan
+    search, plan = DesignSearch([*own, *cheapest], total, progress), design.plan
     for stage in STAGES:
         search.run(replace(plan, power=stage.power, hard=stage.hard), stage.keep or starts, stage.steps)
         plan = _last(design)

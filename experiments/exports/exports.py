@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.identification.consistent_robot import Written
+from idbench.experiments.identification.consistent_robot import WrittenRobot
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.identify import AbstractBlock, Parameter, ShapedFriction
@@ -202,7 +202,7 @@ EARTH = [0.0, 0.0, -9.81]
 
 def mjcf(fit: Fit, model: str, path: Path) -> Exported:
     """Return the robot's file with the parameters, made physically consistent."""
-    written = Written(fit, model)
+    written = WrittenRobot(fit, model)
     return written.text(path.absolute().parent), written.warnings
 
 
@@ -210,7 +210,7 @@ def urdf(fit: Fit, model: str, path: Path) -> Exported:
     """Return the robot as URDF with the parameters."""
     from idbench.sim.robot.write_urdf import urdf_text
 
-    written, robot_model = Written(fit, model), fit.robot_model
+    written, robot_model = WrittenRobot(fit, model), fit.robot_model
     drives = [p.name for p in robot_model.grouping.standard.parameters if p.kind in ("rotor inertia", "stiffness")]
     left = [name for name in drives if written.values.get(name)]
     lost = [f"{', '.join(left)} have no place in a URDF: rotors and springs are left out of {path}"] if left else []

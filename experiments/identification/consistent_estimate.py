@@ -53,7 +53,9 @@ def _places(robot_model: RobotModel, estimate: Estimate) -> list[int]:
 
 def _of_all(robot_model: RobotModel, estimate: Estimate) -> tuple[Array, Array]:
     """Return estimate and covariance with the parameters that were left out: they are zero, and known to be."""
-    C, place, p = estimate.covariance, _places(robot_model, estimate), len(robot_model.grouping.names)
+    C = estimate.covariance
+    place = _places(robot_model, estimate)
+    p = len(robot_model.grouping.names)
     X, sure = np.zeros(p), SURE * np.sqrt(np.diagonal(C).min())
     whole = sure**2 * np.eye(p)
     X[place], whole[np.ix_(place, place)] = estimate.X, C

@@ -20,7 +20,7 @@ SIGMAS = 3.0
 
 @final
 @dataclass(frozen=True, eq=False)
-class Written:
+class WrittenRobot:
     """The physically consistent robot that agrees best with an estimate, as a file."""
 
     fit: Fit

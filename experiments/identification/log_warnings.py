@@ -80,7 +80,9 @@ STILL = 1e-3
 
 def warnings_of_log(log: MotionLog, tree: KinematicTree) -> list[str]:
     """Return what is suspicious about a log: jumps, degrees, millimetres, places that a joint cannot reach, joints at rest."""
-    found, jumping, by_reason = list(_of_jumps(log, tree)), {jump.joint for jump in _jumps(log)}, dict[str, list[str]]()
+    found = list(_of_jumps(log, tree))
+    jumping = {jump.joint for jump in _jumps(log)}
+    by_reason = dict[str, list[str]]()
     for j, (joint, q) in enumerate(zip(tree.joints, log.q.reshape(-1, log.n).T, strict=True)):
         ends = np.array([q.min(), q.max()])
         reason = "" if j in jumping else _reason(joint, ends)

@@ -102,7 +102,9 @@ def read(path: Path, options: ReadOptions, robot_model: RobotModel | None) -> Re
 
     Joints are in the order of the robot; without one in that of the file.
     """
-    columns, delay, before = columns_of(path, options.columns), options.delay, ""
+    columns = columns_of(path, options.columns)
+    delay = options.delay
+    before = ""
     if robot_model is not None:
         joints = robot_model.mounting.joints
         columns = columns if columns.joints or len(joints) != columns.n else replace(columns, joints=joints)

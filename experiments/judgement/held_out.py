@@ -8,7 +8,7 @@ from typing import Any, final
 
 import numpy as np
 
-from idbench.experiments.identification.consistent_robot import Written
+from idbench.experiments.identification.consistent_robot import WrittenRobot
 from idbench.experiments.identification.fit import Fit, fit
 from idbench.experiments.judgement.verdict import Verdict
 from idbench.experiments.results.writing import finite
@@ -95,7 +95,7 @@ class HeldOut:
         BenchError, IdentificationError
             If there is no such robot.
         """
-        written, (log, qd) = Written(self.fit, model), self._replayed
+        written, (log, qd) = WrittenRobot(self.fit, model), self._replayed
         basis, estimate = self.fit.basis, self.fit.estimates[model].X.tolist()
         lost = {p for p in basis.parameters if p.name in written.lost}
         X = dict(zip(basis.parameters, estimate, strict=True))
@@ -106,7 +106,7 @@ class HeldOut:
         log = _without(_without(log, qd, basis, apart), qd, *self._grouped(written))
         return written.without_friction(joints) if joints else written.robot, log, qd
 
-    def _grouped(self, written: Written) -> tuple[Basis, dict[Parameter, float]]:
+    def _grouped(self, written: WrittenRobot) -> tuple[Basis, dict[Parameter, float]]:
         """Return standard parameters that have no place in a simulated robot and stand in no base parameter of their own."""
         standard, alone = self.fit.robot_model.grouping.standard, set(self.fit.basis.names)
         return standard, {p: written.lost[p.name] for p in standard.parameters if p.name in written.lost.keys() - alone}
@@ -157,7 +157,9 @@ def _without(log: MotionLog, qd: Array, basis: Basis, laws: Mapping[Parameter, f
     """
     if not laws:
         return log
-    q, v, conditions = log.q.T, np.ascontiguousarray(qd.T), {name: x.T for name, x in log.conditions.items()}
+    q = log.q.T
+    v = np.ascontiguousarray(qd.T)
+    conditions = {name: x.T for name, x in log.conditions.items()}
     state = State(q, v, lambda _: np.gradient(v, 1 / log.fs, axis=-1), conditions)
     friction, X = basis.of(list(laws)), np.array(list(laws.values()))
     tau = log.tau * np.asarray(log.torque.gain) - combined(friction.explicit(state), X, np.zeros(q.shape)).T

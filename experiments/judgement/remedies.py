@@ -85,7 +85,9 @@ class Remedies:
         """Return the options, and what makes the robot that each describes."""
         request, found = self.held_out.fit.request, dict[str, Callable[[], RobotModel]]()
         robot_model = request.robot_model
-        asked, mounting, joints = robot_model.asked, robot_model.mounting, robot_model.robot.joints
+        asked = robot_model.asked
+        mounting = robot_model.mounting
+        joints = robot_model.robot.joints
         if not all(joint.armature for joint in robot_model.tree.joints):
             found["--armature all"] = lambda: replace(robot_model, asked=replace(asked, armature="all"))
         if "offset" not in asked.add:

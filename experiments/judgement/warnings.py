@@ -38,13 +38,19 @@ OPEN = 0.02
 """Share of a joint's torque on a brisk motion that one sigma of a parameter may make before it counts as left open."""
 
 
-LOG, DELAY, FILE, MOTION, MODEL = "the log", "the torque's delay", "the robot's file", "the motion", "the model"
+LOG = "the log"
+DELAY = "the torque's delay"
+FILE = "the robot's file"
+MOTION = "the motion"
+MODEL = "the model"
 """Subjects of warnings, in the order in which to check them: the first may cause the others."""
 
 
 def warnings_of_result(fit: Fit) -> dict[str, list[str]]:
     """Return what no healthy identification shows, and what the log leaves open, by what it is about."""
-    log, motion, model = [*wrong_sign(fit), *unlike_file(fit)], list[str](), list[str]()
+    log = [*wrong_sign(fit), *unlike_file(fit)]
+    motion = list[str]()
+    model = list[str]()
     negative = {name: _negative(fit, name) for name in fit.estimates}
     linked = list(_link_side(fit)) if not log else []
     model += linked

@@ -20,7 +20,7 @@ from idbench.experiments.requests.jobs import GainsRequest, LoadRequest, Payload
 from idbench.identify import Array, IdentificationError
 from idbench.identify.loads.drive_gains import GainEstimate, identify_drive_gains
 from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot
-from idbench.identify.loads.payload import WAYS, Payload, with_known_robot
+from idbench.identify.loads.payload import WAYS, PayloadEstimate, with_known_robot
 from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario_file import load as load_scenario
 
@@ -34,15 +34,15 @@ class PayloadFit:
 
     judgement: LoadJudgement
     """The robot with its logs, to be judged."""
-    found: dict[str, Payload | str]
+    found: dict[str, PayloadEstimate | str]
     """The payload by the name of the way, or why that gives none."""
     notes: tuple[str, ...]
     """What was read, done and assumed."""
 
     @property
-    def leading(self) -> Payload:
+    def leading(self) -> PayloadEstimate:
         """The payload by the first way that gives one."""
-        return next(p for p in self.found.values() if isinstance(p, Payload))
+        return next(p for p in self.found.values() if isinstance(p, PayloadEstimate))
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +138,9 @@ def _loaded(asked: LoadRequest) -> tuple[LoadJudgement, tuple[str, ...]]:
         request = in_band(request, asked.cutoff)
     paths, band = (*asked.unloaded, *asked.log), asked.cutoff is None
     loaded = load(paths, read_options(asked), request, band=band, more=len(LETTERS))
-    request, notes, first = loaded.request, list(loaded.notes), len(asked.unloaded)
+    request = loaded.request
+    notes = list(loaded.notes)
+    first = len(asked.unloaded)
     without, with_it = loaded.logs(slice(first)), loaded.logs(slice(first, None))
     if robot_model.laws.auto:
         request, choice = chosen_friction(request, without or with_it)
@@ -149,17 +151,17 @@ def _loaded(asked: LoadRequest) -> tuple[LoadJudgement, tuple[str, ...]]:
     return LoadJudgement(robot, request, loaded.names, np.array(loaded.read[-1].columns.gain or 1.0)), tuple(notes)
 
 
-def _by_ways(robot: LoadedRobot, asked: PayloadRequest) -> dict[str, Payload | str]:
+def _by_ways(robot: LoadedRobot, asked: PayloadRequest) -> dict[str, PayloadEstimate | str]:
     """Return the payload by the ways that are asked for, or why one has none; raise if none has."""
     if not robot.without:
         raise ExperimentError("give logs without the payload (--unloaded), or the robot as it was identified before (--before)")
-    found = dict[str, Payload | str]()
+    found = dict[str, PayloadEstimate | str]()
     for way in WAYS if asked.way == "all" else (asked.way,):
         try:
             found[way] = WAYS[way](robot)
         except IdentificationError as error:
             found[way] = str(error)
-    if not any(isinstance(each, Payload) for each in found.values()):
+    if not any(isinstance(each, PayloadEstimate) for each in found.values()):
         raise ExperimentError(str(next(iter(found.values()))))
     return found
 

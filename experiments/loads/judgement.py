@@ -17,7 +17,7 @@ from idbench.experiments.text import error_percentage
 from idbench.identify import Array, Estimate, ExplicitModel, IdentificationError, MotionLog, Problem, validate
 from idbench.identify.loads.drive_gains import read_with
 from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot, of_payload
-from idbench.identify.loads.payload import Payload, with_robot_held
+from idbench.identify.loads.payload import PayloadEstimate, with_robot_held
 
 SURE = 4.0
 """Standard errors from which on a contradiction is reported."""
@@ -72,7 +72,7 @@ class LoadJudgement:
         """Return the verdict on the worst log; poor, if what was found cannot be, or contradicts what is stated."""
         return "poor" if doubts[PAYLOAD] else max((verdict.word for verdict in self.verdicts.values()), key=WORDS.index)
 
-    def warnings(self, payload: Payload | None) -> dict[str, list[str]]:
+    def warnings(self, payload: PayloadEstimate | None) -> dict[str, list[str]]:
         """Return what to check, by what it is about."""
         of_payload_ = [*self._of_stated(), *(_of_body(payload, self.names[len(self.robot.without) :]) if payload else ())]
         return {LOG: list(self._of_logs()), PAYLOAD: of_payload_, MODEL: list(self._of_fit())}
@@ -126,12 +126,12 @@ class LoadJudgement:
                 )
 
 
-def negative_mass(payload: Payload) -> bool:
+def negative_mass(payload: PayloadEstimate) -> bool:
     """Return whether the estimated mass is significantly below zero."""
     return any(name == "ML" and x < -SURE * s for name, x, s in zip(payload.names, payload.X, payload.sigma, strict=True))
 
 
-def _of_body(payload: Payload, loaded: tuple[str, ...]) -> Iterator[str]:
+def _of_body(payload: PayloadEstimate, loaded: tuple[str, ...]) -> Iterator[str]:
     """Yield whether no physical body has the parameters of a payload."""
     if negative_mass(payload):
         i = payload.names.index("ML")

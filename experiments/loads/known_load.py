@@ -7,7 +7,9 @@ import numpy as np
 from idbench.experiments.errors import ExperimentError
 from idbench.identify.loads.loaded_robot import LETTERS
 
-HEAVIEST, FARTHEST, ROUNDING = 1e5, 1e3, 1e-9
+HEAVIEST = 1e5
+FARTHEST = 1e3
+ROUNDING = 1e-9
 """Mass [kg] and distance [m] beyond which no gripper holds anything, and a share of rounding."""
 
 

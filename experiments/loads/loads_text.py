@@ -12,15 +12,15 @@ from idbench.experiments.text import new_table, number, print_titled
 from idbench.identify import IdentificationError
 from idbench.identify.loads.drive_gains import VAGUE, GainEstimate
 from idbench.identify.loads.loaded_robot import LETTERS
-from idbench.identify.loads.payload import Payload
+from idbench.identify.loads.payload import PayloadEstimate
 from idbench.identify.parameters.bodies import pseudo_inertia
 
 UNITS = (*["kg m^2"] * 6, *["kg m"] * 3, "kg")
 
 
-def print_payloads(console: Console, found: Mapping[str, Payload | str], link: str) -> None:
+def print_payloads(console: Console, found: Mapping[str, PayloadEstimate | str], link: str) -> None:
     """Print the payload as each way has it, and the body that agrees best with the first."""
-    ways = {way: payload for way, payload in found.items() if isinstance(payload, Payload)}
+    ways = {way: payload for way, payload in found.items() if isinstance(payload, PayloadEstimate)}
     grid = new_table("", [f"{way}\n{what}" for way in ways for what in ("", "sigma")])
     names = next(iter(ways.values())).names
     for i, name in enumerate(names):
@@ -46,7 +46,7 @@ def print_payloads(console: Console, found: Mapping[str, Payload | str], link: s
         console.print(Text(body["why"]), soft_wrap=True)
 
 
-def body_of(payload: Payload) -> dict[str, Any]:
+def body_of(payload: PayloadEstimate) -> dict[str, Any]:
     """Return mass, centre of mass and inertia of the body that agrees best with an estimate; why, if that is not known."""
     try:
         x = payload.consistent()
@@ -65,9 +65,9 @@ def body_of(payload: Payload) -> dict[str, Any]:
     }
 
 
-def payload_summary(found: Mapping[str, Payload | str]) -> dict[str, Any]:
+def payload_summary(found: Mapping[str, PayloadEstimate | str]) -> dict[str, Any]:
     """Return what a summary.json says of a payload."""
-    ways = {way: payload for way, payload in found.items() if isinstance(payload, Payload)}
+    ways = {way: payload for way, payload in found.items() if isinstance(payload, PayloadEstimate)}
     leading = next(iter(ways.values()))
     return {
         "parameters": list(leading.names),

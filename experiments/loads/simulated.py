@@ -15,8 +15,7 @@ from idbench.identify import Array, IdentificationError
 from idbench.identify.data.kinematics import INERTIAL
 from idbench.identify.loads.drive_gains import identify_drive_gains
 from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot
-from idbench.identify.loads.payload import WAYS
-from idbench.identify.loads.payload import Payload as Identified
+from idbench.identify.loads.payload import WAYS, PayloadEstimate
 from idbench.sim.engine.run import Run
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.robot.payload import Payload
@@ -36,7 +35,7 @@ Found: TypeAlias = tuple[tuple[str, ...], Array, Array, Array]
 
 
 @dataclass(frozen=True, eq=False)
-class Score:
+class PairScore:
     """How far estimates of many runs are off."""
 
     names: tuple[str, ...]
@@ -113,15 +112,15 @@ class Pairs:
         first, second = ((log,) for log in logs)
         return LoadedRobot(self.robot_model.tree, self.robot_model.grouping.standard, first, second, known=known)
 
-    def payloads(self, told: Told) -> dict[str, Score]:
+    def payloads(self, told: Told) -> dict[str, PairScore]:
         """Return how well each way finds the payload."""
-        found, ways = dict[str, Score](), list(WAYS)
+        found, ways = dict[str, PairScore](), list(WAYS)
         for way, identify in WAYS.items():
             one = partial(self._payload, identify)
             found[way] = self._scored(one, partial(_part, told, ways.index(way), len(ways)))
         return found
 
-    def gains(self, known: Mapping[str, float], told: Told) -> Score:
+    def gains(self, known: Mapping[str, float], told: Told) -> PairScore:
         """Return how well gains that are drawn for each run are found, with what is known of the payload."""
         rng, n = np.random.default_rng(self.scenario.seed), self.robot_model.tree.n
         true = rng.uniform(*GAINS, (self.runs, n))
@@ -132,7 +131,7 @@ class Pairs:
 
         return self._scored(found, told)
 
-    def _payload(self, identify: Callable[[LoadedRobot], Identified], run: int) -> Found:
+    def _payload(self, identify: Callable[[LoadedRobot], PayloadEstimate], run: int) -> Found:
         """Return names, estimate, sigma and truth of the payload's base parameters in a run."""
         robot = self.robot(run, {})
         found, p = identify(robot), len(robot.standard.names)
@@ -140,9 +139,11 @@ class Pairs:
         base = robot.both.K[own, p:] @ np.array([self.truth[x] for x in LETTERS])
         return found.names, found.X, found.sigma, base
 
-    def _scored(self, one: Callable[[int], Found], told: Told) -> Score:
+    def _scored(self, one: Callable[[int], Found], told: Told) -> PairScore:
         names: tuple[str, ...] = ()
-        start, rows, failures = perf_counter(), list[tuple[Array, Array, Array]](), list[str]()
+        start = perf_counter()
+        rows = list[tuple[Array, Array, Array]]()
+        failures = list[str]()
         for run in range(self.runs):
             try:
                 names, X, sigma, truth = one(run)
@@ -152,9 +153,9 @@ class Pairs:
             told((run + 1) / self.runs)
         if not rows:
             empty = np.empty((0, 0))
-            return Score((), empty, empty, empty, 0.0, tuple(failures))
+            return PairScore((), empty, empty, empty, 0.0, tuple(failures))
         each = [np.array(x) for x in zip(*rows, strict=True)]
-        return Score(names, each[0], each[1], each[2], (perf_counter() - start) / self.runs, tuple(failures))
+        return PairScore(names, each[0], each[1], each[2], (perf_counter() - start) / self.runs, tuple(failures))
 
 
 def _part(told: Told, number: int, count: int, share: float) -> None:

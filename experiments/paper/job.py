@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.paper.search import Search
+from idbench.experiments.paper.search import TrajectorySearch
 from idbench.experiments.paper.table1 import CHAINS_COMPARED, SCENARIO, Table1
 from idbench.experiments.paper.table2 import Table2
 from idbench.experiments.requests.jobs import Table1Request, Table2Request
@@ -39,4 +39,4 @@ def table2_of(asked: Table2Request, progress: Callable[[float], None], watch: Wa
 
 def searched(seed: int, searching: Searching) -> Scenario:
     """Return a scenario whose trajectory has the paper's condition numbers."""
-    return Search(seed=seed).run(Robot.load("scara"), searching)
+    return TrajectorySearch(seed=seed).run(Robot.load("scara"), searching)

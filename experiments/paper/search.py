@@ -26,7 +26,7 @@ PAPER_CONDITION = {MODELS.create(name): PAPER[name].condition_number for name in
 
 
 @dataclass(frozen=True)
-class Search:
+class TrajectorySearch:
     """A random search for a motion with the paper's condition numbers, the same for the same seed.
 
     It draws a sequence of waypoints, then redraws one of them at a time and keeps what comes closer: first to the

@@ -38,7 +38,7 @@ SCENARIO = "table1"
 
 
 @dataclass(frozen=True)
-class PaperColumn:
+class Table1Column:
     """What the paper's Table 1 prints for one model."""
 
     estimate: tuple[float, ...]
@@ -51,20 +51,20 @@ class PaperColumn:
     """r."""
 
 
-PAPER: Mapping[str, PaperColumn] = {
-    "explicit": PaperColumn(
+PAPER: Mapping[str, Table1Column] = {
+    "explicit": Table1Column(
         (3.501, 0.049, 0.500, 0.060, 0.120, 0.005, 0.010, 0.100),
         (0.040, 0.207, 0.008, 0.003, 0.014, 0.040, 0.024, 0.006),
         28,
         800,
     ),
-    "implicit": PaperColumn(
+    "implicit": Table1Column(
         (3.501, 0.049, 0.500, 0.060, 0.120, 0.005, 0.010, 0.100),
         (0.042, 0.649, 0.011, 0.008, 0.072, 0.369, 0.049, 0.015),
         28,
         800,
     ),
-    "power": PaperColumn(
+    "power": Table1Column(
         (3.502, 0.049, 0.501, 0.060, 0.120, 0.005, 0.010, 0.099),
         (0.057, 1.064, 0.114, 0.001, 0.089, 0.613, 0.622, 0.346),
         93,

@@ -41,7 +41,7 @@ PROCESSINGS: Mapping[str, tuple[str, str]] = {"paper": ("paper", "OLS"), "idbenc
 
 
 @dataclass(frozen=True)
-class PaperColumn:
+class Table2Column:
     """What the paper's Table 2 prints for a model."""
 
     estimate: tuple[float, ...]
@@ -54,17 +54,17 @@ class PaperColumn:
     """Cond(W)."""
 
 
-_DYNAMIC = PaperColumn(
+_DYNAMIC = Table2Column(
     (3.38, -0.18, 0.59, 0.060, 0.119, 0.001, 0.012, 0.12),
     (0.025, 0.046, 0.024, 0.002, 0.002, 0.001, 0.007, 0.02),
     (0.37, 13, 2.1, 2, 0.63, 50, 30, 6.6),
     37,
 )
 
-PAPER: Mapping[str, PaperColumn] = {
+PAPER: Mapping[str, Table2Column] = {
     "explicit": _DYNAMIC,
     "implicit": _DYNAMIC,
-    "power": PaperColumn(
+    "power": Table2Column(
         (3.39, -0.21, 0.61, 0.0633, 0.121, -0.001, 0.012, 0.12),
         (0.025, 0.04, 0.03, 0.0005, 0.001, 0.001, 0.002, 0.01),
         (0.37, 8.6, 2.8, 0.4, 0.5, 53, 7, 4),

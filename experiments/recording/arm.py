@@ -11,7 +11,7 @@ from idbench.experiments.recording.stream import Stream
 from idbench.experiments.style import MEASURED, PLANNED, Color
 from idbench.identify import Array
 from idbench.sim.robot.robot import Robot
-from idbench.sim.robot.scene import Mover, Shape, motion, shapes
+from idbench.sim.robot.scene import Mover, SceneShape, motion, shapes
 
 ROLES: dict[str, Color | None] = {"true": None, "measured": MEASURED, "planned": PLANNED}
 """Arms that may be shown, and the colour of those that are drawn as wires around the first."""
@@ -31,7 +31,9 @@ class Arm:
     """
 
     def __init__(self, stream: Stream, robot: Robot, roles: tuple[str, ...]) -> None:
-        self._stream, self._robot, self._mover = stream, robot, Mover(robot)
+        self._stream = stream
+        self._robot = robot
+        self._mover = Mover(robot)
         two = motion(robot, np.stack([np.zeros(robot.n), np.full(robot.n, 0.1)]))
         pose = {body: np.concatenate([x, two.quaternions[body]], axis=1) for body, x in two.positions.items()}
         self._moving = {body for body, (at, moved) in pose.items() if not np.array_equal(at, moved)}
@@ -65,11 +67,11 @@ class Arm:
 Fill = Literal["solid", "majorwireframe"]
 
 
-def _pose(shape: Shape) -> rr.Transform3D:
+def _pose(shape: SceneShape) -> rr.Transform3D:
     return rr.Transform3D(translation=shape.position, quaternion=rr.Quaternion(xyzw=shape.quaternion))
 
 
-def _drawn(shape: Shape, wire: Color | None) -> rr.AsComponents:
+def _drawn(shape: SceneShape, wire: Color | None) -> rr.AsComponents:
     """Return a shape: solid in its own colour, or as wires of the colour `wire`."""
     color, size = [shape.rgba if wire is None else wire], shape.size
     fill: Fill = "solid" if wire is None else "majorwireframe"
@@ -89,7 +91,7 @@ def _drawn(shape: Shape, wire: Color | None) -> rr.AsComponents:
             return _mesh(shape, wire)
 
 
-def _mesh(shape: Shape, wire: Color | None) -> rr.AsComponents:
+def _mesh(shape: SceneShape, wire: Color | None) -> rr.AsComponents:
     if wire is None:
         return rr.Mesh3D(vertex_positions=shape.vertices, triangle_indices=shape.faces, albedo_factor=shape.rgba)
     low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)  # every edge of a mesh would hide the arm

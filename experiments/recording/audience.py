@@ -97,7 +97,10 @@ class Audience:
     """
 
     def __init__(self, url: str, pace: float | None = None) -> None:
-        self.url, self.pace, self.watching, self._start = url, pace, True, time.perf_counter()
+        self.url = url
+        self.pace = pace
+        self.watching = True
+        self._start = time.perf_counter()
         self._deaf = 0
 
     @property

@@ -16,7 +16,9 @@ from idbench.identify import Array
 HEIGHT = 1.0
 """Height of a frame: the unit of everything in a chart. 2D views keep the ratio of their axes."""
 
-WIDE, NARROW, SQUARE = 2.2, 1.4, 1.2
+WIDE = 2.2
+NARROW = 1.4
+SQUARE = 1.2
 """Widths of frames: of charts one above the other, of those that stand in a row, and of those that hold a long list."""
 
 FRAME: Color = (120, 120, 120)
@@ -29,7 +31,10 @@ LINE = 0.11
 LINES, BESIDE = 11, 0.75
 """Lines of the legend, and how far beside them the next ones stand, if there are more."""
 
-GRID_ORDER, DOT_ORDER, LINE_ORDER, MARK_ORDER = -3.0, -2.0, 1.0, 2.0
+GRID_ORDER = -3.0
+DOT_ORDER = -2.0
+LINE_ORDER = 1.0
+MARK_ORDER = 2.0
 """What is drawn over what."""
 
 Symbol = Literal["circle", "square", "triangle", "diamond", "cross"]
@@ -74,7 +79,11 @@ class Chart:
     """
 
     def __init__(self, stream: Stream, path: str, x: AbstractScale, y: AbstractScale, width: float = WIDE) -> None:
-        self._stream, self._path, self._x, self._y, self._listed = stream, path, x, y, list[str]()
+        self._stream = stream
+        self._path = path
+        self._x = x
+        self._y = y
+        self._listed = list[str]()
         self._width = width
         corners = [[0, 0], [self._width, 0], [self._width, HEIGHT], [0, HEIGHT], [0, 0]]
         self._strips("frame", [np.array(corners)], FRAME, 0.6, GRID_ORDER)

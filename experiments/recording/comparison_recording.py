@@ -35,7 +35,9 @@ from idbench.sim.scenario.scenario_file import to_toml
 
 def record_table1(table: Table1, audience: Audience | None = None) -> list[tuple[str, Stream]]:
     """Return the streams of the recording of `table`, by the name of their file."""
-    log, reference, scenario = table.log, table.reference, table.scenario
+    log = table.log
+    reference = table.reference
+    scenario = table.scenario
     base = Base(
         recording_id(scenario.name, to_toml(scenario).encode()), table.robot, log.fs, ("measured",), reference.qd, audience
     )

@@ -83,7 +83,9 @@ def _send_sigmas(stream: Stream, found: Excited) -> None:
 
 def _send_told(stream: Stream, found: Excited) -> None:
     """Send the share of each stretch of the motion in the information about each parameter."""
-    names, shares, duration = found.design.robot_model.basis.names, found.shares, found.design.duration
+    names = found.design.robot_model.basis.names
+    shares = found.shares
+    duration = found.design.duration
     begin = len(found.ways[0].q) / FS + REST
     middles = begin + (np.arange(STRETCHES) + 0.5) * duration / STRETCHES
     for at, members in _parts(names):

@@ -47,9 +47,13 @@ class Layer:
     """
 
     def __init__(self, name: str, fit: Fit, joints: Sequence[str], known: set[str], audience: Audience | None = None) -> None:
-        self.stream, self._fit, self._known = Stream(name, audience, layer=True), fit, known
+        self.stream = Stream(name, audience, layer=True)
+        self._fit = fit
+        self._known = known
         self._joints = parts(joints)
-        self._log, self._chain, self._at = fit.logs.fitted[0], fit.processing, f"identify/{fit.request.label}"
+        self._log = fit.logs.fitted[0]
+        self._chain = fit.processing
+        self._at = f"identify/{fit.request.label}"
         methods = {path.strip("/").split("/")[1] for path in known if path.strip("/").startswith("identify/")}
         self._shade = len(methods - {fit.request.label})
         self._signals = fit.problem.signals[0]

@@ -87,7 +87,9 @@ class Lanes:
     """
 
     def __init__(self, stream: Stream, fs: float) -> None:
-        self._stream, self._fs, self._last = stream, fs, dict[str, str]()
+        self._stream = stream
+        self._fs = fs
+        self._last = dict[str, str]()
 
     def send(self, path: str, t: Array, states: npt.NDArray[np.str_]) -> None:
         """Send the states of a lane at the instants `t` [s]."""

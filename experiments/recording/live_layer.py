@@ -49,10 +49,16 @@ class LiveIdentification:
     def __init__(
         self, stream: Stream, robot_model: RobotModel, chain: str, channel: TorqueChannel, fs: float, joints: Sequence[str]
     ) -> None:
-        self._stream, self._channel, self._fs = stream, channel, fs
+        self._stream = stream
+        self._channel = channel
+        self._fs = fs
         self._request = Request(robot_model, chain=chain, estimator=ESTIMATOR, name=LABEL)
-        self._joints, self._q, self._tau = joints, list[Array](), list[Array]()
-        self._identified, self._shown, self._broken = 0, dict[str, float](), False
+        self._joints = joints
+        self._q = list[Array]()
+        self._tau = list[Array]()
+        self._identified = 0
+        self._shown = dict[str, float]()
+        self._broken = False
         self.fit: Fit | None = None
 
     def grow(self, q: Array, tau: Array) -> bool:

@@ -17,7 +17,7 @@ from idbench.experiments.style import GREY, WIDTHS, joint_colors, kind_colors
 from idbench.identify import Array, MotionLog
 from idbench.identify.signals.masks import slow_speed
 from idbench.sim.drives.electric import BetweenEdges
-from idbench.sim.engine.watch import Inner, Stretch
+from idbench.sim.engine.watch import Inner, WatchedStretch
 from idbench.sim.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -56,7 +56,10 @@ class Base:
         self.inner: Stream | None = None
         self.live: LiveIdentification | None = None
         self._shown, self._window = 0, (np.inf, -np.inf)
-        self._joints, self._fs, self._roles, self._slow = parts(robot.joints), fs, roles, slow_speed(qd.T)
+        self._joints = parts(robot.joints)
+        self._fs = fs
+        self._roles = roles
+        self._slow = slow_speed(qd.T)
         for number, joint in enumerate(self._joints):  # for layouts, which see entities alone, in the order of their names
             self.stream.keep(f"joints/{number:03}/{joint}", rr.TextDocument(joint))
         self._arm, self._lanes = Arm(self.stream, robot, roles), Lanes(self.stream, fs)
@@ -66,7 +69,7 @@ class Base:
         if audience:
             audience.begin()
 
-    def stretch(self, stretch: Stretch) -> None:
+    def stretch(self, stretch: WatchedStretch) -> None:
         """Send a stretch of a simulation, as it is heard from it."""
         signals, t = _signals(stretch), (stretch.first + np.arange(len(stretch.q))) / self._fs
         if stretch.electric is not None:
@@ -184,7 +187,7 @@ class Base:
             stream.curves(path, [seconds(times[::3])], pulses)
 
 
-def _signals(stretch: Stretch) -> dict[str, Array]:
+def _signals(stretch: WatchedStretch) -> dict[str, Array]:
     """Return the curves of a stretch, by path."""
     planned = stretch.reference
     gap = {} if stretch.gap is None else {"gear/gap": stretch.gap}

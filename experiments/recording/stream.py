@@ -38,8 +38,12 @@ class Stream:
     """
 
     def __init__(self, name: str, audience: Audience | None = None, *, layer: bool = False) -> None:
-        self.name, self.paths, self._audience = name, set[str](), audience
-        self._draft, self._drafted, self._squares = False, set[str](), dict[str, tuple[int, Array]]()
+        self.name = name
+        self.paths = set[str]()
+        self._audience = audience
+        self._draft = False
+        self._drafted = set[str]()
+        self._squares = dict[str, tuple[int, Array]]()
         self._file = rr.RecordingStream(APPLICATION, recording_id=name, send_properties=not layer)
         self._file.set_log_time_enabled(False)
         self._bytes = rr.binary_stream(self._file)

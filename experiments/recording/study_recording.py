@@ -181,7 +181,10 @@ class StudyRecording:
     """
 
     def __init__(self, study: Study, folder: Path, audience: Audience | None = None) -> None:
-        self._study, self._folder, self._next, self._shown = study, folder, 0.0, set[str]()
+        self._study = study
+        self._folder = folder
+        self._next = 0.0
+        self._shown = set[str]()
         self.stream = Stream(f"study-{study.name}-{study.fingerprint[:10]}", audience)
 
     @property

@@ -22,9 +22,13 @@ def address(url: str) -> tuple[str, int]:
     """Return host and port of a viewer; raise ExperimentError if `url` is no address of one."""
     try:
         parts = urlsplit(url)
-        scheme, host, port = parts.scheme, parts.hostname, parts.port
+        scheme = parts.scheme
+        host = parts.hostname
+        port = parts.port
     except ValueError:
-        scheme, host, port = "", None, None
+        scheme = ""
+        host = None
+        port = None
     if scheme not in ("rerun", "rerun+http", "rerun+https") or not host or port is None:
         raise ExperimentError(f"--connect {url} is no address of a viewer: it looks like rerun+http://127.0.0.1:9876/proxy")
     return host, port

@@ -29,7 +29,9 @@ class Budget:
     @cached_property
     def parts(self) -> Mapping[str, Array]:
         """Torques [N m] by their cause, shape (time, joint)."""
-        q, qd, qdd = self.motion.q, self.motion.qd, self.motion.qdd
+        q = self.motion.q
+        qd = self.motion.qd
+        qdd = self.motion.qdd
         still = np.zeros_like(q)
         gravity = inverse_dynamics(self.robot, q, still, still)
         damping = self.robot.model.dof_damping * qd

@@ -172,7 +172,10 @@ def _panels(count: int, height: float, columns: int = 0) -> tuple[Figure, list[A
     figure = Figure(figsize=(WIDTH, whole))
     panels = list(np.atleast_1d(figure.subplots(lines, columns)).ravel())
     # By hand: a layout that is solved for draws everything twice.
-    left, right, bottom, top = 0.75 / WIDTH, 1 - 0.1 / WIDTH, 0.5 / whole, 1 - 0.5 / whole
+    left = 0.75 / WIDTH
+    right = 1 - 0.1 / WIDTH
+    bottom = 0.5 / whole
+    top = 1 - 0.5 / whole
     figure.subplots_adjust(left, bottom, right, top, wspace=0.15, hspace=0.42)
     for panel in panels[count:]:
         panel.set_visible(False)

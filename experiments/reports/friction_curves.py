@@ -39,7 +39,9 @@ class Spectrum:
 
 def left_over(fit: Fit) -> dict[str, Instants]:
     """Return the residuals of each model's equations, at every sample of the first log."""
-    signals, basis, chain = fit.problem.signals[0], fit.basis, fit.processing
+    signals = fit.problem.signals[0]
+    basis = fit.basis
+    chain = fit.processing
     return {form: instants(signals, basis, MODELS.create(form), chain, e.X) for form, e in fit.estimates.items()}
 
 
@@ -50,7 +52,9 @@ def of_joints(fit: Fit, left: Mapping[str, Instants]) -> dict[str, Instants]:
 
 def spectra(fit: Fit, left: Mapping[str, Instants]) -> Iterator[Spectrum]:
     """Yield the spectra of all joints, then those of models that have other rows; what is masked counts as like the rest."""
-    alone, fs, joined = fit.on(0), fit.logs.fitted[0].fs, of_joints(fit, left)
+    alone = fit.on(0)
+    fs = fit.logs.fitted[0].fs
+    joined = of_joints(fit, left)
     noise: dict[str, Array] = {}
     for j, joint in enumerate(fit.robot_model.robot.joints) if joined else ():
         lines = {form: _density(one, j, fs) for form, one in joined.items()}

@@ -81,7 +81,9 @@ def files_named(request: Any, folder: Path = Path()) -> tuple[Path, ...]:
 
 def as_table(request: Any, words: str) -> str:
     """Return options of a command line as keys in one line of TOML; nothing that they name is loaded."""
-    known, found, key = keys_of(request), dict[str, Any](), ""
+    known = keys_of(request)
+    found = dict[str, Any]()
+    key = ""
     for word in shlex.split(words):
         if word.startswith("--"):
             key, mark, value = word[2:].partition("=")

@@ -30,7 +30,10 @@ class Attempts:
     """
 
     def __init__(self, kept: str, folder: ResultsFolder | None = None) -> None:
-        self._kept, self._folder, self._failures, self._traces = kept, folder, list[str](), list[str]()
+        self._kept = kept
+        self._folder = folder
+        self._failures = list[str]()
+        self._traces = list[str]()
 
     def __enter__(self) -> Self:
         return self

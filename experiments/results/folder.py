@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import final
 
 from idbench.experiments.errors import ResultsError
-from idbench.experiments.results.manifest import NAME, Manifest, Written, digest
+from idbench.experiments.results.manifest import NAME, Manifest, WrittenFile, digest
 from idbench.experiments.results.writing import Read, exchange, hidden_folder
 
 try:
@@ -181,7 +181,7 @@ class ResultsFolder:
         gone = self._old(manifest) - {path.name for path in paths} if complete else set()
         kept = {} if complete or self.force else manifest.files  # of another command, and only laid out anew
         written = {
-            path.name: Written(kept[path.name].command if path.name in kept else self.command, (digest(path),))
+            path.name: WrittenFile(kept[path.name].command if path.name in kept else self.command, (digest(path),))
             for path in paths
         }
         manifest.save(written, gone)

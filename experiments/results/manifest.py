@@ -15,7 +15,7 @@ NAME = ".idbench.json"
 
 @final
 @dataclass(frozen=True)
-class Written:
+class WrittenFile:
     """A file that idbench wrote."""
 
     command: str
@@ -31,7 +31,7 @@ class Manifest:
 
     folder: Path
     """The folder."""
-    files: Mapping[str, Written] = field(default_factory=dict)
+    files: Mapping[str, WrittenFile] = field(default_factory=dict)
     """By their names."""
 
     @classmethod
@@ -39,7 +39,7 @@ class Manifest:
         """Return the manifest of a folder; an empty one if it has none that can be read."""
         try:
             content: Mapping[str, Any] = json.loads((folder / NAME).read_text(encoding="utf-8"))["files"]
-            files = {name: Written(str(w["command"]), tuple(map(str, w["digests"]))) for name, w in content.items()}
+            files = {name: WrittenFile(str(w["command"]), tuple(map(str, w["digests"]))) for name, w in content.items()}
         except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
             return cls(folder)
         return cls(folder, files)
@@ -54,12 +54,12 @@ class Manifest:
         """The commands whose files are still there."""
         return list(dict.fromkeys(w.command for name, w in self.files.items() if (self.folder / name).is_file()))
 
-    def save(self, written: Mapping[str, Written], gone: Iterable[str] = ()) -> None:
+    def save(self, written: Mapping[str, WrittenFile], gone: Iterable[str] = ()) -> None:
         """Write it with files that were written, and without those that are gone."""
         files = {name: w for name, w in self.files.items() if name not in set(gone)}
         for name, new in written.items():
             before = files[name].digests[:1] if name in files else ()
-            files[name] = Written(new.command, tuple(dict.fromkeys((*new.digests, *before))))
+            files[name] = WrittenFile(new.command, tuple(dict.fromkeys((*new.digests, *before))))
         content = {name: {"command": w.command, "digests": list(w.digests)} for name, w in sorted(files.items())}
         about = "files that idbench wrote here: it replaces no others"
         replace_own(self.folder / NAME, json.dumps({"about": about, "files": content}, indent=1) + "\n")

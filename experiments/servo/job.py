@@ -15,7 +15,7 @@ from idbench.experiments.servo.servo_text import verdicts
 from idbench.identify import Array, SettingError
 from idbench.identify.files.servo_log import ServoColumns, ServoFile, order, read_servo_log
 from idbench.identify.servo import SERVO_FRICTIONS, ServoFit
-from idbench.identify.servo.choice import FrictionChoice
+from idbench.identify.servo.choice import ServoFrictionChoice
 from idbench.identify.servo.fit import require_possible
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.sim.robot.robot import Robot
@@ -32,7 +32,7 @@ class ServosFit:
     """The same with held-out logs, if there are any."""
     every: Mapping[str, ServoFit | str]
     """The fit of each joint, or why it has none."""
-    choices: Mapping[str, FrictionChoice]
+    choices: Mapping[str, ServoFrictionChoice]
     """The laws of friction that were compared, of joints that have a fit."""
 
     @property
@@ -79,13 +79,13 @@ def servos_identified(asked: ServoRequest, heard: Heard | None = None) -> Servos
         If something is wrong with the request or its files, or no joint has a fit.
     """
     servos, others = servos_of(asked)
-    every, choices = dict[str, ServoFit | str](), dict[str, FrictionChoice]()
+    every, choices = dict[str, ServoFit | str](), dict[str, ServoFrictionChoice]()
     for joint, result in servos.identified(asked.friction, asked.find, held_of(asked, servos.links.joints)):
-        if isinstance(result, FrictionChoice):
+        if isinstance(result, ServoFrictionChoice):
             choices[joint] = result
         elif isinstance(result, str):
             choices.pop(joint, None)
-        every[joint] = result.fit if isinstance(result, FrictionChoice) else result
+        every[joint] = result.fit if isinstance(result, ServoFrictionChoice) else result
         if heard:
             heard(joint, result, ServosFit(servos, others, dict(every), dict(choices)))
     made = ServosFit(servos, others, every, choices)

@@ -10,9 +10,9 @@ import numpy as np
 from idbench.identify import Array, IdentificationError
 from idbench.identify.files.servo_log import ServoColumns
 from idbench.identify.servo import JointLoad, Servo, ServoFit, ServoRun, UnscaledError, identify_again
-from idbench.identify.servo.choice import FrictionChoice
+from idbench.identify.servo.choice import ServoFrictionChoice
 from idbench.identify.servo.fit import has_scale
-from idbench.identify.servo.identification import APART, Joint, per_offset, together
+from idbench.identify.servo.identification import APART, OffsetJoint, per_offset, together
 from idbench.identify.servo.rows import corrected, smoothed
 from idbench.identify.servo.run import without_spikes
 from idbench.identify.servo.stages import looked_at
@@ -53,7 +53,8 @@ def loads(robot: Robot, columns: ServoColumns, moving: Mapping[int, Moving] | No
         constant = (at[0] + at[2]) / 2
         cosine, sine = at[0] - constant, at[1] - constant
         if robot.slides[j]:
-            constant, cosine, sine = at[0], 0 * constant, 0 * constant
+            constant = at[0]
+            cosine = sine = 0 * constant
         gravity = sine * np.sin(q[:, j]) + cosine * np.cos(q[:, j]) + constant
         rest = whole[:, j] - inertia[:, j] * qdd[:, j] - gravity + constant
         found.append(JointLoad(*(_constant(x) for x in (inertia[:, j], sine, cosine, rest))))
@@ -72,7 +73,7 @@ def _constant(x: Array) -> Array:
     return np.array(x[0] if size > 0 else 0.0) if np.ptp(x) <= 1e-9 * size or size == 0 else x
 
 
-Identified = ServoFit | FrictionChoice
+Identified = ServoFit | ServoFrictionChoice
 """Of one joint: its fit, or those with all laws of friction."""
 
 Identify = Callable[[int, Servo, Sequence[ServoRun]], Identified]
@@ -140,7 +141,7 @@ class Joints:
 
     def _together(self, before: Mapping[int, ServoFit], fits: Mapping[int, ServoFit]) -> dict[int, ServoFit]:
         """Return fits whose offsets agree, of some whose loads assume the offsets of the fits before."""
-        moving, joints = self._moving(before), {j: Joint(fit, {}) for j, fit in fits.items()}
+        moving, joints = self._moving(before), {j: OffsetJoint(fit, {}) for j, fit in fits.items()}
         assumed = {k: offset_of(fit) for k, fit in before.items() if k in fits and has_scale(fit)}
         for k, offset in assumed.items():
             runs = self._loaded([{**each, k: each[k]._replace(offset=offset + APART)} for each in moving])
@@ -191,4 +192,4 @@ def _attempt(identify: Callable[[], Identified]) -> tuple[Identified | str, Serv
         return str(error), error.fit
     except IdentificationError as error:
         return str(error), None
-    return result, result.fit if isinstance(result, FrictionChoice) else result
+    return result, result.fit if isinstance(result, ServoFrictionChoice) else result

@@ -15,7 +15,7 @@ from idbench.experiments.servo.identification import Servos
 from idbench.experiments.text import new_table, number, print_titled
 from idbench.identify import Array
 from idbench.identify.servo import Servo, ServoFit
-from idbench.identify.servo.choice import FrictionChoice, lacks_of
+from idbench.identify.servo.choice import ServoFrictionChoice, lacks_of
 from idbench.identify.servo.parameters import SERVO_PARAMETERS
 from idbench.sim.robot.servos import Commands, ServoValues, replay, with_servos
 
@@ -161,7 +161,7 @@ def _lacks(fit: ServoFit) -> str:
     return f"mean residuals: {parts}"
 
 
-def print_choice(page: Page, joint: str, choice: FrictionChoice) -> None:
+def print_choice(page: Page, joint: str, choice: ServoFrictionChoice) -> None:
     """Print laws of friction compared by parts of the log that their fits did not see."""
     first = next(iter(choice.errors))
     grid = new_table("law", ["counts", f"p, against {first}"])

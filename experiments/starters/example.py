@@ -8,7 +8,9 @@ from idbench.identify import write_log
 from idbench.sim import Robot, load_scenario, run
 from idbench.sim.trajectories import RandomMoves
 
-ROBOT, FS, DELAY = "puma560", 250.0, 0.002
+ROBOT = "puma560"
+FS = 250.0
+DELAY = 0.002
 """Robot, sampling frequency [Hz], and delay of the torques [s], which no file of the example states."""
 
 NOISE = (0.3, 0.6, 0.2, 0.02, 0.02, 0.02)

@@ -13,7 +13,9 @@ from idbench.identify import Array
 SURE = 0.01
 """Probability below which two ways of identification count as different."""
 
-DRAWS, EACH, TOGETHER = 20_000, 2 / SURE, 1000
+DRAWS = 20_000
+EACH = 2 / SURE
+TOGETHER = 1000
 """Draws of the permutation test, at least so many and at least so many for each pair, or Holm's correction would leave
 nothing significant; and how many are drawn at a time."""
 
@@ -74,7 +76,9 @@ def _probability(one: Array, other: Array, gap: float, draws: int) -> float:
     draws : int
         Most draws.
     """
-    rng, count, drawn = np.random.default_rng(0), 1, 1
+    rng = np.random.default_rng(0)
+    count = 1
+    drawn = 1
     middle, half = (one + other).mean(axis=0) / 2, (one - other) / (2 * len(one))
     while drawn < draws and count < ENOUGH:
         swapped = (1.0 - 2.0 * rng.integers(0, 2, (TOGETHER, len(one)), dtype=np.int8)) @ half

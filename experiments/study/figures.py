@@ -73,7 +73,9 @@ def error_figure(cells: Sequence[Cell], axis: Axis) -> str:
     figure, panels = _panels(cells[0].parameters)
     for p, (name, panel) in enumerate(panels.items()):
         for model, group in _models(cells).items():
-            x, color, wide = _places(panel, group, axis), _color(model), _width(cells, model)
+            x = _places(panel, group, axis)
+            color = _color(model)
+            wide = _width(cells, model)
             panel.plot(x, [100 * c.deviation[p] for c in group], color=color, label=f"{model}: spread", lw=wide, marker=".")
             bias = np.array([100 * abs(c.bias[p]) for c in group])
             panel.plot(x, bias, color=color, ls=":", label=f"{model}: |bias|", lw=wide)
@@ -95,7 +97,9 @@ def coverage_figure(cells: Sequence[Cell], axis: Axis) -> str:
     for p, (name, panel) in enumerate(panels.items()):
         panel.axhline(100 * RIGHT, color="black", lw=1.0, ls="--")
         for model, group in _models(cells).items():
-            x, color, wide = _places(panel, group, axis), _color(model), _width(cells, model)
+            x = _places(panel, group, axis)
+            color = _color(model)
+            wide = _width(cells, model)
             low, high = (np.array([100 * c.coverage_interval(c.sigma)[p, i] for c in group]) for i in (0, 1))
             panel.plot(
                 x, [100 * c.coverage(c.sigma)[p] for c in group], color=color, label=f"{model}: corrected", lw=wide, marker="."

@@ -50,7 +50,10 @@ def pool_of(asked: StudyRequest, store: Store) -> AbstractContextManager[Any]:
     """Return where shards are computed; nowhere, if nothing is missing."""
     from idbench.experiments.study.cluster import cluster_pool
 
-    scheduler, workers, threads, width = asked.scheduler, asked.workers, asked.threads, width_of(asked)
+    scheduler = asked.scheduler
+    workers = asked.workers
+    threads = asked.threads
+    width = width_of(asked)
     given = [f"--{what}" for what, value in (("workers", workers), ("threads", threads)) if value is not None]
     if (scheduler and given) or len(given) > 1:
         raise StudyError(f"{', '.join(['--scheduler'] * bool(scheduler) + given)} name several places to run: give one")

@@ -38,7 +38,9 @@ def run_of(asked: RunRequest, tell: Callable[[str], None]) -> ScenarioRun:
             raise ExperimentError("--from: which parameters are identified is the study's; leave --friction and the like out")
     else:
         scenario = _with_robot(tell, load(_alone(asked.scenario, asked.study, asked.index)), asked.robot)
-        names, name, chosen = (asked.chain, asked.estimator), "", None
+        names = (asked.chain, asked.estimator)
+        name = ""
+        chosen = None
         parameters = asked.parameters
     robot_model = RobotModel(scenario.robot, parameters)
     request = Request(

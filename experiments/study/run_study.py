@@ -60,7 +60,9 @@ class LocalPool:
 
     def __init__(self, study: Study, threads: int) -> None:
         self.width = threads
-        self._study, self._stop, self._done = study, threading.Event(), dict[int, float]()
+        self._study = study
+        self._stop = threading.Event()
+        self._done = dict[int, float]()
         self._pool: Executor = ThreadPoolExecutor(threads)
         # Shards are the parallel work; a matrix product that forks would only be in their way.
         self._limits = threadpool_limits(1)
@@ -119,7 +121,9 @@ def run_missing(
     finished_shard : callable, optional
         Receives the runs of every shard when it is kept.
     """
-    todo, pending, done = store.missing(shard), dict[Future[Shard], range](), 0
+    todo = store.missing(shard)
+    pending = dict[Future[Shard], range]()
+    done = 0
     while True:
         while len(pending) < 2 * pool.width and (runs := next(todo, None)) is not None:
             pending[pool.submit(runs)] = runs

@@ -60,7 +60,9 @@ def run_shard(study: Study, runs: range, *, threads: int = 1, progress: Progress
     progress : callable, optional
         Receives the share that is done: the simulation and each method count alike.
     """
-    shard, scenarios, done = Shard(), {run: study.scenario_of(run) for run in runs}, 0
+    shard = Shard()
+    scenarios = {run: study.scenario_of(run) for run in runs}
+    done = 0
     steps = 1 + len(study.methods)
     for together in _groups(study, scenarios, shard):
         start, tell = time.perf_counter(), _part(progress, done, len(together), steps * len(runs))
@@ -161,7 +163,9 @@ def _simulation(
 ) -> Simulation:
     """Return how the robots of runs are simulated anew, by estimators that need it, and where these begin."""
     motions = tuple(motion for motion in together.values() if motion is not None)
-    needs, robot_model, start = method.estimator.needs, study.subjects[method.friction], None
+    needs = method.estimator.needs
+    robot_model = study.subjects[method.friction]
+    start = None
     loop = ScenarioLoop(robot_model, (simulated.scenario,), (simulated.log,), motions) if "loop" in needs else None
     if study.start:
         drawn = np.stack([np.random.default_rng([seed, START]).standard_normal(len(truth)) for seed in simulated.seeds])

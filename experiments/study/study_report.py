@@ -122,7 +122,9 @@ def _overview(cell: Cell) -> list[str]:
 
 
 def _details(cell: Cell, title: str) -> Iterator[list[str]]:
-    interval, corrected, paper = cell.coverage_interval(cell.sigma), cell.coverage(cell.sigma), cell.coverage(cell.paper_sigma)
+    interval = cell.coverage_interval(cell.sigma)
+    corrected = cell.coverage(cell.sigma)
+    paper = cell.coverage(cell.paper_sigma)
     for p, name in enumerate(cell.parameters):
         if not np.isfinite(cell.truth[:, p]).any():  # of a law of friction that this method does not identify
             continue

@@ -141,10 +141,14 @@ class Placement:
 
     def __init__(self, joint: Joint, q: Term) -> None:
         along = np.outer(joint.axis, joint.axis)
-        self._axis, self._along, self._across = vector(joint.axis), matrix(along), matrix(np.eye(3) - along)
+        self._axis = vector(joint.axis)
+        self._along = matrix(along)
+        self._across = matrix(np.eye(3) - along)
         self._rotation = matrix(joint.rotation)
         self._back = transposed(self._rotation)
-        self._hinge, position, anchor = joint.kind == "hinge", vector(joint.position), vector(joint.anchor)
+        self._hinge = joint.kind == "hinge"
+        position = vector(joint.position)
+        anchor = vector(joint.anchor)
         moved = q if joint.zero == 0 else q - joint.zero
         if self._hinge:
             self._cos, self._sin = np.cos(moved), np.sin(moved)

@@ -27,7 +27,7 @@ MIN_ROWS = 20
 
 
 @dataclass(frozen=True, eq=False)
-class Clock:
+class LogClock:
     """The rows of a log that count, and their times."""
 
     kept: npt.NDArray[np.intp]
@@ -60,7 +60,9 @@ class Clock:
         if columns.t_tau is None:
             finite &= np.isfinite(columns.tau).all(axis=1)
         rows = np.flatnonzero(finite)
-        broken, backward, t = len(finite) - len(rows), 0, columns.t
+        broken = len(finite) - len(rows)
+        backward = 0
+        t = columns.t
         forward = t[rows] > np.maximum.accumulate(np.concatenate([[-np.inf], t[rows][:-1]]))
         if len(rows) >= MIN_ROWS and np.mean(~forward) > 0.5:
             raise LogError("time hardly ever increases: is its column the right one?")
@@ -206,7 +208,9 @@ def _numbered(t: Array, fs: float) -> Array:
     The frequency at which all stamps have the same phase, |sum of exp(2 pi i f t)| being largest, is looked for in a short
     beginning first, then in ever longer ones, each of which tells it more sharply.
     """
-    since, count, width = t - t[0], min(10 * MIN_ROWS, len(t)), 0.1 * fs
+    since = t - t[0]
+    count = min(10 * MIN_ROWS, len(t))
+    width = 0.1 * fs
     while True:
         some = since[:count]
         tried = fs + np.linspace(-width, width, 161)

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from idbench.identify.arrays import Array
-from idbench.identify.data.clock import Clock, torque_stretches
+from idbench.identify.data.clock import LogClock, torque_stretches
 from idbench.identify.data.log_columns import LogColumns
 from idbench.identify.data.motion_log import MotionLog, TorqueChannel
 from idbench.identify.data.velocities import Velocities
@@ -36,7 +36,7 @@ class Repaired:
 
     logs: tuple[MotionLog, ...]
     """Its pieces."""
-    clock: Clock
+    clock: LogClock
     """Which rows count, and when they were."""
     velocities: Velocities | None = None
     """What the logged velocities are worth; None without any."""
@@ -59,9 +59,12 @@ class Repaired:
         if fs is not None:
             require_positive(fs=fs)
         columns, stretches = torque_stretches(columns)
-        clock = Clock.of(columns)
+        clock = LogClock.of(columns)
         sound, fs = clock.columns(columns), _round(1 / clock.period) if fs is None else fs
-        found, short, velocities, parts = list[MotionLog](), 0, None, _parts(sound, clock, stretches)
+        found = list[MotionLog]()
+        short = 0
+        velocities = None
+        parts = _parts(sound, clock, stretches)
         for part in parts:
             if part.t[-1] - part.t[0] < SHORTEST and len(parts) > 1:
                 short += 1
@@ -131,7 +134,7 @@ def resample(t: Array, q: Array, tau: Array, torque: TorqueChannel, fs: float, t
     return MotionLog(fs, positions, np.asarray(between, dtype=np.float64), torque)
 
 
-def _parts(sound: LogColumns, clock: Clock, stretches: list[tuple[float, float]]) -> list[LogColumns]:
+def _parts(sound: LogColumns, clock: LogClock, stretches: list[tuple[float, float]]) -> list[LogColumns]:
     """Return the pieces between gaps of positions, and of torques that have times of their own."""
     found = []
     for piece in clock.pieces:

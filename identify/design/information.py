@@ -139,7 +139,9 @@ class Information:
         for order in range(3):
             for j in range(n):
                 copies[1 + order * n + j, order, :, j] += steps[order]
-        weight, sums, weighted = self.weight(motion), np.zeros((3 * n + 1, motion.shape[-2])), np.zeros(motion.shape[-2:])
+        weight = self.weight(motion)
+        sums = np.zeros((3 * n + 1, motion.shape[-2]))
+        weighted = np.zeros(motion.shape[-2:])
         q, qd, qdd = _states(copies)
         for (row, place), column in self.basis.explicit(State(q, qd, lambda _: qdd)).items():
             if place == HELD:

@@ -79,7 +79,7 @@ MEMORY = 20
 """Steps that L-BFGS remembers."""
 
 
-class Search:
+class DesignSearch:
     """Minimises what plans cost; what was found so far outlives an interruption.
 
     Parameters
@@ -94,7 +94,9 @@ class Search:
 
     def __init__(self, starts: Sequence[Array], steps: int, progress: Callable[[float], None] | None = None) -> None:
         self.found, self.interrupted = list(starts), False
-        self._steps, self._done, self._progress = steps, 0, progress
+        self._steps = steps
+        self._done = 0
+        self._progress = progress
 
     @property
     def best(self) -> Array:
@@ -125,7 +127,9 @@ class Search:
 
     def _descend(self, plan: Plan, end: "_End", rounds: int) -> None:
         """Descend from an end, which is kept up to date."""
-        shape, before, steps = end.c.shape, self._done, 0
+        shape = end.c.shape
+        before = self._done
+        steps = 0
 
         def value(flat: Array) -> tuple[float, Array]:
             cost, slope = plan.value(flat.reshape(shape))

@@ -14,7 +14,7 @@ from idbench.identify.estimators.likelihood.joint_fit import JointFit
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.solution import AbstractSolution, Given, OfWeightedRows
 from idbench.identify.noise.propagation import NoiseLevels
-from idbench.identify.rows.factors import Factor, Fit, Status
+from idbench.identify.rows.factors import Factor, LeastSquaresFit, Status
 from idbench.identify.rows.rows import Rows
 from idbench.identify.tables import html_table, significant, text_table
 
@@ -119,7 +119,7 @@ class Estimate:
         return cls(problem, x, _real_array("covariance", covariance, (*shape, p, p)), solution)
 
     @classmethod
-    def of_fit(cls, problem: Problem, fit: Fit, *, scaled: bool) -> Self:
+    def of_fit(cls, problem: Problem, fit: LeastSquaresFit, *, scaled: bool) -> Self:
         """Return the estimate of a least-squares solution; `scaled` if its rows were divided by their noise."""
         inverse = fit.factor.inverse(problem.factors.together.status == Status.OK)
         covariance = _paper_covariance(fit.factor, fit.X, inverse)

@@ -21,7 +21,7 @@ from idbench.identify.noise.restricted_likelihood import likely, likely_levels
 from idbench.identify.noise.row_weights import floor_of, reciprocal_root
 from idbench.identify.noise.spectral_levels import position_noise, repeats, spectral_levels
 from idbench.identify.rows.chain import Chain
-from idbench.identify.rows.factors import Factors, Fit, triangular
+from idbench.identify.rows.factors import Factors, LeastSquaresFit, triangular
 from idbench.identify.rows.rows import Rows, is_long
 from idbench.identify.signals.signals import Signals
 
@@ -170,7 +170,7 @@ class Problem:
         return self._explicit or replace(self, model=ExplicitModel(), _signals=self.signals)
 
     @cached_property
-    def start(self) -> Fit:
+    def start(self) -> LeastSquaresFit:
         """The estimate by weighted least squares, from all parts."""
         return self.some_rows.factors.fit(2)
 

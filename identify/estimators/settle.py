@@ -181,7 +181,9 @@ def _scanned(rows: AdaptiveRows, basis: Basis, count: int) -> Basis:
 def _below(costs: Array) -> Array:
     """Return how far the minimum of a parabola lies below each value of a grid that is less than its neighbours, shape (i,)."""
     found, costs = np.zeros(len(costs)), np.where(np.isfinite(costs), costs, np.nan)
-    before, here, after = costs[:-2], costs[1:-1], costs[2:]
+    before = costs[:-2]
+    here = costs[1:-1]
+    after = costs[2:]
     bend = before - 2 * here + after
     inside = (here <= before) & (here <= after) & (bend > 0)
     found[1:-1][inside] = (after - before)[inside] ** 2 / (8 * bend[inside])
@@ -197,7 +199,9 @@ def _best(rows: AdaptiveRows, basis: Basis, shaped: ShapedFriction, joints: Sequ
     candidates = Candidates(shaped.law, (*grid, *here))
     rest = basis.of([parameter for parameter in basis.parameters if parameter not in shaped.parameters(n)])
     there = rest + OfJoints(candidates, tuple(joints))
-    factors, shapes, plain = rows.factors(there), rest.operating_point, _rest(rest)
+    factors = rows.factors(there)
+    shapes = rest.operating_point
+    plain = _rest(rest)
     chosen = np.full((*factors.R.shape[:-3], n), len(grid), dtype=np.intp)
     for run in np.ndindex(chosen.shape[:-1]):
         alone = Factors(factors.R[run], factors.rows[run], factors.names)

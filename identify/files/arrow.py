@@ -160,7 +160,9 @@ def _numeric(path: Path, file: Any) -> "pa.Table":
 
     A file of some kilobytes may hold a column of terabytes, all values being the same.
     """
-    types, wanted, size = arrow().types, list[str](), 0
+    types = arrow().types
+    wanted = list[str]()
+    size = 0
     for field in file.schema_arrow:
         kind = field.type
         if types.is_list(kind) or types.is_fixed_size_list(kind) or types.is_large_list(kind):

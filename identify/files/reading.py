@@ -232,7 +232,9 @@ class _Files:
     def _of(self, quantity: str, source: Source) -> tuple[Array, tuple[str, ...]]:
         """Return the columns of a quantity in SI, shape (time, joint), and the names of joints that they have."""
         path = self._path(source)
-        table, columns, joints = self._table(path), list[Array](), list[str]()
+        table = self._table(path)
+        columns = list[Array]()
+        joints = list[str]()
         for pattern in source.columns:
             if pattern in table.columns or "*" not in pattern:
                 column = table.require(pattern, path)

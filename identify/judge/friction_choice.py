@@ -13,7 +13,7 @@ from idbench.identify.basis.friction.shape import ShapedFriction
 from idbench.identify.basis.of_joints import OfJoints
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.settle import settled
-from idbench.identify.judge.held_out import HeldOut
+from idbench.identify.judge.held_out import HeldOutProducts
 from idbench.identify.judge.law_score import LawScore, LawSearch, gain
 from idbench.identify.signals.masks import NoMask
 
@@ -190,7 +190,7 @@ class _Choice:
         key = tuple(laws), tuple(gone)
         if key not in self._settled:
             self._settled[key] = settled(self.problem.with_basis(self._basis(laws, gone)))
-        return LawSearch(HeldOut.of(self._settled[key], candidates))
+        return LawSearch(HeldOutProducts.of(self._settled[key], candidates))
 
     @cached_property
     def _settled(self) -> dict[tuple[tuple[tuple[str, ...], ...], tuple[str, ...]], Problem]:

@@ -37,7 +37,7 @@ RIDGE = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
-class HeldOut:
+class HeldOutProducts:
     """Products of columns with each other, P of them with those of all laws at all their starting shapes, and with Y."""
 
     start: Problem
@@ -52,9 +52,11 @@ class HeldOut:
     """Which columns a law of a joint has, one list for every combination of its shapes."""
 
     @classmethod
-    def of(cls, start: Problem, candidates: Mapping[str, AbstractBlock]) -> "HeldOut":
+    def of(cls, start: Problem, candidates: Mapping[str, AbstractBlock]) -> "HeldOutProducts":
         """Return the products of a problem's rows, and of those that candidates for further laws have."""
-        X, basis, places = start.factors.fit(2).X, start.basis, dict[tuple[str, int], list[list[int]]]()
+        X = start.factors.fit(2).X
+        basis = start.basis
+        places = dict[tuple[str, int], list[list[int]]]()
         for law, block in candidates.items():
             there = {parameter.joint for parameter in block.parameters(basis.n) if parameter in basis.places}
             shaped, first = _at_all_shapes(block), len(basis.names)

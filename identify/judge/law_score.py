@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from idbench.identify.arrays import Array
-from idbench.identify.judge.held_out import FOLDS, TINY, HeldOut, sigma_squares, solved, squares
+from idbench.identify.judge.held_out import FOLDS, TINY, HeldOutProducts, sigma_squares, solved, squares
 
 EXCUSED = 2.0
 """Squares at speeds above those of a fit that sigma makes, in multiples of what it makes on average, are no fault of a law."""
@@ -47,7 +47,7 @@ def gain(before: Array, after: Array) -> tuple[float, float, float]:
 class LawSearch:
     """Laws that are compared beside those of a problem, joint by joint."""
 
-    products: HeldOut
+    products: HeldOutProducts
     """Of the rows, stretch by stretch."""
 
     @property
@@ -92,7 +92,9 @@ class LawSearch:
         """
         products = self.products
         judged, fitted = products.held[fold][j], products.fitted(fold, j)
-        least, best, spread = np.inf, np.inf, 0.0
+        least = np.inf
+        best = np.inf
+        spread = 0.0
         # The fastest motion has had no say in the shapes: they are those that fit the slower best.
         every = [[]] if law is None else products.places[law, j] if fold == FOLDS else products.likely(law, j)
         for own in every:

@@ -123,7 +123,10 @@ def validate(held_out: Problem, X: Array, covariance: Array | None = None) -> Va
         )
     held_out.require_rows("a motion is judged by its rows, and ")
     judged = as_judged(held_out)
-    signals, chain, basis, rows = judged.signals[0], judged.chain, judged.basis, judged.parts[0].rows
+    signals = judged.signals[0]
+    chain = judged.chain
+    basis = judged.basis
+    rows = judged.parts[0].rows
     left = instants(signals, basis, ExplicitModel(), chain, X)
     moving = [_Joint.of(rows, X, j) for j in range(basis.n)]
     standing = chain.operator.map(left.equations, left.equations.weighted_as(1.0 - signals.weight), chain.grid(signals.log))
@@ -183,7 +186,9 @@ class _Joint:
 
     def judged(self) -> tuple[float, float, float, float, int]:
         """Return the rms of residual and torque, R2, correlation, and the number of valid rows."""
-        rho, y, share = self.rho[self.valid], self.y[self.valid], self.share[self.valid]
+        rho = self.rho[self.valid]
+        y = self.y[self.valid]
+        share = self.share[self.valid]
         if not len(rho):
             return np.nan, np.nan, np.nan, np.nan, 0
         mean = float(share @ y) / self.rows

@@ -28,7 +28,7 @@ MIN_EIGENVALUE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Payload:
+class PayloadEstimate:
     """The parameters of a payload."""
 
     names: tuple[str, ...]
@@ -80,19 +80,19 @@ class Payload:
         return inertial(_outer(scipy.optimize.least_squares(misfit, start, x_scale="jac", xtol=1e-12, ftol=1e-12).x))
 
 
-def together(robot: LoadedRobot) -> Payload:
+def together(robot: LoadedRobot) -> PayloadEstimate:
     """Identify robot and payload in one fit of all logs: what the robot is counts for both."""
     found = robot.estimated(robot.of_both, robot.basis)
-    return Payload(robot.names, *of_payload(found, robot.names), robot.known)
+    return PayloadEstimate(robot.names, *of_payload(found, robot.names), robot.known)
 
 
-def fixed(robot: LoadedRobot) -> Payload:
+def fixed(robot: LoadedRobot) -> PayloadEstimate:
     """Identify the robot without the payload, then the payload alone, the robot's parameters held."""
     first = robot.estimated(robot.without, robot.robot.basis)
     return with_known_robot(robot, first.names, first.X, first.covariance)
 
 
-def with_known_robot(robot: LoadedRobot, names: tuple[str, ...], X: Array, covariance: Array) -> Payload:
+def with_known_robot(robot: LoadedRobot, names: tuple[str, ...], X: Array, covariance: Array) -> PayloadEstimate:
     """Return the payload with the parameters of the robot, identified before, held; their sigma is in that of the payload.
 
     Parameters
@@ -111,7 +111,7 @@ def with_known_robot(robot: LoadedRobot, names: tuple[str, ...], X: Array, covar
     slope = np.zeros((len(found.names), len(names))) if G is None else -G.T @ of_robot.W
     X_payload, C = of_payload(found, robot.names)
     place = [found.names.index(name) for name in robot.names]
-    return Payload(robot.names, X_payload, C + slope[place] @ covariance @ slope[place].T, robot.known)
+    return PayloadEstimate(robot.names, X_payload, C + slope[place] @ covariance @ slope[place].T, robot.known)
 
 
 def with_robot_held(robot: LoadedRobot, values: Mapping[str, float]) -> Estimate:
@@ -121,7 +121,7 @@ def with_robot_held(robot: LoadedRobot, values: Mapping[str, float]) -> Estimate
     return robot.estimated(marked(robot.loaded, 1.0), held)
 
 
-def apart(robot: LoadedRobot) -> Payload:
+def apart(robot: LoadedRobot) -> PayloadEstimate:
     """Identify the robot twice, without and with the payload as a part of its last link, and subtract."""
     basis = robot.robot.basis
     first, second = robot.estimated(robot.without, basis), robot.estimated(robot.loaded, basis)
@@ -131,10 +131,10 @@ def apart(robot: LoadedRobot) -> Payload:
     A, root = T[rows], np.linalg.cholesky(C[np.ix_(rows, rows)])
     W, y = (scipy.linalg.solve_triangular(root, x, lower=True) for x in (A, difference[rows]))
     covariance = np.linalg.inv(W.T @ W)
-    return Payload(robot.names, covariance @ W.T @ y, covariance, robot.known)
+    return PayloadEstimate(robot.names, covariance @ W.T @ y, covariance, robot.known)
 
 
-def difference(robot: LoadedRobot) -> Payload:
+def difference(robot: LoadedRobot) -> PayloadEstimate:
     """Identify the payload from the difference of the torques of one motion, repeated: friction falls out of it."""
     pairs = list(zip(robot.without, robot.loaded, strict=False))
     if not pairs or len(robot.without) != len(robot.loaded) or not all(_repeated(*pair) for pair in pairs):
@@ -156,10 +156,10 @@ def difference(robot: LoadedRobot) -> Payload:
     w = np.tile(weight, len(Y) // rows.kinds) * (rows.valid & first.valid)
     A: Array = np.asarray(W * w[:, None], dtype=np.float64)
     covariance: Array = np.asarray(np.linalg.inv(A.T @ A), dtype=np.float64)
-    return Payload(robot.names, np.asarray(X, dtype=np.float64), covariance, robot.known)
+    return PayloadEstimate(robot.names, np.asarray(X, dtype=np.float64), covariance, robot.known)
 
 
-WAYS: Mapping[str, Callable[[LoadedRobot], Payload]] = {
+WAYS: Mapping[str, Callable[[LoadedRobot], PayloadEstimate]] = {
     "together": together,
     "fixed": fixed,
     "apart": apart,

@@ -16,7 +16,7 @@ BLOCK, TOGETHER = 64, 32
 
 
 @dataclass(frozen=True, eq=False)
-class Band:
+class BandMatrix:
     """A symmetric band matrix C. Leading axes are runs."""
 
     lower: Array
@@ -73,7 +73,7 @@ class Cholesky:
     """At [j, d] what L has in row j + d of column j; NaN in runs that have no factor, shape (..., r, width)."""
 
     @classmethod
-    def of(cls, C: Band) -> Self:
+    def of(cls, C: BandMatrix) -> Self:
         """Return the factor, NaN in runs where C is lost or not positive definite; void rows, without noise, are left.
 
         Raises
@@ -106,7 +106,7 @@ class Cholesky:
         """Return L'^-1 z, shape (..., r, m)."""
         return self._solved(z, "T")
 
-    def inverse(self) -> Band:
+    def inverse(self) -> BandMatrix:
         """Return the inverse of the matrix, as far as that is not zero (Takahashi)."""
         r, width = self.lower.shape[-2:]
         own, below = _in_blocks(self.lower, width, rest=1.0)
@@ -117,7 +117,7 @@ class Cholesky:
         for k in reversed(range(below.shape[-3])):
             beside[..., k, :, :] = -np.matmul(found[..., k + 1, :, :], gain[..., k, :, :])
             found[..., k, :, :] -= np.matmul(np.swapaxes(gain[..., k, :, :], -1, -2), beside[..., k, :, :])
-        return Band(_as_band(found, beside, r))
+        return BandMatrix(_as_band(found, beside, r))
 
     def _solved(self, x: Array, which: str) -> Array:
         runs = np.broadcast_shapes(x.shape[:-2], self.lower.shape[:-2])

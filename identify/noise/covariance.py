@@ -10,7 +10,7 @@ import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
 from idbench.identify.arrays import Array
-from idbench.identify.noise.band_matrix import Band, Cholesky
+from idbench.identify.noise.band_matrix import BandMatrix, Cholesky
 from idbench.identify.rows.row_map import Grid, windowed
 
 
@@ -18,7 +18,7 @@ from idbench.identify.rows.row_map import Grid, windowed
 class Whitening:
     """What makes the rows of one log independent, and of variance 1."""
 
-    C: Band
+    C: BandMatrix
     """Covariance of those that are kept."""
     kept: npt.NDArray[np.bool_]
     """False for rows that are left out, shape (..., r)."""
@@ -100,7 +100,7 @@ class BandedCovariance:
         return type(self)(self.bands * _weights(by_row, lags))
 
     @property
-    def matrix(self) -> Band:
+    def matrix(self) -> BandMatrix:
         """The covariance, rows in the order of Y."""
         *runs, lags, count, kinds, _ = self.bands.shape
         lower = np.zeros((*runs, count, kinds, lags * kinds))
@@ -108,7 +108,7 @@ class BandedCovariance:
         later = np.moveaxis(self.bands, (-4, -2), (-2, -3)).reshape(*runs, count, kinds, lags * kinds)
         for kind in range(kinds):
             lower[..., kind, : lags * kinds - kind] = later[..., kind, kind:]
-        return Band(lower.reshape(*runs, count * kinds, lags * kinds))
+        return BandMatrix(lower.reshape(*runs, count * kinds, lags * kinds))
 
     @property
     def variance(self) -> Array:

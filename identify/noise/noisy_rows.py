@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from idbench.identify.arrays import Array
-from idbench.identify.noise.band_matrix import Band
+from idbench.identify.noise.band_matrix import BandMatrix
 from idbench.identify.noise.covariance import BandedCovariance, Whitening
 from idbench.identify.noise.linearization import Linearization
 from idbench.identify.noise.propagation import NoiseLevels, Paths, position_paths, torque_paths
@@ -73,15 +73,15 @@ class NoisyRows:
         if "units" in self.__dict__:
             position = np.broadcast_to(levels.effective_position, levels.torque.shape)
             squares = np.concatenate([levels.in_rows, position], axis=-1) ** 2
-            return Whitening(Band.weighted(self.units, squares), self.kept)
+            return Whitening(BandMatrix.weighted(self.units, squares), self.kept)
         return self.whitening_by([self.covariance(levels)], np.ones(1))
 
     def whitening_by(self, parts: Sequence[BandedCovariance], shares: Array) -> Whitening:
         """Return what makes the rows that are kept independent, by so much of each covariance, shape (..., part)."""
-        return Whitening(Band.weighted(self.matrices(parts), shares), self.kept)
+        return Whitening(BandMatrix.weighted(self.matrices(parts), shares), self.kept)
 
     @cached_property
-    def units(self) -> list[Band]:
+    def units(self) -> list[BandMatrix]:
         """Covariances that unit noise of torques, and of positions, gives the rows that are kept, joint by joint."""
         return self.matrices(chain(self.torque.each(), self.position.each()))
 
@@ -90,6 +90,6 @@ class NoisyRows:
         for name in ("torque", "position", "units"):
             self.__dict__.pop(name, None)
 
-    def matrices(self, parts: Iterable[BandedCovariance]) -> list[Band]:
+    def matrices(self, parts: Iterable[BandedCovariance]) -> list[BandMatrix]:
         """Return parts of the covariance of the rows that are kept."""
         return [C.kept(self.kept).matrix for C in parts]

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from idbench.identify.arrays import Array
-from idbench.identify.noise.band_matrix import Band, Cholesky
+from idbench.identify.noise.band_matrix import BandMatrix, Cholesky
 from idbench.identify.noise.noisy_rows import NoisyRows
 from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.rows.factors import Factor, triangular
@@ -74,7 +74,7 @@ def likely_levels(parts: Sequence[Rows], noisy: Sequence[NoisyRows], start: Nois
     return NoiseLevels(torque, position, start.repeats)
 
 
-def likely(units: Sequence[Sequence[Band]], joined: Sequence[Array], start: Array, least: Array) -> Array:
+def likely(units: Sequence[Sequence[BandMatrix]], joined: Sequence[Array], start: Array, least: Array) -> Array:
     """Return the numbers, not below `least`, shape (..., i), with which C = sum of number_i C_i makes rows most likely.
 
     Parameters
@@ -113,9 +113,9 @@ class _Slope:
     """What X moves by, in its sigma, for a change of each square, shape (..., p, i)."""
 
     @classmethod
-    def at(cls, units: Sequence[Sequence[Band]], joined: Sequence[Array], squares: Array) -> Self:
+    def at(cls, units: Sequence[Sequence[BandMatrix]], joined: Sequence[Array], squares: Array) -> Self:
         """Return the slopes at squares of levels."""
-        roots = [Cholesky.of(Band.weighted(parts, squares)) for parts in units]
+        roots = [Cholesky.of(BandMatrix.weighted(parts, squares)) for parts in units]
         white = [root.whiten(x) for root, x in zip(roots, joined, strict=True)]
         names = ("",) * (joined[0].shape[-1] - 1)
         factor = Factor(triangular(np.concatenate(white, axis=-2)), np.array(0), names)
@@ -126,7 +126,7 @@ class _Slope:
         for root, parts, z in zip(roots, units, white, strict=True):
             solved = root.unwhiten(z)
             W, left = solved[..., :-1], solved[..., -1:] - np.matmul(solved[..., :-1], X[..., None])
-            P = root.inverse() - Band.product(np.matmul(W, inverse), W, root.lower.shape[-1])
+            P = root.inverse() - BandMatrix.product(np.matmul(W, inverse), W, root.lower.shape[-1])
             products = [part @ left for part in parts]
             for i, (part, product) in enumerate(zip(parts, products, strict=True)):
                 found[..., i] += np.sum(left * product, axis=(-2, -1))

@@ -13,7 +13,7 @@ from idbench.identify.noise.covariance import BandedCovariance
 from idbench.identify.noise.noisy_rows import NoisyRows
 from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.noise.row_weights import two_levels
-from idbench.identify.rows.factors import Factors, Fit, Status
+from idbench.identify.rows.factors import Factors, LeastSquaresFit, Status
 from idbench.identify.rows.rows import Rows
 from idbench.identify.signals.signals import Signals
 from idbench.identify.signals.stencils import slide
@@ -89,7 +89,7 @@ TOLD = 2.0
 
 
 def spectral_levels(
-    parts: Sequence[Rows], noisy: Sequence[NoisyRows], factors: Factors, fit: Fit, position: Array
+    parts: Sequence[Rows], noisy: Sequence[NoisyRows], factors: Factors, fit: LeastSquaresFit, position: Array
 ) -> NoiseLevels:
     """Return the noise of logs as the rows of their explicit model show it, NaN in runs that cannot be solved.
 
@@ -146,7 +146,7 @@ def _torque_share(
     return np.maximum(share, np.minimum(TOLD / few, 1.0))
 
 
-def _leverage(parts: Sequence[Rows], factors: Factors, fit: Fit) -> Array:
+def _leverage(parts: Sequence[Rows], factors: Factors, fit: LeastSquaresFit) -> Array:
     """Return the share of every row that the fit takes, shape (..., kind, instant)."""
     inverse = fit.factor.inverse(factors.together.status == Status.OK)
     each = [rows.by_kind(np.sum(np.matmul(rows.W, inverse) * rows.W, axis=-1)) for rows in parts]

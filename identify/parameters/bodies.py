@@ -81,7 +81,10 @@ def entropic_terms(links: list[list[int]], inertias: list[Array], p: int, weight
     """
     each = len(_PLACES) + 4
     own = each * len(links)
-    linear, rows, limits, cones = np.zeros(p + own), list[Array](), list[Array](), list[Any]()
+    linear = np.zeros(p + own)
+    rows = list[Array]()
+    limits = list[Array]()
+    cones = list[Any]()
     for number, (link, S) in enumerate(zip(links, inertias, strict=True)):
         inverse = np.linalg.inv(np.linalg.cholesky(S))
         units = [inverse @ unit @ inverse.T for unit in PSEUDO]

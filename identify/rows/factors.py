@@ -150,7 +150,7 @@ class Factor:
         return self.R_W / np.where(length > 0, length, 1.0)
 
 
-class Fit(NamedTuple):
+class LeastSquaresFit(NamedTuple):
     """A weighted least-squares solution."""
 
     X: Array
@@ -173,7 +173,7 @@ class Factors:
     """Numbers of rows that are not void, shape (..., kind)."""
     names: tuple[str, ...]
     """Names of X."""
-    _fits: list[Fit] = field(default_factory=list, repr=False)
+    _fits: list[LeastSquaresFit] = field(default_factory=list, repr=False)
 
     def __post_init__(self) -> None:
         for values in (self.R, self.rows):
@@ -215,7 +215,7 @@ class Factors:
         """Return |Y - W X|^2 of every kind, shape (..., kind)."""
         return Factor(self.R, self.rows, self.names).squares(X[..., None, :])
 
-    def fit(self, rounds: int = 0) -> Fit:
+    def fit(self, rounds: int = 0) -> LeastSquaresFit:
         """Return the least-squares solution, with rows divided by the rms of their kind's residuals after the first round.
 
         Parameters
@@ -225,11 +225,11 @@ class Factors:
         """
         if not self._fits:
             one = np.ones(self.rows.shape)
-            self._fits.append(Fit(self.together.solution(self.together.status == Status.OK), one, self.together))
+            self._fits.append(LeastSquaresFit(self.together.solution(self.together.status == Status.OK), one, self.together))
         while len(self._fits) <= rounds:
             weight = 1 / self._rms(self._fits[-1].X)
             factor = self.weighted(weight)
-            self._fits.append(Fit(factor.solution(self.together.status == Status.OK), weight, factor))
+            self._fits.append(LeastSquaresFit(factor.solution(self.together.status == Status.OK), weight, factor))
         return self._fits[rounds]
 
     def _rms(self, X: Array) -> Array:

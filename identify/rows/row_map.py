@@ -71,7 +71,9 @@ def windowed(x: Array, weights: Array, before: int, grid: Grid) -> Array:
     grid : Grid
         The rows.
     """
-    sums, count, step = len(weights), grid.count, grid.step
+    sums = len(weights)
+    count = grid.count
+    step = grid.step
     parts = -(-weights.shape[-1] // step)
     frames = count + parts - 1
     start, length = grid.first - before, frames * step

@@ -73,7 +73,9 @@ class Rows:
         """Return the rows that a map makes of a model's equations; raise SettingError where its columns are not finite."""
         y, columns = _mapped(equations, to_rows)
         _require_finite(columns, equations)
-        n, count, p = equations.kinds, to_rows.grid.count, len(equations.names)
+        n = equations.kinds
+        count = to_rows.grid.count
+        p = len(equations.names)
         held = [row for row, place in equations.addresses if place == HELD]
         y[..., held, :] -= columns[..., : len(held), :]
         places = equations.addresses[len(held) :]
@@ -148,7 +150,9 @@ class Rows:
 
 def _mapped(equations: Equations, to_rows: RowMap) -> tuple[Array, Array]:
     """Return the rows of B tau, shape (..., kind, count), and of the columns of c + s e, shape (..., k, count)."""
-    n, places, by_parts = equations.kinds, equations.addresses, to_rows.rate_kernel
+    n = equations.kinds
+    places = equations.addresses
+    by_parts = to_rows.rate_kernel
     parts = (equations.c, equations.rates) if by_parts is None else (equations.c,)
     both = np.zeros((*equations.y.shape[:-2], n + len(places), equations.y.shape[-1]))
     np.multiply(equations.y, to_rows.inside, out=both[..., :n, :])

@@ -24,7 +24,7 @@ SLOW = 0.05
 
 
 @final
-class Lack(NamedTuple):
+class ServoLack(NamedTuple):
     """Residuals in one kind of motion."""
 
     when: str
@@ -35,7 +35,7 @@ class Lack(NamedTuple):
     """Mean absolute residual [rad]."""
 
 
-def lacks_of(fit: ServoFit) -> list[Lack]:
+def lacks_of(fit: ServoFit) -> list[ServoLack]:
     """Return residuals by what the joint is doing, the largest first."""
     loop, servo = fit.loop, fit.servo
     speed = np.stack([_spread(np.abs(np.gradient(run.clean, run.t)), loop.samples) for run in loop.runs])
@@ -53,7 +53,7 @@ def lacks_of(fit: ServoFit) -> list[Lack]:
     }
     found = [(when, some & loop.kept) for when, some in kinds.items()]
     total = loop.kept.sum()
-    lacks = [Lack(when, float(some.sum() / total), float(r[some].mean())) for when, some in found if some.any()]
+    lacks = [ServoLack(when, float(some.sum() / total), float(r[some].mean())) for when, some in found if some.any()]
     return sorted((x for x in lacks if x.share >= MIN_SHARE), key=lambda x: -x.error)
 
 
@@ -70,7 +70,7 @@ PER_PARAMETER = 2
 
 @final
 @dataclass(frozen=True, eq=False)
-class FrictionChoice:
+class ServoFrictionChoice:
     """Laws of friction compared."""
 
     fits: dict[str, ServoFit]
@@ -90,7 +90,7 @@ class FrictionChoice:
 
 def choose_friction(
     servo: Servo, runs: Sequence[ServoRun], more: Sequence[str] = (), held: dict[str, float] | None = None
-) -> FrictionChoice:
+) -> ServoFrictionChoice:
     """Return the laws of friction compared, each by parts of the log that its fit did not see (see `left_out`).
 
     Laws are taken from the simplest on; a further one replaces the one before if it predicts the parts better and Wilcoxon's
@@ -101,7 +101,9 @@ def choose_friction(
     IdentificationError
         If no law can be fitted.
     """
-    fits, why, rough = dict[str, ServoFit](), list[IdentificationError](), dict[str, dict[str, float]]()
+    fits = dict[str, ServoFit]()
+    why = list[IdentificationError]()
+    rough = dict[str, dict[str, float]]()
     of_laws = {name for names in SERVO_FRICTIONS.values() for name in names}
     parameters_of("coulomb", (*more, *(name for name in held or {} if name not in of_laws)))
     stages = Stages.begun(servo, runs, more, held or {})
@@ -127,7 +129,7 @@ def choose_friction(
         if costs[law].mean() < costs[chosen].mean() and _p(costs[law], costs[chosen], tests) < LEVEL:
             chosen = law
     require_scale(fits[chosen])
-    return FrictionChoice(fits, chosen, {law: float(np.sqrt(x.mean())) for law, x in costs.items()}, p)
+    return ServoFrictionChoice(fits, chosen, {law: float(np.sqrt(x.mean())) for law, x in costs.items()}, p)
 
 
 def _p(one: Array, other: Array, tests: int) -> float:

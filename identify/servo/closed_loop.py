@@ -14,7 +14,7 @@ from idbench.identify.errors import SettingError, require_positive
 from idbench.identify.servo.run import ServoRun
 
 if TYPE_CHECKING:
-    from idbench.identify.servo.servo_step import Law
+    from idbench.identify.servo.servo_step import ServoLaw
 
 PUBLISHED: dict[str, tuple[float, float, int]] = {
     "STS3215": (0.166, 0.97, 4096),
@@ -84,7 +84,9 @@ class ServoLoop:
     """
 
     def __init__(self, servo: Servo, runs: Sequence[ServoRun], step: float, count: float = 0.0) -> None:
-        self.servo, self.runs, self.count = servo, tuple(runs), count
+        self.servo = servo
+        self.runs = tuple(runs)
+        self.count = count
         typical = float(np.median([run.T for run in self.runs]))
         self.h = typical / np.ceil(typical / step - 1e-9)
         self.samples = max(len(run.t) for run in self.runs)
@@ -101,22 +103,24 @@ class ServoLoop:
 
         `ahead`, shape (lane, run) or less, is where runs begin, beyond the position that was measured [rad].
         """
-        from idbench.identify.servo.servo_step import Law  # its compiler takes longer than many a command
+        from idbench.identify.servo.servo_step import ServoLaw  # its compiler takes longer than many a command
 
         lanes = max(np.size(x) for x in p.values())
         every = {name: np.broadcast_to(np.asarray(x, dtype=np.float64), (lanes,)).tolist() for name, x in p.items()}
-        laws = [Law(**{name: x[lane] for name, x in every.items()}) for lane in range(lanes)]
+        laws = [ServoLaw(**{name: x[lane] for name, x in every.items()}) for lane in range(lanes)]
         begins = np.broadcast_to(np.asarray(ahead, dtype=np.float64), (lanes, len(self.runs)))
         out = np.empty((lanes, *self.q.shape))
         with ThreadPoolExecutor(os.cpu_count()) as pool:  # compiled code runs beside Python
             list(pool.map(lambda k: self._simulate_run(k, laws, begins[:, k].tolist(), out[:, k]), range(len(self.runs))))
         return out
 
-    def _simulate_run(self, k: int, laws: "Sequence[Law]", ahead: Sequence[float], out: Array) -> None:
+    def _simulate_run(self, k: int, laws: "Sequence[ServoLaw]", ahead: Sequence[float], out: Array) -> None:
         """Write the positions of a run into `out`, shape (lane, sample)."""
         from idbench.identify.servo.servo_step import Firmware, at_samples, motion
 
-        servo, (before, share), (q, speed) = self.servo, self._places[k], self._begin[k]
+        servo = self.servo
+        (before, share) = self._places[k]
+        (q, speed) = self._begin[k]
         firmware = Firmware(servo.gain * self.runs[k].kp, servo.duty_limit, servo.step)
         for lane, (law, more) in enumerate(zip(laws, ahead, strict=True)):
             path = motion(law, firmware, self._tracks[k], (q + more, speed), self.h, self._fastest)

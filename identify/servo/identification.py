@@ -22,7 +22,7 @@ INSEPARABLE = 100.0
 
 
 @final
-class Joint(NamedTuple):
+class OffsetJoint(NamedTuple):
     """The fit of a joint, and the offsets of others that its loads assume."""
 
     fit: ServoFit
@@ -53,7 +53,7 @@ def per_offset(fit: ServoFit, other: Sequence[ServoRun]) -> Array:
     return np.asarray(np.linalg.pinv(curvature, 1e-12) @ pull / size)
 
 
-def together(joints: Mapping[int, Joint], assumed: Mapping[int, float]) -> dict[int, ServoFit]:
+def together(joints: Mapping[int, OffsetJoint], assumed: Mapping[int, float]) -> dict[int, ServoFit]:
     """Return fits whose offsets agree with each other, and whose covariances contain the errors of all offsets.
 
     The free parameters of joint j are linear in the offsets o of the others, near those that its loads assume:
@@ -79,11 +79,11 @@ def together(joints: Mapping[int, Joint], assumed: Mapping[int, float]) -> dict[
     return {j: _moved(joint.fit, B[j] @ ahead, _covariance(j, joints, B[j] @ agreed, own)) for j, joint in joints.items()}
 
 
-def _of(joint: Joint, k: int) -> Array:
+def _of(joint: OffsetJoint, k: int) -> Array:
     return joint.per_offset.get(k, np.zeros(len(joint.fit.free)))
 
 
-def _covariance(j: int, joints: Mapping[int, Joint], per_error: Array, own: Mapping[int, int]) -> Array:
+def _covariance(j: int, joints: Mapping[int, OffsetJoint], per_error: Array, own: Mapping[int, int]) -> Array:
     """Return that of joint j, `per_error` being what an error of each offset does to its parameters, shape (p, source)."""
     more, all_of = np.eye(len(per_error)), np.zeros((len(per_error), len(per_error)))
     for column, (k, place) in zip(per_error.T, own.items(), strict=True):

@@ -77,7 +77,7 @@ class Found:
 
 
 @final
-class Search:
+class ServoSearch:
     """Minimizes the sum of Fair's function of the residuals, which grows like their size where they are large.
 
     Parameters
@@ -93,7 +93,10 @@ class Search:
     """
 
     def __init__(self, loop: ServoLoop, free: Sequence[str], scales: Mapping[str, float], c: float) -> None:
-        self._loop, self.free, self._scales, self.c = loop, tuple(free), dict(scales), c
+        self._loop = loop
+        self.free = tuple(free)
+        self._scales = dict(scales)
+        self.c = c
         self._count = loop.servo.step
         # Residuals are a third of c in the median; a rounded position is off by its twelfth.
         self._certainty = float((c / 3 / MEDIAN) ** 2 / (self._count**2 / 12))
@@ -113,7 +116,10 @@ class Search:
     def best(self, start: Mapping[str, float], rounds: int = 30) -> Found:
         """Return the best parameters that are found from a start."""
         x, ahead = np.array([start[name] for name in self.free]), np.zeros(len(self._loop.runs))
-        width, damping, idle, spread = 1.0, 1e-2, 0, 1.0
+        width = 1.0
+        damping = 1e-2
+        idle = 0
+        spread = 1.0
         rng = np.random.default_rng(0)  # the same samples for everybody
         for _ in range(rounds):
             tried, cost, J, r, beginning = self._differences(start, x, ahead, width)
@@ -180,7 +186,9 @@ class Search:
     ) -> tuple[Array, Array, Array, Array, Beginning]:
         """Return points about x, their costs, sensitivity and residual at x, and what other beginnings do."""
         h = width * np.array([step_of(name, value, self._scales) for name, value in zip(self.free, x, strict=True)])
-        upper, lower, n = x + np.diag(h), np.maximum(x - np.diag(h), self._low), len(x)
+        upper = x + np.diag(h)
+        lower = np.maximum(x - np.diag(h), self._low)
+        n = len(x)
         tried, half = np.concatenate([x[None], upper, lower]), self._count / 2
         begins = np.concatenate([np.repeat(ahead[None], len(tried), axis=0), [ahead + half, ahead - half]])
         q = self._simulated(start, np.concatenate([tried, [x, x]]), begins)

@@ -22,7 +22,7 @@ def _compiled(function: Callable[..., Any]) -> Any:
         return njit(nogil=True)(function)
 
 
-class Law(NamedTuple):
+class ServoLaw(NamedTuple):
     """Parameters of a servo, by the letters of `SERVO_PARAMETERS`, and what makes those of other laws do nothing."""
 
     a: float
@@ -79,7 +79,7 @@ class Acting(NamedTuple):
 
 
 @_compiled
-def _friction(p: Law, speed: float, motor: float, external: float, sent: float) -> float:
+def _friction(p: ServoLaw, speed: float, motor: float, external: float, sent: float) -> float:
     """Return the torque by which friction can resist at most [N m]."""
     total = p.Fs
     load = abs(external - motor)
@@ -108,7 +108,7 @@ def _slowed(free: float, speed: float, most: float) -> float:
 
 
 @_compiled
-def _pushed(p: Law, firmware: Firmware, q: float, speed: float, target: float, voltage: float) -> float:
+def _pushed(p: ServoLaw, firmware: Firmware, q: float, speed: float, target: float, voltage: float) -> float:
     """Return the torque of the winding without its back-EMF."""
     error = target - np.rint((q - p.offset) / firmware.angle) * firmware.angle - p.lead * speed
     error -= min(max(error, -p.dead_band), p.dead_band)
@@ -116,7 +116,7 @@ def _pushed(p: Law, firmware: Firmware, q: float, speed: float, target: float, v
 
 
 @_compiled
-def _after(p: Law, of: Acting, speed: float, h: float) -> float:
+def _after(p: ServoLaw, of: Acting, speed: float, h: float) -> float:
     """Return the speed of rotor and link as one body after a step."""
     light, damping = 1 / (of.J + p.Ia), p.b * of.on
     half = h / 2 * (damping + p.Fv) * light
@@ -129,7 +129,7 @@ def _after(p: Law, of: Acting, speed: float, h: float) -> float:
 
 
 @_compiled
-def _apart(p: Law, of: Acting, link: float, rotor: float, gap: float, h: float) -> tuple[float, float, float]:
+def _apart(p: ServoLaw, of: Acting, link: float, rotor: float, gap: float, h: float) -> tuple[float, float, float]:
     """Return speeds of link and rotor, and their gap: each by itself, and as one body where one would leave the play."""
     half = p.backlash / 2
     J = max(of.J, LIGHT * p.Ia)
@@ -156,7 +156,7 @@ def targets(command: Array, rate: float, h: float) -> Array:
 
 
 @_compiled
-def motion(p: Law, firmware: Firmware, track: Track, start: tuple[float, float], h: float, fastest: float) -> Array:
+def motion(p: ServoLaw, firmware: Firmware, track: Track, start: tuple[float, float], h: float, fastest: float) -> Array:
     """Return the angle of the log at each step [rad], from an angle of the log and a speed; no speed gets beyond the fastest.
 
     Leapfrog: speeds in the middle of steps, positions at their ends; damping is implicit, so that the result is of second order

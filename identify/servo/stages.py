@@ -14,12 +14,14 @@ from idbench.identify.servo.fit import OTHER_SCALE, TORQUES, ServoFit, require_e
 from idbench.identify.servo.parameters import FURTHER, SERVO_FRICTIONS, SERVO_PARAMETERS, first_of, parameters_of
 from idbench.identify.servo.rows import ServoRows
 from idbench.identify.servo.run import ServoRun, pieces
-from idbench.identify.servo.search import SETTLED, Found, Search
+from idbench.identify.servo.search import SETTLED, Found, ServoSearch
 
 SHAKEN = 2
 """Times that a search leaves its valley for others, at most."""
 
-SCALES, ROTORS, LATER = (0.7, 1.0, 1.4), (0.25, 1.0, 4.0), (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
+SCALES = (0.7, 1.0, 1.4)
+ROTORS = (0.25, 1.0, 4.0)
+LATER = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
 """Factors on all torques, further ones on the armature, and changes of the delay [samples] that are tried from there."""
 
 VALLEYS = 3
@@ -56,7 +58,9 @@ class Valleys:
     """
 
     def __init__(self, coarse: ServoLoop, excitation: Excitation, held: Mapping[str, float]) -> None:
-        self._coarse, self._excitation, self._held = coarse, excitation, dict(held)
+        self._coarse = coarse
+        self._excitation = excitation
+        self._held = dict(held)
 
     def from_start(self, p: Mapping[str, float], free: Sequence[str]) -> Found:
         """Return what is found in coarse steps."""
@@ -83,7 +87,7 @@ class Valleys:
         """Return residuals and sensitivities in another loop."""
         return self._search(loop, found.p, free).at(found)
 
-    def _shaken(self, search: Search, p: dict[str, float]) -> list[dict[str, float]]:
+    def _shaken(self, search: ServoSearch, p: dict[str, float]) -> list[dict[str, float]]:
         """Return the best of parameters in other valleys: a rotor that is light looks like a command that is late."""
         base = {**p, "Ia": max(p["Ia"], p["b"] * self._excitation.T / 2)}
         T, held = self._excitation.T, self._held
@@ -112,7 +116,7 @@ class Valleys:
     def _along(self, loop: ServoLoop, free: Sequence[str], found: Found) -> Found:
         """Return what is found where torques of other scales fit best: along a narrow valley a search of all ends early."""
         search = self._search(loop, found.p, free)
-        others = Search(loop, [name for name in free if name != "a"], self._excitation.scales, search.c)
+        others = ServoSearch(loop, [name for name in free if name != "a"], self._excitation.scales, search.c)
         best, cost = found.p, search.at(found).cost
         for factor in (near**sign for near in NEAR for sign in (1, -1)):
             while (other := others.best(self._times(factor, free, best), ASIDE)).cost < (1 - SETTLED) * cost:
@@ -136,7 +140,7 @@ class Valleys:
     def _scaled(self, free: Sequence[str], p: Mapping[str, float]) -> tuple[dict[str, float], float]:
         """Return the best parameters with another torque per volt, and how many times larger they make the objective."""
         search = self._search(self._coarse, p, free)
-        others = Search(self._coarse, [name for name in free if name != "a"], self._excitation.scales, search.c)
+        others = ServoSearch(self._coarse, [name for name in free if name != "a"], self._excitation.scales, search.c)
         starts = [self._times(factor, free, p) for factor in (OTHER_SCALE, 1 / OTHER_SCALE)]
         best = min((others.best(start, ASIDE) for start in starts), key=lambda other: other.cost)
         return best.p, best.cost / search.best(p, ASIDE).cost
@@ -154,10 +158,10 @@ class Valleys:
             scaled["Ia"] = max(factor * (p["Ia"] + J) - J, 0.1 * p["Ia"]) if "Ia" in free else p["Ia"]
         return scaled
 
-    def _search(self, loop: ServoLoop, begin: Mapping[str, float], free: Sequence[str]) -> Search:
+    def _search(self, loop: ServoLoop, begin: Mapping[str, float], free: Sequence[str]) -> ServoSearch:
         r = np.abs(loop.q - loop.simulate(begin)[0])[loop.kept]
         c = 3 * max(float(np.median(r)), loop.servo.step / 4)
-        return Search(loop, free, self._excitation.scales, c)
+        return ServoSearch(loop, free, self._excitation.scales, c)
 
 
 TRIED = 48
@@ -169,7 +173,9 @@ FEW = 20
 MOST_RUNS = 120
 """Runs that a search looks at; of more, as many evenly spread ones."""
 
-COARSE, MEDIUM, FINE = 0.4, 0.2, 0.1
+COARSE = 0.4
+MEDIUM = 0.2
+FINE = 0.1
 """Longest steps, as shares of the sampling time: of first stages, of the last with whole runs, and with pieces."""
 
 PLAYS = np.array([0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
@@ -189,7 +195,9 @@ class Stages:
     """
 
     def __init__(self, servo: Servo, runs: Sequence[ServoRun], held: dict[str, float], start: Mapping[str, float]) -> None:
-        self.held, self._servo, self._excitation = held, servo, Excitation.of(servo, runs, held)
+        self.held = held
+        self._servo = servo
+        self._excitation = Excitation.of(servo, runs, held)
         self.start, self._few = dict(start), len(_evenly(runs)) <= FEW
         self._whole = looked_at(servo, runs, self.start["delay"])
         self._coarse = ServoLoop(servo, self._whole if self._few else self._whole[::2], COARSE * self._excitation.T)
@@ -260,7 +268,7 @@ def _started(servo: Servo, runs: Sequence[ServoRun], held: dict[str, float], exc
         )
     loop = ServoLoop(servo, runs, COARSE * excitation.T)
     lanes = {name: np.array([p[name] for p in starts]) for name in starts[0]} | {"Fv": np.zeros(len(starts))}
-    cost = Search(loop, (), excitation.scales, excitation.range / 10).cost(loop.simulate(lanes))
+    cost = ServoSearch(loop, (), excitation.scales, excitation.range / 10).cost(loop.simulate(lanes))
     best = {**starts[int(cost.argmin())], "Fv": 0.0}
     if not np.isfinite(best["rate"]):
         del best["rate"]

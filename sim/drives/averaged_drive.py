@@ -16,7 +16,9 @@ Limit = EachPositiveOrNone
 
 def limits(robot: Robot, voltage: Limit, current: Limit) -> tuple[Array, Array]:
     """Return the bus voltage [V] and largest current [A] of every joint: a setting, or what the motors have, if less."""
-    motors, n, unlimited = robot.motors, robot.n, (np.inf,)
+    motors = robot.motors
+    n = robot.n
+    unlimited = (np.inf,)
     V = np.minimum(motors.V, per_joint(voltage or unlimited, n, "drive.bus_voltage"))
     return V, np.minimum(motors.I, per_joint(current or unlimited, n, "drive.current_limit"))
 
@@ -67,7 +69,9 @@ class _Amplifier(AbstractAmplifier):
         self._i = np.zeros(self._R.shape)
 
     def step(self, demand: Array, speed: Array, steps: int) -> Array:
-        dt, e, i0 = steps * self._h, self._K * speed[len(speed) // 2], self._i
+        dt = steps * self._h
+        e = self._K * speed[len(speed) // 2]
+        i0 = self._i
         limited = np.minimum(np.maximum(demand / self._K, -self._I), self._I)
         target = np.minimum(np.maximum(limited, (-self._V - e) / self._R), (self._V - e) / self._R)
         asked = self._R * i0 + self._L * self._w * (target - i0) + e
@@ -79,7 +83,9 @@ class _Amplifier(AbstractAmplifier):
             i1 = np.where(saturated, end + (i0 - end) * np.exp(-t * self._R / self._L), i0)
             charge = np.where(saturated, end * t - (i1 - i0) * self._L / self._R, 0.0)
         else:
-            t, i1, charge = np.zeros(1), i0, np.zeros(1)
+            t = np.zeros(1)
+            i1 = i0
+            charge = np.zeros(1)
         away, rest = i1 - target, dt - t
         self._i = target + away * np.exp(-self._w * rest)
         current = (charge + target * rest - away * (np.expm1(-self._w * rest) / self._w)) / dt
@@ -96,7 +102,9 @@ class _Amplifier(AbstractAmplifier):
 
     def _release(self, v: Array, target: Array, e: Array) -> Array:
         """Return how long [s] the loop asks for more than the voltage `v`, which is all there is."""
-        R, L, w = self._R, self._L, self._w
+        R = self._R
+        L = self._L
+        w = self._w
         end, released = (v - e) / R, (v - e - L * w * target) / (R - L * w)  # currents far later, and when it asks for v
         share = (released - end) / np.where(self._i == end, 1.0, self._i - end)
         return -np.log(np.minimum(np.maximum(share, 1e-300), 1.0)) * L / R

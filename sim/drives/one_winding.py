@@ -43,7 +43,9 @@ class OneWinding:
     """
 
     def __init__(self, passages: TabulatedPassages, joint: int, loop: Loop) -> None:
-        self._loop, self._least, self._highest = loop, passages.least, passages.highest
+        self._loop = loop
+        self._least = passages.least
+        self._highest = passages.highest
         self._V, self._R, self._L = (float(x[0, joint]) for x in passages.winding)
         self._rate, self._share = self._R / self._L, self._L / self._R
         self._rows = passages.rows(joint)
@@ -53,7 +55,10 @@ class OneWinding:
 
     def advance(self, wanted: float, emf: list[float]) -> Periods:
         """Advance by a PWM period for each back-EMF [V], with `wanted` as current reference [A]."""
-        (kp, ki, most, known), V, least, i = self._loop, self._V, self._least, self.i
+        (kp, ki, most, known) = self._loop
+        V = self._V
+        least = self._least
+        i = self.i
         done = Periods([], [], [], [])
         for e in emf:
             error = wanted - i

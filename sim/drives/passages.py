@@ -49,7 +49,9 @@ class TabulatedPassages:
         at = ((i > 0) * self._values + value) * n + np.arange(n)
         found = np.take(self._table, at, axis=0)
         quantities = found[..., 0, :] + found[..., 1, :] * i[..., None] + found[..., 2, :] * e[..., None]
-        charge, electrical, edges = quantities[..., 0], quantities[..., 1], quantities[..., 2:]
+        charge = quantities[..., 0]
+        electrical = quantities[..., 1]
+        edges = quantities[..., 2:]
         passage = Passage(edges[..., -1].copy(), charge, electrical)
         if self.modulator.dead_time:
             turning = (edges * i[..., None] <= 0).any(axis=-1)

@@ -24,7 +24,9 @@ class Profile:
     """
 
     def __init__(self, rate: float, acceleration: float, h: float) -> None:
-        self._rate, self._acceleration, self._h = rate, acceleration, h
+        self._rate = rate
+        self._acceleration = acceleration
+        self._h = h
         self._target: Array | None = None
         self._speed: Array = np.zeros(1)
 

@@ -97,7 +97,9 @@ def pieces(modulator: Modulator, m: Array) -> Pieces:
     both = modulator.pattern(m, np.array([[1.0], [0.0]]))
     edges = np.array([np.broadcast_to(edge, (2, *m.shape)) for pulse in both.pulses for edge in pulse[:2]])
     ends = np.empty((2 * len(edges) + 2, *m.shape))
-    ends[0], ends[1:-1], ends[-1] = 0.0, np.sort(edges.reshape(-1, *m.shape), axis=0), modulator.period
+    ends[0] = 0.0
+    ends[1:-1] = np.sort(edges.reshape(-1, *m.shape), axis=0)
+    ends[-1] = modulator.period
     middle = ((ends[1:] + ends[:-1]) / 2)[:, None]
     level = np.full((len(middle), 2, *m.shape), both.base)
     for pulse in both.pulses:

@@ -96,7 +96,9 @@ class SwitchedAmplifier(AbstractAmplifier):
 
     def __init__(self, settings: SwitchedDrive, motors: Motors, V: Array, I: Array, nsim: int, h: float) -> None:  # noqa: E741
         R, L, K, V, self._I = (every(x, nsim) for x in (motors.R, motors.L, motors.K, V, I))
-        self._K, self._h, self._winding = K, h, Winding(V, R, L)
+        self._K = K
+        self._h = h
+        self._winding = Winding(V, R, L)
         lost = -np.expm1(-h * R / L)
         self._kp = R / lost * -np.expm1(-2 * np.pi * settings.bandwidth * h)
         self._ki = self._kp * lost

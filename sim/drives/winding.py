@@ -62,14 +62,18 @@ def pass_period(i: Array, m: Array, e: Array, winding: Winding, modulator: Modul
 def straight(i: Array, e: Array, winding: Winding, pattern: Pattern, period: float) -> tuple[Passage, Array]:
     """Return the passage of a current that keeps its sign, and the current at every edge."""
     V, R, L = winding
-    rate, now, edges = R / L, i, []
+    rate = R / L
+    now = i
+    edges = []
     t, rest = np.zeros(1), (pattern.base * V - e) / R
     push = np.full(i.shape, pattern.base * period)  # volt-seconds, in bus voltages
     extra = np.zeros_like(i)  # charge of the pulses, times their level
     for pulse in pattern.pulses:
         before = rest + (now - rest) * np.exp(rate * (t - pulse.start))
         goal, dt = (pulse.level * V - e) / R, pulse.end - pulse.start
-        now, t, above = goal + (before - goal) * np.exp(-rate * dt), pulse.end, pulse.level - pattern.base
+        now = goal + (before - goal) * np.exp(-rate * dt)
+        t = pulse.end
+        above = pulse.level - pattern.base
         push = push + above * dt
         extra += above * (goal * dt + (before - now) / rate)
         edges += [before, now]
@@ -78,7 +82,7 @@ def straight(i: Array, e: Array, winding: Winding, pattern: Pattern, period: flo
     return Passage(after, charge, V * (pattern.base * charge + extra)), np.array([*edges, after])
 
 
-class Stretch(NamedTuple):
+class WindingStretch(NamedTuple):
     """Current that goes from `start` to `end` in `dt`, exponentially towards `goal`."""
 
     start: Array
@@ -97,7 +101,7 @@ def step_by_step(i: Array, e: Array, winding: Winding, period: Pieces) -> Passag
     return Passage(end[-1], total, electrical)
 
 
-def stretches(i: Array, e: Array, winding: Winding, period: Pieces) -> Stretch:
+def stretches(i: Array, e: Array, winding: Winding, period: Pieces) -> WindingStretch:
     """Return the parts of a period in which the current is one exponential, shape (stretch, winding) each."""
     V, R, L = winding
     ahead, behind = (period.forward * V - e) / R, (period.backward * V - e) / R
@@ -105,14 +109,16 @@ def stretches(i: Array, e: Array, winding: Winding, period: Pieces) -> Stretch:
     some_dead, found = dead.any(axis=1), []
     for k, dt in enumerate(period.duration):
         goal = np.where(i > 0, ahead[k], behind[k]) if some_dead[k] else ahead[k]
-        whole = Stretch(i, goal + (i - goal) * kept[k], goal, dt)
+        whole = WindingStretch(i, goal + (i - goal) * kept[k], goal, dt)
         at_zero = dead[k] & (i * whole.end <= 0)
         found += _over_zero(at_zero, whole, ahead[k], behind[k], R / L) if at_zero.any() else [whole]
         i = found[-1].end
-    return Stretch(*(np.array(x) for x in zip(*found, strict=True)))
+    return WindingStretch(*(np.array(x) for x in zip(*found, strict=True)))
 
 
-def _over_zero(at_zero: npt.NDArray[np.bool_], whole: Stretch, ahead: Array, behind: Array, rate: Array) -> list[Stretch]:
+def _over_zero(
+    at_zero: npt.NDArray[np.bool_], whole: WindingStretch, ahead: Array, behind: Array, rate: Array
+) -> list[WindingStretch]:
     """Return the stretch up to the instant at which the current is zero and the one after it, empty where it never is.
 
     At zero the current stays, unless the back-EMF drives it on.
@@ -124,4 +130,4 @@ def _over_zero(at_zero: npt.NDArray[np.bool_], whole: Stretch, ahead: Array, beh
     onward = np.maximum(ahead, 0.0) + np.minimum(behind, 0.0)
     meeting = np.where(at_zero, 0.0, after)
     end = np.where(at_zero, -onward * np.expm1(-rest * rate), after)
-    return [Stretch(i, meeting, goal, dt - rest), Stretch(meeting, end, onward, rest)]
+    return [WindingStretch(i, meeting, goal, dt - rest), WindingStretch(meeting, end, onward, rest)]

@@ -52,8 +52,14 @@ class Bench:
         *,
         informed: bool = False,
     ) -> None:
-        fs, n, nsim, samples = scenario.fs, robot.n, len(seeds), len(planned.q)
-        self._scenario, self._planned, self._seeds, self._watcher = scenario, planned, seeds, watcher
+        fs = scenario.fs
+        n = robot.n
+        nsim = len(seeds)
+        samples = len(planned.q)
+        self._scenario = scenario
+        self._planned = planned
+        self._seeds = seeds
+        self._watcher = watcher
         self._h = scenario.drive.step_length(fs, scenario.physics.step)
         self._clock = clock = Clock(round(1 / fs / self._h), self._h, scenario.timing.delay)
         self._plant = plant_of(scenario, robot, nsim, self._h, vary, threads)
@@ -78,7 +84,9 @@ class Bench:
         by_position = scenario.controller.commanded == "position"
         held = every(np.zeros(n), nsim) + at_rest if by_position else InverseDynamics(robot, nsim, vary)(at_rest, still, still)
         self._before = self._command = self._demand = held
-        self._qd, self._steps, self._instants = np.zeros((nsim, n)), 1, dict[int, Array]()
+        self._qd = np.zeros((nsim, n))
+        self._steps = 1
+        self._instants = dict[int, Array]()
         self._steady = scenario.drive.steady and scenario.ripple.steady
         watched = scenario.timing.jitter or scenario.timing.refresh or scenario.torque.source == "current"
         one_by_one = watched or not scenario.friction.steady
@@ -113,7 +121,9 @@ class Bench:
         if sample is not None:
             self._stop_failed(step)
         if sample is not None and sample < len(self._q):
-            self._q[sample], self._speeds[sample], self._currents[sample] = q, qd, self._sensor.value
+            self._q[sample] = q
+            self._speeds[sample] = qd
+            self._currents[sample] = self._sensor.value
             if self._plant.has_play:
                 self._gaps[sample] = self._plant.rotors[0] - q
             if self._watcher and self._watcher.due(self._final(step)):

@@ -57,7 +57,9 @@ class History:
     """
 
     def __init__(self, reach: int, nsim: int, n: int, h: float) -> None:
-        self._h, self._size, self._sim = h, reach + 2, np.arange(nsim)
+        self._h = h
+        self._size = reach + 2
+        self._sim = np.arange(nsim)
         self._q, self._qd = np.zeros((2, self._size, nsim, n))
         self._last = -1
 

@@ -84,7 +84,9 @@ class Failures:
 
     def __init__(self, robot: Robot, planned: Reference, seeds: Sequence[int]) -> None:
         self.reasons: dict[int, str] = {}
-        self._bounds, self._fs, self._seeds = Bounds(robot, planned, len(seeds)), planned.fs, seeds
+        self._bounds = Bounds(robot, planned, len(seeds))
+        self._fs = planned.fs
+        self._seeds = seeds
 
     def look(self, sample: float, q: Array, qd: Array) -> None:
         """Count simulations as failed whose state, shape (nsim, joint), is none of a loop at work.

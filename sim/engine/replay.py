@@ -74,7 +74,9 @@ def physics_steps(fs: float, longest: float) -> tuple[float, int]:
 
 def mean_torques(log: MotionLog, h: float, per_sample: int) -> Array:
     """Return the mean of the torque that acts in every physics step, shape (time, step, joint)."""
-    tau, T, delay = log.tau * np.asarray(log.torque.gain), 1 / log.fs, log.torque.delay
+    tau = log.tau * np.asarray(log.torque.gain)
+    T = 1 / log.fs
+    delay = log.torque.delay
     edges = np.arange(log.samples * per_sample + 1) * h
     if log.torque.meaning == "instantaneous":
         at = log.t + delay

@@ -77,7 +77,9 @@ def simulate(  # noqa: PLR0913  # all but two by their names
     watcher = Watcher(watch, scenario, h, skipped, logged) if watch else None
     with blamed():
         bench = Bench(scenario, robot, planned, seeds, vary or {}, threads, watcher, informed=informed)
-    step, reported, bearable = 0, -1, 0 if throw else len(seeds) - 1
+    step = 0
+    reported = -1
+    bearable = 0 if throw else len(seeds) - 1
     # Of simulations that diverge: each is reported, and ends, alone.
     with np.errstate(over="ignore", invalid="ignore"), blamed():
         while step < bench.steps and len(bench.failures) <= bearable:

@@ -30,7 +30,7 @@ class Inner:
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class WatchedStretch:
     """Samples of the first simulation that have become final; all arrays of shape (time, joint)."""
 
     first: int
@@ -63,7 +63,7 @@ class Stretch:
 class Watch:
     """Somebody who watches the first simulation of a run. No bit of the run depends on it."""
 
-    receive: Callable[[Stretch], None]
+    receive: Callable[[WatchedStretch], None]
     """Receives every stretch, in order, while the run goes on."""
     every: float = np.inf
     """Length of a stretch [s]; by default the whole run is one."""
@@ -106,7 +106,11 @@ class Watcher:
 
     def __init__(self, watch: Watch, scenario: Scenario, h: float, skipped: int, logged: Callable[[Array], Array]) -> None:
         fs, self._by_position = scenario.fs, scenario.controller.commanded == "position"
-        self._watch, self._fs, self._h, self._skipped, self._logged = watch, fs, h, skipped, logged
+        self._watch = watch
+        self._fs = fs
+        self._h = h
+        self._skipped = skipped
+        self._logged = logged
         self._samples = max(1, round(watch.every * fs)) if np.isfinite(watch.every) else np.inf
         self._told, self._taken = skipped, list[Step]()
 
@@ -135,7 +139,7 @@ class Watcher:
             electric = rows.means(self._told, final, per_sample)
             inner = rows.inside(self._watch.window, self._h, self._skipped / self._fs, drive) if self._watch.window else None
         parts |= {"electric": electric, "inner": inner}
-        self._watch.receive(Stretch(self._told - self._skipped, reference, by_position=self._by_position, **parts))
+        self._watch.receive(WatchedStretch(self._told - self._skipped, reference, by_position=self._by_position, **parts))
         self._told = final
 
 

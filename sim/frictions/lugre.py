@@ -62,12 +62,16 @@ class _Contact(AbstractContact):
                 f"friction.deflection = {settings.deflection:g} rad makes bristles that swing within {h:g} s: raise it to "
                 f"{settings.deflection * (swift.max() / 0.5) ** 2:.2g} rad, or lower physics.step"
             )
-        self._settings, self._Fs, self._h = settings, Fs.copy(), h
+        self._settings = settings
+        self._Fs = Fs.copy()
+        self._h = h
         self._damping = 2 * settings.damping * np.sqrt(stiffness * inertia)
         self._z = np.zeros(Fs.shape)  # in multiples of the deflection
 
     def torque(self, qd: Array) -> Array | float:
-        settings, z0, u = self._settings, self._z, qd / self._settings.deflection
+        settings = self._settings
+        z0 = self._z
+        u = qd / self._settings.deflection
         g = 1 + (settings.static - 1) * np.exp(-((qd / settings.velocity) ** 2))
         x = np.abs(u) * self._h / g
         kept, moved = np.exp(-x), -np.expm1(-x)

@@ -71,7 +71,9 @@ class Stribeck(AbstractFrictionLaw):
 
 class _StribeckContact(AbstractContact):
     def __init__(self, settings: Stribeck, frictionloss: Array, Fs: Array) -> None:
-        self._settings, self._frictionloss, self._Fs = settings, frictionloss, Fs.copy()
+        self._settings = settings
+        self._frictionloss = frictionloss
+        self._Fs = Fs.copy()
 
     def torque(self, qd: Array) -> Array | float:
         rise = (self._settings.static - 1) * np.exp(-((qd / self._settings.velocity) ** 2))
@@ -117,7 +119,9 @@ class Asymmetric(AbstractFrictionLaw):
 
 class _AsymmetricContact(AbstractContact):
     def __init__(self, offset: Array, difference: Array, edge: float) -> None:
-        self._offset, self._difference, self._edge = offset, difference, edge
+        self._offset = offset
+        self._difference = difference
+        self._edge = edge
 
     def torque(self, qd: Array) -> Array | float:
         speed = np.abs(qd)
@@ -157,7 +161,9 @@ class LoadDependent(AbstractFrictionLaw):
 
 class _LoadContact(AbstractContact):
     def __init__(self, plant: Batch, Fs: Array, share: Array) -> None:
-        self._frictionloss, self._Fs, self._share = plant.expand("dof_frictionloss"), Fs.copy(), share
+        self._frictionloss = plant.expand("dof_frictionloss")
+        self._Fs = Fs.copy()
+        self._share = share
         self._frictions = [plant.bind(f"qfrc_{name}") for name in ("passive", "constraint")]
         self._tau = np.zeros(Fs.shape)
 
@@ -216,7 +222,10 @@ class Warming(AbstractFrictionLaw):
 
 class _TemperatureContact(AbstractContact):
     def __init__(self, settings: Warming, slope: Array, h: float) -> None:
-        self._settings, self._slope, self._h, self._steps = settings, slope, h, 0
+        self._settings = settings
+        self._slope = slope
+        self._h = h
+        self._steps = 0
 
     def torque(self, qd: Array) -> Array | float:
         above = self._settings.at((self._steps + 0.5) * self._h) - self._settings.reference

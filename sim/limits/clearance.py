@@ -57,7 +57,9 @@ class Clearance:
     """
 
     def __init__(self, robot: Robot, ranges: Array, least: float) -> None:
-        self._robot, self._model, self._data = robot, robot.model, mujoco.MjData(robot.model)
+        self._robot = robot
+        self._model = robot.model
+        self._data = mujoco.MjData(robot.model)
         self._fromto, self.least = np.zeros(6), least
         self.pairs = self._asked()
         random = np.random.default_rng(SEED).uniform(ranges[:, 0], ranges[:, 1], (ALWAYS, robot.n))
@@ -141,7 +143,10 @@ class Clearance:
         for k, posture in enumerate(q):
             d.qpos[:] = posture
             mujoco.mj_kinematics(m, d)
-            pos[k], mat[k], axis[k], anchor[k] = d.geom_xpos, d.geom_xmat, d.xaxis, d.xanchor
+            pos[k] = d.geom_xpos
+            mat[k] = d.geom_xmat
+            axis[k] = d.xaxis
+            anchor[k] = d.xanchor
         return pos, mat, axis, anchor
 
     def _gaps(self, pos: Array, mat: Array) -> Array:
@@ -176,7 +181,9 @@ class Clearance:
         The sum of (1 - distance / margin)^2 over instants and pairs that are nearer than a margin beyond the least distance.
         """
         pos, mat, axis, anchor = self._centres(q)
-        total, slope, near = 0.0, np.zeros_like(q), self._gaps(pos, mat) < self._margin
+        total = 0.0
+        slope = np.zeros_like(q)
+        near = self._gaps(pos, mat) < self._margin
         hinge = ~self._robot.slides
         for k in np.flatnonzero(near.any(axis=1)):
             self._place(pos[k], mat[k])

@@ -91,7 +91,10 @@ class _Values:
     """The parameters of one joint."""
 
     def __init__(self, path: Path, name: str, joint: Mapping[str, Any], scale: float) -> None:
-        self._path, self._name, self._joint, self._scale = path, name, joint, scale
+        self._path = path
+        self._name = name
+        self._joint = joint
+        self._scale = scale
 
     def length(self, key: str) -> float:
         return _number(self._path, f"joint {self._name}: {key}", self._joint.get(key, 0.0), FARTHEST)
@@ -154,7 +157,9 @@ def _body(parent: mujoco.MjsBody, name: str, place: tuple[Array, Array], values:
     quaternion = np.zeros(4)
     mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(place[1]).ravel())
     body = parent.add_body(name=f"link of {name}", pos=place[0], quat=quaternion)
-    body.mass, body.inertia, body.explicitinertial = SMALL, [SMALL * SIZE**2] * 3, True
+    body.mass = SMALL
+    body.inertia = [SMALL * SIZE**2] * 3
+    body.explicitinertial = True
     kind = mujoco.mjtJoint.mjJNT_SLIDE if values.slides else mujoco.mjtJoint.mjJNT_HINGE
     joint = body.add_joint(name=name, type=kind, axis=[0, 0, 1], armature=values.armature)
     if values.range is not None:

@@ -23,7 +23,9 @@ def without_missing_meshes(spec: mujoco.MjSpec, folder: Path) -> list[str]:
         body = geom.parent
         spec.delete(geom)
         if not body.explicitinertial and not list(body.geoms) and list(body.joints):
-            body.mass, body.inertia, body.explicitinertial = SMALL, [SMALL * SIZE**2] * 3, True
+            body.mass = SMALL
+            body.inertia = [SMALL * SIZE**2] * 3
+            body.explicitinertial = True
             bare.append(body.name)
     for mesh in missing.values():
         spec.delete(mesh)

@@ -30,7 +30,10 @@ class Payload:
             return
         link = spec.joints[-1].parent
         body = link.add_body(name="payload", pos=list(self.position))
-        body.mass, body.inertia, body.ipos, body.explicitinertial = self.mass, [self._inertia] * 3, [0, 0, 0], True
+        body.mass = self.mass
+        body.inertia = [self._inertia] * 3
+        body.ipos = [0, 0, 0]
+        body.explicitinertial = True
 
     @property
     def _inertia(self) -> float:

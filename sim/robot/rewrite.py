@@ -130,7 +130,9 @@ def compiled(name: str, text: str, folder: Path | None = None) -> Robot:
 def _around(name: str, text: str) -> str:
     """Return a text with what stands before and after the element of the robot in its file: licences, as a rule."""
     raw = Robot.path(name).read_bytes()
-    parser, starts, ends = expat.ParserCreate(), list[int](), [0]
+    parser = expat.ParserCreate()
+    starts = list[int]()
+    ends = [0]
     parser.StartElementHandler = lambda *_: starts.append(parser.CurrentByteIndex)
     parser.EndElementHandler = lambda *_: ends.append(parser.CurrentByteIndex)
     parser.Parse(raw, True)

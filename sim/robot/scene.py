@@ -28,7 +28,7 @@ HIDDEN = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class SceneShape:
     """One geom."""
 
     name: str
@@ -63,17 +63,19 @@ class Motion:
     """Positions of every site, by name: (time, 3) [m]."""
 
 
-def shapes(robot: Robot) -> list[Shape]:
+def shapes(robot: Robot) -> list[SceneShape]:
     """Return the visible shapes of the robot; planes and height fields are left out."""
     model, found = robot.model, []
     for g in range(model.ngeom):
-        kind, geom, rgba = _KINDS.get(int(model.geom_type[g])), model.geom(g), _color(model, g)
+        kind = _KINDS.get(int(model.geom_type[g]))
+        geom = model.geom(g)
+        rgba = _color(model, g)
         if kind is None or rgba[3] == 0 or model.geom_group[g] >= HIDDEN:
             continue
         body = body_name(model, int(model.geom_bodyid[g]))
         name = geom.name or f"geom{g}"
         mesh = _mesh(model, int(model.geom_dataid[g])) if kind == "mesh" else (np.empty((0, 3)), np.empty((0, 3), np.int32))
-        found.append(Shape(name, body, kind, geom.size.copy(), geom.pos.copy(), _xyzw(geom.quat), rgba, *mesh))
+        found.append(SceneShape(name, body, kind, geom.size.copy(), geom.pos.copy(), _xyzw(geom.quat), rgba, *mesh))
     return found
 
 

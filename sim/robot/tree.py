@@ -133,7 +133,9 @@ def _require_open(robot: Robot) -> None:
 def _tie(model: mujoco.MjModel, equality: int) -> str:
     """Return kind and name of an equality constraint, and what it ties."""
     kind = mujoco.mjtEq(model.eq_type[equality]).name.removeprefix("mjEQ_").lower()
-    one, two, name = int(model.eq_obj1id[equality]), int(model.eq_obj2id[equality]), model.equality(equality).name
+    one = int(model.eq_obj1id[equality])
+    two = int(model.eq_obj2id[equality])
+    name = model.equality(equality).name
     of = model.joint if kind == "joint" else model.body if model.eq_objtype[equality] == mujoco.mjtObj.mjOBJ_BODY else None
     tied = f" ({' and '.join(of(i).name for i in (one, two) if i >= 0)})" if of else ""
     return f"{kind} {name!r}{tied}" if name else f"{kind}{tied}"
@@ -171,7 +173,9 @@ def _placement(model: mujoco.MjModel, body: int) -> tuple[int, Array, Array]:
 
 def _inertial(model: mujoco.MjModel, link: int) -> tuple[Array, Array, float]:
     """Return inertia matrix and first moments about the origin of a link's frame, and its mass."""
-    inertia, first, mass = np.zeros((3, 3)), np.zeros(3), 0.0
+    inertia = np.zeros((3, 3))
+    first = np.zeros(3)
+    mass = 0.0
     for body, position, rotation in _welded(model, link):
         m, c = float(model.body_mass[body]), position + rotation @ model.body_ipos[body]
         axes = rotation @ _rotation(model.body_iquat[body])

@@ -8,7 +8,9 @@ from idbench.sim.trajectories.reference import Reference
 from idbench.sim.trajectories.time_optimal import JerkLimited
 from idbench.sim.trajectories.trajectory import require_in_range
 
-VELOCITY, ACCELERATION, JERK = 1.0, 5.0, 50.0
+VELOCITY = 1.0
+ACCELERATION = 5.0
+JERK = 50.0
 """Limits of a gentle move [rad/s, rad/s^2, rad/s^3]."""
 
 REST = 0.2

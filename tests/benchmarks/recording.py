@@ -26,7 +26,7 @@ from idbench.experiments.recording.viewers import served
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.identify import MotionLog
 from idbench.sim.engine.simulation import simulate
-from idbench.sim.engine.watch import Inner, Stretch, Watch
+from idbench.sim.engine.watch import Inner, Watch, WatchedStretch
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import from_dict, load
 
@@ -43,7 +43,7 @@ def timed(work: Callable[[], object]) -> float:
 
 def forty_seconds(folder: Path) -> None:
     """Record 40 s of a closed loop with an averaged drive, simulated and identified beforehand."""
-    whole, heard = ScenarioRun(load("gain"), Request()), list[Stretch]()
+    whole, heard = ScenarioRun(load("gain"), Request()), list[WatchedStretch]()
     run = simulate(whole.scenario, watch=Watch(heard.append))
     part = cut(run.alone(), 4000)
     seconds = []
@@ -62,7 +62,7 @@ def cut(log: MotionLog, samples: int) -> MotionLog:
     return MotionLog(log.fs, log.q[:samples], log.tau[:samples], log.torque)
 
 
-def record(recording: RunRecording, ran: ScenarioRun, heard: Stretch, folder: Path) -> None:
+def record(recording: RunRecording, ran: ScenarioRun, heard: WatchedStretch, folder: Path) -> None:
     """Send the first 4000 samples of a run, and its identification, and write them."""
     names = ("measured", "q", "qd", "tau", "command", "logged")
     parts = {name: getattr(heard, name)[:4000] for name in names}
@@ -81,7 +81,7 @@ def inside(folder: Path) -> None:
     """Record 1 s inside the loop of a chopper at 10 kHz."""
     motion = {"kind": "random", "moves": 1, "rest": 0.2}
     chopper = {"kind": "switched", "pwm": 10000.0, "bandwidth": 1000.0}
-    described, heard = from_dict({"name": "inside", "trajectory": motion, "drive": chopper}), list[Stretch]()
+    described, heard = from_dict({"name": "inside", "trajectory": motion, "drive": chopper}), list[WatchedStretch]()
     simulate(described, watch=Watch(heard.append, window=(0.2, 1.2)))
     seconds = []
     for _ in range(TIMES):

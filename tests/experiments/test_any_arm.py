@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from idbench.experiments.identification.consistent_robot import Written
+from idbench.experiments.identification.consistent_robot import WrittenRobot
 from idbench.experiments.identification.fit import fit
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
@@ -76,7 +76,7 @@ def test_round_trip_from_file_to_file(arm, tmp_path):
     """
     robot_model = arm.fit.robot_model
     path = tmp_path / "out.xml"
-    path.write_text(Written(arm.fit, "explicit").text(tmp_path))
+    path.write_text(WrittenRobot(arm.fit, "explicit").text(tmp_path))
     made = Robot.load(str(path))
     truth, written = standard_parameters(robot_model.robot), standard_parameters(made)
     base = [robot_model.grouping.base(np.array([x[n] for n in robot_model.grouping.standard.names])) for x in (truth, written)]

@@ -303,11 +303,11 @@ def test_a_small_file_that_unpacks_to_more_than_there_is(tmp_path, complaint, mo
 
 def test_a_long_log_of_zeros_takes_no_time_for_each_of_its_rows(log):
     """Once the median of all steps was computed for each of them."""
-    from idbench.identify.data.clock import Clock
+    from idbench.identify.data.clock import LogClock
     from idbench.identify.data.log_columns import LogColumns
 
     n, calls = 20_000, []
-    clock = Clock.of(LogColumns(np.arange(n) / 1000.0, np.zeros((n, 2)), np.zeros((n, 2)), None))
+    clock = LogClock.of(LogColumns(np.arange(n) / 1000.0, np.zeros((n, 2)), np.zeros((n, 2)), None))
     original = np.median
     try:
         np.median = lambda *args, **options: calls.append(1) or original(*args, **options)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.paper.search import Search
+from idbench.experiments.paper.search import TrajectorySearch
 from idbench.experiments.paper.table1 import SCENARIO, Table1
 from idbench.sim.errors import ScenarioError
 from idbench.sim.scenario.scenario_file import load
@@ -18,7 +18,7 @@ def test_the_scenario_that_ships_is_what_its_command_finds(robot):
     """Numbers to 1e-9 rad: another machine may round Cond(W) differently, but must take the same way."""
     shipped = load(SCENARIO)
     assert f"--seed {shipped.seed}" in shipped.origin
-    found = Search(seed=shipped.seed).run(robot)
+    found = TrajectorySearch(seed=shipped.seed).run(robot)
     assert found.origin == shipped.origin
     np.testing.assert_allclose(found.trajectory.waypoints, shipped.trajectory.waypoints, atol=1e-9)
     np.testing.assert_allclose(found.trajectory.durations, shipped.trajectory.durations, atol=1e-9)
@@ -27,7 +27,7 @@ def test_the_scenario_that_ships_is_what_its_command_finds(robot):
 @pytest.mark.parametrize("seed", [11, 12, 13])
 def test_other_trajectories_of_the_search_are_identified_as_well(seed, robot, truth):
     """Three seeds that nothing was chosen by: cond within 10 % of the paper's, all 24 errors within 0.01 %."""
-    scenario = Search(seed=seed).run(robot)
+    scenario = TrajectorySearch(seed=seed).run(robot)
     estimates = Table1(scenario, ("idbench",)).estimates["idbench"]
     for form, cond, rows in (("explicit", 28, 800), ("implicit", 28, 800), ("power", 93, 400)):
         assert estimates[form].condition_number == pytest.approx(cond, rel=0.1)
@@ -37,7 +37,7 @@ def test_other_trajectories_of_the_search_are_identified_as_well(seed, robot, tr
 
 
 def test_limits_are_kept(robot):
-    search = Search(seed=3, velocity=5.0)
+    search = TrajectorySearch(seed=3, velocity=5.0)
     scenario = search.run(robot)
     points = np.array(scenario.trajectory.waypoints)
     assert (np.abs(points) <= robot.ranges[:, 1] - search.clearance).all()
@@ -52,9 +52,11 @@ def test_a_torque_limit_turns_motions_away(robot):
         name, n, ranges, model, joints = robot.name, robot.n, robot.ranges, robot.model, robot.joints
         torque_limits = np.array([30.0, 1.5])
 
-    tau = np.abs(Table1(Search(seed=3, tolerance=0.05).run(Weak()), ()).log.tau).max(axis=0)
+    tau = np.abs(Table1(TrajectorySearch(seed=3, tolerance=0.05).run(Weak()), ()).log.tau).max(axis=0)
     assert (tau <= Weak.torque_limits).all()
-    assert (np.abs(Table1(Search(seed=3, tolerance=0.05).run(robot), ()).log.tau).max(axis=0) > Weak.torque_limits).any()
+    assert (
+        np.abs(Table1(TrajectorySearch(seed=3, tolerance=0.05).run(robot), ()).log.tau).max(axis=0) > Weak.torque_limits
+    ).any()
 
 
 def test_it_never_sees_an_error_of_identification(robot):
@@ -67,20 +69,20 @@ def test_it_never_sees_an_error_of_identification(robot):
     spec = mujoco.MjSpec.from_file(str(models.path("scara")))
     spec.joint("joint1").damping, spec.joint("joint1").armature = [0.1, 0, 0], 0.5
     other = Robot("scara", spec.compile())
-    assert Search(seed=4).run(other).trajectory == Search(seed=4).run(robot).trajectory
+    assert TrajectorySearch(seed=4).run(other).trajectory == TrajectorySearch(seed=4).run(robot).trajectory
 
 
 def test_it_gives_up_with_advice(robot):
     with pytest.raises(ExperimentError, match=r"in 2 rounds \(closest: .*; try another seed"):
-        replace(Search(), tolerance=1e-9, rounds=2).run(robot)
+        replace(TrajectorySearch(), tolerance=1e-9, rounds=2).run(robot)
 
 
 @pytest.mark.parametrize("settings", [{"smallest_move": 4.0}, {"clearance": 3.0}])
 def test_impossible_waypoints_are_told(settings, robot):
     with pytest.raises(ScenarioError, match=r"no waypoint is .* lower smallest_move or clearance"):
-        Search(**settings).run(robot)
+        TrajectorySearch(**settings).run(robot)
 
 
 def test_impossible_settings_are_told():
     with pytest.raises(ExperimentError, match="motion = 0 must be above 0"):
-        Search(motion=0)
+        TrajectorySearch(motion=0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from idbench.identify import LogError, TorqueChannel
-from idbench.identify.data.clock import Clock
+from idbench.identify.data.clock import LogClock
 from idbench.identify.data.log_columns import LogColumns
 from idbench.identify.data.resample import Repaired
 from idbench.identify.data.velocities import Velocities
@@ -62,7 +62,7 @@ def test_rows_that_repeat_others_are_left_out(columns, rng):
 def test_rows_of_a_robot_that_stands_are_no_repeats():
     t = np.arange(0, 4, 1 / FS)
     q = motion(np.clip(t, 1, 3))
-    clock = Clock.of(LogColumns(t, q, 10 * q, None))
+    clock = LogClock.of(LogColumns(t, q, 10 * q, None))
     assert clock.repeated == 0
 
 

@@ -20,7 +20,7 @@ from idbench.identify.data.kinematics import Limits
 from idbench.identify.design.criteria import CRITERIA, LogSigma, sigmas_of
 from idbench.identify.design.information import Information, predicted_information
 from idbench.identify.design.plan import Plan
-from idbench.identify.design.search import Greedy, Search
+from idbench.identify.design.search import DesignSearch, Greedy
 from idbench.identify.design.shapes import Shapes
 from idbench.identify.errors import SettingError
 
@@ -108,7 +108,7 @@ def test_search_finds_far_better_than_random_and_survives_an_interruption():
     plan = plan_of()
     starts = [random_coefficients(plan, seed) for seed in range(4)]
     random = min(plan.value(c)[0] for c in starts)
-    search = Search(starts, 160)
+    search = DesignSearch(starts, 160)
     search.run(plan, 4, 40)
     assert plan.value(search.best)[0] < random - 0.3
     costs = [plan.value(c)[0] for c in search.found]
@@ -118,7 +118,7 @@ def test_search_finds_far_better_than_random_and_survives_an_interruption():
         if share > 0.1:
             raise KeyboardInterrupt
 
-    stopped = Search(starts, 160, stop)
+    stopped = DesignSearch(starts, 160, stop)
     stopped.run(plan, 4, 40)
     assert stopped.interrupted
     assert plan.value(stopped.best)[0] < random

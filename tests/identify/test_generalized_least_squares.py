@@ -19,7 +19,7 @@ from idbench.identify import (
     identify_each,
     scara,
 )
-from idbench.identify.noise.band_matrix import Band, Cholesky
+from idbench.identify.noise.band_matrix import BandMatrix, Cholesky
 from idbench.identify.noise.noisy_rows import NoisyRows
 from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.noise.restricted_likelihood import likely_levels
@@ -72,7 +72,7 @@ def test_band_algebra_is_that_of_the_whole_matrix(whitened, rng):
 
 def test_a_matrix_that_is_not_positive_is_refused():
     with pytest.raises(IdentificationError, match=r"covariance of the rows is singular.*use WLS"):
-        Cholesky.of(Band(np.array([[1.0, 2.0], [1.0, 0.0]])))
+        Cholesky.of(BandMatrix(np.array([[1.0, 2.0], [1.0, 0.0]])))
 
 
 @pytest.mark.parametrize("model", MODELS.builtin)
@@ -209,7 +209,7 @@ def test_rows_of_one_model_that_are_too_few_leave_the_others(log):
 
 
 def test_one_run_without_a_covariance_leaves_the_others():
-    root = Cholesky.of(Band(np.array([[[4.0]] * 3, [[-1.0]] * 3])))
+    root = Cholesky.of(BandMatrix(np.array([[[4.0]] * 3, [[-1.0]] * 3])))
     np.testing.assert_array_equal(root.lower[0], [[2.0]] * 3)
     assert np.isnan(root.lower[1]).all()
 

@@ -14,12 +14,12 @@ from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.loads.job import GainsFit, PayloadFit, files_of, gains_of, payload_of, simulated_pairs
 from idbench.experiments.loads.judgement import LoadJudgement, negative_mass
 from idbench.experiments.loads.loads_text import body_of, gains_summary, payload_summary, print_gains, print_payloads
-from idbench.experiments.loads.simulated import Score
+from idbench.experiments.loads.simulated import PairScore
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.writing import require_free, write_summary, write_text
 from idbench.experiments.text import new_table, print_titled
-from idbench.identify.loads.payload import Payload
+from idbench.identify.loads.payload import PayloadEstimate
 from idbench.sim.robot.rewrite import with_body
 
 
@@ -79,7 +79,7 @@ def _print_gains(page: Page, options: IdentifyGains, made: GainsFit) -> None:
 
 
 def _judge(
-    page: Page, judgement: LoadJudgement, payload: Payload | None, attempts: Attempts, folder: ResultsFolder | None
+    page: Page, judgement: LoadJudgement, payload: PayloadEstimate | None, attempts: Attempts, folder: ResultsFolder | None
 ) -> None:
     """Print the verdict, and what to check, and save both."""
     with stages_of("judging"):
@@ -95,7 +95,7 @@ def _judge(
     attempts.attempt("summary.json", lambda: _save(page, folder))
 
 
-def _write_mjcf(page: Page, options: IdentifyPayload, robot_model: RobotModel, found: Payload) -> None:
+def _write_mjcf(page: Page, options: IdentifyPayload, robot_model: RobotModel, found: PayloadEstimate) -> None:
     """Write the robot's file with the payload as a body."""
     body, path = body_of(found), options.write_mjcf
     if path is None or "mass" not in body or negative_mass(found):
@@ -127,7 +127,7 @@ def _try_gains(page: Page, options: IdentifyGains) -> None:
     page.found |= {"experiment": "gains", "path": pairs.scenario.name, **_summary(score)}
 
 
-def _print_scores(page: Page, scores: dict[str, Score], title: str) -> None:
+def _print_scores(page: Page, scores: dict[str, PairScore], title: str) -> None:
     """Print rms errors, coverage and time."""
     names = next((score.names for score in scores.values() if score.names), ())
     grid = new_table("", [f"{way}\n{what}" for way in scores for what in ("bias", "rms")])
@@ -143,7 +143,7 @@ def _print_scores(page: Page, scores: dict[str, Score], title: str) -> None:
             page.print(Text(f"{way}: {score.failures.count(why)} runs without an estimate: {why}"), soft_wrap=True)
 
 
-def _summary(score: Score) -> dict[str, Any]:
+def _summary(score: PairScore) -> dict[str, Any]:
     return {
         "parameters": list(score.names),
         "bias": score.bias.tolist() if score.names else [],

@@ -9,9 +9,7 @@ from rich.console import Console
 
 from idbench.experiments.cli.command_text import command_of
 from idbench.experiments.cli.commands.inner import doubt_window, recording_of, require_window
-from idbench.experiments.cli.options.jobs import Search as SearchOptions
-from idbench.experiments.cli.options.jobs import Table1 as Table1Options
-from idbench.experiments.cli.options.jobs import Table2 as Table2Options
+from idbench.experiments.cli.options.jobs import SearchCommand, Table1Command, Table2Command
 from idbench.experiments.cli.page import new_page, progress_of, shown
 from idbench.experiments.cli.saving import saved
 from idbench.experiments.errors import ExperimentError
@@ -29,7 +27,7 @@ LEFT_OUT = ("out", "force", "json", "watching")
 """Options that make no difference to a table."""
 
 
-def _folder(options: Table1Options | Table2Options, experiment: str) -> ResultsFolder:
+def _folder(options: Table1Command | Table2Command, experiment: str) -> ResultsFolder:
     """Return the folder of a table's results."""
     out = options.out or Path("runs") / experiment
     folder = ResultsFolder(
@@ -39,7 +37,7 @@ def _folder(options: Table1Options | Table2Options, experiment: str) -> ResultsF
     return folder
 
 
-def compare(options: Table1Options) -> None:
+def compare(options: Table1Command) -> None:
     """Reproduce the comparison."""
     if options.motions is not None:
         _over_motions(options, options.motions)
@@ -57,7 +55,7 @@ def compare(options: Table1Options) -> None:
                 attempts.recording(lambda: comparison_recording.record_table1(table, audience))
 
 
-def _over_motions(options: Table1Options, motions: int) -> None:
+def _over_motions(options: Table1Command, motions: int) -> None:
     """Lay the distribution of errors over random motions beside the paper's."""
     if options.scenario is not None or options.chain != "all":
         raise ExperimentError(
@@ -72,7 +70,7 @@ def _over_motions(options: Table1Options, motions: int) -> None:
             attempts.file("motions.png", lambda: picture(found))
 
 
-def search(options: SearchOptions) -> None:
+def search(options: SearchCommand) -> None:
     """Search a trajectory."""
     if options.out is not None:
         require_free(options.out, "--out", force=options.force)
@@ -94,7 +92,7 @@ def _searching() -> Iterator[Searching]:
         yield lambda number, distance: status.update(f"searching: round {number}, {distance:.1%} from the paper's Cond(W)")
 
 
-def table2(options: Table2Options) -> None:
+def table2(options: Table2Command) -> None:
     """Repeat the paper's experiment and attribute its errors."""
     watching, folder = options.watching, _folder(options, "table2")
     require_window(options.inner, watching)

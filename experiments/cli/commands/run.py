@@ -9,7 +9,7 @@ from rich.text import Text
 
 from idbench.experiments.cli.command_text import command_of
 from idbench.experiments.cli.commands.inner import doubt_window, recording_of, require_window
-from idbench.experiments.cli.options.jobs import Run
+from idbench.experiments.cli.options.jobs import RunCommand
 from idbench.experiments.cli.own_parts import with_own_parts
 from idbench.experiments.cli.page import Page, new_page, shown, stages_of
 from idbench.experiments.cli.saving import Files, saved, write_scenario
@@ -30,7 +30,7 @@ LEFT_OUT = ("out", "force", "json", "watching", "yes")
 """Options that make no difference to a run's results."""
 
 
-def run(options: Run) -> None:
+def run(options: RunCommand) -> None:
     """Simulate a scenario, identify it, save and record it."""
     page, watching = new_page(machine=options.json), options.watching
     options = with_own_parts(options)

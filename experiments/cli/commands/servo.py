@@ -31,7 +31,7 @@ from idbench.experiments.servo.servo_text import (
     without_servo,
 )
 from idbench.identify.servo import ServoFit
-from idbench.identify.servo.choice import FrictionChoice
+from idbench.identify.servo.choice import ServoFrictionChoice
 
 if TYPE_CHECKING:
     from idbench.experiments.recording.folder import Streams
@@ -48,7 +48,9 @@ def servo(options: IdentifyServo) -> None:
     with options.watching.audience() as audience, shown(page), folder.held() if folder else nullcontext():
         page.found |= {"experiment": "servo", "robot": absolute(str(options.robot)), "friction": options.friction, "joints": {}}
         made = _identified(page, folder, options)
-        servos, others, found = made.servos, made.others, made.fits
+        servos = made.servos
+        others = made.others
+        found = made.fits
         for what, each in made.errors.items():
             print_errors(page, "fitted logs" if what == "fitted" else "held out logs", each)
         page.found |= made.summary()
@@ -73,7 +75,7 @@ def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo
     last = list[ServosFit]()
 
     def heard(joint: str, result: Identified | str, made: ServosFit) -> None:
-        if isinstance(result, FrictionChoice):
+        if isinstance(result, ServoFrictionChoice):
             print_choice(page, joint, result)
         last[:] = [made]
         page.found |= made.parameters()

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING
 
-from idbench.experiments.cli.options.jobs import Study
+from idbench.experiments.cli.options.jobs import StudyCommand
 from idbench.experiments.cli.page import new_page, runs_of, shown
 from idbench.experiments.errors import StudyError
 from idbench.experiments.recording.audience import Audience
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from idbench.experiments.recording.study_recording import StudyRecording
 
 
-def study(options: Study) -> None:
+def study(options: StudyCommand) -> None:
     """Run a study, or list those that ship."""
     watching = options.watching
     if watching.pace is not None:

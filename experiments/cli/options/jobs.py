@@ -34,7 +34,7 @@ class RecordedOptions(WrittenOptions):
 @command("run")
 @final
 @dataclass(frozen=True, kw_only=True)
-class Run(jobs.RunRequest, RecordedOptions, Command, action="run:run"):
+class RunCommand(jobs.RunRequest, RecordedOptions, Command, action="run:run"):
     """Simulate a scenario in closed loop, identify it with all models, and record it."""
 
     out: Folder = None
@@ -70,7 +70,7 @@ class Identify(jobs.IdentifyRequest, RecordedOptions, Command, action="identify:
 @command("table1")
 @final
 @dataclass(frozen=True, kw_only=True)
-class Table1(jobs.Table1Request, RecordedOptions, Command, action="paper:compare"):
+class Table1Command(jobs.Table1Request, RecordedOptions, Command, action="paper:compare"):
     """Reproduce the paper's simulation comparison (Table 1) and record it."""
 
     out: Folder = None
@@ -80,7 +80,7 @@ class Table1(jobs.Table1Request, RecordedOptions, Command, action="paper:compare
 @command("table2")
 @final
 @dataclass(frozen=True, kw_only=True)
-class Table2(jobs.Table2Request, RecordedOptions, Command, action="paper:table2"):
+class Table2Command(jobs.Table2Request, RecordedOptions, Command, action="paper:table2"):
     """Repeat the paper's experiment (Table 2) on the virtual robot, and attribute its errors; takes two minutes."""
 
     out: Path = Path("runs/table2")
@@ -92,7 +92,7 @@ class Table2(jobs.Table2Request, RecordedOptions, Command, action="paper:table2"
 @command("search")
 @final
 @dataclass(frozen=True, kw_only=True)
-class Search(Command, action="paper:search"):
+class SearchCommand(Command, action="paper:search"):
     """Search a trajectory with the paper's condition numbers. (`idbench excite` designs better ones.)"""
 
     seed: int = 0
@@ -150,7 +150,7 @@ class IdentifyServo(jobs.ServoRequest, RecordedOptions, Command, action="servo:s
 @command("study")
 @final
 @dataclass(frozen=True, kw_only=True)
-class Study(jobs.StudyRequest, RecordedOptions, Command, action="study:study"):
+class StudyCommand(jobs.StudyRequest, RecordedOptions, Command, action="study:study"):
     """Run a study: simulate a scenario over a grid and many seeds, and identify each run. Without a name: list the studies."""
 
     out: Folder = None

@@ -60,7 +60,9 @@ class TotalLeastSquares(AbstractEstimator):
         R = triangular(rows.joined * weight[..., None])
         S = self._noise(problem, weight)
         runs, p = R.shape[:-2], len(problem.names)
-        X, inverse, failures = np.full((*runs, p), np.nan), np.full((*runs, p, p), np.nan), dict[tuple[int, ...], str]()
+        X = np.full((*runs, p), np.nan)
+        inverse = np.full((*runs, p, p), np.nan)
+        failures = dict[tuple[int, ...], str]()
         for run in np.ndindex(runs):
             if problem.factors.together.status[run] != Status.OK:
                 continue

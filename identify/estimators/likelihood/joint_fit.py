@@ -102,7 +102,9 @@ class JointFit:
         IdentificationError
             If it diverges or does not settle, or the log does not determine the motion.
         """
-        now, noises, sigma = self, self._noises(), np.full(len(self.unknowns), np.inf)
+        now = self
+        noises = self._noises()
+        sigma = np.full(len(self.unknowns), np.inf)
         for _ in range(ROUNDS):
             for _ in range(STEPS):
                 now, moved, taken = now._step(noises)

@@ -77,7 +77,9 @@ class UnscentedKalmanFilter(AbstractEstimator):
         start, h = starting_point(problem), small_steps(problem)
         sigma = np.maximum(self.spread * np.abs(start), UNSURE * h)
         runs, p = start.shape[:-1], start.shape[-1]
-        X, covariance, failures = np.full((*runs, p), np.nan), np.full((*runs, p, p), np.nan), dict[tuple[int, ...], str]()
+        X = np.full((*runs, p), np.nan)
+        covariance = np.full((*runs, p, p), np.nan)
+        failures = dict[tuple[int, ...], str]()
         torque = np.zeros((*runs, problem.basis.n))
         levels = problem.noise
         for run in np.ndindex(runs):
@@ -182,7 +184,9 @@ class _Filter:
     def _step(self, k: int, points: Array, sigma: Array) -> tuple[Array, Array]:
         """Return points a sample later, by the midpoint rule, and what a torque does to the state of the first."""
         n, T = self.basis.n, 1 / self.fs
-        q, qd, X = points[:n], points[n : 2 * n], points[2 * n :] * sigma[:, None]
+        q = points[:n]
+        qd = points[n : 2 * n]
+        X = points[2 * n :] * sigma[:, None]
         first, _ = self._acceleration(k, q, qd, X)
         middle, inverse = self._acceleration(k, q + T / 2 * qd, qd + T / 2 * first, X)
         moved = np.concatenate([q + T * qd + T**2 / 2 * middle, qd + T * middle, points[2 * n :]])

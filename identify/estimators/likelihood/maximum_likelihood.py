@@ -17,7 +17,7 @@ from idbench.identify.estimators.likelihood.joint_fit import CHECK, JointFit
 from idbench.identify.estimators.likelihood.normal_equations import NormalEquations
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.models import ExplicitModel
-from idbench.identify.noise.band_matrix import Band, Cholesky
+from idbench.identify.noise.band_matrix import BandMatrix, Cholesky
 from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.noise.restricted_likelihood import EXACT, SMALLEST
 from idbench.identify.rows.factors import Status
@@ -90,7 +90,7 @@ def _covariance(fit: JointFit, log: int) -> Array:
     return inverse + np.matmul(np.matmul(pairs, fit.covariance), np.swapaxes(pairs, -1, -2))
 
 
-def _windows(inverse: Band, n: int) -> Array:
+def _windows(inverse: BandMatrix, n: int) -> Array:
     """Return what the inverse has of both nodes of every cell, joint by joint, shape (cell, joint, 4, 4)."""
     cells = len(inverse.lower) // (2 * n) - 1
     found, first = np.zeros((cells, n, 4, 4)), 2 * n * np.arange(cells)[:, None] + np.arange(n)
@@ -100,7 +100,9 @@ def _windows(inverse: Band, n: int) -> Array:
     return found
 
 
-FAR, APART, SMALL = 15.0, 3.0, 1e-2
+FAR = 15.0
+APART = 3.0
+SMALL = 1e-2
 """Sigmas from the generalized least-squares estimate beyond which a fit is not believed; those where its own sigma is below
 this share of that. Where torques do not belong to the motion, parameters of zero, with which nothing moves, are as good as any.
 Noise alone, of a 10-bit encoder, takes a fit 7 sigma far."""
@@ -156,7 +158,9 @@ class MaximumLikelihood(AbstractEstimator):
         # Rows show little of the positions' noise where torques are noisy; their differences show all of it.
         start, position = GeneralizedLeastSquares().solve(problem), np.maximum(problem.position_noise, SMALLEST)
         torque = problem.likely_noise.torque.copy()
-        runs, p, failures = start.X.shape[:-1], len(problem.names), dict[tuple[int, ...], str]()
+        runs = start.X.shape[:-1]
+        p = len(problem.names)
+        failures = dict[tuple[int, ...], str]()
         X, covariance = np.full((*runs, p), np.nan), np.full((*runs, p, p), np.nan)
         fits: dict[tuple[int, ...], JointFit] = {}
         for run in np.ndindex(runs):
@@ -167,7 +171,9 @@ class MaximumLikelihood(AbstractEstimator):
             except IdentificationError as error:  # one run does not take the others away
                 failures[run] = str(error)
                 continue
-            fits[run], X[run], covariance[run] = found, found.X, found.covariance[:p, :p]
+            fits[run] = found
+            X[run] = found.X
+            covariance[run] = found.covariance[:p, :p]
             torque[run] = np.where(np.isfinite(torque[run]), found.levels.torque, np.nan)
         if failures and not fits:
             raise IdentificationError(next(iter(failures.values())))

@@ -70,7 +70,9 @@ class NormalEquations:
         their products with the solutions show how much of the mean torques' residuals the unknowns take (M. F. Hutchinson,
         "A stochastic estimator of the trace of the influence matrix", Communications in Statistics 19 (1990) 433-450).
         """
-        n, p, size = basis.n, len(X) + 1, z.size
+        n = basis.n
+        p = len(X) + 1
+        size = z.size
         right = 1 + (0 if signs is None else len(signs) * 2 * n)
         both = np.zeros((size, p + right))
         found = cls(np.zeros((size, 4 * n)).T, both, np.zeros((p, p)), np.zeros((p, right)))
@@ -162,7 +164,9 @@ class NormalEquations:
     def _add_cells(self, first: int, H: Array, W: Array, rho: Array) -> None:
         """Add residuals rho, (cell, joint, right), of slopes H, (cell, 4 n, joint), by nodes and W, (cell, joint, p), by X."""
         (count, width), p = H.shape[:2], W.shape[-1]
-        own, products, step = np.matmul(H, np.swapaxes(H, -1, -2)), np.matmul(H, np.concatenate([W, rho], axis=-1)), width // 2
+        own = np.matmul(H, np.swapaxes(H, -1, -2))
+        products = np.matmul(H, np.concatenate([W, rho], axis=-1))
+        step = width // 2
         nodes = self.both.reshape(-1, step, self.both.shape[1])
         columns = self.band.T.reshape(-1, step, width)  # of the lower half: from the diagonal on
         for half in (0, 1):

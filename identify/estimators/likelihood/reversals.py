@@ -35,7 +35,9 @@ class Inside:
     def jumps(self, basis: Basis, points: list[tuple[Array, Array, Array]], D: Array, part: slice) -> "Jumps":
         """Return what reversals in a part of the cells change, of columns D, shape (point, cell, joint, p), at two points."""
         which = np.flatnonzero((self.cell >= part.start) & (self.cell < part.stop))
-        cell, joint, every = self.cell[which] - part.start, self.joint[which], np.arange(len(which))
+        cell = self.cell[which] - part.start
+        joint = self.joint[which]
+        every = np.arange(len(which))
         after = []
         for (q, qd, qdd), before in zip(points, D, strict=True):
             turned = qd[:, cell].copy()
@@ -65,7 +67,9 @@ class Jumps:
 
     def add(self, W: Array, H: Array, X: Array, sign: float) -> None:
         """Add them to the mean, or with sign -1 to half the difference, of W, shape (cell, joint, p), and of its slopes H X."""
-        s, mean, n = self.share, (self.change[1] + self.change[0]) / 2, W.shape[1]
+        s = self.share
+        mean = (self.change[1] + self.change[0]) / 2
+        n = W.shape[1]
         weight, slope = (1 - s, -np.ones_like(s)) if sign > 0 else (np.sqrt(3) * s * (1 - s), np.sqrt(3) * (1 - 2 * s))
         added = weight[:, None, None] * mean
         if sign < 0:
@@ -91,7 +95,7 @@ RATIO = 50.0
 Flags = npt.NDArray[np.bool_]
 
 
-class Stretch(NamedTuple):
+class ReversalStretch(NamedTuple):
     """Cells, begin to end, in which a joint is slow, between others in which it moves with these signs."""
 
     joint: int
@@ -101,7 +105,7 @@ class Stretch(NamedTuple):
     after: float
 
 
-def stretches(qd: Array, slow: Flags) -> list[Stretch]:
+def stretches(qd: Array, slow: Flags) -> list[ReversalStretch]:
     """Return the stretches of slow cells, shape (joint, cell), that neither begin nor end with the log."""
     found = []
     for joint, flags in enumerate(slow):
@@ -109,7 +113,7 @@ def stretches(qd: Array, slow: Flags) -> list[Stretch]:
         for begin, end in edges.reshape(-1, 2):
             if begin > 0 and end < len(flags):
                 signs = np.sign(qd[joint, [begin - 1, end]])
-                found.append(Stretch(joint, int(begin), int(end), float(signs[0]), float(signs[1])))
+                found.append(ReversalStretch(joint, int(begin), int(end), float(signs[0]), float(signs[1])))
     return found
 
 
@@ -179,7 +183,7 @@ class Turns:
         return cls([], np.zeros(shape, dtype=bool), np.zeros(shape))
 
     @classmethod
-    def of(cls, cells: Cells, basis: Basis, X: Array, z: Array, found: list[Stretch], margin: Array) -> Self:
+    def of(cls, cells: Cells, basis: Basis, X: Array, z: Array, found: list[ReversalStretch], margin: Array) -> Self:
         """Return what a motion z says of stretches; `margin` is how well torques are known near reversals, shape (joint,)."""
         turns = cls.none((basis.n, cells.count))
         for joint in sorted({one.joint for one in found}):
@@ -191,7 +195,7 @@ class Turns:
                 turns._follow(one, v, forces.part(slice(begin, end)), margin[joint], cells.period)
         return turns
 
-    def _slowest(self, one: Stretch, v: Array) -> Stretch:
+    def _slowest(self, one: ReversalStretch, v: Array) -> ReversalStretch:
         """Return the part of a stretch, of velocities v, shape (cell,), in which the joint may stop; mark the rest."""
         slowest = np.flatnonzero(np.abs(v) < OUTPACED * np.abs(np.diff(v)).max(initial=0.0))
         first, last = (slowest[0], slowest[-1] + 1) if len(slowest) else (0, 0)
@@ -199,7 +203,7 @@ class Turns:
             self.near[one.joint, cells], self.sign[one.joint, cells] = True, sign
         return one._replace(begin=int(one.begin + first), end=int(one.begin + last))
 
-    def _follow(self, one: Stretch, v: Array, forces: Forces, margin: float, period: float) -> None:
+    def _follow(self, one: ReversalStretch, v: Array, forces: Forces, margin: float, period: float) -> None:
         """Mark where a joint of velocities v, shape (cell,), certainly moves on through a stretch, and where it reverses.
 
         It certainly moves while friction does not stop it within a cell. Nothing is known of the cells from the first in which
@@ -207,7 +211,9 @@ class Turns:
         """
         if not len(v):
             return
-        row, sign, step = one.joint, np.full(len(v), one.before), period * margin / forces.inertia
+        row = one.joint
+        sign = np.full(len(v), one.before)
+        step = period * margin / forces.inertia
         early, late = (s * (v + period * forces.under(s)) > step for s in (one.before, one.after))
         late &= one.after * v > -step
         if not early.all():

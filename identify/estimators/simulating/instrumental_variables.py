@@ -31,7 +31,9 @@ class DirectInverse(AbstractSimulating):
 
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate of every run."""
-        rounds, rows, kinds = self.begun(problem), problem.rows, Kinds.of_rows(problem)
+        rounds = self.begun(problem)
+        rows = problem.rows
+        kinds = Kinds.of_rows(problem)
 
         def step(X: Array) -> Solved:
             W = problem.at(rounds.simulated(X).logs).W
@@ -59,7 +61,9 @@ class InstrumentalVariables(AbstractSimulating):
 
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate of every run."""
-        rounds, rows, kinds = self.begun(problem, exact=False), problem.rows, Kinds.of_rows(problem)
+        rounds = self.begun(problem, exact=False)
+        rows = problem.rows
+        kinds = Kinds.of_rows(problem)
 
         def step(X: Array) -> Solved:
             return solve_with(kinds, rows.Y, rows.W, problem.at(rounds.simulated(X).logs).W)

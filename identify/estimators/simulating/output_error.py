@@ -106,7 +106,11 @@ class _Shots:
     """The segments of one log, and the states at which they begin."""
 
     def __init__(self, plant: AbstractPlant, log: MotionLog, first: npt.NDArray[np.intp], count: int, states: Array) -> None:
-        self._plant, self._log, self._first, self._count, self._states = plant, log, first, count, states
+        self._plant = plant
+        self._log = log
+        self._first = first
+        self._count = count
+        self._states = states
         self._measured = np.stack([log.q[k : k + count] for k in first.tolist()])
         self._of_X, self._rest = np.empty(0), np.empty(0)
 
@@ -126,7 +130,9 @@ class _Shots:
 
     def linearized(self, X: Array, h: Array) -> tuple[Array, Array]:
         """Return residuals, shape (segment, count, joint), and their slopes by X, both without what initial states explain."""
-        n, p, segments = self._log.n, len(X), len(self._first)
+        n = self._log.n
+        p = len(X)
+        segments = len(self._first)
         steps = np.array([*([STEP_Q] * n), *([STEP_QD] * n)])
         parameters = np.concatenate([X[None], X + np.diag(h), np.tile(X, (2 * n, 1))])
         moved = np.concatenate([np.zeros((1 + p, 2 * n)), np.diag(steps)])

@@ -87,7 +87,9 @@ class Rounds:
             If every run fails; the reason of the first.
         """
         found: Solved | None = None
-        steps, move, left = steps or Steps(), np.full(X.shape, np.inf), np.full(X.shape[:-1], np.inf)
+        steps = steps or Steps()
+        move = np.full(X.shape, np.inf)
+        left = np.full(X.shape[:-1], np.inf)
         for number in range(1, self.most + 1):
             with stage(f"round {number} of at most {self.most}"):
                 new = step(X)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from idbench.identify.servo import Servo, ServoFit
-from idbench.identify.servo.identification import Joint, together
+from idbench.identify.servo.identification import OffsetJoint, together
 from idbench.identify.servo.search import Found
 
 RNG = np.random.default_rng(0)
@@ -29,7 +29,9 @@ def covariance(n=3):
 def three():
     """Return three joints whose fits depend on each other's offsets, the last without one of its own."""
     fits = [fit_of(covariance()), fit_of(covariance()), fit_of(covariance(2), ("a", "lead"))]
-    return {j: Joint(fit, {k: 0.4 * RNG.normal(size=len(fit.free)) for k in (0, 1) if k != j}) for j, fit in enumerate(fits)}
+    return {
+        j: OffsetJoint(fit, {k: 0.4 * RNG.normal(size=len(fit.free)) for k in (0, 1) if k != j}) for j, fit in enumerate(fits)
+    }
 
 
 def whole(joints):
@@ -63,7 +65,7 @@ def test_offsets_agree_and_covariances_are_those_of_the_whole_system(three):
 
 
 def test_joints_without_an_effect_on_each_other_stay(three):
-    apart = {j: Joint(joint.fit, {}) for j, joint in three.items()}
+    apart = {j: OffsetJoint(joint.fit, {}) for j, joint in three.items()}
     for assumed in ({}, {0: 0.3, 1: -0.2}):
         found = together(apart, assumed)
         assert {j: fit.p for j, fit in found.items()} == {j: joint.fit.p for j, joint in three.items()}
@@ -72,7 +74,7 @@ def test_joints_without_an_effect_on_each_other_stay(three):
 
 
 def test_an_offset_that_is_held_has_no_error(three):
-    held = {**three, 0: Joint(replace(fit_of(covariance(2)), free=("a", "lead")), {1: np.array([0.1, 0.2])})}
+    held = {**three, 0: OffsetJoint(replace(fit_of(covariance(2)), free=("a", "lead")), {1: np.array([0.1, 0.2])})}
     found = together(held, {0: 0.3, 1: -0.2})
     alone, other = three[1].fit, found[1]
     np.testing.assert_allclose(other.covariance, alone.covariance)  # nothing comes back to it
@@ -82,12 +84,14 @@ def test_an_offset_that_is_held_has_no_error(three):
 def test_offsets_that_gravity_does_not_tell_apart_stay_as_they_are():
     """Two parallel axes, all of the weight behind the second: only the sum of their offsets is known."""
     B = {0: np.array([0.0, -0.9999, 0.0]), 1: np.array([0.0, -1.0, 0.0])}
-    pair = {j: Joint(fit_of(covariance()), {1 - j: B[j]}) for j in (0, 1)}
+    pair = {j: OffsetJoint(fit_of(covariance()), {1 - j: B[j]}) for j in (0, 1)}
     found = together(pair, {0: 0.1, 1: -0.1})
     assert {j: fit.p for j, fit in found.items()} == {j: joint.fit.p for j, joint in pair.items()}
 
 
 def test_parameters_stay_within_their_limits():
     one, other = fit_of(covariance()), fit_of(covariance())
-    found = together({0: Joint(one, {1: np.array([-1e3, 0.0, 0.0])}), 1: Joint(other, {})}, {1: other.p["offset"] - 0.5})
+    found = together(
+        {0: OffsetJoint(one, {1: np.array([-1e3, 0.0, 0.0])}), 1: OffsetJoint(other, {})}, {1: other.p["offset"] - 0.5}
+    )
     assert found[0].p["a"] == 0

@@ -10,7 +10,7 @@ from idbench.identify import ExcitationError
 from idbench.identify.servo import SERVO_FRICTIONS, JointLoad, Servo, ServoRun, UnscaledError, identify_again, identify_servo
 from idbench.identify.servo.choice import choose_friction, lacks_of
 from idbench.identify.servo.closed_loop import ServoLoop, count_of
-from idbench.identify.servo.search import Search
+from idbench.identify.servo.search import ServoSearch
 
 SERVO = Servo(0.166, 16.0, supply=12.0, duty_limit=0.97)
 LAW = {"a": 0.6, "b": 1.2, "Ia": 0.02, "Fs": 0.1, "Fv": 0.02, "offset": 0.0, "delay": 0.02, "rate": 4.5}
@@ -65,7 +65,7 @@ def test_a_fit_without_a_piece_is_that_of_the_others(run):
     assert len(left.costs) % len(runs) == 0
     worst = int(left.costs[: len(runs)].argmax())
     others = ServoLoop(SERVO, [x for k, x in enumerate(runs) if k != worst], fit.loop.h)
-    without = Search(others, fit.free, fit.excitation.scales, 3 * fit.scale).best(fit.p, 10).p
+    without = ServoSearch(others, fit.free, fit.excitation.scales, 3 * fit.scale).best(fit.p, 10).p
     sigma = fit.standard_errors
     assert max(abs(without[name] - fit.p[name]) / sigma[name] for name in fit.free) < 3
     assert np.isfinite(left.covariance).all()
@@ -185,7 +185,7 @@ def test_a_friction_next_to_nothing_sets_no_scale():
 
 @pytest.mark.thorough
 def test_where_no_parameter_has_an_effect_no_other_valley_is_tried(fit):
-    search = Search(fit.loop, fit.free, fit.excitation.scales, fit.scale)
+    search = ServoSearch(fit.loop, fit.free, fit.excitation.scales, fit.scale)
     nothing = replace(fit.found.beginning, sensitivity=np.zeros_like(fit.found.beginning.sensitivity))
     still = replace(fit.found, sensitivity=np.zeros_like(fit.found.sensitivity), beginning=nothing)
     assert search.away(still) == [fit.p]

@@ -26,10 +26,14 @@ kp = 16
 
 def main(folder: Path) -> None:
     """Write one log a run, named by its mass, length, gain and motion."""
-    robots, gains, names = set(), set(), set()
+    robots = set()
+    gains = set()
+    names = set()
     for path in sorted(folder.rglob("*.json")):
         run = json.loads(path.read_text())
-        mass, length, kp = float(run["mass"]), float(run["length"]), int(run["kp"])
+        mass = float(run["mass"])
+        length = float(run["length"])
+        kp = int(run["kp"])
         robot = f"{1000 * mass:.0f}g-{1000 * length:.0f}mm"
         if robot not in robots:
             Path(f"{robot}.xml").write_text(ROBOT.format(name=robot, mass=mass, length=length))
