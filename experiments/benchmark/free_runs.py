@@ -6,7 +6,7 @@ import numpy as np
 
 from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.results.writing import finite
-from idbench.sim.engine.free_run import free_run
+from idbench.sim.engine.driven import free_run
 
 
 def free_runs(held_out: HeldOut, model: str, length: float) -> dict[str, Any]:

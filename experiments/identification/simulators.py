@@ -11,7 +11,7 @@ import numpy.typing as npt
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.identify import AbstractLoop, AbstractPlant, Array, IdentificationError, MotionLog, Simulated
 from idbench.sim.encoders import ExactEncoder
-from idbench.sim.engine.shooting import shoot
+from idbench.sim.engine.driven import shoot
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.errors import BenchError
 from idbench.sim.frictions import CoulombViscous

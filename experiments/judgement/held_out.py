@@ -16,7 +16,7 @@ from idbench.identify import Array, Basis, IdentificationError, MotionLog, Probl
 from idbench.identify.arrays import combined
 from idbench.identify.basis.parameter import FRICTION, NOT_NEGATIVE, Parameter
 from idbench.identify.rows.rows import manageable
-from idbench.sim.engine.replay import Replay, replay
+from idbench.sim.engine.driven import Replay, replay
 from idbench.sim.errors import BenchError
 from idbench.sim.robot.robot import Robot
 

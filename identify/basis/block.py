@@ -34,21 +34,25 @@ class AbstractBlock(ABC):
     def explicit(self, state: State) -> BlockColumns:
         """Return the columns D(q, qd, qdd) of the joint torques (Eq. 5, 6)."""
 
-    @abstractmethod
     def momentum(self, state: State) -> BlockColumns:
-        """Return the columns M_i(q) qd of the momenta, still to be differentiated (Eq. 9)."""
+        """Return the columns M_i(q) qd of the momenta, still to be differentiated (Eq. 9); none by default."""
+        del state
+        return {}
 
-    @abstractmethod
     def remainder(self, state: State) -> BlockColumns:
-        """Return the columns R_i(q, qd) of the torques that are not the derivative of a momentum (Eq. 8, 9)."""
+        """Return the columns R_i(q, qd) of the torques that are no derivative of a momentum (Eq. 8, 9); none by default."""
+        del state
+        return {}
 
-    @abstractmethod
     def energy(self, state: State) -> BlockColumns:
-        """Return the columns h_i(q, qd) of kinetic plus potential energy in row 0, still to be differentiated (Eq. 10)."""
+        """Return the columns h_i(q, qd) of the energy in row 0, still to be differentiated (Eq. 10); none by default."""
+        del state
+        return {}
 
-    @abstractmethod
     def dissipation(self, state: State) -> BlockColumns:
-        """Return the columns of the dissipated power qd' Gamma_f in row 0 (Eq. 10)."""
+        """Return the columns of the dissipated power qd' Gamma_f in row 0 (Eq. 10); none by default."""
+        del state
+        return {}
 
     @property
     def is_nonlinear(self) -> bool:
@@ -80,5 +84,4 @@ class AbstractConservativeBlock(AbstractBlock):
     @final
     def dissipation(self, state: State) -> BlockColumns:
         """Return no columns."""
-        del state
-        return {}
+        return super().dissipation(state)

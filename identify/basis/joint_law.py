@@ -40,22 +40,10 @@ class AbstractJointLaw(AbstractBlock):
         return self.remainder(state)
 
     @final
-    def momentum(self, state: State) -> BlockColumns:
-        """Return no columns."""
-        del state
-        return {}
-
-    @final
     def remainder(self, state: State) -> BlockColumns:
         """Return the torques: joint j's parameters in row j."""
         found = self._checked(state)
         return {(p.joint or 0, p): found[p.symbol][..., p.joint, :] for p in self.parameters(state.n)}
-
-    @final
-    def energy(self, state: State) -> BlockColumns:
-        """Return no columns."""
-        del state
-        return {}
 
     @final
     def dissipation(self, state: State) -> BlockColumns:
@@ -129,11 +117,6 @@ class Armature(AbstractConservativeBlock):
     def momentum(self, state: State) -> BlockColumns:
         """Return qd (Eq. 9)."""
         return {(j, _rotor(j)): state.qd[..., j, :] for j in self._numbers(state.n)}
-
-    def remainder(self, state: State) -> BlockColumns:
-        """Return no columns."""
-        del state
-        return {}
 
     def energy(self, state: State) -> BlockColumns:
         """Return qd^2 / 2 (Eq. 10)."""

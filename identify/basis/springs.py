@@ -30,11 +30,6 @@ class Spring(AbstractConservativeBlock):
         """Return q - rest."""
         return self.remainder(state)
 
-    def momentum(self, state: State) -> BlockColumns:
-        """Return no columns."""
-        del state
-        return {}
-
     def remainder(self, state: State) -> BlockColumns:
         """Return q - rest."""
         return {(j, _stiffness(j)): self._bent(state, j) for j in self._numbers(state.n)}
@@ -96,11 +91,6 @@ class Balancer(AbstractConservativeBlock):
     def explicit(self, state: State) -> BlockColumns:
         """Return forces times dl/dq."""
         return self.remainder(state)
-
-    def momentum(self, state: State) -> BlockColumns:
-        """Return no columns."""
-        del state
-        return {}
 
     def remainder(self, state: State) -> BlockColumns:
         """Return forces times dl/dq."""

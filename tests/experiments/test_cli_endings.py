@@ -44,9 +44,11 @@ def test_interruption_of_the_work_leaves_nothing(out, capfd, monkeypatch):
 
 def test_a_real_interrupt_ends_the_process_without_a_traceback(tmp_path, start):
     """Ctrl-C at some instant of a long search."""
-    code = "import sys; from idbench.experiments.paper.search import Search; from idbench.experiments import cli\n"
+    code = "import sys; from idbench.experiments.paper.search import TrajectorySearch; from idbench.experiments import cli\n"
     code += "from idbench.experiments.paper import job as paper\n"
-    code += "paper.Search = lambda seed: print('searching') or Search(seed=seed, tolerance=0.0, rounds=10**6)\n"
+    code += (
+        "paper.TrajectorySearch = lambda seed: print('searching') or TrajectorySearch(seed=seed, tolerance=0.0, rounds=10**6)\n"
+    )
     code += "sys.exit(cli.main(['table1', '--seed', '1', '--out', 'results']))"
     process = start("-uc", code, cwd=tmp_path)
     assert process.stdout.readline()  # the search is under way
@@ -92,7 +94,7 @@ def test_an_interrupt_that_comes_out_as_another_error_is_one(tmp_path, start):
                 time.sleep(30)
             except KeyboardInterrupt:
                 raise ImportError("half loaded") from None
-        paper.Search = half_loaded
+        paper.TrajectorySearch = half_loaded
         sys.exit(cli.main(["table1", "--seed", "1", "--out", "results"]))
     """
     process = start("-uc", code, cwd=tmp_path)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from idbench.sim.engine.free_run import free_run
+from idbench.sim.engine.driven import free_run
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.robot import Robot

@@ -36,22 +36,12 @@ class TiedFriction(AbstractBlock):
         """Return the signs of the velocities of the other joints."""
         return self.remainder(state)
 
-    def momentum(self, state: State) -> BlockColumns:
-        """Return no columns."""
-        del state
-        return {}
-
     def remainder(self, state: State) -> BlockColumns:
         """Return the signs of the velocities of the other joints."""
         weights = np.array(self.coupling.weights)
         each = weights[:, None] * np.sign(state.qd)
         others = np.sum(each, axis=-2, keepdims=True) - each
         return {(int(j), self._own): weights[j] * others[..., j, :] for j in np.flatnonzero(weights)}
-
-    def energy(self, state: State) -> BlockColumns:
-        """Return no columns."""
-        del state
-        return {}
 
     def dissipation(self, state: State) -> BlockColumns:
         """Return the power of the torques."""

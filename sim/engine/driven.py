@@ -1,0 +1,201 @@
+"""Robots driven by the torques of a log: held to its motion by a weak loop, from where it is again and again, or from anywhere.
+
+One loop: plants start somewhere in the log, get its torques as its channel says, and what a feedback adds.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+import numpy.typing as npt
+
+from idbench.identify.data.motion_log import MotionLog
+from idbench.sim.engine.failures import Bounds
+from idbench.sim.engine.plant import Plant
+from idbench.sim.errors import ScenarioError
+from idbench.sim.robot.inverse_dynamics import BLOCK, InverseDynamics
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.robot import Robot
+from idbench.sim.scenario.scenario import Physics
+from idbench.sim.trajectories import Reference
+
+STEP = 0.002
+"""Longest physics step of shooting [s]: of half a second nothing is lost by it."""
+
+Feedback = Callable[[int, Plant], Array]
+"""Torque beside that of the log at a sample [N m], shape (joint,)."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """What a simulated robot does with the torques of a log."""
+
+    q: Array
+    """Its positions [rad], shape (time, joint)."""
+    feedback: Array
+    """What the loop adds to the torques of the log to hold it to the log's motion [N m], shape (time, joint)."""
+
+
+def replay(robot: Robot, log: MotionLog, qd: Array, bandwidth: float) -> Replay:
+    """Return what `robot` does with the torques of a log.
+
+    The torques act as the log's channel says; the loop adds M (w^2 e + 2 w de/dt), M the diagonal of the inertia matrix. A
+    robot with the parameters of the one that was logged needs no feedback, beside noise.
+
+    Parameters
+    ----------
+    robot : Robot
+        To be simulated.
+    log : MotionLog
+        One run.
+    qd : Array, shape (time, joint)
+        Velocities of the log [rad/s].
+    bandwidth : float
+        Natural frequency w of the loop [rad/s].
+
+    Raises
+    ------
+    ScenarioError
+        If it runs away.
+    """
+    kp, feedback = _inertia(robot, log.q) * bandwidth**2, np.empty(log.q.shape)
+    bounds = Bounds(robot, Reference(log.fs, log.q, qd, np.zeros_like(qd)), 1)
+
+    def held(k: int, plant: Plant) -> Array:
+        if broken := {**plant.troubles, **bounds.broken(plant.q, plant.qd)}:
+            raise ScenarioError(f"a robot with these parameters does not follow the log: {broken[0]} after {k / log.fs:.3g} s")
+        feedback[k] = kp[k] * (log.q[k] - plant.q[0] + 2 / bandwidth * (qd[k] - plant.qd[0]))
+        return feedback[k]
+
+    q, _ = _driven(_start(robot, log, log.q[:1], qd[:1]), np.zeros(1, dtype=np.intp), log.samples, held)
+    return Replay(q[0], feedback)
+
+
+def free_run(robot: Robot, log: MotionLog, qd: Array, length: float) -> tuple[Array, Array]:
+    """Return logged and simulated positions of stretches of a log that follow each other, shape (stretch, time, joint).
+
+    Each begins with the position and velocity of the log; nothing holds the robot to its motion.
+
+    Parameters
+    ----------
+    robot : Robot
+        To be simulated.
+    log : MotionLog
+        One run.
+    qd : Array, shape (time, joint)
+        Velocities of the log [rad/s].
+    length : float
+        Of a stretch [s].
+
+    Raises
+    ------
+    ScenarioError
+        If the log is shorter than a stretch.
+    """
+    samples = round(length * log.fs)
+    count = log.samples // max(samples, 1)
+    if samples < 1:
+        raise ScenarioError(f"a stretch of {length:g} s has no sample at {log.fs:g} Hz: use a longer one")
+    if count < 1:
+        raise ScenarioError(f"a log of {log.samples / log.fs:.3g} s has no stretch of {length:g} s: use a shorter one")
+    first = samples * np.arange(count)
+    simulated, broken = _driven(_start(robot, log, log.q[first], qd[first]), first, samples)
+    simulated[broken] = np.nan
+    return log.q[: count * samples].reshape(count, samples, -1), simulated
+
+
+def shoot(
+    robot: Robot, vary: Mapping[str, npt.ArrayLike], q: Array, qd: Array, log: MotionLog, first: npt.ArrayLike, count: int
+) -> Array:
+    """Return the positions of robots that start somewhere in a log, shape (nsim, count, joint), NaN of those that run away.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    vary : mapping of str to array_like
+        Fields of MuJoCo's model with a value for each simulation, shape (nsim, ...).
+    q, qd : Array, shape (nsim, joint)
+        States at their first sample [rad, rad/s].
+    log : MotionLog
+        One run; its torques act as its channel says.
+    first : int array, shape (nsim,)
+        First sample of each.
+    count : int
+        Number of samples, the first included.
+    """
+    found, broken = _driven(_start(robot, log, q, qd, Physics(step=STEP), vary, 0), np.asarray(first), count)
+    found[broken] = np.nan
+    return found
+
+
+def _start(
+    robot: Robot,
+    log: MotionLog,
+    q: Array,
+    qd: Array,
+    physics: Physics | None = None,
+    vary: Mapping[str, npt.ArrayLike] | None = None,
+    threads: int = 1,
+) -> tuple[Plant, Array]:
+    """Return robots in states [rad, rad/s], and the torques of a log in every physics step, shape (time, step, joint)."""
+    physics = physics or Physics()
+    h, per_sample = physics_steps(log.fs, physics.step)
+    plant = Plant(robot, len(q), physics, h, vary or {}, threads)
+    plant.q[:], plant.qd[:] = q, qd
+    return plant, mean_torques(log, h, per_sample)
+
+
+def _driven(
+    started: tuple[Plant, Array], first: npt.NDArray[np.intp], count: int, feedback: Feedback | None = None
+) -> tuple[Array, list[int]]:
+    """Return positions from some samples of a log on, shape (sim, count, joint), and the simulations that ran away."""
+    plant, torques = started
+    found = np.full((len(first), count, torques.shape[-1]), np.nan)
+    for k in range(count):
+        found[:, k] = plant.q
+        acting = torques[first + k]
+        if feedback is not None:
+            acting = acting + feedback(k, plant)
+        if k + 1 < count:
+            plant.step(np.ascontiguousarray(np.swapaxes(acting, 0, 1)), torques.shape[1])
+    return found, list(plant.troubles)
+
+
+def physics_steps(fs: float, longest: float) -> tuple[float, int]:
+    """Return the length of physics steps of at most `longest` [s], and how many a sample takes."""
+    per_sample = int(np.ceil(1 / fs / longest - 1e-9))
+    return 1 / fs / per_sample, per_sample
+
+
+def mean_torques(log: MotionLog, h: float, per_sample: int) -> Array:
+    """Return the mean of the torque that acts in every physics step, shape (time, step, joint)."""
+    tau = log.tau * np.asarray(log.torque.gain)
+    T = 1 / log.fs
+    delay = log.torque.delay
+    edges = np.arange(log.samples * per_sample + 1) * h
+    if log.torque.meaning == "instantaneous":
+        at = log.t + delay
+        values = np.stack([np.interp(edges, at, x) for x in tau.T], axis=-1)
+        means = (values[1:] + values[:-1]) / 2
+    else:
+        starts = np.arange(log.samples + 1) * T + delay
+        impulse = np.concatenate([np.zeros((1, log.n)), np.cumsum(tau, axis=0) * T])
+        before, after = np.minimum(edges - starts[0], 0.0), np.maximum(edges - starts[-1], 0.0)
+        grown = np.stack([np.interp(edges, starts, x) for x in impulse.T], axis=-1)
+        grown += before[:, None] * tau[0] + after[:, None] * tau[-1]
+        means = np.diff(grown, axis=0) / h
+    return means.reshape(log.samples, per_sample, log.n)
+
+
+def _inertia(robot: Robot, q: Array) -> Array:
+    """Return the diagonal of M at every sample, shape (time, joint)."""
+    found = np.empty(q.shape)
+    for i in range(0, len(q), BLOCK):
+        part = q[i : i + BLOCK]
+        states = InverseDynamics(robot, len(part))
+        states(part, np.zeros_like(part), np.zeros_like(part))
+        found[i : i + BLOCK] = states.inertia()
+    return found
