@@ -8,22 +8,25 @@ import pytest
 OURS = {"models", "sim", "identify", "experiments"}
 
 CONTRACT = {
+    "idbench.identify.basis",
+    "idbench.identify.basis.friction.shape",
     "idbench.identify.data.motion_log",
     "idbench.identify.data.kinematics",
     "idbench.identify.plugins",
     "idbench.identify.errors",
     "idbench.identify.blame",
 }
-"""What `sim` may know of `identify`: the contract types, the plug-in tables, and whose mistake it is if one goes wrong."""
+"""What `sim` may know of `identify`: contract types, laws of friction, plug-in tables, and whose mistake it is."""
 
 ALLOWED = {
     "models": set(),
     "identify": {"identify", "numpy", "scipy"},
     "sim": {"sim", "models", "numpy", "mujoco", "ruckig", "pydantic"},
-    "experiments": {"experiments", "sim", "identify", "models", "numpy", "rerun", "rerun_cli", "rich", "tyro"},
+    "experiments": {"experiments", "sim", "identify", "models", "numpy", "rerun", "rerun_cli", "rich"},
 }
 
 ALLOWED_IN = {
+    **{f"experiments/cli/{name}.py": {"tyro"} for name in ("app", "help_text", "typed", "wrong_words")},
     "identify/files/arrow.py": {"pyarrow"},
     "identify/files/log_file.py": {"pyarrow"},
     "identify/files/ros_bag.py": {"rosbags"},
@@ -81,6 +84,13 @@ def test_arrows(package, root):
                 assert module in CONTRACT, f"{name} imports {module}"
             elif top in OURS or top not in sys.stdlib_module_names:
                 assert top in ALLOWED[package] | ALLOWED_IN.get(name, set()), f"{name} imports {module}"
+
+
+def test_the_command_line_is_known_to_itself_alone(root):
+    """Jobs, studies and sets of logs call functions: nobody writes a command that is parsed."""
+    for path in (path for folder in OURS for path in (root / folder).rglob("*.py")):
+        if not path.is_relative_to(root / "experiments" / "cli"):
+            assert not any(module.startswith("idbench.experiments.cli") for module in imports(path)), path
 
 
 def test_nobody_is_imported_under_two_names(root):

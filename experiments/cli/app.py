@@ -131,7 +131,7 @@ def _version() -> str:
 
 
 def _print(text: str) -> None:
-    from idbench.experiments.cli.page import new_page
+    from idbench.experiments.results.page import new_page
 
     page = new_page()
     page.print(text)

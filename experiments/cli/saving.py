@@ -5,9 +5,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from idbench.experiments.cli.page import Page
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.results.page import Page
 from idbench.experiments.results.writing import write_summary
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import to_toml

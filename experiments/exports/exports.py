@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import fields, is_dataclass
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
@@ -14,7 +15,7 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.consistent_robot import WrittenRobot
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.robot_model import RobotModel
-from idbench.identify import AbstractBlock, Parameter, ShapedFriction
+from idbench.identify import AbstractBlock, AbstractFriction, Parameter, SettingError, ShapedFriction
 from idbench.identify.basis import LoadFriction
 from idbench.identify.basis.of_joints import inner_of
 from idbench.identify.basis.parameter import BODY
@@ -24,29 +25,28 @@ from idbench.sim.robot.rewrite import rewritten
 if TYPE_CHECKING:
     from idbench.identify import Array
 
-TERMS: Mapping[str, tuple[str, Mapping[str, str]]] = {
-    "Fva": ("np.abs(qd)", {}),
-    "Fst": ("np.exp(-((np.abs(qd) / {vs}) ** {exponent})) * np.sign(qd)", {"vs": "vs", "exponent": "ds"}),
-    "Fp": ("np.abs(qd) ** {exponent} * np.sign(qd)", {"exponent": "ap"}),
-    "Ft": ("np.tanh(qd / {vt})", {"vt": "vt"}),
-    "Fat": ("2 / np.pi * np.arctan(qd / {vat})", {"vat": "vat"}),
-    "Fl": ("np.abs(load) * np.sign(qd)", {}),
-}
-"""Letters of a law -> its torque of a unit parameter, and the letters of its settings."""
+LOAD = "np.abs(load) * np.sign(qd)"
+"""Friction that grows with the load: the torque of a unit parameter, where `load` is the torque without friction."""
+
+APART = ("Ia", "Fv", "Fs", "off")
+"""Letters of what the function has by itself, beside the links."""
 
 
 def lines_of(fit: Fit, values: Mapping[str, float]) -> list[str]:
-    """Return the lines that add the laws to `tau`, whose torque without friction is `load`."""
+    """Return the lines that add the laws to `tau`, each by its own `force`; `load` is the torque without friction."""
     n, lines = fit.basis.n, list[str]()
     for block in fit.basis.blocks:
-        law = _law(block)
+        inner, law = inner_of(block), _law(block)
         letters = getattr(law, "symbol", "Fl" if isinstance(law, LoadFriction) else "")
-        if letters not in TERMS or not any(f"{letters}{j + 1}" in values for j in range(n)):
+        if not letters or letters in APART or not any(f"{letters}{j + 1}" in values for j in range(n)):
             continue
-        text, settings = TERMS[letters]
-        each = {name: [values.get(f"{x}{j + 1}", _fixed(law, name)) for j in range(n)] for name, x in settings.items()}
+        shapes = {shape.setting: shape.letters for shape in getattr(inner, "shapes", ())}
+        text = LOAD if isinstance(law, LoadFriction) else law.source()
+        each = {
+            name: [values.get(f"{shapes.get(name)}{j + 1}", _fixed(law, name)) for j in range(n)] for name in _settings(law)
+        }
         torque = text.format(**{name: _array(x) for name, x in each.items()})
-        lines.append(f"tau = tau + {_array([values.get(f'{letters}{j + 1}', 0.0) for j in range(n)])} * {torque}")
+        lines.append(f"tau = tau + {_array([values.get(f'{letters}{j + 1}', 0.0) for j in range(n)])} * ({torque})")
     return lines
 
 
@@ -54,6 +54,10 @@ def _law(block: AbstractBlock) -> Any:
     """Return the law of a block, of some joints, with unknown shapes or without."""
     inner = inner_of(block)
     return inner.law if isinstance(inner, ShapedFriction) else inner
+
+
+def _settings(law: Any) -> tuple[str, ...]:
+    return tuple(each.name for each in fields(law)) if is_dataclass(law) else ()
 
 
 def _fixed(law: Any, setting: str) -> float:
@@ -65,8 +69,16 @@ def _array(values: list[float]) -> str:
     return f"np.array({[float(f'{x:.12g}') for x in values]})"
 
 
-KNOWN = ("Ia", "Fv", "Fs", "off", *TERMS, *(letters for _, settings in TERMS.values() for letters in settings.values()))
-"""Letters of the laws that a controller's function has, beside the links."""
+def _known(robot_model: RobotModel) -> set[str]:
+    """Return the letters of what the function has beside the links; SettingError if a law's force cannot be written."""
+    found = set(APART)
+    for block in robot_model.basis.blocks:
+        inner, law = inner_of(block), _law(block)
+        if isinstance(law, AbstractFriction) and law.symbol not in APART:
+            _ = law.source()
+        if isinstance(law, AbstractFriction | LoadFriction):
+            found |= set(inner.letters())  # type: ignore[attr-defined]  # both kinds of laws have letters
+    return found
 
 
 def standard_of(fit: Fit, model: str) -> dict[str, float]:
@@ -85,7 +97,11 @@ def standard_of(fit: Fit, model: str) -> dict[str, float]:
 
 def require_known(robot_model: RobotModel, target: object) -> None:
     """Raise ExperimentError if a robot has what a controller's function does not: springs, other laws, coupled drives."""
-    strange = [p for p in robot_model.grouping.standard.parameters if p.kind not in BODY and (p.symbol not in KNOWN or p.drive)]
+    try:
+        known = _known(robot_model)
+    except SettingError as error:
+        raise ExperimentError(f"{target}: {error}") from error
+    strange = [p for p in robot_model.grouping.standard.parameters if p.kind not in BODY and (p.symbol not in known or p.drive)]
     if strange:
         names = ", ".join(parameter.name for parameter in strange[:6])
         raise ExperimentError(

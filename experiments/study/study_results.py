@@ -26,8 +26,8 @@ MOST_REASONS = 3
 """Reasons of failures that are printed; the report has all."""
 
 if TYPE_CHECKING:
-    from idbench.experiments.cli.page import Page
     from idbench.experiments.recording.study_recording import StudyRecording
+    from idbench.experiments.results.page import Page
 
 
 def write_results(page: "Page", store: Store, folder: ResultsFolder, recording: "StudyRecording | None") -> None:

@@ -1,9 +1,13 @@
 """Laws of a joint: torques that depend on its own motion, or load, alone."""
 
+import ast
+import inspect
+import re
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, final
+from textwrap import dedent
+from typing import Any, ClassVar, final
 
 import numpy as np
 
@@ -83,6 +87,25 @@ class AbstractFriction(AbstractJointLaw):
     @abstractmethod
     def force(self, q: Array, qd: Array) -> Array:
         """Return the friction torque of a unit parameter, (..., joint, time), positive when it resists qd > 0."""
+
+    @final
+    def source(self) -> str:
+        """Return `force` as a Python expression of q, qd, np and, in braces, the law's settings, as written functions have it.
+
+        Raises
+        ------
+        SettingError
+            If it is more than one expression of these.
+        """
+        lines: Any = ast.parse(dedent(inspect.getsource(type(self).force))).body[0]
+        code = [line for line in lines.body if not isinstance(line, ast.Delete | ast.Expr)]
+        names = {node.id for line in code for node in ast.walk(line) if isinstance(node, ast.Name)}
+        if len(code) != 1 or not isinstance(code[0], ast.Return) or not names <= {"q", "qd", "np", "self"}:
+            raise SettingError(
+                f"the force of {type(self).__name__} cannot be written: let it return one expression of q, qd, np and self"
+            )
+        expression: Any = code[0].value
+        return re.sub(r"\bself\.(\w+)", r"{\1}", ast.unparse(expression))
 
     @final
     def letters(self) -> Mapping[str, tuple[Kind, str]]:

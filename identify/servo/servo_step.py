@@ -79,7 +79,7 @@ class Acting(NamedTuple):
 
 
 @_compiled
-def _friction(p: ServoLaw, speed: float, motor: float, external: float, sent: float) -> float:
+def friction(p: ServoLaw, speed: float, motor: float, external: float, sent: float) -> float:
     """Return the torque by which friction can resist at most [N m]."""
     total = p.Fs
     load = abs(external - motor)
@@ -124,8 +124,8 @@ def _after(p: ServoLaw, of: Acting, speed: float, h: float) -> float:
     free = speed + later * (of.push + of.external - (damping + p.Fv) * speed)
     motor = of.push - damping * speed
     sent = math.copysign(light, free) * (of.J * motor - p.Ia * of.external)
-    friction = _friction(p, speed, motor, of.external, sent) + p.Fo * (1 - of.on)
-    return _slowed(free, speed, later * friction)
+    resisting = friction(p, speed, motor, of.external, sent) + p.Fo * (1 - of.on)
+    return _slowed(free, speed, later * resisting)
 
 
 @_compiled

@@ -7,6 +7,7 @@ from idbench.sim.frictions.lugre import Dahl as Dahl
 from idbench.sim.frictions.lugre import LuGre as LuGre
 from idbench.sim.frictions.static import Asymmetric as Asymmetric
 from idbench.sim.frictions.static import CoulombViscous as CoulombViscous
+from idbench.sim.frictions.static import Law as Law
 from idbench.sim.frictions.static import LoadDependent as LoadDependent
 from idbench.sim.frictions.static import Stribeck as Stribeck
 from idbench.sim.frictions.static import Warming as Warming
@@ -19,6 +20,7 @@ FRICTIONS: PluginTable[AbstractFrictionLaw] = PluginTable(
         "stribeck": Stribeck,
         "asymmetric": Asymmetric,
         "load": LoadDependent,
+        "law": Law,
         "warming": Warming,
         "lugre": LuGre,
         "dahl": Dahl,

@@ -1,15 +1,21 @@
-"""Friction that changes as the drives warm up."""
+"""Frictions that depend on the motion, the load or the temperature alone, not on what was before."""
 
+from dataclasses import field, fields, is_dataclass
 from typing import Annotated, final
 
 import numpy as np
 from mujoco.batch import Batch
 from pydantic import Field
 
+from idbench.identify.basis import BLOCKS, AbstractFriction, Shape, ShapedFriction, StribeckFriction
+from idbench.identify.basis.friction.shape import with_settings
 from idbench.sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import EachNotNegative, EachNotNegativeOrNone, EachNumber, Number, Positive, per_joint, settings
+
+SLOW, JUMP = 1e-9, 1e-6
+"""Speed at which a joint is as good as at rest [rad/s], and change of a unit law over twice that which is a jump."""
 
 
 @final
@@ -66,18 +72,81 @@ class Stribeck(AbstractFrictionLaw):
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
         """Return the law, which sets MuJoCo's Coulomb friction anew in every step: its constraint keeps standing joints."""
         del h
-        return _StribeckContact(self, plant.expand("dof_frictionloss"), Fs)
+        law = StribeckFriction(self.velocity)
+        return _LawContact(law, plant, Fs, (self.static - 1) * Fs)
 
 
-class _StribeckContact(AbstractContact):
-    def __init__(self, settings: Stribeck, frictionloss: Array, Fs: Array) -> None:
-        self._settings = settings
-        self._frictionloss = frictionloss
+@final
+@settings
+class Law(AbstractFrictionLaw):
+    """size g(q, qd) of a law that is identified, such as tanh or a law of one's own, beside Fs sign(qd) + Fv qd."""
+
+    law: str = "tanh"
+    """Name of the law, among the blocks of `idbench list` that have one parameter a joint."""
+    size: EachNumber = (0.1,)
+    """Its parameter, of all joints or of each, in the law's unit."""
+    settings: dict[str, Number] = field(default_factory=dict)
+    """Values of its settings, such as vt = 0.05; by default those at which their identification starts."""
+    viscous: EachNotNegativeOrNone = None
+    """Fv [N m s/rad], of all joints or of each; without it the robot's own."""
+    coulomb: EachNotNegativeOrNone = None
+    """Fs [N m], of all joints or of each; without it the robot's own."""
+
+    def __post_init__(self) -> None:
+        _ = self._force
+
+    @property
+    def steady(self) -> bool:
+        """False."""
+        return False
+
+    def truth(self, robot: Robot) -> dict[str, float]:
+        """Return the law's parameter, and its shapes that are identified, too."""
+        each, n = per_joint(self.size, robot.n, "friction.size"), robot.n
+        found = {f"{self._force.symbol}{j + 1}": float(x) for j, x in enumerate(each)}
+        for shape in self._shapes:
+            found |= {f"{shape.letters}{j + 1}": float(getattr(self._force, shape.setting)) for j in range(n)}
+        return found
+
+    def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
+        """Return the law: where it jumps at rest MuJoCo's Coulomb friction, set anew in every step, keeps standing joints."""
+        del h
+        return _LawContact(self._force, plant, Fs, per_joint(self.size, Fs.shape[-1], "friction.size"))
+
+    @property
+    def _shapes(self) -> tuple[Shape, ...]:
+        block = BLOCKS.create(self.law)
+        return block.shapes if isinstance(block, ShapedFriction) else ()
+
+    @property
+    def _force(self) -> AbstractFriction:
+        block = BLOCKS.create(self.law)
+        law = block.law if isinstance(block, ShapedFriction) else block
+        if not isinstance(law, AbstractFriction):
+            raise ValueError(f"{self.law} is no law of friction with one parameter a joint")
+        start = {shape.setting: shape.start for shape in self._shapes}
+        known: list[str] = [each.name for each in fields(law)] if is_dataclass(law) else []
+        if unknown := sorted(self.settings.keys() - set(known)):
+            raise ValueError(f"{self.law} has no setting {unknown[0]!r}; it has {', '.join(known) or 'none'}")
+        return with_settings(law, {**start, **self.settings}) if known else law
+
+
+class _LawContact(AbstractContact):
+    def __init__(self, law: AbstractFriction, plant: Batch, Fs: Array, size: Array) -> None:
+        self._law = law
         self._Fs = Fs.copy()
+        self._size = size
+        self._q = plant.bind("qpos")
+        still = np.zeros(Fs.shape)
+        ahead, back = (law.force(still, still + x) for x in (SLOW, -SLOW))
+        self._frictionloss = plant.expand("dof_frictionloss") if np.any(np.abs(ahead - back) > JUMP) else None
 
     def torque(self, qd: Array) -> Array | float:
-        rise = (self._settings.static - 1) * np.exp(-((qd / self._settings.velocity) ** 2))
-        self._frictionloss[:] = self._Fs * (1 + rise)
+        if self._frictionloss is None:
+            found: Array = -self._size * self._law.force(self._q, qd)
+            return found
+        moving = np.where(qd == 0, SLOW, qd)
+        self._frictionloss[:] = np.maximum(self._Fs + self._size * self._law.force(self._q, moving) * np.sign(moving), 0.0)
         return 0.0
 
 

@@ -17,9 +17,9 @@ from pathlib import Path
 import mujoco
 from mujoco.batch import Batch
 
-from idbench.experiments.cli.page import new_page
 from idbench.experiments.recording.study_recording import StudyRecording
 from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.results.page import new_page
 from idbench.experiments.study.cluster import cluster_pool
 from idbench.experiments.study.run_study import local_pool, run_missing
 from idbench.experiments.study.store import Store

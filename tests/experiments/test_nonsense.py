@@ -328,7 +328,7 @@ def test_little_memory_is_told(start):
 
 def test_progress_is_told_by_model_and_estimator(csv, monkeypatch, capfd):
     """A line for each stage where there is no terminal, at most every so often; none on standard output."""
-    monkeypatch.setattr("idbench.experiments.cli.page.EVERY", 0.002)
+    monkeypatch.setattr("idbench.experiments.results.page.EVERY", 0.002)
     assert main([*IDENTIFY, "--estimator", "GLS", "--no-rerun"]) == 0
     out, err = capfd.readouterr()
     assert "identifying: " in err

@@ -5,10 +5,10 @@ from pathlib import Path
 from rich.text import Text
 
 from idbench.experiments.cli.options.tools import Check, New
-from idbench.experiments.cli.page import new_page, stages_of
 from idbench.experiments.contracts.contract import Example
 from idbench.experiments.contracts.contracts import found, keeps
 from idbench.experiments.errors import ExperimentError
+from idbench.experiments.results.page import new_page, stages_of
 from idbench.experiments.starters.starters import new_example, new_plugin, new_scenario, new_set, new_study
 
 

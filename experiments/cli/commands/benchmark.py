@@ -9,9 +9,9 @@ from idbench.experiments.benchmark.definition import SHIPPED, read_definition, s
 from idbench.experiments.benchmark.job import Made, rows_of, sets_of
 from idbench.experiments.benchmark.tables import print_rows, report
 from idbench.experiments.cli.options.jobs import Benchmark
-from idbench.experiments.cli.page import Page, new_page, shown, stages_of
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.results.page import Page, new_page, shown, stages_of
 from idbench.experiments.results.writing import write_summary
 
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from idbench.experiments.cli.command_text import command_of
 from idbench.experiments.cli.options.jobs import Excite
-from idbench.experiments.cli.page import new_page, progress_of, shown
 from idbench.experiments.cli.saving import Files, saved, write_scenario
 from idbench.experiments.excite.excited import Excited
 from idbench.experiments.excite.job import designed, excited, files_of
@@ -17,6 +16,7 @@ from idbench.experiments.judgement.warnings import FILE, warnings_of_robot
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.reports.excite import print_excited, print_sequence
 from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.results.page import new_page, progress_of, shown
 from idbench.identify.files.log_file import write_log
 from idbench.sim.limits.motion_limits import looser
 

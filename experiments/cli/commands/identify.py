@@ -13,7 +13,6 @@ from idbench.experiments.cli.commands.follow import Follower
 from idbench.experiments.cli.commands.identify_views import Shown, require_layer, require_targets, view_all
 from idbench.experiments.cli.options.jobs import Identify
 from idbench.experiments.cli.own_parts import with_own_parts
-from idbench.experiments.cli.page import Page, new_page, shown, stages_of
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.job import files_of, fit_of, loaded_logs, notes_of, read_options, request_of, summary_of
@@ -25,6 +24,7 @@ from idbench.experiments.reports.estimates import conclusion, shown_whole
 from idbench.experiments.reports.printed import print_fit, print_held_out
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.results.page import Page, new_page, shown, stages_of
 from idbench.experiments.results.writing import write_summary
 from idbench.identify.files.log_file import write_log
 

@@ -8,7 +8,6 @@ from typing import final
 from rich.text import Text
 
 from idbench.experiments.cli.options.jobs import Identify
-from idbench.experiments.cli.page import Page
 from idbench.experiments.errors import ExperimentError, ResultsError
 from idbench.experiments.exports.exports import EXPORTS
 from idbench.experiments.identification.fit import Fit
@@ -18,6 +17,7 @@ from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import RECORDING, ResultsFolder
 from idbench.experiments.results.manifest import Manifest
+from idbench.experiments.results.page import Page
 from idbench.experiments.results.writing import require_free, write_text
 
 

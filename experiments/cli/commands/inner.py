@@ -2,10 +2,10 @@
 
 from typing import TYPE_CHECKING
 
-from idbench.experiments.cli.page import Page
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.recording.audience import Audience, Watching
+from idbench.experiments.results.page import Page
 from idbench.sim.scenario.scenario import Scenario
 
 if TYPE_CHECKING:

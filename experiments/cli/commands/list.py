@@ -5,8 +5,8 @@ from rich.table import Table
 from rich.text import Text
 
 from idbench.experiments.cli.options.tools import List
-from idbench.experiments.cli.page import new_page
 from idbench.experiments.plugin_tables import TABLES, plugin_conflicts
+from idbench.experiments.results.page import new_page
 from idbench.identify.plugins import PluginTable
 
 

@@ -8,7 +8,6 @@ from rich.text import Text
 
 from idbench.experiments.cli.command_text import command_of
 from idbench.experiments.cli.options.jobs import IdentifyGains, IdentifyPayload
-from idbench.experiments.cli.page import Page, new_page, progress_of, shown, stages_of
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.loads.job import GainsFit, PayloadFit, files_of, gains_of, payload_of, simulated_pairs
@@ -17,6 +16,7 @@ from idbench.experiments.loads.loads_text import body_of, gains_summary, payload
 from idbench.experiments.loads.simulated import PairScore
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.results.page import Page, new_page, progress_of, shown, stages_of
 from idbench.experiments.results.writing import require_free, write_summary, write_text
 from idbench.experiments.text import new_table, print_titled
 from idbench.identify.loads.payload import PayloadEstimate

@@ -8,11 +8,11 @@ from pathlib import Path
 from rich.text import Text
 
 from idbench.experiments.cli.options.tools import ShowLog
-from idbench.experiments.cli.page import Page, new_page, shown
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.logs import LogFacts
 from idbench.experiments.identification.reading import columns_of
 from idbench.experiments.results.attempts import Attempts
+from idbench.experiments.results.page import Page, new_page, shown
 from idbench.experiments.results.writing import new_file, require_free, write_text
 from idbench.experiments.text import new_table, print_titled
 from idbench.identify import LogError

@@ -10,7 +10,6 @@ from rich.console import Console
 from idbench.experiments.cli.command_text import command_of
 from idbench.experiments.cli.commands.inner import doubt_window, recording_of, require_window
 from idbench.experiments.cli.options.jobs import SearchCommand, Table1Command, Table2Command
-from idbench.experiments.cli.page import new_page, progress_of, shown
 from idbench.experiments.cli.saving import saved
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.paper.job import Searching, searched, table1_of, table2_of
@@ -19,6 +18,7 @@ from idbench.experiments.paper.motions_report import picture, print_motions
 from idbench.experiments.paper.table1_text import print_table1
 from idbench.experiments.paper.table2 import print_table2
 from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.results.page import new_page, progress_of, shown
 from idbench.experiments.results.writing import require_free, write_text
 from idbench.identify.files.log_file import write_log
 from idbench.sim.scenario.scenario_file import load, to_toml

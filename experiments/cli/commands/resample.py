@@ -6,10 +6,10 @@ from pathlib import Path
 from rich.text import Text
 
 from idbench.experiments.cli.options.tools import Export, Resample
-from idbench.experiments.cli.page import new_page, shown
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.reading import channel_of, columns_of, stated_by
 from idbench.experiments.identification.robot_model import SCARA
+from idbench.experiments.results.page import new_page, shown
 from idbench.experiments.results.writing import folder_for, new_file, require_free
 from idbench.identify import MotionLog
 from idbench.identify.data.resample import Repaired

@@ -9,10 +9,10 @@ from rich.console import Console
 from rich.text import Text
 
 from idbench.experiments.cli.options.tools import DescribeRobot
-from idbench.experiments.cli.page import new_page
 from idbench.experiments.identification.robot_model import RobotModel, absolute
 from idbench.experiments.judgement.warnings import FILE, warnings_of_robot
 from idbench.experiments.reports.budget import Budget
+from idbench.experiments.results.page import new_page
 from idbench.experiments.text import new_table, print_titled
 from idbench.sim.errors import BenchError
 from idbench.sim.trajectories import RandomMoves

@@ -11,7 +11,6 @@ from idbench.experiments.cli.command_text import command_of
 from idbench.experiments.cli.commands.inner import doubt_window, recording_of, require_window
 from idbench.experiments.cli.options.jobs import RunCommand
 from idbench.experiments.cli.own_parts import with_own_parts
-from idbench.experiments.cli.page import Page, new_page, shown, stages_of
 from idbench.experiments.cli.saving import Files, saved, write_scenario
 from idbench.experiments.identification.log_warnings import warnings_of_log
 from idbench.experiments.identification.scenario_run import ScenarioRun
@@ -20,6 +19,7 @@ from idbench.experiments.plugin_tables import plugin_conflicts
 from idbench.experiments.reports.estimates import shown_whole
 from idbench.experiments.reports.printed import print_fit
 from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.results.page import Page, new_page, shown, stages_of
 from idbench.experiments.servo.identification import servo_toml, write_commands
 from idbench.experiments.study.one_run import files_of, run_of
 from idbench.identify.files.log_file import write_log

@@ -1,7 +1,7 @@
 """The command that writes scenarios."""
 
 from idbench.experiments.cli.options.tools import WriteScenario
-from idbench.experiments.cli.page import new_page
+from idbench.experiments.results.page import new_page
 from idbench.experiments.results.writing import require_free, write_text
 from idbench.sim.scenario.scenario_file import designed, load, names, to_toml
 

@@ -9,12 +9,12 @@ from rich.text import Text
 
 from idbench.experiments.cli.command_text import command_of
 from idbench.experiments.cli.options.jobs import IdentifyServo
-from idbench.experiments.cli.page import Page, new_page, shown, stages_of
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.results.page import Page, new_page, shown, stages_of
 from idbench.experiments.results.writing import require_free, write_summary, write_text
 from idbench.experiments.servo.identification import Servos
 from idbench.experiments.servo.job import ServosFit, files_of, servos_identified

@@ -7,10 +7,10 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from idbench.experiments.cli.options.jobs import StudyCommand
-from idbench.experiments.cli.page import new_page, runs_of, shown
 from idbench.experiments.errors import StudyError
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.folder import ResultsFolder
+from idbench.experiments.results.page import new_page, runs_of, shown
 from idbench.experiments.study.job import LARGEST_SHARD, pool_of, runs_of_shard, store_of
 from idbench.experiments.study.run_study import run_missing
 from idbench.experiments.study.statistics import cells

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from idbench.experiments.cli.options.tools import View
-from idbench.experiments.cli.page import new_page
 from idbench.experiments.errors import ExperimentError, ResultsError
 from idbench.experiments.recording.comparison_recording import compare
 from idbench.experiments.recording.folder import BASE, files, merge
 from idbench.experiments.recording.viewers import LOOPBACK, require_display, viewer_binary
+from idbench.experiments.results.page import new_page
 from idbench.experiments.results.writing import new_file
 
 LATEST = Path("runs")
