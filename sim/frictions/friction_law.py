@@ -1,6 +1,7 @@
 """What a friction of a scenario is: how the joints of the simulated robot resist."""
 
 from abc import ABC, abstractmethod
+from dataclasses import field
 from typing import final
 
 import mujoco
@@ -8,7 +9,7 @@ from mujoco.batch import Batch
 
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
-from idbench.sim.settings import EachNotNegativeOrNone, per_joint
+from idbench.sim.settings import EachNotNegativeOrNone, per_joint, settings
 
 
 class AbstractContact(ABC):
@@ -29,16 +30,19 @@ class AbstractContact(ABC):
         """
 
 
+@settings
 class AbstractFrictionLaw(ABC):
     """The settings of a friction; all have Fv and Fs."""
 
-    viscous: EachNotNegativeOrNone
-    coulomb: EachNotNegativeOrNone
+    viscous: EachNotNegativeOrNone = field(default=None, kw_only=True)
+    """Fv [N m s/rad], of all joints or of each; without it the robot's own."""
+    coulomb: EachNotNegativeOrNone = field(default=None, kw_only=True)
+    """Fs [N m], of all joints or of each; without it the robot's own."""
 
     @property
-    @abstractmethod
     def steady(self) -> bool:
-        """Whether MuJoCo alone makes the friction, so that many physics steps may be taken at once."""
+        """Whether MuJoCo alone makes the friction, so that many physics steps may be taken at once; not by default."""
+        return False
 
     @final
     def edit(self, spec: mujoco.MjSpec) -> None:

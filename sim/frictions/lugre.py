@@ -9,7 +9,7 @@ from pydantic import Field
 from idbench.sim.errors import ScenarioError
 from idbench.sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
 from idbench.sim.robot.motors import Array
-from idbench.sim.settings import EachNotNegativeOrNone, Number, Positive, settings
+from idbench.sim.settings import Number, Positive, settings
 
 
 @final
@@ -30,15 +30,6 @@ class LuGre(AbstractFrictionLaw):
     """Friction at the brink of motion, in multiples of Fs."""
     velocity: Positive = 0.1
     """Stribeck velocity [rad/s]."""
-    viscous: EachNotNegativeOrNone = None
-    """Fv [N m s/rad], of all joints or of each; without it the robot's own."""
-    coulomb: EachNotNegativeOrNone = None
-    """Fs [N m], of all joints or of each; without it the robot's own."""
-
-    @property
-    def steady(self) -> bool:
-        """False."""
-        return False
 
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
         """Return unbent bristles; MuJoCo's own Coulomb friction is switched off.
@@ -93,15 +84,6 @@ class Dahl(AbstractFrictionLaw):
 
     deflection: Positive = 1e-3
     """Bristle deflection at which Fs is reached [rad]: stiffness is Fs over it."""
-    viscous: EachNotNegativeOrNone = None
-    """Fv [N m s/rad], of all joints or of each; without it the robot's own."""
-    coulomb: EachNotNegativeOrNone = None
-    """Fs [N m], of all joints or of each; without it the robot's own."""
-
-    @property
-    def steady(self) -> bool:
-        """False."""
-        return False
 
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
         """Return unbent bristles."""

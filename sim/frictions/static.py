@@ -12,7 +12,7 @@ from idbench.identify.basis.friction.shape import with_settings
 from idbench.sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
-from idbench.sim.settings import EachNotNegative, EachNotNegativeOrNone, EachNumber, Number, Positive, per_joint, settings
+from idbench.sim.settings import EachNotNegative, EachNumber, Number, Positive, per_joint, settings
 
 SLOW, JUMP = 1e-9, 1e-6
 """Speed at which a joint is as good as at rest [rad/s], and change of a unit law over twice that which is a jump."""
@@ -22,11 +22,6 @@ SLOW, JUMP = 1e-9, 1e-6
 @settings
 class CoulombViscous(AbstractFrictionLaw):
     """Fs sign(qd) + Fv qd; near standstill MuJoCo's soft constraint decides."""
-
-    viscous: EachNotNegativeOrNone = None
-    """Fv [N m s/rad], of all joints or of each; without it the robot's own."""
-    coulomb: EachNotNegativeOrNone = None
-    """Fs [N m], of all joints or of each; without it the robot's own."""
 
     @property
     def steady(self) -> bool:
@@ -54,15 +49,6 @@ class Stribeck(AbstractFrictionLaw):
     """Friction at the brink of motion, in multiples of Fs."""
     velocity: Positive = 0.1
     """Stribeck velocity [rad/s]: above it the rise is gone."""
-    viscous: EachNotNegativeOrNone = None
-    """Fv [N m s/rad], of all joints or of each; without it the robot's own."""
-    coulomb: EachNotNegativeOrNone = None
-    """Fs [N m], of all joints or of each; without it the robot's own."""
-
-    @property
-    def steady(self) -> bool:
-        """False."""
-        return False
 
     def truth(self, robot: Robot) -> dict[str, float]:
         """Return Fst and vs."""
@@ -87,18 +73,9 @@ class Law(AbstractFrictionLaw):
     """Its parameter, of all joints or of each, in the law's unit."""
     settings: dict[str, Number] = field(default_factory=dict)
     """Values of its settings, such as vt = 0.05; by default those at which their identification starts."""
-    viscous: EachNotNegativeOrNone = None
-    """Fv [N m s/rad], of all joints or of each; without it the robot's own."""
-    coulomb: EachNotNegativeOrNone = None
-    """Fs [N m], of all joints or of each; without it the robot's own."""
 
     def __post_init__(self) -> None:
         _ = self._force
-
-    @property
-    def steady(self) -> bool:
-        """False."""
-        return False
 
     def truth(self, robot: Robot) -> dict[str, float]:
         """Return the law's parameter, and its shapes that are identified, too."""
@@ -161,15 +138,6 @@ class Asymmetric(AbstractFrictionLaw):
     """Half of what viscous friction forwards has above that backwards [N m s/rad], of all joints or of each."""
     edge: Positive = 0.002
     """Speed over which the offset rises [rad/s]: a joint that stands is not pushed."""
-    viscous: EachNotNegativeOrNone = None
-    """Fv [N m s/rad], of all joints or of each; without it the robot's own."""
-    coulomb: EachNotNegativeOrNone = None
-    """Fs [N m], of all joints or of each; without it the robot's own."""
-
-    @property
-    def steady(self) -> bool:
-        """False."""
-        return False
 
     def truth(self, robot: Robot) -> dict[str, float]:
         """Return off and Fva."""
@@ -208,15 +176,6 @@ class LoadDependent(AbstractFrictionLaw):
 
     share: EachNotNegative = (0.1,)
     """Friction over load, of all joints or of each."""
-    viscous: EachNotNegativeOrNone = None
-    """Fv [N m s/rad], of all joints or of each; without it the robot's own."""
-    coulomb: EachNotNegativeOrNone = None
-    """Fs [N m], of all joints or of each; without it the robot's own."""
-
-    @property
-    def steady(self) -> bool:
-        """False."""
-        return False
 
     def truth(self, robot: Robot) -> dict[str, float]:
         """Return Fl."""
@@ -261,15 +220,6 @@ class Warming(AbstractFrictionLaw):
     """Temperature in the end [deg C]."""
     time: Positive = 60.0
     """Time constant of the warming [s]."""
-    viscous: EachNotNegativeOrNone = None
-    """Fv [N m s/rad], of all joints or of each; without it the robot's own."""
-    coulomb: EachNotNegativeOrNone = None
-    """Fs [N m], of all joints or of each; without it the robot's own."""
-
-    @property
-    def steady(self) -> bool:
-        """False."""
-        return False
 
     def truth(self, robot: Robot) -> dict[str, float]:
         """Return FvT."""

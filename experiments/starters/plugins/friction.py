@@ -7,7 +7,7 @@ from mujoco.batch import Batch
 
 from idbench.sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
 from idbench.sim.robot.motors import Array
-from idbench.sim.settings import EachNotNegativeOrNone, NotNegative, settings
+from idbench.sim.settings import NotNegative, settings
 
 
 @final
@@ -15,17 +15,8 @@ from idbench.sim.settings import EachNotNegativeOrNone, NotNegative, settings
 class Starter(AbstractFrictionLaw):
     """Coulomb and viscous friction, and drag that grows with the square of the velocity."""
 
-    viscous: EachNotNegativeOrNone = None
-    """Fv [N m s/rad], of all joints or of each; without it the robot's own."""
-    coulomb: EachNotNegativeOrNone = None
-    """Fs [N m], of all joints or of each; without it the robot's own."""
     drag: NotNegative = 0.01
     """Fq [N m s^2/rad^2], of all joints."""
-
-    @property
-    def steady(self) -> bool:
-        """False: the torque changes from step to step."""
-        return False
 
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
         """Return the friction at work."""
