@@ -10,6 +10,7 @@ OURS = {"models", "sim", "identify", "experiments"}
 CONTRACT = {
     "idbench.identify.basis",
     "idbench.identify.basis.friction.shape",
+    "idbench.identify.basis.parameter",
     "idbench.identify.data.motion_log",
     "idbench.identify.data.kinematics",
     "idbench.identify.plugins",

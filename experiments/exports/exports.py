@@ -18,7 +18,7 @@ from idbench.experiments.identification.robot_model import RobotModel
 from idbench.identify import AbstractBlock, AbstractFriction, Parameter, SettingError, ShapedFriction
 from idbench.identify.basis import LoadFriction
 from idbench.identify.basis.of_joints import inner_of
-from idbench.identify.basis.parameter import BODY
+from idbench.identify.basis.parameter import BODY, named
 from idbench.identify.data.kinematics import INERTIAL, Joint
 from idbench.sim.robot.rewrite import rewritten
 
@@ -38,15 +38,15 @@ def lines_of(fit: Fit, values: Mapping[str, float]) -> list[str]:
     for block in fit.basis.blocks:
         inner, law = inner_of(block), _law(block)
         letters = getattr(law, "symbol", "Fl" if isinstance(law, LoadFriction) else "")
-        if not letters or letters in APART or not any(f"{letters}{j + 1}" in values for j in range(n)):
+        if not letters or letters in APART or not any(named(letters, j) in values for j in range(n)):
             continue
         shapes = {shape.setting: shape.letters for shape in getattr(inner, "shapes", ())}
         text = LOAD if isinstance(law, LoadFriction) else law.source()
         each = {
-            name: [values.get(f"{shapes.get(name)}{j + 1}", _fixed(law, name)) for j in range(n)] for name in _settings(law)
+            name: [values.get(named(shapes.get(name, ""), j), _fixed(law, name)) for j in range(n)] for name in _settings(law)
         }
         torque = text.format(**{name: _array(x) for name, x in each.items()})
-        lines.append(f"tau = tau + {_array([values.get(f'{letters}{j + 1}', 0.0) for j in range(n)])} * ({torque})")
+        lines.append(f"tau = tau + {_array([values.get(named(letters, j), 0.0) for j in range(n)])} * ({torque})")
     return lines
 
 
@@ -182,7 +182,7 @@ def python_text(fit: Fit, model: str, target: Path) -> str:
     require_known(fit.robot_model, target)
     tree, values = fit.robot_model.tree, standard_of(fit, model)
     n = tree.n
-    each = {x: [values.get(f"{x}{j + 1}", 0.0) for j in range(n)] for x in ("Ia", "Fv", "Fs", "off")}
+    each = {x: [values.get(named(x, j), 0.0) for j in range(n)] for x in ("Ia", "Fv", "Fs", "off")}
     text = files("idbench.experiments.exports").joinpath("inverse_dynamics.py.txt").read_text(encoding="utf-8")
     words = {
         "{laws}": "".join(f"    {line}\n" for line in lines_of(fit, values)),
@@ -195,7 +195,7 @@ def python_text(fit: Fit, model: str, target: Path) -> str:
         "{estimator!r}": repr(fit.request.estimator),
         "{gravity}": repr([float(x) for x in tree.gravity]),
         "{tree}": pformat([_joint(joint) for joint in tree.joints], width=110),
-        "{links}": pformat([[values.get(f"{x}{j + 1}", 0.0) for x in INERTIAL] for j in range(n)], width=110),
+        "{links}": pformat([[values.get(named(x, j), 0.0) for x in INERTIAL] for j in range(n)], width=110),
         **{f"{{{x}}}": repr(of) for x, of in each.items()},
     }
     for mark, word in words.items():

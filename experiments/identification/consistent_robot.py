@@ -9,7 +9,7 @@ from typing import final
 from idbench.experiments.identification.consistent_estimate import consistent_of
 from idbench.experiments.identification.fit import Fit
 from idbench.identify import Consistent
-from idbench.identify.basis.parameter import FRICTION
+from idbench.identify.basis.parameter import FRICTION, named
 from idbench.sim.robot.rewrite import compiled, rewritten
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import standard_parameters
@@ -42,9 +42,9 @@ class WrittenRobot:
     def values(self) -> dict[str, float]:
         """The standard parameters by name; those that were not asked for are zero."""
         found, robot_model = self.consistent, self.fit.robot_model
-        without = {f"Ia{j + 1}": 0.0 for j in range(robot_model.basis.n)} if robot_model.asked.armature == "none" else {}
+        without = {named("Ia", j): 0.0 for j in range(robot_model.basis.n)} if robot_model.asked.armature == "none" else {}
         for letters, law in (("Fv", "viscous"), ("Fs", "coulomb")):
-            without |= {f"{letters}{j + 1}": 0.0 for j, own in enumerate(robot_model.laws.names) if law not in own}
+            without |= {named(letters, j): 0.0 for j, own in enumerate(robot_model.laws.names) if law not in own}
         return without | dict(zip(found.names, map(float, found.standard), strict=True))
 
     def text(self, folder: Path | None = None) -> str:

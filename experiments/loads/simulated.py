@@ -12,6 +12,7 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.requests.shared import Parameters
 from idbench.identify import Array, IdentificationError
+from idbench.identify.basis.parameter import named
 from idbench.identify.data.kinematics import INERTIAL
 from idbench.identify.loads.drive_gains import identify_drive_gains
 from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot
@@ -127,7 +128,7 @@ class Pairs:
 
         def found(run: int) -> Found:
             gains = identify_drive_gains(self.robot(run, known, true[run]))
-            return tuple(f"g{j + 1}" for j in range(n)), gains.gains, gains.sigma, true[run]
+            return tuple(named("g", j) for j in range(n)), gains.gains, gains.sigma, true[run]
 
         return self._scored(found, told)
 

@@ -10,6 +10,7 @@ from idbench.experiments.servo.identification import known_servos
 from idbench.experiments.servo.joints import Joints, JointsLog
 from idbench.experiments.study.statistics import BOUNDS
 from idbench.identify import MotionLog
+from idbench.identify.basis.parameter import named
 from idbench.identify.files.servo_log import ServoColumns
 from idbench.identify.servo import Servo, ServoFit, ServoRun, identify_servo, parameters_of
 from idbench.sim.drives import ServoDrive
@@ -45,7 +46,7 @@ def law_of(text: str) -> Law:
 def names_of(scenario: Scenario, laws: Sequence[str]) -> tuple[str, ...]:
     """Return the parameters of all joints with any of the laws."""
     letters = dict.fromkeys(x for text in laws for x in law_of(text).letters)
-    return tuple(f"{x}{j + 1}" for j in range(scenario.real_robot.n) for x in letters)
+    return tuple(named(x, j) for j in range(scenario.real_robot.n) for x in letters)
 
 
 def truth_of(scenario: Scenario) -> dict[str, float]:
@@ -61,7 +62,7 @@ def truth_of(scenario: Scenario) -> dict[str, float]:
         of_joint |= {"lead": drive.lead, "dead_band": drive.dead_band}
         if not drive.off:  # then damping shows as one
             of_joint |= {"b": of_joint["b"] + of_joint["Fv"], "Fv": 0.0}
-        found |= {f"{name}{j + 1}": float(x) for name, x in of_joint.items()}
+        found |= {named(name, j): float(x) for name, x in of_joint.items()}
     return found | scenario.friction.truth(robot)
 
 
@@ -78,7 +79,7 @@ def servo_columns(law: str, simulated: Run, i: int) -> dict[str, float] | str:
             why.append(str(fit))
             continue
         for name, sigma in fit.standard_errors.items():
-            at, bound = f"{name}{j + 1}", fit.bound[name]
+            at, bound = named(name, j), fit.bound[name]
             found |= {at: fit.p[name], f"{at}.sigma": sigma, f"{at}.paper_sigma": bound, f"{at}.truth": truth.get(at, np.nan)}
             found |= dict.fromkeys((at + part for part in BOUNDS), bound)
     return found or "; ".join(why)

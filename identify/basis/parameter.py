@@ -33,6 +33,11 @@ OF_A_SLIDE = {"N m": "N", "N m s/rad": "N s/m", "kg m^2": "kg"}
 """Units of rotor inertia and friction of a hinge -> those of a slide."""
 
 
+def named(letters: str, joint: int) -> str:
+    """Return the name of a joint's parameter: its letters, and the number of the joint, from 1."""
+    return f"{letters}{joint + 1}"
+
+
 @final
 @dataclass(frozen=True)
 class Parameter:
@@ -62,7 +67,7 @@ class Parameter:
     def name(self) -> str:
         """What it is called in tables, such as Fv2."""
         letters = (self.label or self.symbol) + "R" * self.grouped
-        return f"{letters}_{self.drive}" if self.drive else letters if self.joint is None else f"{letters}{self.joint + 1}"
+        return f"{letters}_{self.drive}" if self.drive else letters if self.joint is None else named(letters, self.joint)
 
     def of_a_slide(self) -> Self:
         """Return this parameter with the unit that it has where the joint slides."""

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from idbench.identify.basis import BLOCKS, AbstractFriction, Shape, ShapedFriction, StribeckFriction
 from idbench.identify.basis.friction.shape import with_settings
+from idbench.identify.basis.parameter import named
 from idbench.sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
@@ -53,7 +54,7 @@ class Stribeck(AbstractFrictionLaw):
     def truth(self, robot: Robot) -> dict[str, float]:
         """Return Fst and vs."""
         rise = (self.static - 1) * robot.model.dof_frictionloss
-        return {f"Fst{j + 1}": float(x) for j, x in enumerate(rise)} | {f"vs{j + 1}": self.velocity for j in range(robot.n)}
+        return {named("Fst", j): float(x) for j, x in enumerate(rise)} | {named("vs", j): self.velocity for j in range(robot.n)}
 
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
         """Return the law, which sets MuJoCo's Coulomb friction anew in every step: its constraint keeps standing joints."""
@@ -80,9 +81,9 @@ class Law(AbstractFrictionLaw):
     def truth(self, robot: Robot) -> dict[str, float]:
         """Return the law's parameter, and its shapes that are identified, too."""
         each, n = per_joint(self.size, robot.n, "friction.size"), robot.n
-        found = {f"{self._force.symbol}{j + 1}": float(x) for j, x in enumerate(each)}
+        found = {named(self._force.symbol, j): float(x) for j, x in enumerate(each)}
         for shape in self._shapes:
-            found |= {f"{shape.letters}{j + 1}": float(getattr(self._force, shape.setting)) for j in range(n)}
+            found |= {named(shape.letters, j): float(getattr(self._force, shape.setting)) for j in range(n)}
         return found
 
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
@@ -142,7 +143,7 @@ class Asymmetric(AbstractFrictionLaw):
     def truth(self, robot: Robot) -> dict[str, float]:
         """Return off and Fva."""
         pairs = (("off", self._each("offset", robot.n)), ("Fva", self._each("difference", robot.n)))
-        return {f"{letters}{j + 1}": float(x) for letters, values in pairs for j, x in enumerate(values)}
+        return {named(letters, j): float(x) for letters, values in pairs for j, x in enumerate(values)}
 
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
         """Return what the directions differ by; MuJoCo makes the rest."""
@@ -179,7 +180,7 @@ class LoadDependent(AbstractFrictionLaw):
 
     def truth(self, robot: Robot) -> dict[str, float]:
         """Return Fl."""
-        return {f"Fl{j + 1}": float(x) for j, x in enumerate(per_joint(self.share, robot.n, "friction.share"))}
+        return {named("Fl", j): float(x) for j, x in enumerate(per_joint(self.share, robot.n, "friction.share"))}
 
     def start(self, plant: Batch, Fs: Array, h: float) -> AbstractContact:
         """Return the law, which sets MuJoCo's Coulomb friction anew in every step: its constraint keeps standing joints."""
@@ -223,7 +224,7 @@ class Warming(AbstractFrictionLaw):
 
     def truth(self, robot: Robot) -> dict[str, float]:
         """Return FvT."""
-        return {f"FvT{j + 1}": float(x) for j, x in enumerate(per_joint(self.slope, robot.n, "friction.slope"))}
+        return {named("FvT", j): float(x) for j, x in enumerate(per_joint(self.slope, robot.n, "friction.slope"))}
 
     def conditions(self, t: Array, n: int) -> dict[str, Array]:
         """Return the temperature, the same of all joints."""

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from idbench.identify.basis.parameter import named
 from idbench.identify.data.kinematics import INERTIAL
 from idbench.sim.errors import RobotError
 from idbench.sim.robot.dh import TABLE
@@ -61,9 +62,9 @@ def rewritten(name: str, standard: Values, folder: Path | None = None, mounting:
     _set_tendons(robot, root, wanted)
     for j, joint in enumerate(joints):
         for letters, attribute in DRIVE.items():
-            if f"{letters}{j + 1}" in wanted:
-                joint.set(attribute, repr(float(wanted[f"{letters}{j + 1}"])))
-        if f"M{j + 1}" in wanted:
+            if named(letters, j) in wanted:
+                joint.set(attribute, repr(float(wanted[named(letters, j)])))
+        if named("M", j) in wanted:
             _set_link(robot, bodies, j, wanted)
     home = Robot.path(name).absolute().parent
     if folder is not None:

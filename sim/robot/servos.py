@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from idbench.identify.basis.parameter import named
 from idbench.sim.errors import RobotError
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.mounting import PLAIN, Mounting
@@ -103,7 +104,7 @@ def with_servos(
         If the file does not compile.
     """
     robot = Robot.load(name, mounting.edit)
-    letters = {f"{x}{j + 1}": y for j, s in servos.items() for x, y in _passive(s).items()}
+    letters = {named(x, j): y for j, s in servos.items() for x, y in _passive(s).items()}
     root = ElementTree.fromstring(rewritten(name, letters, folder, mounting))
     for joint in root.iter("joint"):
         if joint.get("name") in [robot.joints[j] for j in servos]:

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import mujoco
 import numpy as np
 
+from idbench.identify.basis.parameter import named
 from idbench.identify.data.kinematics import GROUND, INERTIAL, Coupling, Joint, KinematicTree
 from idbench.sim.errors import RobotError
 from idbench.sim.robot.motors import Array
@@ -99,11 +100,11 @@ def standard_parameters(robot: Robot) -> dict[str, float]:
         if j + 1 == robot.n or model.jnt_bodyid[j + 1] != body:
             inertia, first, mass = _inertial(model, body)
             values = *inertia[np.triu_indices(3)], *first, mass
-            found |= {f"{x}{j + 1}": float(v) for x, v in zip(INERTIAL, values, strict=True)}
+            found |= {named(x, j): float(v) for x, v in zip(INERTIAL, values, strict=True)}
         for letters, field in (("Ia", "dof_armature"), ("Fv", "dof_damping"), ("Fs", "dof_frictionloss")):
-            found[f"{letters}{j + 1}"] = float(getattr(model, field)[j])
+            found[named(letters, j)] = float(getattr(model, field)[j])
         if model.jnt_stiffness[j].any():
-            found[f"K{j + 1}"] = float(np.ravel(model.jnt_stiffness[j])[0])
+            found[named("K", j)] = float(np.ravel(model.jnt_stiffness[j])[0])
     for i in fixed_tendons(model):
         for letters, field in TENDON.items():
             found[f"{letters}_{tendon_name(model, i)}"] = float(np.ravel(getattr(model, field)[i])[0])

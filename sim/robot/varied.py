@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from mujoco.batch import Batch
 
+from idbench.identify.basis.parameter import named
 from idbench.identify.data.kinematics import INERTIAL
 from idbench.sim.errors import RobotError, ScenarioError
 from idbench.sim.robot.motors import Array
@@ -44,11 +45,11 @@ def model_fields(robot: Robot, standard: Mapping[str, Array]) -> dict[str, Array
     names += tuple(TENDON.values()) if model.ntendon else ()
     found = {name: np.repeat(getattr(model, name)[None], nsim, axis=0).astype(np.float64) for name in names}
     for j in range(robot.n):
-        if f"M{j + 1}" in standard:
-            _set_link(robot, j, np.stack([standard[f"{x}{j + 1}"] for x in INERTIAL], axis=-1), found)
+        if named("M", j) in standard:
+            _set_link(robot, j, np.stack([standard[named(x, j)] for x in INERTIAL], axis=-1), found)
         for letters, name in DRIVE.items():
-            if f"{letters}{j + 1}" in standard:
-                found[name][:, j] = standard[f"{letters}{j + 1}"]
+            if named(letters, j) in standard:
+                found[name][:, j] = standard[named(letters, j)]
     for i in fixed_tendons(model):
         for letters, name in TENDON.items():
             if (key := f"{letters}_{tendon_name(model, i)}") in standard:

@@ -5,6 +5,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from idbench.identify.basis.parameter import named
 from idbench.identify.data.kinematics import INERTIAL, KinematicTree
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.mounting import Mounting
@@ -92,9 +93,9 @@ def _bare(link: ElementTree.Element) -> None:
 
 def _give(link: ElementTree.Element, standard: Mapping[str, float], j: int, origin: Array | None = None) -> None:
     """Give a link its mass, centre of mass and inertia, about an origin of its own."""
-    if f"M{j + 1}" not in standard:
+    if named("M", j) not in standard:
         return
-    xx, xy, xz, yy, yz, zz, *first, mass = (standard[f"{x}{j + 1}"] for x in INERTIAL)
+    xx, xy, xz, yy, yz, zz, *first, mass = (standard[named(x, j)] for x in INERTIAL)
     centre = np.array(first) / mass if mass > 0 else np.zeros(3)
     about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     inertia = about - mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
@@ -112,8 +113,8 @@ def _resist(joint: ElementTree.Element, standard: Mapping[str, float], j: int) -
     dynamics = joint.find("dynamics")
     dynamics = ElementTree.SubElement(joint, "dynamics") if dynamics is None else dynamics
     for letters, attribute in (("Fv", "damping"), ("Fs", "friction")):
-        if f"{letters}{j + 1}" in standard:
-            dynamics.set(attribute, repr(float(standard[f"{letters}{j + 1}"])))
+        if named(letters, j) in standard:
+            dynamics.set(attribute, repr(float(standard[named(letters, j)])))
 
 
 def _turn(axis: Array, angle: float) -> Array:
