@@ -1,34 +1,21 @@
-"""The functions of `idbench`: each makes a request of its arguments, and does what its command does."""
+"""Robots, logs, fits and simulations: each function makes a request of its arguments, and does what its command does."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
+from idbench.experiments.api.logs import given_log, motion_log
 from idbench.experiments.api.results import Identification, SimulatedRun
-from idbench.experiments.api.study_table import StudyTable
-from idbench.experiments.benchmark.job import rows_of
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.excite.excited import Excited
-from idbench.experiments.excite.job import excited
 from idbench.experiments.identification.job import chooses_band, fit_of, identified, read_options, request_of
 from idbench.experiments.identification.load import judged_on, prepared, with_held_out
-from idbench.experiments.identification.reading import ReadLog, file_of, given_log, motion_log, read
+from idbench.experiments.identification.reading import ReadLog, file_of, read
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel, absolute
-from idbench.experiments.loads.job import GainsFit, PayloadFit, gains_of, payload_of
-from idbench.experiments.paper.job import table1_of, table2_of
-from idbench.experiments.paper.table1 import Table1
-from idbench.experiments.paper.table2 import Table2
 from idbench.experiments.requests import jobs
 from idbench.experiments.requests.shared import LogRequest, MountingOptions, Parameters
 from idbench.experiments.requests.table import keys_of, request_from
-from idbench.experiments.servo.job import ServosFit, servos_identified
-from idbench.experiments.study.job import LARGEST_SHARD, pool_of, runs_of_shard
-from idbench.experiments.study.run_study import run_missing
-from idbench.experiments.study.store import Store
-from idbench.experiments.study.study_file import load_study
 from idbench.identify import BLOCKS, CHAINS, ESTIMATORS, MODELS, MotionLog
 from idbench.identify.plugins import Table
 from idbench.sim.engine.simulation import simulate as simulated
@@ -63,7 +50,7 @@ def load_robot(robot: str | Path, **keys: Any) -> RobotModel:
     >>> idbench.load_robot("scara", add="offset").basis.names[-2:]
     ('off1', 'off2')
     """
-    asked = request_from(LogRequest, _named(keys), "load_robot", taken=_others((Parameters, MountingOptions)))
+    asked = request_from(LogRequest, named(keys), "load_robot", taken=_others((Parameters, MountingOptions)))
     made = RobotModel(absolute(str(robot)), asked.parameters, asked.mounting.mounting)
     _ = made.basis
     return made
@@ -133,10 +120,10 @@ def fit(
     >>> found.parameters["Fs1"].unit, round(found.parameters["Fs1"].value, 4)
     ('N m', 0.5)
     """
-    logs = _several(log)
-    held_out = _several(validate)
+    logs = several(log)
+    held_out = several(validate)
     model = robot if isinstance(robot, RobotModel) else None
-    table = _named(keys) | ({} if robot is None or model else {"robot": robot})
+    table = named(keys) | ({} if robot is None or model else {"robot": robot})
     paths = {name: tuple(map(Path, given)) for name, given in (("log", logs), ("validate", held_out)) if _files(given)}
     asked = request_from(jobs.IdentifyRequest, table | paths, "fit", taken={"label"})
     delay_given = asked.torque_delay != "estimate"
@@ -173,101 +160,11 @@ def simulate(scenario: str | Path | Scenario, seed: int | None = None, **keys: A
     """
     made = scenario if isinstance(scenario, Scenario) else load_scenario(str(scenario))
     made = made if seed is None else replace(made, seed=seed)
-    asked = request_from(LogRequest, _named(keys), "simulate", taken=_others((Parameters,)))
+    asked = request_from(LogRequest, named(keys), "simulate", taken=_others((Parameters,)))
     return SimulatedRun(simulated(made), RobotModel(made.robot, asked.parameters))
 
 
-def study(
-    name: str | Path, *, seeds: int | None = None, out: str | Path | None = None, threads: int | None = None, **parts: Any
-) -> StudyTable:
-    """Return a study that was run: errors and coverage of every combination.
-
-    Parameters
-    ----------
-    name : str or Path
-        Name of a shipped study (`idbench study` lists them), or its file (TOML).
-    seeds : int, optional
-        Independent runs per combination, instead of the study's number.
-    out : str or Path, optional
-        Folder that keeps all runs; an interrupted study goes on there. By default nothing is kept.
-    threads : int, optional
-        Shards at a time; by default all processors.
-    **parts
-        models, chains, estimators, friction: names, objects or classes, instead of the study's.
-
-    Raises
-    ------
-    StudyError, ExperimentError, BenchError
-        If there is no such study, or it cannot be run.
-
-    Examples
-    --------
-    >>> import idbench
-    >>> table = idbench.study("encoder", seeds=2, chains=["idbench"], models=["explicit"], estimators=["OLS"])
-    >>> table.study.size == len(table.rows["run"])
-    True
-    """
-    tables = {f"{key}s": PARTS[key] for key in ("model", "chain", "estimator")} | {"friction": BLOCKS}
-    if unknown := sorted(parts.keys() - tables.keys()):
-        raise ExperimentError(f"study: unknown key {unknown[0]!r}; known: seeds, out, threads, {', '.join(tables)}")
-    changed: dict[str, Any] = {key: tuple(map(tables[key].name_of, _several(value))) for key, value in parts.items()}
-    described = load_study(str(name))
-    described = replace(described, **changed) if seeds is None else replace(described, **changed).with_seeds(seeds)
-    asked = jobs.StudyRequest(threads=threads)
-    with TemporaryDirectory(prefix="idbench-") as folder:
-        store = Store.new(described, Path(folder) / described.name if out is None else Path(out))
-        with store.held(), pool_of(asked, store) as pool:
-            if pool is not None:
-                run_missing(store, pool, min(LARGEST_SHARD, runs_of_shard(asked, store)), _unheard)
-        return StudyTable.of(store)
-
-
-def fit_payload(log: Logs, unloaded: Logs = (), **keys: Any) -> PayloadFit:
-    """Return what the gripper holds, as `idbench payload` finds it; files of logs, and its options by keyword."""
-    return payload_of(_asked(jobs.PayloadRequest, "fit_payload", keys, log=log, unloaded=unloaded))
-
-
-def fit_gains(log: Logs, unloaded: Logs = (), **keys: Any) -> GainsFit:
-    """Return the torque constants of the drives, as `idbench gains` finds them; files of logs, and its options by keyword."""
-    return gains_of(_asked(jobs.GainsRequest, "fit_gains", keys, log=log, unloaded=unloaded))
-
-
-def fit_servos(log: Logs, robot: str | Path, servo: str | Path, **keys: Any) -> ServosFit:
-    """Return servos, identified from commands and positions as `idbench servo` does; files, and its options by keyword."""
-    return servos_identified(_asked(jobs.ServoRequest, "fit_servos", {**keys, "robot": robot, "servo": servo}, log=log))
-
-
-def design(robot: str | Path, **keys: Any) -> Excited:
-    """Return an exciting trajectory within the robot's limits, as `idbench excite` designs it; its options by keyword."""
-    return excited(_asked(jobs.ExciteRequest, "design", {**keys, "robot": robot}), _unheard)[0]
-
-
-def benchmark(*sets: str | Path, out: str | Path = Path("runs") / "benchmark", force: bool = False) -> dict[str, Any]:
-    """Return the rows of sets of real logs, by name, as `idbench benchmark` makes them; or why a set has none."""
-    asked = _asked(jobs.BenchmarkRequest, "benchmark", {}, sets=sets)
-    return dict(rows_of(asked, Path(out), _unheard, force=force))
-
-
-def table1(**keys: Any) -> Table1:
-    """Return the paper's simulation comparison (Table 1); options of `idbench table1`: chain, seed, scenario."""
-    return table1_of(_asked(jobs.Table1Request, "table1", keys))
-
-
-def table2(**keys: Any) -> Table2:
-    """Return the paper's experiment on the virtual robot (Table 2); option: scenario."""
-    return table2_of(_asked(jobs.Table2Request, "table2", keys), _unheard)
-
-
-def _unheard(*_: object) -> None:
-    """Show no progress: `idbench.identify.telling.listening` hears it."""
-
-
-def _asked(request: type[Any], where: str, keys: Mapping[str, Any], **files: Any) -> Any:
-    given = {name: tuple(map(Path, _several(value))) for name, value in files.items()}
-    return request_from(request, {**_named(keys), **{name: value for name, value in given.items() if value}}, where)
-
-
-def _named(keys: Mapping[str, Any]) -> dict[str, Any]:
+def named(keys: Mapping[str, Any]) -> dict[str, Any]:
     """Return keys with names in the place of objects and classes, which the tables have from now on."""
     return {key: _names(PARTS[key], value) if key in PARTS else value for key, value in keys.items()}
 
@@ -276,7 +173,8 @@ def _names(table: Table[Any], value: Any) -> Any:
     return tuple(map(table.name_of, value)) if isinstance(value, list | tuple) else table.name_of(value)
 
 
-def _several(given: Any) -> tuple[Any, ...]:
+def several(given: Any) -> tuple[Any, ...]:
+    """Return one thing, or several, as a tuple."""
     one = isinstance(given, str | Path | MotionLog) or not isinstance(given, Iterable)
     return (given,) if one else tuple(given)
 

@@ -8,11 +8,11 @@ from typing import Any, final
 
 import numpy as np
 
+from idbench.experiments.api.logs import given_log
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.exports.exports import EXPORTS
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.job import summary_of
-from idbench.experiments.identification.reading import given_log
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.judgement.checks import checks
 from idbench.experiments.judgement.judgement import Judgement, judge

@@ -149,33 +149,6 @@ def read(path: Path, options: ReadOptions, robot_model: RobotModel | None) -> Re
     return ReadLog(path, (log,), columns, channel, None, tuple(notes))
 
 
-def motion_log(path: Path, options: ReadOptions, robot_model: RobotModel | None = None) -> MotionLog:
-    """Return the log of a file, with the names of its joints; raise ExperimentError if it has several pieces."""
-    found = read(path, options, robot_model)
-    if len(found.logs) > 1:
-        raise ExperimentError(f"{path} has {len(found.logs)} pieces with gaps between them: give the file itself to the fit")
-    names = found.columns.joints if robot_model is None else robot_model.robot.joints
-    return replace(found.logs[0], joints=names)
-
-
-def given_log(name: str, log: MotionLog, robot_model: RobotModel) -> ReadLog:
-    """Return a log of Python as one that was read, its joints in the order of the robot."""
-    joints = robot_model.robot.joints
-    columns = LogColumns(log.t, log.q, log.tau, log.torque, log.joints)
-    try:
-        _ = columns.ordered(joints)
-    except LogError as error:
-        raise ExperimentError(f"{name}: {error}") from error
-    if log.joints and log.joints != joints:
-        place = [log.joints.index(joint) for joint in joints]
-        gain = np.asarray(log.torque.gain)
-        torque = replace(log.torque, gain=tuple(gain[place].tolist())) if gain.size > 1 else log.torque
-        conditions = {key: x[..., place] if x.shape[-1] > 1 else x for key, x in log.conditions.items()}
-        log = replace(log, q=log.q[..., place], tau=log.tau[..., place], torque=torque, conditions=conditions, joints=joints)
-    columns = LogColumns(log.t, log.q, log.tau, log.torque, joints)
-    return ReadLog(Path(name), (replace(log, joints=()),), columns, log.torque)
-
-
 def read_as(first: Path, path: Path, options: ReadOptions, robot_model: RobotModel | None) -> ReadLog:
     """Return a log, its columns as the file beside another log says where none is beside this one.
 

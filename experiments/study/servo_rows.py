@@ -25,7 +25,7 @@ SERVO = "servo"
 """Name of the model in results."""
 
 
-class Law(NamedTuple):
+class StudiedLaw(NamedTuple):
     """A law of friction, and what else is found, as `load+lead` states it."""
 
     friction: str
@@ -37,10 +37,10 @@ class Law(NamedTuple):
         return parameters_of(self.friction, self.more)
 
 
-def law_of(text: str) -> Law:
+def law_of(text: str) -> StudiedLaw:
     """Return the law that a text states."""
     friction, *more = text.split("+")
-    return Law(friction, tuple(more))
+    return StudiedLaw(friction, tuple(more))
 
 
 def names_of(scenario: Scenario, laws: Sequence[str]) -> tuple[str, ...]:

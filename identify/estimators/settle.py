@@ -43,9 +43,9 @@ def settled(problem: Problem) -> Problem:
 
     Variable projection: for fixed shapes of friction the other parameters are linear. G. Golub and V. Pereyra, "The
     differentiation of pseudo-inverses and nonlinear least squares problems whose variables separate", SIAM J. Numerical
-    Analysis 10 (1973) 413-432; with columns of the shapes as slopes about the estimate, a round is a step of Gauss and Newton.
-    After convergence, other shapes are tried once more, joint by joint: the misfit has several minima.
-    Of logs too long for their rows to be kept, some pieces say what the shapes are.
+    Analysis 10 (1973) 413-432; with columns of the shapes as slopes about the estimate, a round is a step of Gauss and
+    Newton, X(k+1) = argmin |w (Y - W(b(X(k))) X)|. After convergence, other shapes are tried once more, joint by joint: the
+    misfit has several minima. Of logs too long for their rows to be kept, some pieces say what the shapes are.
     """
     if not problem.basis.is_nonlinear:
         return problem
@@ -60,7 +60,7 @@ def settled(problem: Problem) -> Problem:
 
 
 def _settled(rows: "AdaptiveRows", here: Basis) -> Basis:
-    """Return the basis about its own estimate, near where it begins."""
+    """Return the basis at its own estimate, near where it begins: b(k+1) = b(X(k)), X(k) = argmin |w (Y - W(b(k)) X)|."""
     there, cost = rows.factors(here), rows.misfit(here)
     for _ in range(ROUNDS):
         X = _estimate(there, here)

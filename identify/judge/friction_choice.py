@@ -82,6 +82,7 @@ class _Choice:
     candidates: Mapping[str, AbstractBlock]
 
     def run(self, most: int | None) -> FrictionChoice:
+        """Return the laws found by forward selection: laws(k+1) = laws(k) + argmax of the explained held-out squares."""
         laws: list[tuple[str, ...]] = [()] * self.problem.basis.n
         scores = dict[tuple[int, str], LawScore]()
         while True:

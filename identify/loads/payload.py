@@ -135,7 +135,10 @@ def apart(robot: LoadedRobot) -> PayloadEstimate:
 
 
 def difference(robot: LoadedRobot) -> PayloadEstimate:
-    """Identify the payload from the difference of the torques of one motion, repeated: friction falls out of it."""
+    """Identify the payload from the difference of the torques of one motion, repeated: friction falls out of it.
+
+    X(k+1) = argmin |w(k) (Y_loaded - Y_without - W X)|, w(k) one over the rms residual of each joint.
+    """
     pairs = list(zip(robot.without, robot.loaded, strict=False))
     if not pairs or len(robot.without) != len(robot.loaded) or not all(_repeated(*pair) for pair in pairs):
         raise LogError(

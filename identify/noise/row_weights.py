@@ -22,7 +22,8 @@ FAINT = 1e-3
 def two_levels(x: Array, z: Array, squares: Array) -> tuple[Array, Array]:
     """Return a and b, not negative, with which squares of expectation a x + b z are most likely, shape (...).
 
-    By least squares with errors in proportion to the expectation, round by round (Whittle's likelihood, of a spectrum).
+    (a, b)(k+1) = argmin sum ((y - a x - b z) / (a(k) x + b(k) z))^2: least squares with errors in proportion to the
+    expectation, iterated (Whittle's likelihood, of a spectrum).
 
     Parameters
     ----------

@@ -216,7 +216,9 @@ class Factors:
         return Factor(self.R, self.rows, self.names).squares(X[..., None, :])
 
     def fit(self, rounds: int = 0) -> LeastSquaresFit:
-        """Return the least-squares solution, with rows divided by the rms of their kind's residuals after the first round.
+        """Return the least-squares solution, with rows divided by the rms of their kind's residuals after the first step.
+
+        X(k+1) = argmin sum over kinds |Y - W X|^2 / rms(Y - W X(k))^2.
 
         Parameters
         ----------

@@ -114,7 +114,11 @@ class ServoSearch:
         return float(self.cost(self._loop.simulate(p))[0])
 
     def best(self, start: Mapping[str, float], rounds: int = 30) -> Found:
-        """Return the best parameters that are found from a start."""
+        """Return the best parameters that are found from a start.
+
+        Levenberg and Marquardt, x(k+1) = x(k) - (J' J + mu D)^-1 J' r, initial positions eliminated (Schur complement);
+        several mu, and samples about the step, are simulated at once, and the best of all is x(k+1).
+        """
         x, ahead = np.array([start[name] for name in self.free]), np.zeros(len(self._loop.runs))
         width = 1.0
         damping = 1e-2

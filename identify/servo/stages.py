@@ -63,7 +63,7 @@ class Valleys:
         self._held = dict(held)
 
     def from_start(self, p: Mapping[str, float], free: Sequence[str]) -> Found:
-        """Return what is found in coarse steps."""
+        """Return p = argmin cost in coarse steps, again from shaken starts, until cost(k+1) > (1 - ESCAPED) cost(k)."""
         found = self._search(self._coarse, p, free).best(p)
         for _ in range(SHAKEN):
             search = self._search(self._coarse, found.p, free)
@@ -102,7 +102,7 @@ class Valleys:
         return [tried[int(k)] for k in order]
 
     def _better(self, loop: ServoLoop, free: Sequence[str], found: Found) -> Found:
-        """Return what is found from both sides of the axes that are known worst, if it is better."""
+        """Return the best of searches from p +- sigma v, v the worst known axes, while cost(k+1) < (1 - ESCAPED) cost(k)."""
         for _ in range(SHAKEN):
             search = self._search(loop, found.p, free)
             tried = search.away(found)
@@ -114,7 +114,7 @@ class Valleys:
         return found
 
     def _along(self, loop: ServoLoop, free: Sequence[str], found: Found) -> Found:
-        """Return what is found where torques of other scales fit best: along a narrow valley a search of all ends early."""
+        """Return the best along p(f) = f p, f of all torques: in a narrow valley a search of all parameters ends early."""
         search = self._search(loop, found.p, free)
         others = ServoSearch(loop, [name for name in free if name != "a"], self._excitation.scales, search.c)
         best, cost = found.p, search.at(found).cost
@@ -124,7 +124,7 @@ class Valleys:
         return found if best is found.p else search.best(best, REFINED)
 
     def _of_scale(self, loop: ServoLoop, free: Sequence[str], found: Found) -> tuple[Found, float]:
-        """Return what is found, from other scales of the torques if that is better, and its contrast (see `ServoFit`)."""
+        """Return the best of searches from p(f) = f p, and the contrast min_f cost(f p) / cost(p) (see `ServoFit`)."""
         scaled, contrast = self._scaled(free, found.p)
         for _ in range(SHAKEN):
             if contrast > 1 - ESCAPED:

@@ -27,7 +27,8 @@ def without_wild_samples(x: Array, least: float) -> tuple[Array, npt.NDArray[np.
 
     A sample is wild if it differs from the cubic through two neighbours to either side by `WILD` standard deviations of such
     differences, as a quantile of their absolute values gives it, and by more than the samples near it. The most wild are
-    replaced first, so that one does not accuse its neighbours; what replaces them is a cubic spline through the others.
+    replaced first, so that one does not accuse its neighbours; what replaces them is a cubic spline through the others:
+    x(k+1) = spline of x(k) without its samples of |x - cubic| > WILD s.
 
     Parameters
     ----------

@@ -131,7 +131,9 @@ class _Amplifier(AbstractAmplifier):
         def each(values: tuple[float, ...], name: str) -> Array:
             return every(per_joint(values, n, f"drive.{name}"), nsim)
 
-        self._settings, self._h, self._t = settings, h, h / 2  # in the middle of the step to come
+        self._settings = settings
+        self._h = h
+        self._t = h / 2  # in the middle of the step to come
         self._K, self._R = each(settings.torque_constant, "torque_constant"), each(settings.resistance, "resistance")
         self._gain = settings.gain * each(settings.kp, "kp")
         self._most = each(settings.current_limit or (np.inf,), "current_limit")

@@ -14,18 +14,18 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from idbench.experiments.api.calls import benchmark as benchmark
-    from idbench.experiments.api.calls import design as design
     from idbench.experiments.api.calls import fit as fit
-    from idbench.experiments.api.calls import fit_gains as fit_gains
-    from idbench.experiments.api.calls import fit_payload as fit_payload
-    from idbench.experiments.api.calls import fit_servos as fit_servos
     from idbench.experiments.api.calls import load_robot as load_robot
     from idbench.experiments.api.calls import read_log as read_log
     from idbench.experiments.api.calls import simulate as simulate
-    from idbench.experiments.api.calls import study as study
-    from idbench.experiments.api.calls import table1 as table1
-    from idbench.experiments.api.calls import table2 as table2
+    from idbench.experiments.api.jobs import benchmark as benchmark
+    from idbench.experiments.api.jobs import design as design
+    from idbench.experiments.api.jobs import fit_gains as fit_gains
+    from idbench.experiments.api.jobs import fit_payload as fit_payload
+    from idbench.experiments.api.jobs import fit_servos as fit_servos
+    from idbench.experiments.api.jobs import study as study
+    from idbench.experiments.api.jobs import table1 as table1
+    from idbench.experiments.api.jobs import table2 as table2
     from idbench.experiments.api.results import Identification as Identification
     from idbench.experiments.api.results import ParameterEstimate as ParameterEstimate
     from idbench.experiments.api.results import Score as Score
@@ -42,10 +42,8 @@ if TYPE_CHECKING:
     from idbench.sim.scenario.scenario import Scenario as Scenario
 
 PLACES = {
-    "experiments.api.calls": (
-        *("load_robot", "read_log", "fit", "simulate", "study", "fit_payload", "fit_gains", "fit_servos"),
-        *("design", "benchmark", "table1", "table2"),
-    ),
+    "experiments.api.calls": ("load_robot", "read_log", "fit", "simulate"),
+    "experiments.api.jobs": ("study", "fit_payload", "fit_gains", "fit_servos", "design", "benchmark", "table1", "table2"),
     "experiments.api.results": ("Identification", "ParameterEstimate", "Score", "SimulatedRun"),
     "experiments.api.study_table": ("StudyTable",),
     "experiments.errors": ("ExperimentError",),

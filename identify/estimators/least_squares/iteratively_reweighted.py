@@ -56,7 +56,7 @@ class IterativelyReweighted(AbstractEstimator):
         require_whole(1, rounds=self.rounds)
 
     def solve(self, problem: Problem) -> Estimate:
-        """Return the estimate of every run."""
+        """Return the estimate of every run: X(k+1) = (W' w(k)^2 W)^-1 W' w(k)^2 Y, w(k) from the residuals Y - W X(k)."""
         clean = problem.with_logs([_clean(log) for log in problem.logs])
         rows, kinds = clean.rows, Kinds.of_rows(clean)
         Y, W = rows.Y * kinds.own, rows.W * kinds.own[..., None]

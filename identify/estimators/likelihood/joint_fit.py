@@ -95,7 +95,8 @@ class JointFit:
     def solved(self, floor: Array, steady: float = STEADY) -> "JointFit":
         """Return the fit whose likelihood is greatest; levels of the torques, not below `floor`, are found as well.
 
-        They count as settled when sigmas change by less than the share `steady`, in rms.
+        Steps are of Gauss and Newton, u(k+1) = u(k) - A^-1 g with A and g of `normal_equations`; levels and steps take
+        turns. They count as settled when sigmas change by less than the share `steady`, in rms.
 
         Raises
         ------

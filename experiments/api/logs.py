@@ -1,0 +1,39 @@
+"""Logs of a Python session, as jobs read them."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.reading import ReadLog, ReadOptions, read
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.identify import LogError, MotionLog
+from idbench.identify.data.log_columns import LogColumns
+
+
+def motion_log(path: Path, options: ReadOptions, robot_model: RobotModel | None = None) -> MotionLog:
+    """Return the log of a file, with the names of its joints; raise ExperimentError if it has several pieces."""
+    found = read(path, options, robot_model)
+    if len(found.logs) > 1:
+        raise ExperimentError(f"{path} has {len(found.logs)} pieces with gaps between them: give the file itself to the fit")
+    names = found.columns.joints if robot_model is None else robot_model.robot.joints
+    return replace(found.logs[0], joints=names)
+
+
+def given_log(name: str, log: MotionLog, robot_model: RobotModel) -> ReadLog:
+    """Return a log of Python as one that was read, its joints in the order of the robot."""
+    joints = robot_model.robot.joints
+    columns = LogColumns(log.t, log.q, log.tau, log.torque, log.joints)
+    try:
+        _ = columns.ordered(joints)
+    except LogError as error:
+        raise ExperimentError(f"{name}: {error}") from error
+    if log.joints and log.joints != joints:
+        place = [log.joints.index(joint) for joint in joints]
+        gain = np.asarray(log.torque.gain)
+        torque = replace(log.torque, gain=tuple(gain[place].tolist())) if gain.size > 1 else log.torque
+        conditions = {key: x[..., place] if x.shape[-1] > 1 else x for key, x in log.conditions.items()}
+        log = replace(log, q=log.q[..., place], tau=log.tau[..., place], torque=torque, conditions=conditions, joints=joints)
+    columns = LogColumns(log.t, log.q, log.tau, log.torque, joints)
+    return ReadLog(Path(name), (replace(log, joints=()),), columns, log.torque)
