@@ -6,8 +6,9 @@ the power model alone; a gain error scales everything.
 """
 
 import json
+import threading
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import TypeAlias
 
 from idbench.identify import (
@@ -25,7 +26,7 @@ from idbench.identify import (
 from idbench.identify.models import ExplicitModel, PowerModel
 from idbench.sim.drives import AveragedDrive, SwitchedDrive
 from idbench.sim.encoders import IncrementalEncoder
-from idbench.sim.engine.simulation import simulate
+from idbench.sim.engine.simulation import Progress, simulate
 from idbench.sim.frictions import Stribeck
 from idbench.sim.robot.scara import scara_truth
 from idbench.sim.scenario.measurement import TorqueMeasurement
@@ -79,16 +80,61 @@ def imperfections(table2: Scenario) -> list[Imperfection]:
     ]
 
 
-def errors_of(imperfection: Imperfection) -> Errors:
+class Attribution:
+    """Errors of all imperfections; their logs are simulated on threads, while the twin is. No bit depends on the threads.
+
+    Parameters
+    ----------
+    table2 : Scenario
+        The robot and its motion.
+    threads : int
+        Simulations at a time.
+    """
+
+    def __init__(self, table2: Scenario, threads: int = 2) -> None:
+        self._imperfections = imperfections(table2)
+        self._stop = threading.Event()
+        self._pool = ThreadPoolExecutor(threads)
+        every = dict.fromkeys(_key(one) for one in self._imperfections)
+        self._logs = {key: self._pool.submit(_simulated, key, self._go_on) for key in every}
+
+    def errors(self, progress: Progress | None = None) -> dict[str, Errors]:
+        """Return, for every imperfection, the signed error [%] of every parameter in each model."""
+        found = dict[str, Errors]()
+        try:
+            for one in self._imperfections:
+                found[one.name] = errors_of(one, *self._logs[_key(one)].result())
+                if progress:
+                    progress(len(found) / len(self._imperfections))
+        finally:
+            self.stop()
+        return found
+
+    def stop(self) -> None:
+        """End simulations that are not finished."""
+        self._stop.set()
+        self._pool.shutdown(cancel_futures=True)
+
+    def _go_on(self, share: float) -> None:
+        """Raise CancelledError in a simulation that nobody waits for any more."""
+        del share
+        if self._stop.is_set():
+            raise CancelledError
+
+
+def errors_of(imperfection: Imperfection, log: MotionLog, truth: list[float]) -> Errors:
     """Return the signed error [%] of every parameter in each model."""
-    log, truth = _ideal_but_for(json.dumps(to_dict(imperfection.scenario)))
     assumed = MotionLog(log.fs, log.q, log.tau, imperfection.assumed or log.torque)
     estimates = identify_each(assumed, scara(), COMPARED, imperfection.chain, WeightedLeastSquares())
     return {form: estimate.error_percent(truth) for form, estimate in estimates.items()}
 
 
-@cache
-def _ideal_but_for(scenario: str) -> tuple[MotionLog, list[float]]:
-    """Return the log of a scenario in JSON, which several imperfections may share, and the true parameters."""
-    run = simulate(from_dict(json.loads(scenario)))
+def _key(imperfection: Imperfection) -> str:
+    """Return the scenario, which several imperfections may share."""
+    return json.dumps(to_dict(imperfection.scenario))
+
+
+def _simulated(scenario: str, progress: Progress) -> tuple[MotionLog, list[float]]:
+    """Return the log of a scenario in JSON, and the true parameters."""
+    run = simulate(from_dict(json.loads(scenario)), progress=progress)
     return run.alone(), list(scara_truth(run.robots[0]).values())

@@ -19,8 +19,7 @@ from idbench.experiments.identification.fit import Fit, fit
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
-from idbench.experiments.paper.attribution import Errors
-from idbench.experiments.paper.parallel_attribution import ParallelAttribution
+from idbench.experiments.paper.attribution import Attribution, Errors
 from idbench.experiments.text import new_table, percent, print_table
 from idbench.identify import CHAINS, Estimate, TorqueChannel
 from idbench.sim.engine.run import Run
@@ -138,8 +137,8 @@ class Table2:
             self._attribution.stop()
 
     @cached_property
-    def _attribution(self) -> ParallelAttribution:
-        return ParallelAttribution(self.scenario)
+    def _attribution(self) -> Attribution:
+        return Attribution(self.scenario)
 
     def summary(self) -> dict[str, Any]:
         """Return summary.json: `models` holds processing `idbench`, `paper_processing` that of the paper."""

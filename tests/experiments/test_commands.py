@@ -222,7 +222,7 @@ def test_table2_on_a_short_motion(tmp_path, capsys, monkeypatch):
     path, out = tmp_path / "twin.toml", tmp_path / "out"
     path.write_text(to_toml(scenario))
     few = [i for i in imperfections(scenario) if i.name in ("nothing", "hold, not given", "gain error of 2 %")]
-    monkeypatch.setattr("idbench.experiments.paper.parallel_attribution.imperfections", lambda _: few)
+    monkeypatch.setattr("idbench.experiments.paper.attribution.imperfections", lambda _: few)
     assert main(["table2", "--scenario", str(path), "--out", str(out)]) == 0
     printed = capsys.readouterr().out
     assert "explicit model, 2 realizations" in printed
