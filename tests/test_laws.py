@@ -64,7 +64,7 @@ def test_a_force_that_is_no_expression_is_refused():
 
 @pytest.mark.parametrize("name", [*laws(), Square()], ids=str)
 def test_what_is_simulated_is_identified(name):
-    """The law alone makes what is identified of it; without noise, what is left is that the controller holds torques."""
+    """Without noise, the errors are those of held torques and of the low-pass."""
     name = BLOCKS.name_of(name)
     scenario = idbench.load_scenario("ideal")
     moves = RandomMoves(moves=12, durations=(0.6, 1.2), rest=0.1, seed=1)

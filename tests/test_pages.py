@@ -1,5 +1,6 @@
 """The pages: their tables are those of the results, their sentences can be read, their code runs."""
 
+import ast
 import json
 import re
 import subprocess
@@ -91,11 +92,21 @@ def test_diagrams_are_those_of_their_script(root):
 def test_notebooks_are_those_of_their_scripts(root):
     """What the site runs are the scripts; the notebooks beside them hold the same cells, without outputs."""
     scripts = sorted((root / "docs" / "notebooks").glob("*.py"))
-    assert len(scripts) == 2
+    assert len(scripts) == 5
     for script in scripts:
         cells = json.loads(script.with_suffix(".ipynb").read_text())["cells"]
         code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
         assert all(not cell.get("outputs") for cell in cells)
         source = script.read_text()
         assert all(piece in source for piece in code), "uv run --group docs python docs/build/notebooks.py"
-        assert len(cells) - len(code) == source.count('"""') // 2, script.name
+        texts = [node for node in ast.parse(source).body if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)]
+        assert len(cells) - len(code) == len(texts), script.name
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", ["comparison", "first_fit", "own_estimator", "own_law", "your_arm"])
+def test_a_notebook_runs_from_top_to_bottom(root, tmp_path, name):
+    source = (root / "docs" / "notebooks" / f"{name}.py").read_text()
+    code = source.split("from idbench.experiments.recording.notebook")[0]  # a viewer is for notebooks alone
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

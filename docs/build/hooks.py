@@ -35,7 +35,7 @@ def on_files(files: Files, config: Any) -> Files:
     from site_recordings import recordings
 
     made = {"reference/commands.md": commands(), "reference/settings.md": "\n".join(settings())}
-    made |= {"reference/names.md": "\n".join([*package("identify"), *simulator()])}
+    made |= {"reference/names.md": "\n".join([*session(), *package("identify"), *simulator()])}
     made |= notebook_pages()
     for path, text in made.items():
         files.append(File.generated(config, path, content=text))
@@ -122,26 +122,34 @@ def _shown(value: Any) -> str:
     return "its own section below" if is_dataclass(value) else "none" if nothing else f"`{value}`"
 
 
+def session() -> Iterator[str]:
+    """Yield what `import idbench` has."""
+    import idbench
+
+    yield "# idbench\n\nWhat `import idbench` has: the jobs of the commands, as functions ([15 lines of Python](../python.md)).\n"
+    places = {key: place for place, names in idbench.PLACES.items() for key in names}
+    yield from (f"::: idbench.{places[key]}.{key}\n" for key in idbench.__all__ if places[key].startswith("experiments"))
+
+
 def package(name: str) -> Iterator[str]:
     """Yield the public names of a package, those of one kind together."""
     from idbench import identify
 
     named = {key: value for key, value in vars(identify).items() if not key.startswith("_")}
     public = [key for key, value in named.items() if not isinstance(value, ModuleType)]
-    yield f"# {name}\n\nWhat `from {name} import ...` has, and [what of sim](#sim). Shapes and units are in [ ]."
+    yield f"# {name}\n\nWhat `from idbench.{name} import ...` has, and [what of sim](#sim). Shapes and units are in [ ]."
     yield "Equation numbers are the paper's.\n"
-    yield "Notebooks: [the paper's comparison](../notebooks/comparison.md), [identify your arm](../notebooks/your-arm.md).\n"
     taken = set[str]()
     for title, names in KINDS_OF_NAMES:
         taken |= set(names)
         yield f"## {title}\n"
-        yield from (f"::: identify.{key}\n" for key in names)
+        yield from (f"::: idbench.identify.{key}\n" for key in names)
     tables = [key for key in public if key.isupper()]
     yield "## Plug-in tables\n"
     yield f"{', '.join(f'`{key}`' for key in tables)}: from a name to what makes the plug-in. `idbench list` prints them.\n"
     yield "## Everything else\n"
     documented = [key for key in public if key not in taken | set(tables) | {"Array", "Columns"}]
-    yield from (f"::: identify.{key}\n" for key in sorted(documented, key=str.lower))
+    yield from (f"::: idbench.identify.{key}\n" for key in sorted(documented, key=str.lower))
 
 
 def simulator() -> Iterator[str]:

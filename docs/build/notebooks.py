@@ -27,11 +27,17 @@ def pages() -> dict[str, str]:
     for script in sorted(FOLDER.glob("*.py")):
         made = executed(notebook(script))
         for cell in made.cells:  # widgets, such as a viewer, are for notebooks alone
-            cell["outputs"] = [output for output in cell.get("outputs", []) if output.output_type == "stream"]
+            cell["outputs"] = [output for output in cell.get("outputs", []) if _is_text(output)]
         body, _ = MarkdownExporter(exclude_input_prompt=True).from_notebook_node(made)
         name = script.stem.replace("_", "-")
         found[f"notebooks/{name}.md"] = f"{body}\n*This page is the notebook `docs/notebooks/{script.stem}.ipynb`, run.*\n"
     return found
+
+
+def _is_text(output: nbformat.NotebookNode) -> bool:
+    """Return whether an output is printed text, or a table."""
+    data = output.get("data", {})
+    return bool(output.output_type == "stream" or ("text/html" in data and not any("widget" in kind for kind in data)))
 
 
 def notebook(script: Path) -> nbformat.NotebookNode:
