@@ -14,9 +14,9 @@ from idbench.experiments.exports.exports import EXPORTS
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.job import summary_of
 from idbench.experiments.identification.robot_model import RobotModel
-from idbench.experiments.judgement.checks import checks
+from idbench.experiments.judgement.held_out import Verdict
 from idbench.experiments.judgement.judgement import Judgement, judge
-from idbench.experiments.judgement.verdict import Verdict
+from idbench.experiments.judgement.remedies import checks
 from idbench.experiments.reports.estimates import conclusion
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.writing import write_text

@@ -3,24 +3,80 @@
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from idbench.experiments.benchmark.definition import Definition
-from idbench.experiments.benchmark.free_runs import free_runs
-from idbench.experiments.benchmark.repeats import repeats
 from idbench.experiments.benchmark.set_fit import SetFit
 from idbench.experiments.benchmark.tools import judged, predictions, what_tools_read, write_for_tools
 from idbench.experiments.errors import is_told, reason
-from idbench.experiments.identification.fit import Fit
-from idbench.experiments.judgement.held_out import HeldOut
+from idbench.experiments.identification.fit import Fit, fit
+from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.request import Request
+from idbench.experiments.judgement.held_out import WORDS, HeldOut
 from idbench.experiments.judgement.judgement import Unjudged, judge
-from idbench.experiments.judgement.verdict import WORDS
 from idbench.experiments.requests.jobs import IdentifyRequest
 from idbench.experiments.results.writing import finite
+from idbench.experiments.text import SIGMAS
+from idbench.identify import Estimate, IdentificationError, MotionLog
 from idbench.identify.judge.excitation import seen
+from idbench.sim.engine.driven import free_run
+
+
+class Repeats(NamedTuple):
+    """Differences of parameters between fits of single logs, in their standard errors."""
+
+    inside: int
+    """How many are within two."""
+    compared: int
+    """How many there are."""
+    failed: tuple[str, ...]
+    """Why logs have no fit."""
+
+
+def repeats(request: Request, logs: Sequence[MotionLog], names: Sequence[str]) -> Repeats:
+    """Return how fits of single logs agree, by the first model that each has."""
+    fits, failed = list[Estimate](), list[str]()
+    for log, name in zip(logs, names, strict=True):
+        try:
+            found: Fit = fit(request, Logs((log,), (name,), None, (), None))
+        except IdentificationError as error:
+            failed.append(f"{name}: {error}")
+        else:
+            fits.append(found.estimates[found.leading])
+    # What is grouped with what differs where fits left parameters out.
+    pairs = list(combinations(fits, 2))
+    alike = [(one, other) for one, other in pairs if one.names == other.names]
+    if len(alike) < len(pairs):
+        failed.append("fits of single logs that have different parameters are not compared")
+    z = [x for one, other in alike for x in _differences(one, other)]
+    return Repeats(int(np.sum(np.abs(z) < SIGMAS)), len(z), tuple(failed))
+
+
+def _differences(one: Estimate, other: Estimate) -> list[float]:
+    """Return the differences of the parameters, in standard errors."""
+    sigma = np.hypot(one.standard_errors, other.standard_errors)
+    z = (one.X - other.X) / np.where(sigma > 0, sigma, np.nan)
+    return [float(x) for x in z[np.isfinite(z)]]
+
+
+def free_runs(held_out: HeldOut, model: str, length: float) -> dict[str, Any]:
+    """Return what a summary says of positions that are simulated, from where the log is, for some time.
+
+    NRMSE is the rms of the error over the range of the joint in the log. A simulation that diverges is counted, and has no
+    other part in it.
+    """
+    robot, log, qd = held_out.driven(model)
+    measured, simulated = free_run(robot, log, qd, length)
+    kept = np.asarray(np.isfinite(simulated).all(axis=(1, 2)))
+    squares = (measured[kept] - simulated[kept]) ** 2
+    whole = np.ptp(log.q, axis=0)
+    nrmse = np.sqrt(squares.mean(axis=(0, 1))) / np.where(whole > 0, whole, np.nan) if kept.any() else np.full(log.n, np.nan)
+    return {"length": length, "stretches": len(kept), "diverged": int((~kept).sum()), "nrmse": [finite(x) for x in nrmse]}
+
 
 Made = tuple[dict[str, Any], Callable[[Path], None]]
 """The row of a set, and what writes the files that other tools read into a folder."""

@@ -8,7 +8,7 @@ from contextlib import suppress
 from tyro.extras import SubcommandApp
 
 from idbench.experiments.cli.interruption import INTERRUPTED, Notice, TerminatedError, importing, noticing, terminating
-from idbench.experiments.cli.typed import typed, untyped
+from idbench.experiments.cli.parser import typed, untyped
 from idbench.experiments.errors import ExperimentError, is_told, reason, report, visible
 
 DESCRIPTION = "A MuJoCo testbench for the dynamic identification of robots."
@@ -87,8 +87,7 @@ def _require_memory() -> None:
 
 def parsed(words: list[str]) -> Callable[[], None] | None:
     """Return the command that words name, with its options, or None if they asked for its help, which is shown."""
-    from idbench.experiments.cli.help_text import show_help, without_short
-    from idbench.experiments.cli.wrong_words import refused, require_command, require_once
+    from idbench.experiments.cli.parser import refused, require_command, require_once, show_help, without_short
 
     require_command(words, COMMANDS)
     if show_help(words, COMMANDS):

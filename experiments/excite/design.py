@@ -21,9 +21,8 @@ from idbench.identify.plugins import did_you_mean
 from idbench.sim.limits.clearance import Clearance
 from idbench.sim.limits.motion_limits import BOX, CLEARANCE, FLOOR, MotionLimits, home_of, limits_of, surroundings
 from idbench.sim.scenario.scenario import Scenario
-from idbench.sim.trajectories.approach import approach
-from idbench.sim.trajectories.reference import Reference
-from idbench.sim.trajectories.trajectory import AbstractTrajectory
+from idbench.sim.trajectories.time_optimal import approach
+from idbench.sim.trajectories.trajectory import AbstractTrajectory, Reference
 
 SIGMA, DETERMINANT = "sigma", "determinant"
 """What is minimised by default, and what that begins with."""

@@ -20,7 +20,7 @@ from idbench.sim.engine.simulation import Progress
 from idbench.sim.limits.motion_limits import floor_of
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import to_dict
-from idbench.sim.trajectories.reference import Reference
+from idbench.sim.trajectories.trajectory import Reference
 
 BINDING = 0.9
 """Share of a limit from which on it counts as active."""

@@ -13,7 +13,7 @@ from idbench.sim.limits.clearance import Clearance, Touch
 from idbench.sim.limits.motion_limits import MotionLimits
 from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from idbench.sim.robot.robot import Robot
-from idbench.sim.trajectories.reference import Reference
+from idbench.sim.trajectories.trajectory import Reference
 
 FS = 1000.0
 """Frequency [Hz] at which limits are looked at."""

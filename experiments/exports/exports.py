@@ -17,8 +17,8 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.identify import AbstractBlock, AbstractFriction, Parameter, SettingError, ShapedFriction
 from idbench.identify.basis import LoadFriction
+from idbench.identify.basis.block import BODY, named
 from idbench.identify.basis.of_joints import inner_of
-from idbench.identify.basis.parameter import BODY, named
 from idbench.identify.data.kinematics import INERTIAL, Joint
 from idbench.sim.robot.rewrite import rewritten
 

@@ -9,7 +9,7 @@ from typing import final
 from idbench.experiments.identification.consistent_estimate import consistent_of
 from idbench.experiments.identification.fit import Fit
 from idbench.identify import Consistent
-from idbench.identify.basis.parameter import FRICTION, named
+from idbench.identify.basis.block import FRICTION, named
 from idbench.sim.robot.rewrite import compiled, rewritten
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import standard_parameters

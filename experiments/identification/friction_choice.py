@@ -12,9 +12,9 @@ from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
 from idbench.identify import ESTIMATORS, IdentificationError, MotionLog, Problem, ReversalMask
 from idbench.identify.arrays import TINY
+from idbench.identify.basis.block import Parameter
 from idbench.identify.basis.friction.shape import ShapedFriction
 from idbench.identify.basis.of_joints import OfJoints
-from idbench.identify.basis.parameter import Parameter
 from idbench.identify.blame import blamed
 from idbench.identify.estimators.settle import settled
 from idbench.identify.judge.band import slow_motion

@@ -6,7 +6,7 @@ import numpy as np
 
 from idbench.experiments.identification.fit import Fit
 from idbench.identify import Array, Joint, KinematicTree, MotionLog, Problem
-from idbench.identify.basis.parameter import FRICTION, RIGID, Kind
+from idbench.identify.basis.block import FRICTION, RIGID, Kind
 from idbench.identify.data.jumps import Jump, jumps
 from idbench.identify.data.kinematics import GROUND
 

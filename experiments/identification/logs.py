@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, final
 import numpy as np
 
 from idbench.identify import Array, Basis, Chain, IdentificationError, MotionLog, TorqueChannel, encoder_steps
+from idbench.identify.data.jumps import white_noise
 from idbench.identify.data.log_columns import LogColumns
 from idbench.identify.data.resample import Repaired
-from idbench.identify.data.velocities import white_noise
 from idbench.identify.judge.band import content_end
 from idbench.identify.judge.delay import DelayEstimate, estimate_delay
 from idbench.identify.rows.rows import is_long

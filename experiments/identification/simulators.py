@@ -19,8 +19,7 @@ from idbench.sim.robot.payload import Payload
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import kinematic_tree, standard_parameters
 from idbench.sim.robot.varied import model_fields
-from idbench.sim.scenario.measurement import TorqueMeasurement
-from idbench.sim.scenario.ripple import Ripple
+from idbench.sim.scenario.measurement import Ripple, TorqueMeasurement
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.trajectories import Reference
 

@@ -6,8 +6,7 @@ from typing import Any, final
 
 from idbench.experiments.errors import is_told, reason, trace
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.judgement.held_out import HeldOut, on_last_quarter, on_log
-from idbench.experiments.judgement.verdict import WORDS
+from idbench.experiments.judgement.held_out import WORDS, HeldOut, on_last_quarter, on_log
 
 
 @final

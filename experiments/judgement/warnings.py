@@ -8,7 +8,7 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.log_warnings import resting, unlike_file, warnings_of_base
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.identify import MotionLog, brisk_shares, showing_moves
-from idbench.identify.basis.parameter import NOT_NEGATIVE
+from idbench.identify.basis.block import NOT_NEGATIVE
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import kinematic_tree, unmodelled
 

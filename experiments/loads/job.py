@@ -13,8 +13,7 @@ from idbench.experiments.identification.load import in_band, load
 from idbench.experiments.identification.reading import file_of
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel, absolute
-from idbench.experiments.loads.judgement import LoadJudgement
-from idbench.experiments.loads.known_load import known_of
+from idbench.experiments.loads.known_load import LoadJudgement, known_of
 from idbench.experiments.loads.simulated import Pairs
 from idbench.experiments.requests.jobs import GainsRequest, LoadRequest, PayloadRequest
 from idbench.identify import Array, IdentificationError

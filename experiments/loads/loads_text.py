@@ -7,7 +7,7 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
-from idbench.experiments.loads.judgement import negative_mass
+from idbench.experiments.loads.known_load import negative_mass
 from idbench.experiments.text import new_table, number, print_titled
 from idbench.identify import IdentificationError
 from idbench.identify.loads.drive_gains import VAGUE, GainEstimate

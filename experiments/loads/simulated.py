@@ -12,7 +12,7 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.requests.shared import Parameters
 from idbench.identify import Array, IdentificationError
-from idbench.identify.basis.parameter import named
+from idbench.identify.basis.block import named
 from idbench.identify.data.kinematics import INERTIAL
 from idbench.identify.loads.drive_gains import identify_drive_gains
 from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot

@@ -8,7 +8,7 @@ import rerun as rr
 
 from idbench.experiments.recording.columns import Times, part, poses
 from idbench.experiments.recording.stream import Stream
-from idbench.experiments.style import MEASURED, PLANNED, Color
+from idbench.experiments.text import MEASURED, PLANNED, Color
 from idbench.identify import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.scene import Mover, SceneShape, motion, shapes

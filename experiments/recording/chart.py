@@ -10,7 +10,7 @@ import rerun as rr
 from idbench.experiments.recording.columns import part
 from idbench.experiments.recording.scales import AbstractScale
 from idbench.experiments.recording.stream import Stream
-from idbench.experiments.style import Color
+from idbench.experiments.text import Color
 from idbench.identify import Array
 
 HEIGHT = 1.0

@@ -28,8 +28,7 @@ from idbench.experiments.recording.motion_layer import Base
 from idbench.experiments.recording.scales import listed, signed
 from idbench.experiments.recording.stream import Stream
 from idbench.experiments.reports.estimates import markdown
-from idbench.experiments.style import FORM_WIDTHS, FORMS, GREY, joint_colors, lighter, model_color
-from idbench.experiments.text import percent
+from idbench.experiments.text import FORM_WIDTHS, FORMS, GREY, joint_colors, lighter, model_color, percent
 from idbench.sim.scenario.scenario_file import to_toml
 
 

@@ -17,7 +17,7 @@ from idbench.experiments.recording.motion_layer import Base
 from idbench.experiments.recording.scales import decades, linear, listed
 from idbench.experiments.recording.stream import Stream
 from idbench.experiments.reports.excite import lines
-from idbench.experiments.style import FORMS, GREY, Color, joint_colors
+from idbench.experiments.text import FORMS, GREY, Color, joint_colors
 from idbench.sim.scenario.scenario_file import to_toml
 
 SHOWN = 50.0

@@ -13,10 +13,10 @@ from idbench.experiments.recording.columns import POSES, Times, parts, seconds, 
 from idbench.experiments.recording.lanes import Lanes, joint_states
 from idbench.experiments.recording.layouts import tabs
 from idbench.experiments.recording.stream import Stream
-from idbench.experiments.style import GREY, WIDTHS, joint_colors, kind_colors
+from idbench.experiments.text import GREY, WIDTHS, joint_colors, kind_colors
 from idbench.identify import Array, MotionLog
 from idbench.identify.signals.masks import slow_speed
-from idbench.sim.drives.electric import BetweenEdges
+from idbench.sim.drives.drive import BetweenEdges
 from idbench.sim.engine.watch import Inner, WatchedStretch
 from idbench.sim.robot.robot import Robot
 

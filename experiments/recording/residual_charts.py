@@ -13,8 +13,7 @@ from idbench.experiments.recording.columns import part
 from idbench.experiments.recording.scales import Signed, Words, decades, linear, listed
 from idbench.experiments.recording.stream import Stream
 from idbench.experiments.reports.friction_curves import FRICTIONS, FrictionCurves, Spectrum, left_over, of_joints, spectra
-from idbench.experiments.style import GREY, JOINTS, SIGMAS, Color, model_color
-from idbench.experiments.text import percentage
+from idbench.experiments.text import GREY, JOINTS, SIGMAS, Color, model_color, percentage
 from idbench.identify import Array, Estimate, Instants, binned, cutoffs
 
 LINEAR_UP_TO = 1e-3

@@ -10,7 +10,7 @@ from idbench.experiments.recording.folder import BASE
 from idbench.experiments.recording.identification_recording import recording_id
 from idbench.experiments.recording.motion_layer import Base
 from idbench.experiments.recording.stream import Stream
-from idbench.experiments.style import FORMS, GREY
+from idbench.experiments.text import FORMS, GREY
 from idbench.identify import Array
 from idbench.identify.files.servo_log import ServoColumns
 from idbench.identify.servo.rows import smoothed

@@ -12,7 +12,7 @@ from rerun.chunk import Chunk, RrdReader
 from idbench.experiments.errors import ResultsError
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.recording.columns import Times, scalars
-from idbench.experiments.style import STATES, Color
+from idbench.experiments.text import STATES, Color
 from idbench.identify import Array
 
 APPLICATION = "idbench"

@@ -21,8 +21,8 @@ from idbench.experiments.study.answer import answer, short, value, where
 from idbench.experiments.study.axis import Axis
 from idbench.experiments.study.statistics import MIN_ERROR, Cell
 from idbench.experiments.study.study import Study
-from idbench.experiments.study.study_report import command, worst_runs
-from idbench.experiments.style import FORMS, GREY, JOINTS, Color, lighter
+from idbench.experiments.study.study_results import command, worst_runs
+from idbench.experiments.text import FORMS, GREY, JOINTS, Color, lighter
 from idbench.identify import Array
 
 PERCENT = 100.0

@@ -1,20 +1,42 @@
 """Figures of an identification's report."""
 
 from collections.abc import Sequence
+from importlib.resources import files
+from io import StringIO
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
+from jinja2 import Environment
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.reports.friction_curves import FRICTIONS, WHOLE, FrictionCurves, left_over, spectra
-from idbench.experiments.reports.html import svg
-from idbench.experiments.style import SIGMAS, model_color
-from idbench.experiments.text import percentage
+from idbench.experiments.text import SIGMAS, model_color, percentage
 from idbench.identify import Array, cutoffs
+
+mpl.rcParams.update({"svg.hashsalt": "idbench", "svg.fonttype": "none", "font.size": 8, "axes.grid": True, "grid.alpha": 0.3})
+
+
+def rendered(package: str, template: str, **words: Any) -> str:
+    """Return the page that a template of a package makes of `words`; it needs no other file."""
+    page = Environment(autoescape=True, trim_blocks=True).from_string(_text(package, template))
+    return page.render(style=_text("idbench.experiments.reports", "report.css"), **words)
+
+
+def svg(figure: Figure) -> str:
+    """Return a figure as SVG, the same bytes for the same figure."""
+    text = StringIO()
+    figure.savefig(text, format="svg", metadata={"Date": None})
+    return text.getvalue()[text.getvalue().index("<svg") :]
+
+
+def _text(package: str, name: str) -> str:
+    return files(package).joinpath(name).read_text(encoding="utf-8")
+
 
 NOISES: dict[str, dict[str, Any]] = {
     "torque noise": {"color": "0.5", "lw": 1.0, "ls": "--"},

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from idbench.experiments.identification.logs import LogFacts
-from idbench.experiments.style import JOINTS
+from idbench.experiments.text import JOINTS
 from idbench.identify import Array
 
 POINTS = 4000

@@ -11,11 +11,11 @@ from idbench.experiments.reports.estimates import EstimatesTable
 from idbench.experiments.reports.figures import (
     friction_figure,
     parameters_figure,
+    rendered,
     residuals_figure,
     spectra_figure,
     torques_figure,
 )
-from idbench.experiments.reports.html import rendered
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.text import percentage
 

@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import final
 
 from idbench.experiments.errors import ResultsError
-from idbench.experiments.results.manifest import NAME, Manifest, WrittenFile, digest
-from idbench.experiments.results.writing import Read, exchange, hidden_folder
+from idbench.experiments.results.writing import NAME, Manifest, Read, WrittenFile, digest, exchange, hidden_folder
 
 try:
     import fcntl

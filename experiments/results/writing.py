@@ -1,17 +1,19 @@
 """The one way to a file: written whole or not at all, and never in the place of what somebody else wrote."""
 
+import hashlib
 import json
 import os
 import socket
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from filecmp import cmp
 from importlib.metadata import version
 from math import isfinite
 from pathlib import Path
 from shutil import rmtree
-from typing import Any
+from typing import Any, Self, final
 
 from idbench.experiments.errors import ResultsError, shortened
 from idbench.identify import Estimate
@@ -167,3 +169,65 @@ def _is_running(process: int) -> bool:
     except OSError:  # somebody else's
         return True
     return True
+
+
+NAME = ".idbench.json"
+"""Name of its file in a folder."""
+
+
+@final
+@dataclass(frozen=True)
+class WrittenFile:
+    """A file that idbench wrote."""
+
+    command: str
+    """The command that wrote it."""
+    digests: tuple[str, ...]
+    """Of its content, and of that which was there before: an exchange may have been cut off between the two."""
+
+
+@final
+@dataclass(frozen=True)
+class Manifest:
+    """The files of a folder that idbench wrote."""
+
+    folder: Path
+    """The folder."""
+    files: Mapping[str, WrittenFile] = field(default_factory=dict)
+    """By their names."""
+
+    @classmethod
+    def of(cls, folder: Path) -> Self:
+        """Return the manifest of a folder; an empty one if it has none that can be read."""
+        try:
+            content: Mapping[str, Any] = json.loads((folder / NAME).read_text(encoding="utf-8"))["files"]
+            files = {name: WrittenFile(str(w["command"]), tuple(map(str, w["digests"]))) for name, w in content.items()}
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+            return cls(folder)
+        return cls(folder, files)
+
+    def owns(self, name: str) -> bool:
+        """Return whether a file is there and as idbench wrote it."""
+        path = self.folder / name
+        return name in self.files and path.is_file() and digest(path) in self.files[name].digests
+
+    @property
+    def commands(self) -> list[str]:
+        """The commands whose files are still there."""
+        return list(dict.fromkeys(w.command for name, w in self.files.items() if (self.folder / name).is_file()))
+
+    def save(self, written: Mapping[str, WrittenFile], gone: Iterable[str] = ()) -> None:
+        """Write it with files that were written, and without those that are gone."""
+        files = {name: w for name, w in self.files.items() if name not in set(gone)}
+        for name, new in written.items():
+            before = files[name].digests[:1] if name in files else ()
+            files[name] = WrittenFile(new.command, tuple(dict.fromkeys((*new.digests, *before))))
+        content = {name: {"command": w.command, "digests": list(w.digests)} for name, w in sorted(files.items())}
+        about = "files that idbench wrote here: it replaces no others"
+        replace_own(self.folder / NAME, json.dumps({"about": about, "files": content}, indent=1) + "\n")
+
+
+def digest(path: Path) -> str:
+    """Return what tells the content of a file from others."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -8,11 +8,11 @@ from matplotlib.axes import Axes as Panel
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from idbench.experiments.reports.html import svg
+from idbench.experiments.reports.figures import svg
 from idbench.experiments.study.answer import in_words, value
 from idbench.experiments.study.axis import Axis
 from idbench.experiments.study.statistics import RIGHT, Cell
-from idbench.experiments.style import FORMS, SIGMAS
+from idbench.experiments.text import FORMS, SIGMAS
 from idbench.identify import Array
 
 OTHER = [90, 90, 90]

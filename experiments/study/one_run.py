@@ -14,7 +14,7 @@ from idbench.experiments.study.axis import Method, of_currents
 from idbench.sim.drives import IdealDrive
 from idbench.sim.errors import RobotError
 from idbench.sim.robot.robot import Robot
-from idbench.sim.scenario.ripple import Ripple
+from idbench.sim.scenario.measurement import Ripple
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import load
 from idbench.sim.trajectories import Quintic

@@ -10,7 +10,7 @@ from idbench.experiments.servo.identification import known_servos
 from idbench.experiments.servo.joints import Joints, JointsLog
 from idbench.experiments.study.statistics import BOUNDS
 from idbench.identify import MotionLog
-from idbench.identify.basis.parameter import named
+from idbench.identify.basis.block import named
 from idbench.identify.files.servo_log import ServoColumns
 from idbench.identify.servo import Servo, ServoFit, ServoRun, identify_servo, parameters_of
 from idbench.sim.drives import ServoDrive

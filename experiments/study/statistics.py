@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from idbench.experiments.style import SIGMAS
+from idbench.experiments.text import SIGMAS
 from idbench.identify import Array
 
 CONFIDENCE = 0.95

@@ -6,6 +6,7 @@
 from idbench.identify.basis.basis import Basis as Basis
 from idbench.identify.basis.block import AbstractBlock as AbstractBlock
 from idbench.identify.basis.block import AbstractConservativeBlock as AbstractConservativeBlock
+from idbench.identify.basis.block import Parameter as Parameter
 from idbench.identify.basis.friction.laws import ArctanFriction as ArctanFriction
 from idbench.identify.basis.friction.laws import AsymmetricViscousFriction as AsymmetricViscousFriction
 from idbench.identify.basis.friction.laws import Cogging as Cogging
@@ -26,7 +27,6 @@ from idbench.identify.basis.joint_law import AbstractJointLaw as AbstractJointLa
 from idbench.identify.basis.joint_law import Armature as Armature
 from idbench.identify.basis.of_joints import Coupled as Coupled
 from idbench.identify.basis.of_joints import OfJoints as OfJoints
-from idbench.identify.basis.parameter import Parameter as Parameter
 from idbench.identify.basis.springs import Balancer as Balancer
 from idbench.identify.basis.springs import Spring as Spring
 from idbench.identify.basis.tree_links import TreeLinks as TreeLinks

@@ -9,8 +9,7 @@ from typing import Self, final
 import numpy as np
 
 from idbench.identify.arrays import HELD, Array, Columns
-from idbench.identify.basis.block import AbstractBlock, Narrowing
-from idbench.identify.basis.parameter import Kind, Parameter
+from idbench.identify.basis.block import AbstractBlock, Kind, Narrowing, Parameter
 from idbench.identify.blame import expect
 from idbench.identify.errors import PluginError, SettingError
 from idbench.identify.signals.state import State

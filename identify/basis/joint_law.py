@@ -12,8 +12,7 @@ from typing import Any, ClassVar, final
 import numpy as np
 
 from idbench.identify.arrays import Array
-from idbench.identify.basis.block import AbstractBlock, AbstractConservativeBlock, BlockColumns
-from idbench.identify.basis.parameter import Kind, Parameter
+from idbench.identify.basis.block import AbstractBlock, AbstractConservativeBlock, BlockColumns, Kind, Parameter
 from idbench.identify.blame import expect
 from idbench.identify.errors import SettingError
 from idbench.identify.signals.state import State

@@ -9,9 +9,8 @@ import numpy as np
 
 from idbench.identify.arrays import Array, combined
 from idbench.identify.basis.basis import Basis
-from idbench.identify.basis.block import AbstractConservativeBlock, BlockColumns
+from idbench.identify.basis.block import AbstractConservativeBlock, BlockColumns, Kind, Parameter
 from idbench.identify.basis.joint_law import AbstractJointLaw
-from idbench.identify.basis.parameter import Kind, Parameter
 from idbench.identify.basis.tree_links import TreeLinks
 from idbench.identify.data.kinematics import KinematicTree
 from idbench.identify.errors import SettingError

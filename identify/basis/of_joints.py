@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Self, final
 import numpy as np
 
 from idbench.identify.arrays import Array
-from idbench.identify.basis.block import AbstractBlock, BlockColumns
-from idbench.identify.basis.parameter import Parameter
+from idbench.identify.basis.block import AbstractBlock, BlockColumns, Parameter
 from idbench.identify.data.kinematics import Coupling
 from idbench.identify.signals.state import State
 

@@ -6,8 +6,7 @@ from typing import final
 import numpy as np
 
 from idbench.identify.arrays import Array
-from idbench.identify.basis.block import AbstractConservativeBlock, BlockColumns
-from idbench.identify.basis.parameter import Parameter
+from idbench.identify.basis.block import AbstractConservativeBlock, BlockColumns, Parameter
 from idbench.identify.errors import SettingError, require_finite, require_positive
 from idbench.identify.signals.state import State
 

@@ -8,12 +8,11 @@ from typing import NamedTuple, Self, TypeAlias, final
 import numpy as np
 
 from idbench.identify.basis.basis import Basis
-from idbench.identify.basis.block import AbstractBlock, AbstractConservativeBlock, BlockColumns
+from idbench.identify.basis.block import AbstractBlock, AbstractConservativeBlock, BlockColumns, Kind, Parameter
 from idbench.identify.basis.friction.laws import CoulombFriction, ViscousFriction
 from idbench.identify.basis.friction.load import TiedFriction
 from idbench.identify.basis.joint_law import AbstractFriction, Armature
 from idbench.identify.basis.of_joints import Coupled, OfJoints
-from idbench.identify.basis.parameter import Kind, Parameter
 from idbench.identify.basis.springs import Spring
 from idbench.identify.basis.twists import (
     ZERO,

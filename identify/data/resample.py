@@ -9,9 +9,9 @@ import scipy
 
 from idbench.identify.arrays import Array
 from idbench.identify.data.clock import LogClock, torque_stretches
+from idbench.identify.data.jumps import Velocities
 from idbench.identify.data.log_columns import LogColumns
 from idbench.identify.data.motion_log import MotionLog, TorqueChannel
-from idbench.identify.data.velocities import Velocities
 from idbench.identify.errors import LogError, require_positive
 
 MOST_SAMPLES = 1e8

@@ -9,7 +9,7 @@ import scipy
 
 from idbench.identify.arrays import HELD, Array
 from idbench.identify.basis.basis import Basis
-from idbench.identify.basis.parameter import FRICTION
+from idbench.identify.basis.block import FRICTION
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.models import ExplicitModel
 from idbench.identify.noise.linearization import Linearization, observation

@@ -10,10 +10,10 @@ import numpy as np
 
 from idbench.identify.arrays import TINY, Array
 from idbench.identify.basis.basis import Basis
+from idbench.identify.basis.block import Kind, Parameter
 from idbench.identify.basis.friction.shape import ShapedFriction, with_settings
 from idbench.identify.basis.joint_law import AbstractFriction, AbstractJointLaw
 from idbench.identify.basis.of_joints import OfJoints
-from idbench.identify.basis.parameter import Kind, Parameter
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.rows.factors import Factors, Status
 from idbench.identify.rows.rows import Rows

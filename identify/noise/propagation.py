@@ -11,7 +11,7 @@ from idbench.identify.arrays import Array
 from idbench.identify.noise.covariance import BandedCovariance
 from idbench.identify.noise.linearization import Linearization, smoothed
 from idbench.identify.rows.row_map import Grid, RowMap
-from idbench.identify.signals.differentiators import CentralDifference
+from idbench.identify.signals.filters import CentralDifference
 
 RATE, EDGES = 50.0, 200.0
 """Least frequencies [Hz] at which noise is propagated: rows and motion have little beyond some 10 Hz, edges of masks more."""

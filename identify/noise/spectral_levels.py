@@ -7,16 +7,16 @@ import numpy as np
 import scipy
 
 from idbench.identify.arrays import Array
+from idbench.identify.data.jumps import ORDER
 from idbench.identify.data.motion_log import MotionLog
-from idbench.identify.data.velocities import ORDER
 from idbench.identify.noise.covariance import BandedCovariance
 from idbench.identify.noise.noisy_rows import NoisyRows
 from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.noise.row_weights import two_levels
 from idbench.identify.rows.factors import Factors, LeastSquaresFit, Status
 from idbench.identify.rows.rows import Rows
+from idbench.identify.signals.filters import slide
 from idbench.identify.signals.signals import Signals
-from idbench.identify.signals.stencils import slide
 
 OVERLAP = 0.1
 """Share of a log that must lie over itself for what it says of a lag to count."""

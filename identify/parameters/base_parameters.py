@@ -9,7 +9,7 @@ import numpy as np
 
 from idbench.identify.arrays import HELD, Array
 from idbench.identify.basis.basis import Basis
-from idbench.identify.basis.parameter import FRICTION, Parameter
+from idbench.identify.basis.block import FRICTION, Parameter
 from idbench.identify.basis.tree_links import tree_basis
 from idbench.identify.data.kinematics import GROUND, Joint, KinematicTree
 from idbench.identify.signals.state import State

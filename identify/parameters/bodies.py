@@ -8,7 +8,7 @@ from typing import Any, Literal, final
 import numpy as np
 
 from idbench.identify.arrays import Array
-from idbench.identify.basis.parameter import NOT_NEGATIVE, Parameter
+from idbench.identify.basis.block import NOT_NEGATIVE, Parameter
 from idbench.identify.data.kinematics import INERTIAL
 from idbench.identify.errors import IdentificationError
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 import scipy
 
 from idbench.identify.arrays import Array
-from idbench.identify.basis.parameter import NOT_NEGATIVE
+from idbench.identify.basis.block import NOT_NEGATIVE
 from idbench.identify.data.kinematics import INERTIAL
 from idbench.identify.errors import IdentificationError
 from idbench.identify.parameters.base_parameters import BaseParameters

@@ -15,9 +15,14 @@ from idbench.identify.rows.operators import FirLowPass, IirLowPass, Samples
 from idbench.identify.rows.operators.operator import AbstractOperator
 from idbench.identify.rows.row_map import Grid
 from idbench.identify.rows.rows import Rows
-from idbench.identify.signals.differentiators import AbstractDifferentiator, CentralDifference
+from idbench.identify.signals.filters import (
+    AbstractDifferentiator,
+    AbstractPrefilter,
+    ButterworthPrefilter,
+    CentralDifference,
+    NoPrefilter,
+)
 from idbench.identify.signals.masks import AbstractMask, NoMask, ReversalMask
-from idbench.identify.signals.prefilters import AbstractPrefilter, ButterworthPrefilter, NoPrefilter
 from idbench.identify.signals.signals import Signals
 from idbench.identify.signals.torques import AbstractAlignment, AsLogged, ByChannel
 

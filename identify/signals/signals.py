@@ -10,9 +10,8 @@ from idbench.identify.arrays import Array
 from idbench.identify.blame import expect
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import PluginError
-from idbench.identify.signals.differentiators import AbstractDifferentiator
+from idbench.identify.signals.filters import AbstractDifferentiator, AbstractPrefilter
 from idbench.identify.signals.masks import AbstractMask
-from idbench.identify.signals.prefilters import AbstractPrefilter
 from idbench.identify.signals.state import State
 from idbench.identify.signals.torques import AbstractAlignment, Torque
 

@@ -10,7 +10,7 @@ import numpy as np
 from idbench.identify.arrays import Array
 from idbench.identify.data.motion_log import Meaning, TorqueChannel
 from idbench.identify.plugins import Table
-from idbench.identify.signals.stencils import REACH, averaged, shift, slide
+from idbench.identify.signals.filters import REACH, averaged, shift, slide
 
 _DIFFERENCE = np.array([-0.5, 0.0, 0.5])
 

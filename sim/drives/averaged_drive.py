@@ -4,8 +4,7 @@ from typing import final
 
 import numpy as np
 
-from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, Trace, every
-from idbench.sim.drives.electric import Electric
+from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, Electric, Trace, every
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.motors import Array, Motors
 from idbench.sim.robot.robot import Robot

@@ -6,9 +6,8 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
-from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, Commanded, Trace, every
-from idbench.sim.drives.electric import Electric
-from idbench.sim.drives.profile import Profile, within
+from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, Commanded, Electric, Trace, every
+from idbench.sim.drives.pwm import Profile, within
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot

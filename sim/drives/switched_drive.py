@@ -6,8 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from idbench.sim.drives.averaged_drive import limits
-from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, Trace, every
-from idbench.sim.drives.electric import BetweenEdges, Electric
+from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, BetweenEdges, Electric, Trace, every
 from idbench.sim.drives.one_winding import Loop, OneWinding
 from idbench.sim.drives.passages import TabulatedPassages, passages
 from idbench.sim.drives.pwm import Modulation, Modulator, pieces

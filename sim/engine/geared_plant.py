@@ -11,7 +11,7 @@ from mujoco.batch import Batch
 from idbench.sim.engine.plant import ALL, Plant
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.motors import Array
-from idbench.sim.robot.play import with_play
+from idbench.sim.robot.payload import with_play
 from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario import Scenario
 

@@ -14,7 +14,7 @@ from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.trajectories import Reference
-from idbench.sim.trajectories.approach import approach
+from idbench.sim.trajectories.time_optimal import approach
 
 Progress = Callable[[float], None]
 """Receives the share of a run that is done."""

@@ -8,11 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from idbench.sim.drives.drive import AbstractAmplifier, Trace
-from idbench.sim.drives.electric import BetweenEdges, Electric
+from idbench.sim.drives.drive import AbstractAmplifier, BetweenEdges, Electric, Trace
 from idbench.sim.robot.motors import Array
 from idbench.sim.scenario.scenario import Scenario
-from idbench.sim.trajectories.reference import Reference
+from idbench.sim.trajectories.trajectory import Reference
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,8 @@ from mujoco.batch import Batch
 from pydantic import Field
 
 from idbench.identify.basis import BLOCKS, AbstractFriction, Shape, ShapedFriction, StribeckFriction
+from idbench.identify.basis.block import named
 from idbench.identify.basis.friction.shape import with_settings
-from idbench.identify.basis.parameter import named
 from idbench.sim.frictions.friction_law import AbstractContact, AbstractFrictionLaw
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot

@@ -1,13 +1,64 @@
 """A payload that the controller does not know."""
 
 from math import pi
+from pathlib import Path
 from typing import Annotated, final
 
 import mujoco
 from pydantic import Field
 
-from idbench.sim.errors import ScenarioError
+from idbench.sim.errors import RobotError, ScenarioError
+from idbench.sim.robot.motors import Array
+from idbench.sim.robot.urdf import SIZE, SMALL
 from idbench.sim.settings import NotNegative, Number, settings
+
+
+def without_missing_meshes(spec: mujoco.MjSpec, folder: Path) -> list[str]:
+    """Take shapes out whose meshes are not there; return what was done. Links that have their mass from them get some."""
+    home = folder / (spec.meshdir or "")
+    missing = {
+        mesh.name or Path(mesh.file).stem: mesh for mesh in spec.meshes if mesh.file and not (home / mesh.file).is_file()
+    }
+    if not missing:
+        return []
+    notes = [
+        f"meshes that are not there ({', '.join(list(missing)[:3])}{', ...' if len(missing) > 3 else ''}): it is not drawn"
+    ]
+    bare = []
+    for geom in [geom for geom in spec.geoms if geom.meshname in missing]:
+        body = geom.parent
+        spec.delete(geom)
+        if not body.explicitinertial and not list(body.geoms) and list(body.joints):
+            body.mass = SMALL
+            body.inertia = [SMALL * SIZE**2] * 3
+            body.explicitinertial = True
+            bare.append(body.name)
+    for mesh in missing.values():
+        spec.delete(mesh)
+    return notes + ([f"no inertia of {', '.join(bare)} but that of its mesh: 1 g is taken"] if bare else [])
+
+
+HARD = (0.95, 0.999, 1e-4, 0.5, 2.0)
+"""MuJoCo's solimp of the ends: hard from 0.1 mrad on."""
+
+LOCKED = 1e-9
+"""Play of a joint that has none [rad]."""
+
+
+def with_play(spec: mujoco.MjSpec, play: Array, h: float) -> None:
+    """Give every joint free play [rad or m], shape (joint,): two joints at one place, the second with ends.
+
+    The first keeps drive, armature and friction, the second has the link. `h` is the physics step [s].
+    """
+    if len({joint.parent.name for joint in spec.joints}) < len(spec.joints):
+        raise RobotError("backlash needs a body for each joint; this robot has a body that moves in several joints")
+    for joint, width in zip(list(spec.joints), play.tolist(), strict=True):
+        half = max(width, LOCKED) / 2
+        gap = joint.parent.add_joint(name=f"{joint.name}_play", type=joint.type, axis=joint.axis, pos=joint.pos)
+        gap.range, gap.limited = [-half, half], mujoco.mjtLimited.mjLIMITED_TRUE
+        gap.armature = gap.frictionloss = gap.margin = 0.0
+        gap.damping, gap.stiffness = [0.0] * len(gap.damping), [0.0] * len(gap.stiffness)
+        gap.solref_limit, gap.solimp_limit = [2 * h, 1.0], list(HARD)
 
 
 @final

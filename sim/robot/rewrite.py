@@ -10,13 +10,13 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from idbench.identify.basis.parameter import named
+from idbench.identify.basis.block import named
 from idbench.identify.data.kinematics import INERTIAL
 from idbench.sim.errors import RobotError
 from idbench.sim.robot.dh import TABLE
-from idbench.sim.robot.meshes import without_missing_meshes
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.mounting import PLAIN, Mounting
+from idbench.sim.robot.payload import without_missing_meshes
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import kinematic_tree, standard_parameters
 

@@ -10,12 +10,11 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from idbench.identify.basis.parameter import named
+from idbench.identify.basis.block import named
 from idbench.sim.errors import RobotError
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.mounting import PLAIN, Mounting
-from idbench.sim.robot.payload import Payload
-from idbench.sim.robot.play import HARD
+from idbench.sim.robot.payload import HARD, Payload
 from idbench.sim.robot.rewrite import compiled, rewritten
 from idbench.sim.robot.robot import Robot
 

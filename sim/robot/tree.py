@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import mujoco
 import numpy as np
 
-from idbench.identify.basis.parameter import named
+from idbench.identify.basis.block import named
 from idbench.identify.data.kinematics import GROUND, INERTIAL, Coupling, Joint, KinematicTree
 from idbench.sim.errors import RobotError
 from idbench.sim.robot.motors import Array

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from mujoco.batch import Batch
 
-from idbench.identify.basis.parameter import named
+from idbench.identify.basis.block import named
 from idbench.identify.data.kinematics import INERTIAL
 from idbench.sim.errors import RobotError, ScenarioError
 from idbench.sim.robot.motors import Array

@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from idbench.identify.basis.parameter import named
+from idbench.identify.basis.block import named
 from idbench.identify.data.kinematics import INERTIAL, KinematicTree
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.mounting import Mounting

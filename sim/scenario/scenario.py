@@ -12,8 +12,7 @@ from idbench.sim.errors import ScenarioError
 from idbench.sim.frictions import AbstractFrictionLaw, CoulombViscous
 from idbench.sim.robot.payload import Payload
 from idbench.sim.robot.robot import Robot
-from idbench.sim.scenario.measurement import TorqueMeasurement
-from idbench.sim.scenario.ripple import Ripple
+from idbench.sim.scenario.measurement import Ripple, TorqueMeasurement
 from idbench.sim.settings import NotNegative, Number, Positive, Seed, settings
 from idbench.sim.trajectories import AbstractTrajectory, Quintic
 

@@ -6,10 +6,10 @@ from idbench.sim.trajectories.point_to_point import PointToPoint as PointToPoint
 from idbench.sim.trajectories.quintic import Quintic as Quintic
 from idbench.sim.trajectories.quintic import RandomMoves as RandomMoves
 from idbench.sim.trajectories.recorded import Recorded as Recorded
-from idbench.sim.trajectories.reference import Reference as Reference
 from idbench.sim.trajectories.steps import RandomSteps as RandomSteps
 from idbench.sim.trajectories.time_optimal import TimeOptimal as TimeOptimal
 from idbench.sim.trajectories.trajectory import AbstractTrajectory as AbstractTrajectory
+from idbench.sim.trajectories.trajectory import Reference as Reference
 
 TRAJECTORIES: PluginTable[AbstractTrajectory] = PluginTable(
     "trajectories",

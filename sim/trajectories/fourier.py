@@ -11,8 +11,7 @@ from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import NotNegative, Number, Positions, Positive, Whole, settings
 from idbench.sim.trajectories.point_to_point import at_rest
-from idbench.sim.trajectories.reference import AbstractMotion, Reference
-from idbench.sim.trajectories.trajectory import AbstractTrajectory
+from idbench.sim.trajectories.trajectory import AbstractMotion, AbstractTrajectory, Reference
 
 STILL = 1e-6
 """Speed, and acceleration, at the ends of a period, as a share of the largest, that counts as rest."""

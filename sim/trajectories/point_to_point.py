@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.motors import Array
-from idbench.sim.trajectories.reference import AbstractMotion, Reference
+from idbench.sim.trajectories.trajectory import AbstractMotion, Reference
 
 PEAK_VELOCITY = 15 / 8
 """Largest |ds/du| of s(u) = 10 u^3 - 15 u^4 + 6 u^5, at u = 1/2."""

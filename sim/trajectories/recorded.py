@@ -13,8 +13,7 @@ from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import Positive, settings
-from idbench.sim.trajectories.reference import AbstractMotion, Reference
-from idbench.sim.trajectories.trajectory import AbstractTrajectory
+from idbench.sim.trajectories.trajectory import AbstractMotion, AbstractTrajectory, Reference
 
 DEGREE = 5
 """Degree of the spline through positions: its acceleration is smooth, too."""

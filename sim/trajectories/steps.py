@@ -13,8 +13,7 @@ from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import NotNegative, Positive, Seed, Share, Truth, Whole, settings
 from idbench.sim.trajectories.point_to_point import PointToPoint
 from idbench.sim.trajectories.quintic import draw_waypoint, room
-from idbench.sim.trajectories.reference import AbstractMotion, Reference
-from idbench.sim.trajectories.trajectory import AbstractTrajectory
+from idbench.sim.trajectories.trajectory import AbstractMotion, AbstractTrajectory, Reference
 
 
 @final

@@ -11,8 +11,7 @@ from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import EachPositive, NotNegative, Positions, per_joint, settings
-from idbench.sim.trajectories.reference import AbstractMotion, Reference
-from idbench.sim.trajectories.trajectory import AbstractTrajectory
+from idbench.sim.trajectories.trajectory import AbstractMotion, AbstractTrajectory, Reference, require_in_range
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,3 +119,30 @@ def _standing(point: Array) -> Array:
     states = np.zeros((len(point), 1, 4))
     states[:, 0, 0] = point
     return states
+
+
+VELOCITY = 1.0
+ACCELERATION = 5.0
+JERK = 50.0
+"""Limits of a gentle move [rad/s, rad/s^2, rad/s^3]."""
+
+REST = 0.2
+"""Time at rest before and after it [s]."""
+
+
+def approach(robot: Robot, start: Array, goal: Array, fs: float, most: Array | None = None) -> Reference:
+    """Return ruckig's move from `start` to `goal` [rad], shape (joint,), gentle, at rest at both ends.
+
+    No faster than the file of the robot allows, nor than `most` [rad/s, rad/s^2, rad/s^3], shape (3, joint).
+
+    Raises
+    ------
+    ScenarioError
+        If `start` is not a position of the robot's joints.
+    """
+    require_in_range(robot, start[None])
+    known = np.stack([robot.most(rate) for rate in ("velocity", "acceleration", "jerk")])
+    limits = np.minimum(known, np.array([[VELOCITY], [ACCELERATION], [JERK]]))
+    if most is not None:
+        limits = np.minimum(limits, most)
+    return JerkLimited.between(np.stack([start, goal]), limits, REST).sample(fs)

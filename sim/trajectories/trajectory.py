@@ -1,6 +1,7 @@
 """What a trajectory of a scenario is."""
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 from typing import final
 
 import numpy as np
@@ -9,7 +10,40 @@ from idbench.identify.blame import blamed, expect_kind
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
-from idbench.sim.trajectories.reference import AbstractMotion, Reference
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A planned motion, sampled."""
+
+    fs: float
+    """[Hz]."""
+    q: Array
+    """Positions [rad], shape (time, joint), or (time, nsim, joint) for many simulations."""
+    qd: Array
+    """Velocities [rad/s], of the same shape."""
+    qdd: Array
+    """Accelerations [rad/s^2], of the same shape."""
+
+
+class AbstractMotion(ABC):
+    """A planned motion as a function of time, at rest before its start and after its end."""
+
+    @property
+    @abstractmethod
+    def duration(self) -> float:
+        """Time from the first to the last instant, pauses included [s]."""
+
+    @abstractmethod
+    def at(self, t: Array, fs: float) -> Reference:
+        """Return the motion at the times `t` [s], shape (time,)."""
+
+    @final
+    def sample(self, fs: float) -> Reference:
+        """Return the motion at t = 0, 1/fs, 2/fs, ... below its duration, exactly."""
+        count = round(self.duration * fs)
+        return self.at(np.arange(count) / fs, fs)
+
 
 MOST_SAMPLES = 1e8
 """Samples of a joint above which a motion is taken for a slip: 0.8 GB."""

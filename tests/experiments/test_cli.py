@@ -6,7 +6,7 @@ import pytest
 
 from idbench.experiments.cli import main
 from idbench.experiments.paper.table1 import SCENARIO
-from idbench.experiments.results.manifest import NAME as MANIFEST
+from idbench.experiments.results.writing import NAME as MANIFEST
 from idbench.identify.files.log_file import read_log
 from idbench.sim.scenario.scenario_file import from_dict, load
 

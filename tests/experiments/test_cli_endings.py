@@ -11,7 +11,7 @@ import pytest
 import idbench.experiments.recording.comparison_recording
 from idbench.experiments.cli import main
 from idbench.experiments.cli.interruption import noticing
-from idbench.experiments.results.manifest import NAME as MANIFEST
+from idbench.experiments.results.writing import NAME as MANIFEST
 
 KEPT = ["log.parquet", "summary.json"]
 """What is there before anything is shown."""

@@ -13,7 +13,7 @@ from idbench.experiments.cli.options.jobs import Identify
 from idbench.experiments.paper import table2
 from idbench.experiments.paper.attribution import imperfections
 from idbench.experiments.paper.table2 import PAPER, Table2
-from idbench.experiments.results.manifest import NAME as MANIFEST
+from idbench.experiments.results.writing import NAME as MANIFEST
 from idbench.identify.files.log_file import read_log
 from idbench.sim.drives import AveragedDrive
 from idbench.sim.scenario.scenario_file import from_dict, load, names, to_dict, to_toml

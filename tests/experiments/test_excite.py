@@ -11,7 +11,7 @@ from idbench.experiments.excite.design import Design
 from idbench.experiments.excite.excitation import EXCITATIONS
 from idbench.experiments.excite.excited import Excited
 from idbench.experiments.excite.stages import STAGES
-from idbench.experiments.results.manifest import NAME as MANIFEST
+from idbench.experiments.results.writing import NAME as MANIFEST
 from idbench.sim.limits.motion_limits import MotionLimits
 from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from idbench.sim.robot.robot import Robot

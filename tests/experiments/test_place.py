@@ -11,8 +11,7 @@ import pytest
 from idbench.experiments.cli import main
 from idbench.experiments.errors import ResultsError
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.results.manifest import NAME, Manifest
-from idbench.experiments.results.writing import HIDDEN, new_file, write_text
+from idbench.experiments.results.writing import HIDDEN, NAME, Manifest, new_file, write_text
 from idbench.identify.files.log_file import read_log, write_log
 
 RUN = "run", "ideal", "--no-rerun", "--out"

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from idbench.experiments.cli import main
-from idbench.experiments.results.manifest import NAME
+from idbench.experiments.results.writing import NAME
 from idbench.identify import IdentificationError
 
 WORDS = "--robot", "puma560", "--model", "explicit", "--estimator", "WLS"

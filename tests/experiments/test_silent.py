@@ -138,7 +138,7 @@ def test_a_payload_is_saved_before_it_is_judged(payload, idbench, tmp_path, monk
     def broken(*args):
         raise ZeroDivisionError("on purpose")
 
-    monkeypatch.setattr("idbench.experiments.loads.judgement.LoadJudgement.warnings", broken)
+    monkeypatch.setattr("idbench.experiments.loads.known_load.LoadJudgement.warnings", broken)
     code, out, err = idbench("payload", payload / "full.parquet", "--unloaded", payload / "empty.parquet", *WAY, "--out", "f")
     assert (code, "the verdict: " in err, "consistent body" in out) == (2, True, True)
     assert (tmp_path / "f" / "summary.json").is_file()

@@ -18,7 +18,7 @@ from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.identify import MotionLog, TorqueChannel
-from idbench.identify.basis.parameter import BODY
+from idbench.identify.basis.block import BODY
 from idbench.identify.data.kinematics import INERTIAL
 from idbench.identify.files.log_file import write_log
 from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics

@@ -5,9 +5,9 @@ import pytest
 
 from idbench.identify import LogError, TorqueChannel
 from idbench.identify.data.clock import LogClock
+from idbench.identify.data.jumps import Velocities
 from idbench.identify.data.log_columns import LogColumns
 from idbench.identify.data.resample import Repaired
-from idbench.identify.data.velocities import Velocities
 
 FS = 1000.0
 T = np.arange(0, 8, 1 / FS)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from idbench.identify import CentralDifference, SettingError
-from idbench.identify.signals.stencils import averaged, shift
+from idbench.identify.signals.filters import averaged, shift
 
 FS = 50.0
 T = np.arange(40) / FS

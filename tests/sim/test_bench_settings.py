@@ -15,8 +15,7 @@ from idbench.sim.frictions import CoulombViscous, LuGre, Stribeck
 from idbench.sim.robot.payload import Payload
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.scara import scara_truth
-from idbench.sim.scenario.measurement import CurrentSensor, TorqueMeasurement
-from idbench.sim.scenario.ripple import Ripple
+from idbench.sim.scenario.measurement import CurrentSensor, Ripple, TorqueMeasurement
 from idbench.sim.scenario.scenario import Physics, Timing
 from idbench.sim.trajectories import Quintic
 

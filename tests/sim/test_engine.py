@@ -14,8 +14,7 @@ from idbench.sim.engine.simulation import simulate
 from idbench.sim.errors import ScenarioError
 from idbench.sim.frictions import LuGre, Stribeck
 from idbench.sim.robot.scara import scara_truth
-from idbench.sim.scenario.measurement import TorqueMeasurement
-from idbench.sim.scenario.ripple import Ripple
+from idbench.sim.scenario.measurement import Ripple, TorqueMeasurement
 from idbench.sim.scenario.scenario import Physics, Timing
 from idbench.sim.trajectories import Quintic, RandomMoves
 

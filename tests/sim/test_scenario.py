@@ -9,8 +9,7 @@ from idbench.sim.drives import AveragedDrive, SwitchedDrive
 from idbench.sim.encoders import IncrementalEncoder
 from idbench.sim.errors import ScenarioError
 from idbench.sim.robot.payload import Payload
-from idbench.sim.scenario.measurement import TorqueMeasurement
-from idbench.sim.scenario.ripple import Ripple
+from idbench.sim.scenario.measurement import Ripple, TorqueMeasurement
 from idbench.sim.scenario.scenario import Physics, Scenario, Timing
 from idbench.sim.scenario.scenario_file import KINDS, from_dict, load, names, to_dict, to_toml
 from idbench.sim.settings import description, fields_of, per_joint

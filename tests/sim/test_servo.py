@@ -10,7 +10,7 @@ from idbench.identify.files.servo_log import read_servo_log
 from idbench.identify.servo import JointLoad, Servo, ServoRun
 from idbench.identify.servo.closed_loop import ServoLoop
 from idbench.sim.drives import ServoDrive
-from idbench.sim.drives.profile import Profile
+from idbench.sim.drives.pwm import Profile
 from idbench.sim.encoders import ExactEncoder
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.engine.watch import Watch

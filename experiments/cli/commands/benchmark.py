@@ -6,7 +6,7 @@ from pathlib import Path
 from rich.text import Text
 
 from idbench.experiments.benchmark.definition import SHIPPED, read_definition, shipped
-from idbench.experiments.benchmark.job import Made, rows_of, sets_of
+from idbench.experiments.benchmark.job import RowOrReason, rows_of, sets_of
 from idbench.experiments.benchmark.tables import print_rows, report
 from idbench.experiments.cli.options.jobs import Benchmark
 from idbench.experiments.results.attempts import Attempts
@@ -23,7 +23,7 @@ def benchmark(options: Benchmark) -> None:
         return
     sets, out = sets_of(options), options.out or Path("runs") / "benchmark"
     whole = ResultsFolder(out, "benchmark", "idbench benchmark", options.force)
-    rows = dict[str, Made]()
+    rows = dict[str, RowOrReason]()
     with shown(page), whole.held():
         try:
             with stages_of("benchmark") as told:
@@ -50,7 +50,7 @@ def _list(page: Page) -> None:
     page.close()
 
 
-def _show(page: Page, rows: Mapping[str, Made]) -> None:
+def _show(page: Page, rows: Mapping[str, RowOrReason]) -> None:
     there = [row for row in rows.values() if not isinstance(row, str)]
     page.found |= {"experiment": "benchmark", "rows": there}
     page.found["failures"] = {name: why for name, why in rows.items() if isinstance(why, str)}

@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from idbench.experiments.cli.command_text import command_of
+from idbench.experiments.cli.command import command_of
 from idbench.experiments.cli.options.jobs import Excite
 from idbench.experiments.cli.saving import Files, saved, write_scenario
 from idbench.experiments.excite.excited import Excited

@@ -8,17 +8,16 @@ from pathlib import Path
 
 from rich.text import Text
 
-from idbench.experiments.cli.command_text import command_of
+from idbench.experiments.cli.command import command_of, with_own_parts
 from idbench.experiments.cli.commands.follow import Follower
 from idbench.experiments.cli.commands.identify_views import Shown, require_layer, require_targets, view_all
 from idbench.experiments.cli.options.jobs import Identify
-from idbench.experiments.cli.own_parts import with_own_parts
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.job import files_of, fit_of, loaded_logs, notes_of, read_options, request_of, summary_of
 from idbench.experiments.identification.request import Request
-from idbench.experiments.judgement.checks import checks
 from idbench.experiments.judgement.judgement import Judgement, judge
+from idbench.experiments.judgement.remedies import checks
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.reports.estimates import conclusion, shown_whole
 from idbench.experiments.reports.printed import print_fit, print_held_out

@@ -16,9 +16,8 @@ from idbench.experiments.judgement.judgement import Judgement
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import RECORDING, ResultsFolder
-from idbench.experiments.results.manifest import Manifest
 from idbench.experiments.results.page import Page
-from idbench.experiments.results.writing import require_free, write_text
+from idbench.experiments.results.writing import Manifest, require_free, write_text
 
 
 @final

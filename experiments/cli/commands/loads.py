@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 from rich.text import Text
 
-from idbench.experiments.cli.command_text import command_of
+from idbench.experiments.cli.command import command_of
 from idbench.experiments.cli.options.jobs import IdentifyGains, IdentifyPayload
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.loads.job import GainsFit, PayloadFit, files_of, gains_of, payload_of, simulated_pairs
-from idbench.experiments.loads.judgement import LoadJudgement, negative_mass
+from idbench.experiments.loads.known_load import LoadJudgement, negative_mass
 from idbench.experiments.loads.loads_text import body_of, gains_summary, payload_summary, print_gains, print_payloads
 from idbench.experiments.loads.simulated import PairScore
 from idbench.experiments.results.attempts import Attempts

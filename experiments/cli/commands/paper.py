@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from idbench.experiments.cli.command_text import command_of
+from idbench.experiments.cli.command import command_of
 from idbench.experiments.cli.commands.inner import doubt_window, recording_of, require_window
 from idbench.experiments.cli.options.jobs import SearchCommand, Table1Command, Table2Command
 from idbench.experiments.cli.saving import saved

@@ -7,10 +7,9 @@ from shlex import quote
 
 from rich.text import Text
 
-from idbench.experiments.cli.command_text import command_of
+from idbench.experiments.cli.command import command_of, with_own_parts
 from idbench.experiments.cli.commands.inner import doubt_window, recording_of, require_window
 from idbench.experiments.cli.options.jobs import RunCommand
-from idbench.experiments.cli.own_parts import with_own_parts
 from idbench.experiments.cli.saving import Files, saved, write_scenario
 from idbench.experiments.identification.log_warnings import warnings_of_log
 from idbench.experiments.identification.scenario_run import ScenarioRun

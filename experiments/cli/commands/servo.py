@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.text import Text
 
-from idbench.experiments.cli.command_text import command_of
+from idbench.experiments.cli.command import command_of
 from idbench.experiments.cli.options.jobs import IdentifyServo
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import absolute

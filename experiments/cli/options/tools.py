@@ -30,7 +30,7 @@ class View(Command, action="view:view"):
 @command("log")
 @final
 @dataclass(frozen=True)
-class ShowLog(Command, action="log:show_log"):
+class ShowLog(Command, action="logs:show_log"):
     """Show the contents of a log: columns, units, rate, clock, ranges, noise, encoders. Needs no robot."""
 
     log: Log
@@ -50,7 +50,7 @@ class ShowLog(Command, action="log:show_log"):
 @command("resample")
 @final
 @dataclass(frozen=True)
-class Resample(Command, action="resample:resample"):
+class Resample(Command, action="logs:resample"):
     """Resample a log at a fixed frequency and repair its clock: repeated rows, jitter, missing samples, gaps."""
 
     log: Log
@@ -72,7 +72,7 @@ class Resample(Command, action="resample:resample"):
 @command("export")
 @final
 @dataclass(frozen=True)
-class Export(Command, action="resample:export"):
+class Export(Command, action="logs:export"):
     """Write the logs of a results folder as CSV."""
 
     folder: Log

@@ -4,8 +4,7 @@ from typing import final
 
 import numpy as np
 
-from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, Trace
-from idbench.sim.drives.electric import Electric
+from idbench.sim.drives.drive import AbstractAmplifier, AbstractDrive, Electric, Trace
 from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import Positive, settings

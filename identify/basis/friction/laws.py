@@ -7,9 +7,9 @@ from typing import ClassVar, final
 import numpy as np
 
 from idbench.identify.arrays import Array
+from idbench.identify.basis.block import Kind
 from idbench.identify.basis.friction.shape import Shape, ShapedFriction
 from idbench.identify.basis.joint_law import AbstractFriction, AbstractJointLaw
-from idbench.identify.basis.parameter import Kind
 from idbench.identify.errors import require_positive
 from idbench.identify.signals.state import State
 

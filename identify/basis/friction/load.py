@@ -8,9 +8,8 @@ import numpy as np
 
 from idbench.identify.arrays import Array, combined
 from idbench.identify.basis.basis import Basis
-from idbench.identify.basis.block import AbstractBlock, BlockColumns
+from idbench.identify.basis.block import RIGID, AbstractBlock, BlockColumns, Kind, Parameter
 from idbench.identify.basis.joint_law import AbstractJointLaw
-from idbench.identify.basis.parameter import RIGID, Kind, Parameter
 from idbench.identify.data.kinematics import Coupling
 from idbench.identify.signals.state import State
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
+from idbench.identify.basis.block import Kind, Parameter
 from idbench.identify.basis.joint_law import AbstractFriction, AbstractJointLaw
-from idbench.identify.basis.parameter import Kind, Parameter
 from idbench.identify.signals.state import State
 
 STEP = 1e-4

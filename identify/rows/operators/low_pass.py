@@ -14,7 +14,7 @@ from idbench.identify.errors import require_below_nyquist, require_positive, req
 from idbench.identify.models import Equations
 from idbench.identify.rows.operators.operator import AbstractOperator
 from idbench.identify.rows.row_map import Grid, Kernel, RowMap, Window
-from idbench.identify.signals.stencils import forward_backward, settling_time
+from idbench.identify.signals.filters import forward_backward, settling_time
 
 
 class AbstractLowPass(AbstractOperator):

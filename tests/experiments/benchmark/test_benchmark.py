@@ -11,7 +11,7 @@ import pytest
 
 from idbench.experiments.benchmark.definition import SHIPPED, read_definition, shipped
 from idbench.experiments.benchmark.files import files_of
-from idbench.experiments.benchmark.set_row import set_row
+from idbench.experiments.benchmark.job import set_row
 from idbench.experiments.benchmark.tables import share
 from idbench.experiments.benchmark.tools import prepared
 from idbench.experiments.cli import main

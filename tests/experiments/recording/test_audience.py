@@ -11,7 +11,7 @@ import pytest
 from idbench.experiments.cli import main
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.recording.audience import Audience, Watching
-from idbench.experiments.results.manifest import NAME as MANIFEST
+from idbench.experiments.results.writing import NAME as MANIFEST
 from idbench.sim.scenario.scenario_file import load, to_toml
 from idbench.sim.trajectories import RandomMoves
 

@@ -1,16 +1,137 @@
 """Words of a command that it does not take, each said in one line."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import fields, is_dataclass
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
 from difflib import get_close_matches
+from inspect import cleandoc
 from itertools import takewhile
 from types import UnionType
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
+import tyro
 from tyro import _errors as parser  # private: tyro has no other way to say what is wrong in words of one's own
+from tyro import _strings  # private: tyro keeps the line breaks of texts that are indented, as ours are
+from tyro.constructors import PrimitiveConstructorSpec
 
 from idbench.experiments.errors import ExperimentError
+from idbench.experiments.requests.words import Word
+
+
+def typed(request: type, shown: Container[str] | None = None) -> type:
+    """Return a request with the marks of the library on its fields; the help has all of them, or those that are `shown`."""
+    hints = get_type_hints(request, include_extras=True)
+    marked = dict[str, Any]()
+    defaults = dict[str, Any]()
+    for each in fields(request):
+        hint = hints[each.name]
+        default = each.default
+        hidden = shown is not None and each.name not in shown
+        made, marks = _plain(hint), _marks(hint, default)
+        if (inner := group_of(hint)) is not None:
+            made, marks = typed(inner, shown), [tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes]
+            hidden = shown is not None and not any(f.name in shown for f in fields(inner))
+            defaults[each.name] = field(default_factory=made)
+        elif default is not MISSING:
+            defaults[each.name] = default
+        marks += [tyro.conf.Suppress] if hidden else []
+        marked[each.name] = Annotated[(made, *marks)] if marks else made
+    space = {"__annotations__": marked, "__doc__": request.__doc__, "__module__": request.__module__, **defaults}
+    return dataclass(frozen=True, kw_only=True)(type(request.__name__, (request,), space))
+
+
+def untyped(made: Any) -> Any:
+    """Return what the library made as the request that it is."""
+    values = {f.name: getattr(made, f.name) for f in fields(made)}
+    return type(made).__mro__[1](**{name: untyped(x) if is_dataclass(x) else x for name, x in values.items()})
+
+
+def group_of(hint: Any) -> Any:
+    """Return the dataclass of a group of options, or None of a single one."""
+    first = _plain(hint)
+    return first if is_dataclass(first) else None
+
+
+def word_of(hint: Any) -> Word:
+    """Return how a value of a type is typed."""
+    return next((mark for mark in getattr(hint, "__metadata__", ()) if isinstance(mark, Word)), Word())
+
+
+def _plain(hint: Any) -> Any:
+    return get_args(hint)[0] if get_origin(hint) is Annotated else hint
+
+
+def _marks(hint: Any, default: object) -> list[Any]:
+    """Return what the library knows of a field: metavar, name, the value that one word becomes."""
+    word = word_of(hint)
+    metavar, unsaid = word.metavar if word.made is None else "", default is None or default == ()
+    marks = list[Any]()
+    if metavar or word.option or unsaid:
+        said = "" if unsaid else None
+        marks.append(tyro.conf.arg(name=word.option or None, metavar=metavar or None, help_behavior_hint=said))
+    if word.made is not None:
+        marks.append(_one(word))
+    if word.positional:
+        marks.append(tyro.conf.Positional)
+    if word.flag:
+        marks.append(tyro.conf.FlagCreatePairsOff)
+    return marks
+
+
+def _one(word: Word) -> PrimitiveConstructorSpec[Any]:
+    made = word.made or str
+    return PrimitiveConstructorSpec(
+        nargs=1,
+        metavar=word.metavar,
+        instance_from_str=lambda words: made(words[0]),
+        is_instance=lambda _: True,
+        str_from_instance=lambda value: [] if value is None else [str(value)],
+        choices=word.known or None,
+    )
+
+
+ALL = "--help-all"
+HELP = ("-h", "--help")
+
+
+def _joined(helptext: str) -> str:
+    """Return a text with its paragraphs in one line each."""
+    return re.sub(r"(?<!\n)\n(?!\n)", " ", cleandoc(helptext))
+
+
+_strings.remove_single_line_breaks = _joined
+
+
+def show_help(words: Sequence[str], commands: Mapping[str, type]) -> bool:
+    """Print the short help of a command that has one, and return whether it was asked for."""
+    options = commands.get(words[0])
+    essential: tuple[str, ...] = getattr(options, "essential", ())
+    if options is None or not essential or not set(words[1:]) & set(HELP):
+        return False
+    try:
+        tyro.cli(typed(options, essential), prog=f"idbench {words[0]}", args=["--help"])
+    except SystemExit:
+        print(f"{_hidden(options, essential)} more options: idbench {words[0]} {ALL}")  # noqa: T201  # as the parser prints
+    return True
+
+
+def without_short(words: Sequence[str]) -> list[str]:
+    """Return words that ask the parser for all of its help."""
+    return ["--help" if word == ALL else word for word in words]
+
+
+def _hidden(options: type, names: Sequence[str]) -> int:
+    """Return how many options are not shown."""
+    hints = get_type_hints(options, include_extras=True)
+    count = 0
+    for each in fields(options):
+        if (inner := group_of(hints[each.name])) is not None:
+            count += _hidden(inner, names)
+        else:
+            count += each.name not in names
+    return count
+
 
 KINDS: Mapping[type, str] = {int: "a whole number", float: "a number"}
 """What options take, in words."""
@@ -130,10 +251,10 @@ def _wanted(argument: Any) -> str:
 def _options(command: Any) -> Iterator[str]:
     """Yield the options of a command, those of its groups, too."""
     hints = get_type_hints(command)
-    for field in fields(command):
-        hint = hints[field.name]
+    for each in fields(command):
+        hint = hints[each.name]
         if is_dataclass(hint):
             yield from _options(hint)
         else:
-            name = field.name.replace("_", "-")
+            name = each.name.replace("_", "-")
             yield from (f"--{name}", *((f"--no-{name}",) if hint is bool else ()))
