@@ -114,7 +114,7 @@ from idbench.identify.signals.masks import AbstractMask as AbstractMask
 from idbench.identify.signals.masks import NoMask as NoMask
 from idbench.identify.signals.masks import ReversalMask as ReversalMask
 from idbench.identify.signals.signals import Signals as Signals
-from idbench.identify.signals.state import State as State
+from idbench.identify.signals.signals import State as State
 from idbench.identify.signals.torques import ALIGNMENTS as ALIGNMENTS
 from idbench.identify.signals.torques import AbstractAlignment as AbstractAlignment
 from idbench.identify.signals.torques import AsLogged as AsLogged

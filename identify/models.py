@@ -11,8 +11,7 @@ from idbench.identify.arrays import HELD, Array, Columns, Multipliers, combined
 from idbench.identify.basis.basis import Basis
 from idbench.identify.blame import expect
 from idbench.identify.plugins import Table
-from idbench.identify.signals.signals import Signals
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import Signals, State
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,6 +3,9 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import cache
+
+from threadpoolctl import ThreadpoolController
 
 Listener = Callable[[str], None]
 """Receives what is being worked at, from the outermost to the innermost: "power model, IV: round 3 of 15"."""
@@ -35,3 +38,15 @@ def stage(what: str) -> Iterator[None]:
 def _tell() -> None:
     if (listener := _listener.get()) is not None:
         listener(": ".join(_within.get()))
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Keep BLAS to one thread, whatever it is set to: results are then the same on every machine, too."""
+    with _controller().limit(limits=1):
+        yield
+
+
+@cache
+def _controller() -> ThreadpoolController:
+    return ThreadpoolController()

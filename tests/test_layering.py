@@ -32,7 +32,7 @@ ALLOWED_IN = {
     "identify/files/arrow.py": {"pyarrow"},
     "identify/files/log_file.py": {"pyarrow"},
     "identify/files/ros_bag.py": {"rosbags"},
-    "identify/one_thread.py": {"threadpoolctl"},
+    "identify/telling.py": {"threadpoolctl"},
     "identify/servo/servo_step.py": {"numba"},
     "identify/parameters/consistent.py": {"clarabel"},
     "sim/scenario/scenario_file.py": {"tomli_w"},

@@ -64,7 +64,7 @@ from pathlib import Path
 from idbench.experiments.recording.notebook import notebook_viewer
 from idbench.experiments.recording.comparison_recording import record_table1
 from idbench.experiments.results.folder import ResultsFolder
-from idbench.experiments.recording.folder import write_streams
+from idbench.experiments.results.attempts import write_streams
 
 folder = ResultsFolder(Path("comparison"), "table1", command="notebook comparison")
 with folder.held():

@@ -9,28 +9,7 @@ from rerun.chunk import RrdReader
 from idbench.experiments.errors import ResultsError
 from idbench.experiments.recording.layouts import tabs
 from idbench.experiments.recording.stream import Stream
-from idbench.experiments.results.folder import RECORDING, ResultsFolder
-
-Streams = Sequence[tuple[str, Stream]]
-
-
-def write_streams(streams: Streams, folder: ResultsFolder | None) -> None:
-    """Write the files of a recording into a results folder, all or none; who watches has seen them anyway.
-
-    Raises
-    ------
-    ResultsError
-        If they cannot be written.
-    """
-    try:
-        if folder is not None:
-            with folder.more() as hidden:
-                for name, stream in streams:
-                    stream.write(hidden / name)
-    finally:
-        for _, stream in streams:  # when everything is written: a viewer may hang
-            stream.close()
-
+from idbench.experiments.results.folder import RECORDING
 
 BASE = RECORDING
 INNER = "recording.inner.rrd"

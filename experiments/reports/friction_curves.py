@@ -14,8 +14,7 @@ from idbench.identify.basis.joint_law import AbstractFriction
 from idbench.identify.basis.of_joints import inner_of
 from idbench.identify.judge.diagnosis import filtered
 from idbench.identify.rows.row_map import Kernel
-from idbench.identify.signals.signals import Signals
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import Signals, State
 
 RESOLUTION = 0.5
 """Distance of the frequencies [Hz]."""

@@ -7,14 +7,35 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Self, TypeVar, final
 
 from idbench.experiments.errors import REPORT, ResultsError, is_told, reason, report, trace
-from idbench.experiments.recording.folder import write_streams
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.identify.blame import is_mistake
 
 if TYPE_CHECKING:
-    from idbench.experiments.recording.folder import Streams
+    from collections.abc import Sequence
+
+    from idbench.experiments.recording.stream import Stream
+
+    Streams = Sequence[tuple[str, Stream]]
 
 T = TypeVar("T")
+
+
+def write_streams(streams: "Streams", folder: ResultsFolder | None) -> None:
+    """Write the files of a recording into a results folder, all or none; who watches has seen them anyway.
+
+    Raises
+    ------
+    ResultsError
+        If they cannot be written.
+    """
+    try:
+        if folder is not None:
+            with folder.more() as hidden:
+                for name, stream in streams:
+                    stream.write(hidden / name)
+    finally:
+        for _, stream in streams:  # when everything is written: a viewer may hang
+            stream.close()
 
 
 @final

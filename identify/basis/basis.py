@@ -12,7 +12,7 @@ from idbench.identify.arrays import HELD, Array, Columns
 from idbench.identify.basis.block import AbstractBlock, Kind, Narrowing, Parameter
 from idbench.identify.blame import expect
 from idbench.identify.errors import PluginError, SettingError
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import State
 
 
 @final

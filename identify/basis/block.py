@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal, Protocol, Self, TypeAlias, final, runtime_checkable
 
 from idbench.identify.arrays import Array
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import State
 
 if TYPE_CHECKING:
     from idbench.identify.basis.basis import Basis

@@ -15,7 +15,7 @@ from idbench.identify.arrays import Array
 from idbench.identify.basis.block import AbstractBlock, AbstractConservativeBlock, BlockColumns, Kind, Parameter
 from idbench.identify.blame import expect
 from idbench.identify.errors import SettingError
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import State
 
 
 class AbstractJointLaw(AbstractBlock):

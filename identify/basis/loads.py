@@ -14,7 +14,7 @@ from idbench.identify.basis.joint_law import AbstractJointLaw
 from idbench.identify.basis.tree_links import TreeLinks
 from idbench.identify.data.kinematics import KinematicTree
 from idbench.identify.errors import SettingError
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import State
 
 
 @final

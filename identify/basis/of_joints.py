@@ -9,7 +9,7 @@ import numpy as np
 from idbench.identify.arrays import Array
 from idbench.identify.basis.block import AbstractBlock, BlockColumns, Parameter
 from idbench.identify.data.kinematics import Coupling
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import State
 
 if TYPE_CHECKING:
     from idbench.identify.basis.basis import Basis

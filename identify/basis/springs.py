@@ -8,7 +8,7 @@ import numpy as np
 from idbench.identify.arrays import Array
 from idbench.identify.basis.block import AbstractConservativeBlock, BlockColumns, Parameter
 from idbench.identify.errors import SettingError, require_finite, require_positive
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import State
 
 
 @final

@@ -32,7 +32,7 @@ from idbench.identify.basis.twists import (
 )
 from idbench.identify.data.kinematics import INERTIAL, KinematicTree
 from idbench.identify.errors import SettingError
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import State
 
 MX, M = INERTIAL.index("MX"), INERTIAL.index("M")
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from idbench.identify.arrays import Array
 from idbench.identify.data.kinematics import GROUND, Joint, KinematicTree
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import State
 
 Term: TypeAlias = Array | float
 """A signal (..., time), or what it is at all times."""

@@ -16,7 +16,7 @@ from idbench.identify.noise.linearization import Linearization, observation
 from idbench.identify.noise.noisy_rows import NoisyRows
 from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.rows.chain import Chain
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import State
 
 
 def predicted_information(log: MotionLog, basis: Basis, X: Array, levels: NoiseLevels, chain: Chain) -> Array:

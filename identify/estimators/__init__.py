@@ -2,18 +2,18 @@
 
 from idbench.identify.estimators.estimate import Estimate as Estimate
 from idbench.identify.estimators.estimator import AbstractEstimator as AbstractEstimator
-from idbench.identify.estimators.least_squares.generalized_least_squares import (
+from idbench.identify.estimators.least_squares.iteratively_reweighted import IterativelyReweighted as IterativelyReweighted
+from idbench.identify.estimators.least_squares.ordinary_weighted_generalized import (
     GeneralizedLeastSquares as GeneralizedLeastSquares,
 )
-from idbench.identify.estimators.least_squares.iteratively_reweighted import IterativelyReweighted as IterativelyReweighted
-from idbench.identify.estimators.least_squares.ordinary_least_squares import (
+from idbench.identify.estimators.least_squares.ordinary_weighted_generalized import (
     OrdinaryLeastSquares as OrdinaryLeastSquares,
+)
+from idbench.identify.estimators.least_squares.ordinary_weighted_generalized import (
+    WeightedLeastSquares as WeightedLeastSquares,
 )
 from idbench.identify.estimators.least_squares.recursive_least_squares import RecursiveLeastSquares as RecursiveLeastSquares
 from idbench.identify.estimators.least_squares.total_least_squares import TotalLeastSquares as TotalLeastSquares
-from idbench.identify.estimators.least_squares.weighted_least_squares import (
-    WeightedLeastSquares as WeightedLeastSquares,
-)
 from idbench.identify.estimators.likelihood.kalman_filter import UnscentedKalmanFilter as UnscentedKalmanFilter
 from idbench.identify.estimators.likelihood.maximum_likelihood import (
     MaximumLikelihood as MaximumLikelihood,

@@ -8,14 +8,13 @@ from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import IdentificationError
 from idbench.identify.estimators.estimate import Estimate
 from idbench.identify.estimators.estimator import AbstractEstimator
-from idbench.identify.estimators.least_squares.generalized_least_squares import GeneralizedLeastSquares
+from idbench.identify.estimators.least_squares.ordinary_weighted_generalized import GeneralizedLeastSquares
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.settle import settled
 from idbench.identify.estimators.simulator import Simulation
 from idbench.identify.models import AbstractModel, ExplicitModel
-from idbench.identify.one_thread import one_thread
 from idbench.identify.rows.chain import Chain, idbench_chain
-from idbench.identify.telling import stage
+from idbench.identify.telling import one_thread, stage
 
 
 def identify(

@@ -17,7 +17,7 @@ from idbench.identify.basis.of_joints import OfJoints
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.rows.factors import Factors, Status
 from idbench.identify.rows.rows import Rows
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import State
 
 ROUNDS = 30
 """At most; most laws take five."""

@@ -7,8 +7,7 @@ import numpy as np
 
 from idbench.identify.arrays import Array
 from idbench.identify.files.layout import LogLayout, Source
-from idbench.identify.files.table import LogTable
-from idbench.identify.files.units import SI, factor, named_unit
+from idbench.identify.files.table import SI, LogTable, factor, named_unit
 
 CURRENTS = ("current", "currents", "cur", "amps")
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from idbench.identify.data.motion_log import TorqueChannel
 from idbench.identify.errors import IdentificationError, LogError
-from idbench.identify.files.units import SI, factor
+from idbench.identify.files.table import SI, factor
 
 QUANTITIES = ("t", "q", "qd", "tau", "temperature")
 """What columns may be."""

@@ -14,8 +14,7 @@ from idbench.identify.errors import LogError
 from idbench.identify.files.formats import read_table
 from idbench.identify.files.guess import guess
 from idbench.identify.files.layout import LAYOUT, LogLayout, Source, matching
-from idbench.identify.files.table import LogTable
-from idbench.identify.files.units import SI, needs_gain
+from idbench.identify.files.table import SI, LogTable, needs_gain
 
 CLOCKS = 1e6
 """Times [s] beyond this are those of a calendar: logs count from their beginning."""

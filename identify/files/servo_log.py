@@ -13,8 +13,7 @@ from idbench.identify.arrays import Array
 from idbench.identify.errors import IdentificationError, LogError, SettingError
 from idbench.identify.files.formats import read_table
 from idbench.identify.files.layout import matching
-from idbench.identify.files.table import LogTable
-from idbench.identify.files.units import factor
+from idbench.identify.files.table import LogTable, factor
 from idbench.identify.plugins import did_you_mean
 from idbench.identify.servo.closed_loop import PUBLISHED, Servo
 

@@ -1,12 +1,75 @@
 """What a file of a log holds: columns that have names."""
 
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from idbench.identify.arrays import Array
-from idbench.identify.errors import LogError
+from idbench.identify.errors import LogError, SettingError
+
+TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+POSITIONS = {"rad": 1.0, "deg": np.pi / 180, "mrad": 1e-3, "rev": 2 * np.pi, "m": 1.0, "cm": 1e-2, "mm": 1e-3}
+VELOCITIES = {
+    **{f"{unit}/s": size for unit, size in POSITIONS.items()},
+    "rpm": 2 * np.pi / 60,
+}
+TORQUES = {
+    "N m": 1.0,
+    "mN m": 1e-3,
+    "kN m": 1e3,
+    "N cm": 1e-2,
+    "N": 1.0,
+    "kN": 1e3,
+    "A": 1.0,
+    "mA": 1e-3,
+    "%": 1e-2,
+    "1": 1.0,
+}
+"""Those that are no torques need a gain beside them."""
+
+UNITS = {"t": TIMES, "q": POSITIONS, "qd": VELOCITIES, "tau": TORQUES, "temperature": {"degC": 1.0}}
+"""Units of each quantity of a log."""
+
+SI = {"t": "s", "q": "rad", "qd": "rad/s", "tau": "N m", "temperature": "degC"}
+"""Units that are taken where a file states none; those of slides are m and N, which are of the same size."""
+
+NEED_GAIN = ("A", "mA", "%")
+"""Units of efforts that a gain makes torques [N m] of: gain is N m/A, or N m at 100 %."""
+
+
+def factor(quantity: str, unit: str) -> float:
+    """Return what turns values in a unit into SI; raise SettingError if it is none of this quantity."""
+    known = UNITS[quantity]
+    plain = _plain(unit)
+    for name, size in known.items():
+        if _plain(name) == plain:
+            return size
+    raise SettingError(f"unit {unit!r} of {quantity} is unknown; known: {', '.join(known)}")
+
+
+def needs_gain(unit: str) -> bool:
+    """Return whether an effort in this unit is no torque."""
+    return _plain(unit) in [_plain(name) for name in NEED_GAIN]
+
+
+def named_unit(quantity: str, column: str) -> str:
+    """Return the unit that the name of a column ends with, as "q1 [deg]" or tau1_mNm does; empty if it has none."""
+    found = re.search(r"[\[(]([^\])]+)[\])]\s*$|_([A-Za-z]+)$", column)
+    text = _plain(next((part for part in found.groups() if part), "")) if found else ""
+    return next((name for name in UNITS[quantity] if text and _plain(name) == text), "")
+
+
+def _plain(unit: str) -> str:
+    """Return a unit without what people write differently: N m, Nm and N*m are one."""
+    short = {"degrees": "deg", "degree": "deg", "seconds": "s", "sec": "s", "msec": "ms", "amps": "A", "ampere": "A"}
+    text = re.sub(r"[\s*·._-]", "", unit.strip()).replace("°", "deg").replace("µ", "u").replace("μ", "u")
+    text = re.sub(r"(?<=[a-zA-Z])ps$", "/s", text) if text in ("radps", "degps", "mps") else text
+    return short.get(text.lower(), text)
+
 
 COPIES = 3
 """How often the values of a log are in memory at once while it is read and turned into SI."""

@@ -14,8 +14,7 @@ from idbench.identify.models import AbstractModel, Equations
 from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.rows.chain import Chain
 from idbench.identify.rows.row_map import Kernel
-from idbench.identify.signals.signals import Signals
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import Signals, State
 
 EVERY = 50.0
 """Frequency of the instants over which the robot's slopes are averaged [Hz]."""

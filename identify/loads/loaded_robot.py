@@ -15,7 +15,7 @@ from idbench.identify.errors import LogError, SettingError
 from idbench.identify.estimators.estimate import Estimate
 from idbench.identify.estimators.estimator import AbstractEstimator
 from idbench.identify.estimators.identification import estimate
-from idbench.identify.estimators.least_squares.generalized_least_squares import GeneralizedLeastSquares
+from idbench.identify.estimators.least_squares.ordinary_weighted_generalized import GeneralizedLeastSquares
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.settle import settled
 from idbench.identify.models import ExplicitModel

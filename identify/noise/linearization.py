@@ -12,8 +12,7 @@ import scipy
 from idbench.identify.arrays import HELD, Array, combined, frozen
 from idbench.identify.basis.basis import Basis
 from idbench.identify.signals.filters import slide
-from idbench.identify.signals.signals import Signals
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import Signals, State
 
 STEP_Q, STEP_QD = 1e-3, 0.05
 """Steps [rad, rad/s] of central differences: torques are sines of positions, and squares of velocities."""

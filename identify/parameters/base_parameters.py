@@ -12,7 +12,7 @@ from idbench.identify.basis.basis import Basis
 from idbench.identify.basis.block import FRICTION, Parameter
 from idbench.identify.basis.tree_links import tree_basis
 from idbench.identify.data.kinematics import GROUND, Joint, KinematicTree
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import State
 
 STATES = 56
 """Random states for each joint: four for each of its fourteen standard parameters, with a rotor and three laws of friction."""

@@ -12,7 +12,7 @@ from idbench.identify.errors import LogError, SettingError, require_not_negative
 from idbench.identify.models import AbstractModel
 from idbench.identify.plugins import Table
 from idbench.identify.rows.operators import FirLowPass, IirLowPass, Samples
-from idbench.identify.rows.operators.operator import AbstractOperator
+from idbench.identify.rows.operators.low_pass import AbstractOperator
 from idbench.identify.rows.row_map import Grid
 from idbench.identify.rows.rows import Rows
 from idbench.identify.signals.filters import (

@@ -7,12 +7,12 @@ from typing import NamedTuple, final
 import numpy as np
 
 from idbench.identify.arrays import Array
-from idbench.identify.one_thread import one_thread
 from idbench.identify.servo.closed_loop import Servo, ServoLoop
 from idbench.identify.servo.fit import ServoFit
 from idbench.identify.servo.parameters import limits_of, parameters_of, simpler
 from idbench.identify.servo.run import ServoRun
 from idbench.identify.servo.stages import Stages
+from idbench.identify.telling import one_thread
 
 APART = 0.01
 """By how much an offset is changed to see what that does to other joints [rad]."""

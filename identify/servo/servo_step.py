@@ -2,6 +2,8 @@
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +14,18 @@ from idbench.identify.arrays import Array
 
 LIGHT = 1e-9
 """Inertia of a link that has none, beside that of its rotor."""
+
+
+def _remove_stale() -> None:
+    """Remove compiled code that is older than this file: of an earlier version numba cannot even read the index."""
+    here = Path(__file__)
+    with suppress(OSError):  # a folder that cannot be written: nothing was kept there
+        for path in (here.parent / "__pycache__").glob(f"{here.stem}.*.nb?"):
+            if path.stat().st_mtime < here.stat().st_mtime:
+                path.unlink()
+
+
+_remove_stale()
 
 
 def _compiled(function: Callable[..., Any]) -> Any:

@@ -7,7 +7,6 @@ from typing import Self, final
 import numpy as np
 
 from idbench.identify.errors import ExcitationError, IdentificationError
-from idbench.identify.one_thread import one_thread
 from idbench.identify.servo.closed_loop import Servo, ServoLoop, count_of
 from idbench.identify.servo.excitation import Excitation
 from idbench.identify.servo.fit import OTHER_SCALE, TORQUES, ServoFit, require_explained, require_possible, require_scale
@@ -15,6 +14,7 @@ from idbench.identify.servo.parameters import FURTHER, SERVO_FRICTIONS, SERVO_PA
 from idbench.identify.servo.rows import ServoRows
 from idbench.identify.servo.run import ServoRun, pieces
 from idbench.identify.servo.search import SETTLED, Found, ServoSearch
+from idbench.identify.telling import one_thread
 
 SHAKEN = 2
 """Times that a search leaves its valley for others, at most."""

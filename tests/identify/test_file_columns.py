@@ -10,7 +10,7 @@ from idbench.identify.data.resample import Repaired
 from idbench.identify.files.layout import LogLayout, Source, matching
 from idbench.identify.files.log_file import read_log, write_log
 from idbench.identify.files.reading import read_columns
-from idbench.identify.files.units import factor, named_unit
+from idbench.identify.files.table import factor, named_unit
 
 
 def test_units_have_one_meaning():

@@ -23,7 +23,7 @@ from idbench.identify import (
 from idbench.identify.basis import LoadFriction, StribeckFriction
 from idbench.identify.estimators.settle import settled
 from idbench.identify.judge.friction_choice import choose_friction
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import State
 
 X = np.array([3.5, 0.5, 0.5, 0.06, 0.12, 0.005, 0.1, 0.2])
 """Parameters of the SCARA."""

@@ -5,7 +5,7 @@ import pytest
 
 from idbench.identify import CHAINS, ESTIMATORS, ExplicitModel, MotionLog, Problem, TorqueChannel, scara
 from idbench.identify.judge.band import slow_motion
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import State
 
 X = np.array([3.5, 0.5, 0.5, 0.06, 0.12, 0.005, 0.1, 0.2])
 """Parameters of the SCARA."""

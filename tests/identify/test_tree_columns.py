@@ -134,7 +134,7 @@ def test_what_is_zero_at_all_times_has_no_column():
     assert {p.name for row, p in columns if row == 1} == {"M2"}
 
 
-MODULES = ("terms", "twists", "body_regressor", "tree_links")
+MODULES = ("twists", "tree_links")
 
 
 def sites(tree):

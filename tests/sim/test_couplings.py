@@ -8,7 +8,7 @@ import pytest
 
 from idbench.identify import ExplicitModel, OfJoints, tree_basis
 from idbench.identify.basis import CoulombFriction, ViscousFriction
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import State
 from idbench.sim.errors import RobotError
 from idbench.sim.robot.mounting import Mounting, coupled
 from idbench.sim.robot.rewrite import compiled, rewritten

@@ -21,7 +21,7 @@ from idbench.identify.files.log_file import write_log
 from idbench.sim.limits.motion_limits import looser
 
 if TYPE_CHECKING:
-    from idbench.experiments.recording.folder import Streams
+    from idbench.experiments.results.attempts import Streams
 
 LEFT_OUT = ("out", "force", "json", "watching")
 """Options that make no difference to a motion, or stand elsewhere in the command."""

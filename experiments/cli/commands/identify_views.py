@@ -66,8 +66,8 @@ def recording(shown: Shown, attempts: Attempts) -> None:
     if shown.fit.logs.long:
         shown.page.print("not recorded: the rows of such a long log are not kept; identify a part of it to look inside")
         return
-    from idbench.experiments.recording.folder import write_streams
     from idbench.experiments.recording.identification_recording import add_layer, record_log
+    from idbench.experiments.results.attempts import write_streams
 
     alone = shown.folder is not None or into is None
     made = record_log(shown.fit.on(0), shown.audience) if alone else add_layer(run, shown.fit, shown.audience)

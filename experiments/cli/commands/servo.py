@@ -34,7 +34,7 @@ from idbench.identify.servo import ServoFit
 from idbench.identify.servo.choice import ServoFrictionChoice
 
 if TYPE_CHECKING:
-    from idbench.experiments.recording.folder import Streams
+    from idbench.experiments.results.attempts import Streams
 
 
 def servo(options: IdentifyServo) -> None:

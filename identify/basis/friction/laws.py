@@ -11,7 +11,7 @@ from idbench.identify.basis.block import Kind
 from idbench.identify.basis.friction.shape import Shape, ShapedFriction
 from idbench.identify.basis.joint_law import AbstractFriction, AbstractJointLaw
 from idbench.identify.errors import require_positive
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import State
 
 
 @final

@@ -11,7 +11,7 @@ from idbench.identify.basis.basis import Basis
 from idbench.identify.basis.block import RIGID, AbstractBlock, BlockColumns, Kind, Parameter
 from idbench.identify.basis.joint_law import AbstractJointLaw
 from idbench.identify.data.kinematics import Coupling
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import State
 
 
 @final

@@ -11,7 +11,7 @@ from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.basis.block import Kind, Parameter
 from idbench.identify.basis.joint_law import AbstractFriction, AbstractJointLaw
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import State
 
 STEP = 1e-4
 """Of central differences by the logarithm of a shape."""

@@ -19,7 +19,7 @@ from idbench.identify.models import ExplicitModel
 from idbench.identify.noise.linearization import friction_jumps
 from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.rows.factors import Status
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import State
 
 ALPHA, BETA = 0.1, 2.0
 """Spread of the sigma points, and 2 for normal distributions (E. A. Wan and R. van der Merwe, "The unscented Kalman filter for

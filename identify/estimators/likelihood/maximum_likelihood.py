@@ -11,7 +11,7 @@ from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import IdentificationError
 from idbench.identify.estimators.estimate import Estimate
 from idbench.identify.estimators.estimator import AbstractEstimator, Need
-from idbench.identify.estimators.least_squares.generalized_least_squares import GeneralizedLeastSquares
+from idbench.identify.estimators.least_squares.ordinary_weighted_generalized import GeneralizedLeastSquares
 from idbench.identify.estimators.likelihood.cells import Cells, hermite
 from idbench.identify.estimators.likelihood.joint_fit import CHECK, JointFit
 from idbench.identify.estimators.likelihood.normal_equations import NormalEquations

@@ -9,8 +9,7 @@ import numpy as np
 from idbench.identify.arrays import Array
 from idbench.identify.errors import SettingError, require_positive, require_whole
 from idbench.identify.models import Equations
-from idbench.identify.rows.operators.low_pass import AbstractLowPass
-from idbench.identify.rows.operators.operator import AbstractOperator
+from idbench.identify.rows.operators.low_pass import AbstractLowPass, AbstractOperator
 from idbench.identify.rows.row_map import Grid, Kernel, RowMap, Window
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from idbench.identify import MotionLog, TorqueChannel, scara
 from idbench.identify.arrays import combined
-from idbench.identify.signals.state import State
+from idbench.identify.signals.signals import State
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.scara import scara_truth
 

@@ -12,7 +12,7 @@ from distributed import LocalCluster
 from rerun.chunk import RrdReader
 
 from idbench.experiments.cli import main
-from idbench.experiments.cli.commands import study as study_commands
+from idbench.experiments.study import job as study_job
 from idbench.experiments.study import run_study as engine
 from idbench.experiments.study.store import Store
 
@@ -136,7 +136,7 @@ def test_a_thousand_million_runs_are_asked_for_twice(file, complaint, tmp_path, 
     printed = complaint("study", str(file), "--seeds", "1000000000", *out)
     assert "2,000,000,000 runs, more than 100,000: if you mean it, add --yes" in printed
     assert not (tmp_path / "out").exists()
-    monkeypatch.setattr(study_commands, "MANY", 3)
+    monkeypatch.setattr(study_job, "MANY", 3)
     assert "18 runs, more than 3" in complaint("study", str(file), *out)
     assert main(["study", str(file), "--yes", *out]) == 0
 
