@@ -1,0 +1,209 @@
+"""`import idbench`: a call gives what its command writes; results say what they are; wrong keys are refused by name."""
+
+import json
+import subprocess
+import sys
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+import idbench
+from idbench.experiments.cli import main
+from idbench.identify import ESTIMATORS, AbstractEstimator, Estimate, WeightedLeastSquares
+from idbench.identify.files.log_file import write_log
+from idbench.sim.trajectories import RandomMoves
+
+
+@dataclass(frozen=True)
+class Ridge(AbstractEstimator):
+    """Least squares with a penalty on the size of the parameters."""
+
+    strength: float = 1e-6
+
+    def solve(self, problem):
+        W, Y = problem.rows.W, problem.rows.Y
+        Wt = np.swapaxes(W, -1, -2)
+        X = np.linalg.solve(Wt @ W + self.strength * np.eye(W.shape[-1]), Wt @ Y[..., None])
+        return Estimate.judge(problem, X[..., 0])
+
+
+NAMES = {"experiment", "log", "path", "folder", "warnings", "command", "version"}
+"""What a summary has beside the result: names of files and what was printed."""
+
+
+def summary(folder):
+    found = json.loads((folder / "summary.json").read_text())
+    return {key: value for key, value in found.items() if key not in NAMES}
+
+
+def as_json(made):
+    return {key: value for key, value in json.loads(json.dumps(made)).items() if key not in NAMES}
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """Two logs of a SCARA, as files."""
+    folder = tmp_path_factory.mktemp("api")
+    for seed, name in enumerate(("first", "second")):
+        moves = RandomMoves(moves=8, durations=(0.6, 1.2), rest=0.3, seed=seed)
+        write_log(
+            idbench.simulate(replace(idbench.load_scenario("ripple"), trajectory=moves), seed).log, folder / f"{name}.parquet"
+        )
+    return folder
+
+
+def test_a_fit_of_files_is_that_of_the_command(files, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words = ["--validate", str(files / "second.parquet"), "--model", "explicit", "--estimator", "WLS", "--no-rerun"]
+    assert main(["identify", str(files / "first.parquet"), *words, "--out", "found"]) == 0
+    fit = idbench.fit(files / "first.parquet", validate=files / "second.parquet", model="explicit", estimator="WLS")
+    assert as_json(fit.summary()) == summary(tmp_path / "found")
+    assert fit.verdict in capsys.readouterr().out
+
+
+def test_a_fit_of_logs_is_that_of_their_files(files):
+    logs = [idbench.read_log(files / f"{name}.parquet") for name in ("first", "second")]
+    one = idbench.fit(logs[0], "scara", validate=logs[1], model="power", estimator="OLS")
+    two = idbench.fit(files / "first.parquet", "scara", validate=files / "second.parquet", model="power", estimator="OLS")
+    np.testing.assert_array_equal(one.fit.estimates["power"].X, two.fit.estimates["power"].X)
+    assert [each["models"] for each in one.summary()["validations"]] == [
+        each["models"] for each in two.summary()["validations"]
+    ]
+
+
+def test_a_run_is_that_of_the_command(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "ideal", "--out", "ran", "--no-rerun", "--estimator", "OLS"]) == 0
+    run = idbench.simulate("ideal")
+    assert run.truth == dict(zip(*(summary(tmp_path / "ran")[key] for key in ("parameters", "truth")), strict=True))
+    fit = idbench.fit(run.log, run.robot, truth=run.truth, estimator="OLS")
+    written = summary(tmp_path / "ran")
+    assert as_json(fit.fit.summary())["models"] == written["models"]
+
+
+def test_a_study_is_that_of_the_command(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = (
+        'name = "short"\nquestion = "?"\nscenario = "quantization"\nseeds = 2\nmodels = ["explicit"]\nestimators = ["OLS"]\n'
+        '[settings.trajectory]\nkind = "random"\nmoves = 6\n[[axes]]\nfield = "encoder.lines"\nvalues = [1024, 4096]\n'
+    )
+    (tmp_path / "short.toml").write_text(text)
+    assert main(["study", "short.toml", "--no-rerun"]) == 0
+    table, seconds = idbench.study("short.toml"), {"seconds"}
+    written = summary(tmp_path / "runs" / "short")
+    made = as_json(table.summary())
+    assert {k: v for k, v in made.items() if k not in seconds} == {k: v for k, v in written.items() if k not in seconds}
+    assert "1024" in repr(table)
+    own = idbench.study("short.toml", estimators=["WLS", Ridge(), Ridge(1e-3)])
+    assert {names[1] for _, *names in own.typical_errors()} == {"WLS", "Ridge", "Ridge(strength=0.001)"}
+
+
+@pytest.mark.thorough
+def test_tables_motions_and_sets_are_those_of_their_commands(files, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["table1", "--no-rerun", "--out", "t1"]) == 0
+    assert as_json(idbench.table1().summary()) == summary(tmp_path / "t1")
+    words = ["--duration", "4", "--seed", "2"]
+    assert main(["excite", "scara", *words, "--no-rerun", "--out", "moved"]) == 0
+    assert as_json(idbench.design("scara", duration=4, seed=2).summary()) == summary(tmp_path / "moved")
+    text = 'title = "one"\nfit = ["first.parquet"]\nheld_out = ["second.parquet"]\n[identify]\nmodel = "explicit"\n'
+    (files / "benchmark.toml").write_text(text)
+    assert main(["benchmark", str(files), "--out", "rows"]) == 0
+    row = idbench.benchmark(files, out=tmp_path / "others")[files.name]
+    times = {"seconds", "seconds_of_judging", "made_of"}
+    written = json.loads((tmp_path / "rows" / "summary.json").read_text())["rows"][0]
+    assert {k: v for k, v in as_json(row).items() if k not in times} == {k: v for k, v in written.items() if k not in times}
+
+
+def test_numbers_have_units_and_errors_and_torques_are_predicted(files, robot):
+    fit = idbench.fit(files / "first.parquet", model="explicit", estimator="WLS")
+    estimate = fit.fit.estimates["explicit"]
+    Fv1 = fit.parameters["Fv1"]
+    assert (Fv1.value, Fv1.sigma, Fv1.unit) == (estimate.X[1], estimate.standard_errors[1], "N m s/rad")
+    np.testing.assert_allclose(np.diagonal(fit.correlation), 1.0)
+    q, qd, qdd = np.random.default_rng(0).normal(size=(3, 4, 5, 2))
+    tau = fit.predict(q, qd, qdd)
+    assert tau.shape == q.shape
+    # Eq. 5: the same columns, sample by sample.
+    X = dict(zip(estimate.names, estimate.X, strict=True))
+    np.testing.assert_allclose(
+        tau[..., 1],
+        X["ZZ2"] * (qdd[..., 0] + qdd[..., 1])
+        + X["LMX2"] * (qdd[..., 0] * np.cos(q[..., 1]) + qd[..., 0] ** 2 * np.sin(q[..., 1]))
+        + X["LMY2"] * (qd[..., 0] ** 2 * np.cos(q[..., 1]) - qdd[..., 0] * np.sin(q[..., 1]))
+        + X["Fv2"] * qd[..., 1]
+        + X["Fs2"] * np.sign(qd[..., 1]),
+        atol=1e-12,
+    )
+    score = fit.score(idbench.read_log(files / "second.parquet"))
+    assert (score.percent < 10).all()
+    assert "rms error" in repr(score)
+
+
+def test_files_are_written_and_those_of_others_kept(files, tmp_path):
+    fit = idbench.fit(files / "first.parquet", model="explicit", estimator="WLS")
+    fit.write(tmp_path / "arm.py", tmp_path / "arm.json")
+    fit.report(tmp_path / "report.html")
+    assert {path.name for path in tmp_path.iterdir()} == {"arm.py", "arm.json", "report.html"}
+    (tmp_path / "notes.py").write_text("mine")
+    with pytest.raises(idbench.ExperimentError, match=r"notes\.py"):
+        fit.write(tmp_path / "notes.py")
+    assert (tmp_path / "notes.py").read_text() == "mine"
+
+
+def test_joints_are_put_in_the_order_of_the_robot(files):
+    log = idbench.read_log(files / "first.parquet")
+    names = idbench.load_robot("scara").robot.joints
+    turned = replace(log, q=log.q[:, ::-1], tau=log.tau[:, ::-1], joints=names[::-1])
+    one, two = (idbench.fit(each, "scara", model="explicit", estimator="OLS") for each in (log, turned))
+    np.testing.assert_array_equal(one.fit.estimates["explicit"].X, two.fit.estimates["explicit"].X)
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"estimater": "OLS"}, "unknown key 'estimater' (did you mean 'estimator'?)"),
+        ({"estimator": "OSL"}, "no 'OSL' among the estimators"),
+        ({"estimator": 3.0}, "is none of the estimators"),
+        ({"estimator": "mine:Ridge"}, "no 'mine:Ridge' among the estimators"),
+        ({"cutoff": "fast"}, "cutoff = 'fast'"),
+        ({"cutoff": -1.0}, "cutoff"),
+        ({"torque": "late"}, "torque = 'late'"),
+        ({"validate": ["gone.csv"]}, "gone.csv"),
+        ({"gravity": [0, 0]}, "gravity"),
+        ({"friction": "sticky"}, "no law 'sticky'"),
+    ],
+)
+def test_wrong_keys_are_refused_by_name(files, keys, words):
+    with pytest.raises((idbench.ExperimentError, idbench.IdentificationError, idbench.BenchError)) as refused:
+        idbench.fit(files / "first.parquet", **keys)
+    assert words in str(refused.value)
+
+
+def test_results_are_tables_in_a_notebook(files):
+    log, robot = idbench.read_log(files / "first.parquet"), idbench.load_robot("scara")
+    fit = idbench.fit(log, robot, model="explicit", estimator="WLS")
+    for shown in (log, robot, fit, fit.score(log), fit.fit.estimates["explicit"]):
+        assert shown._repr_html_().count("<tr>") > 2
+        assert "object at 0x" not in repr(shown)
+    assert repr(fit).startswith("Result: ")
+
+
+def test_an_object_has_the_name_of_the_table_where_it_is_one():
+    assert ESTIMATORS.name_of(WeightedLeastSquares()) == "WLS"
+    assert ESTIMATORS.name_of(WeightedLeastSquares) == "WLS"
+
+
+@pytest.mark.thorough
+def test_it_lives_beside_folders_of_the_same_names(tmp_path):
+    """A script whose project has packages of its own called models, sim, identify and experiments."""
+    for name in ("models", "sim", "identify", "experiments"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").write_text(f"NAME = 'my {name}'\n")
+    code = "import models, sim, identify, experiments, idbench\n"
+    code += "fit = idbench.fit(idbench.simulate('ideal').log, 'scara', model='explicit', estimator='OLS')\n"
+    code += "print(models.NAME, sim.NAME, identify.NAME, experiments.NAME, len(fit.parameters))"
+    (tmp_path / "script.py").write_text(code)
+    done = subprocess.run([sys.executable, "script.py"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.stdout == "my models my sim my identify my experiments 8\n", done.stderr
