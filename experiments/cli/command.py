@@ -9,8 +9,6 @@ from typing import Any, ClassVar, TypeVar, get_type_hints
 
 from idbench.experiments.cli.interruption import importing
 from idbench.experiments.cli.parser import word_of
-from idbench.experiments.requests.jobs import IdentifyRequest, RunRequest
-from idbench.experiments.requests.shared import Parameters
 
 
 class Command:
@@ -79,22 +77,20 @@ def _word(value: object, absolute: bool) -> str:
     return quote(str(Path(text).absolute()) if there else text)
 
 
-Asked = TypeVar("Asked", bound=IdentifyRequest | RunRequest)
+Asked = TypeVar("Asked")
 
 
 def with_own_parts(asked: Asked) -> Asked:
-    """Return a request whose model, chain, estimator and laws are names of the tables, which have loaded those of one's own."""
+    """Return a request whose models, chains, estimators and laws are names of tables, which have loaded one's own."""
     from idbench.identify import CHAINS, ESTIMATORS, MODELS
 
-    names: dict[str, Any] = {"chain": CHAINS.load(asked.chain), "estimator": ESTIMATORS.load(asked.estimator)}
-    if isinstance(asked, IdentifyRequest) and asked.model:
-        names["model"] = MODELS.load(asked.model)
-    return replace(asked, parameters=with_own_laws(asked.parameters), **names)
-
-
-def with_own_laws(asked: Parameters) -> Parameters:
-    """Return parameters whose laws of friction are names of the table."""
-    return replace(asked, friction=_loaded(asked.friction), add=_loaded(asked.add))
+    made: Any = asked
+    tables: dict[str, Any] = {"model": MODELS, "chain": CHAINS, "estimator": ESTIMATORS}
+    given = {name: getattr(made, name, None) for name in tables}
+    named: dict[str, Any] = {name: tables[name].load(value) for name, value in given.items() if value}
+    laws = replace(made.parameters, friction=_loaded(made.parameters.friction), add=_loaded(made.parameters.add))
+    found: Asked = replace(made, parameters=laws, **named)
+    return found
 
 
 def _loaded(texts: Sequence[str]) -> tuple[str, ...]:

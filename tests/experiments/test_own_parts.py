@@ -6,11 +6,12 @@ import pytest
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.chain_settings import chain_of
-from idbench.identify import CHAINS, MODELS
+from idbench.identify import BLOCKS, CHAINS, ESTIMATORS, MODELS
 
 OWN = '''
 from dataclasses import dataclass, replace
-from idbench.identify import CHAINS, ExplicitModel, FirLowPass
+import numpy as np
+from idbench.identify import CHAINS, AbstractEstimator, AbstractFriction, Estimate, ExplicitModel, FirLowPass
 
 class Steady(ExplicitModel):
     """The explicit model, by another name."""
@@ -19,6 +20,25 @@ def slow():
     return replace(CHAINS.create("idbench"), operator=FirLowPass(cutoff=6.0))
 
 explicit = Steady
+
+@dataclass(frozen=True)
+class Ridge(AbstractEstimator):
+    """Least squares with a penalty."""
+
+    def solve(self, problem):
+        W, Y = problem.rows.W, problem.rows.Y
+        Wt = np.swapaxes(W, -1, -2)
+        return Estimate.judge(problem, np.linalg.solve(Wt @ W + 1e-9 * np.eye(W.shape[-1]), Wt @ Y[..., None])[..., 0])
+
+@dataclass(frozen=True)
+class Drag(AbstractFriction):
+    """Fq |qd| qd."""
+
+    symbol = "Fq"
+    unit = "N m s^2/rad^2"
+
+    def force(self, q, qd):
+        return np.abs(qd) * qd
 '''
 
 
@@ -28,7 +48,7 @@ def own(tmp_path, monkeypatch):
     (tmp_path / "own_parts.py").write_text(OWN)
     monkeypatch.syspath_prepend(tmp_path)
     yield
-    for table in (MODELS, CHAINS):
+    for table in (MODELS, CHAINS, ESTIMATORS, BLOCKS):
         table._loaded.clear()
 
 
@@ -39,6 +59,20 @@ def test_a_model_and_a_chain_of_ones_own_are_named_on_the_command_line(own, idbe
     shown = json.loads((tmp_path / "found" / "summary.json").read_text())
     assert set(shown["models"]) == {"Steady"}
     assert shown["chain"] == "slow"
+
+
+def test_estimators_and_laws_of_ones_own_are_named_in_every_command(own, idbench, logs, tmp_path):
+    words = ["--friction", "standard+own_parts:Drag", "--estimator", "own_parts:Ridge"]
+    known = ["--robot", "puma560", "--torque", "held", "--model", "explicit", "--no-rerun", "--out", "found"]
+    code, _, complaint = idbench("identify", logs / "first.parquet", *known, *words)
+    assert code == 0, complaint
+    found = json.loads((tmp_path / "found" / "summary.json").read_text())
+    assert (found["estimator"], "Fq6" in found["parameters"]) == ("Ridge", True)
+    assert "own_parts:Ridge" in (tmp_path / "found" / "report.html").read_text()  # how to make it again
+    code, _, complaint = idbench("run", "ideal", "--add", "own_parts:Drag", "--estimator", "own_parts:Ridge", "--no-rerun")
+    assert code == 0, complaint
+    code, out, complaint = idbench("robot", "scara", "--add", "own_parts:Drag")
+    assert (code, "Fq2" in out) == (0, True), complaint
 
 
 @pytest.mark.parametrize(

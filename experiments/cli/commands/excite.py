@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from idbench.experiments.cli.command import command_of
+from idbench.experiments.cli.command import command_of, with_own_parts
 from idbench.experiments.cli.options.jobs import Excite
 from idbench.experiments.cli.saving import Files, saved, write_scenario
 from idbench.experiments.excite.excited import Excited
@@ -29,14 +29,14 @@ LEFT_OUT = ("out", "force", "json", "watching")
 
 def excite(options: Excite) -> None:
     """Design a motion, or a sequence of them, save and show it."""
-    stem, design = Path(options.robot).stem, designed(options)
+    stem, design = Path(options.robot).stem, designed(with_own_parts(options))
     command = command_of("excite", options, "robot", ("force", "json", "watching"))
     whole = command_of("excite", options, "robot", LEFT_OUT, absolute=True)
     out = options.out or Path("runs") / f"excited-{stem}"
     folder, page = ResultsFolder(out, "excite", whole, options.force, files_of(options)), new_page(machine=options.json)
     with options.watching.audience() as audience, shown(page), folder.held():
         with progress_of(f"designing a motion of {stem}") as progress:
-            found, sequence = excited(options, progress)
+            found, sequence = excited(with_own_parts(options), progress)
             print_excited(page, found)
         robot = design.robot_model.robot
         page.warn({FILE: warnings_of_robot(robot), "limits": looser(robot, design.asked)})

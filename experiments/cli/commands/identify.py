@@ -36,8 +36,7 @@ NOT_MADE_AGAIN = tuple(name for name in LEFT_OUT if name != "out")
 
 def identify(options: Identify) -> None:
     """Identify logs, judge the result, save and show it."""
-    page, options = new_page(machine=options.json), with_own_parts(options)
-    request = request_of(options)
+    page, request = new_page(machine=options.json), request_of(with_own_parts(options))
     command, read = command_of("identify", options, "log", NOT_MADE_AGAIN), files_of(options)
     whole = command_of("identify", options, "log", LEFT_OUT, absolute=True)
     folder = ResultsFolder(options.out, "identify", whole, options.force, read) if options.out else None
@@ -49,7 +48,7 @@ def identify(options: Identify) -> None:
         audience = stack.enter_context(options.watching.audience())
         options = _followed(stack, options, request, audience)
         with stages_of("identifying"):
-            result = fit_of(*loaded_logs(options, request))
+            result = fit_of(*loaded_logs(with_own_parts(options), request))
         _show_fit(page, result, options, read[0])
         _save(folder, page, result)
         kept = f"the estimates are printed{f', and with the logs in {folder.out}' if folder else ''}"

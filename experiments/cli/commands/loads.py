@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from rich.text import Text
 
-from idbench.experiments.cli.command import command_of
+from idbench.experiments.cli.command import command_of, with_own_parts
 from idbench.experiments.cli.options.jobs import IdentifyGains, IdentifyPayload
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import RobotModel
@@ -35,7 +35,7 @@ def payload(options: IdentifyPayload) -> None:
             _compare_ways(page, options)
             _finish(page, folder)
             return
-        made = payload_of(options)
+        made = payload_of(with_own_parts(options))
         _print_payload(page, options, made)
         with _finish(page, folder) as attempts:
             _judge(page, made.judgement, made.leading, attempts, folder)
@@ -52,7 +52,7 @@ def gains(options: IdentifyGains) -> None:
             _try_gains(page, options)
             _finish(page, folder)
             return
-        made = gains_of(options)
+        made = gains_of(with_own_parts(options))
         _print_gains(page, options, made)
         with _finish(page, folder) as attempts:
             _judge(page, made.judgement, None, attempts, folder)
@@ -108,7 +108,7 @@ def _write_mjcf(page: Page, options: IdentifyPayload, robot_model: RobotModel, f
 
 def _compare_ways(page: Page, options: IdentifyPayload) -> None:
     """Print how well each way finds the payload of a simulated robot."""
-    pairs = simulated_pairs(options)
+    pairs = simulated_pairs(with_own_parts(options))
     with progress_of("payload") as told:
         scores = pairs.payloads(told)
     _print_scores(page, scores, f"{pairs.scenario.name}: payload of {pairs.scenario.payload.mass:g} kg, {pairs.runs} runs")
@@ -117,7 +117,7 @@ def _compare_ways(page: Page, options: IdentifyPayload) -> None:
 
 def _try_gains(page: Page, options: IdentifyGains) -> None:
     """Print how well gains of a simulated robot are found."""
-    pairs = simulated_pairs(options)
+    pairs = simulated_pairs(with_own_parts(options))
     known = {"ML": pairs.truth["ML"]}
     with progress_of("gains") as told:
         score = pairs.gains(known, told)

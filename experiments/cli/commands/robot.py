@@ -8,6 +8,7 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
+from idbench.experiments.cli.command import with_own_parts
 from idbench.experiments.cli.options.tools import DescribeRobot
 from idbench.experiments.identification.robot_model import RobotModel, absolute
 from idbench.experiments.judgement.warnings import FILE, warnings_of_robot
@@ -23,10 +24,8 @@ MANY = 30
 
 def describe(options: DescribeRobot) -> None:
     """Show what can be identified of a robot."""
-    robot_model, page = (
-        RobotModel(absolute(options.name), options.parameters, options.mounting.mounting),
-        new_page(machine=options.json),
-    )
+    asked, page = with_own_parts(options), new_page(machine=options.json)
+    robot_model = RobotModel(absolute(asked.name), asked.parameters, asked.mounting.mounting)
     robot_model.require_laws()
     if robot_model.robot.n > MANY:
         sys.stderr.write(f"idbench: grouping the parameters of {robot_model.robot.n} joints takes a while\n")

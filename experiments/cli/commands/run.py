@@ -32,8 +32,7 @@ LEFT_OUT = ("out", "force", "json", "watching", "yes")
 def run(options: RunCommand) -> None:
     """Simulate a scenario, identify it, save and record it."""
     page, watching = new_page(machine=options.json), options.watching
-    options = with_own_parts(options)
-    made = run_of(options, lambda said: page.print(Text(said), soft_wrap=True))
+    made = run_of(with_own_parts(options), lambda said: page.print(Text(said), soft_wrap=True))
     require_window(options.inner, watching)
     name = made.scenario.name
     command = command_of("run", options, "scenario", LEFT_OUT, absolute=True)
