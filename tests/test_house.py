@@ -136,3 +136,22 @@ def test_names_of_parameters_are_made_in_one_place(syntax):
                 assert not re.fullmatch(r"f['\"](\{[^{}]+\}|[A-Z]\w*)\{j \+ 1\}['\"]", text), (
                     f"{name}, line {node.lineno}: {text}"
                 )
+
+
+def test_numbers_say_what_they_are(root):
+    """A number at module level has a text below it, or a comment: what it limits, its unit, where it is from."""
+    for room in ROOMS:
+        for path in (root / room).rglob("*.py"):
+            text = path.read_text()
+            lines, body = text.splitlines(), ast.parse(text).body
+            for node, below in zip(body, [*body[1:], None], strict=True):
+                if not isinstance(node, ast.Assign) or not _has_number(node) or "Annotated" in ast.unparse(node):
+                    continue
+                described = isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant)
+                beside = any("#" in line for line in lines[node.lineno - 2 : node.end_lineno])
+                if not (described or beside or "sets" in path.parts or ast.unparse(node.targets[0]).startswith(("_", "("))):
+                    raise AssertionError(f"{path.name}, line {node.lineno}: what is {ast.unparse(node.targets[0])}?")
+
+
+def _has_number(node):
+    return any(isinstance(each, ast.Constant) and type(each.value) in (int, float) for each in ast.walk(node.value))

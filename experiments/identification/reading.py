@@ -29,7 +29,7 @@ SLOWEST = 0.5
 LATEST = 1.0
 """Delay [s] that no torque of a log has."""
 
-TURN = 2 * np.pi
+TURN = 2 * np.pi  # [rad]
 
 NEARLY = 0.2
 """Share of a turn by which a jump may differ from one: the joint moves on between two samples."""

@@ -21,9 +21,13 @@ from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot, of_payload
 from idbench.identify.loads.payload import PayloadEstimate, with_robot_held
 
 HEAVIEST = 1e5
+"""Mass beyond which no gripper holds anything [kg]."""
+
 FARTHEST = 1e3
+"""Distance beyond which no gripper holds anything [m]."""
+
 ROUNDING = 1e-9
-"""Mass [kg] and distance [m] beyond which no gripper holds anything, and a share of rounding."""
+"""Share of the moments of inertia that is rounding of a drawing."""
 
 
 def known_of(mass: float | None, at: Sequence[float] | None, inertia: Sequence[float] | None) -> dict[str, float]:

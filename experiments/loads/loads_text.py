@@ -15,6 +15,7 @@ from idbench.identify.loads.loaded_robot import LETTERS
 from idbench.identify.loads.payload import PayloadEstimate
 from idbench.identify.parameters.bodies import pseudo_inertia
 
+# Of LETTERS.
 UNITS = (*["kg m^2"] * 6, *["kg m"] * 3, "kg")
 
 

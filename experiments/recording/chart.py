@@ -17,9 +17,13 @@ HEIGHT = 1.0
 """Height of a frame: the unit of everything in a chart. 2D views keep the ratio of their axes."""
 
 WIDE = 2.2
+"""Width of the frames of charts one above the other."""
+
 NARROW = 1.4
+"""Width of the frames of charts in a row."""
+
 SQUARE = 1.2
-"""Widths of frames: of charts one above the other, of those that stand in a row, and of those that hold a long list."""
+"""Width of the frames that hold a long list."""
 
 FRAME: Color = (120, 120, 120)
 GRID: Color = (70, 70, 70)
@@ -31,11 +35,10 @@ LINE = 0.11
 LINES, BESIDE = 11, 0.75
 """Lines of the legend, and how far beside them the next ones stand, if there are more."""
 
-GRID_ORDER = -3.0
-DOT_ORDER = -2.0
-LINE_ORDER = 1.0
-MARK_ORDER = 2.0
-"""What is drawn over what."""
+GRID_ORDER = -3.0  # what is drawn over what: of two things the one of higher order
+DOT_ORDER = -2.0  # dots over the grid
+LINE_ORDER = 1.0  # lines over dots
+MARK_ORDER = 2.0  # marks over all
 
 Symbol = Literal["circle", "square", "triangle", "diamond", "cross"]
 

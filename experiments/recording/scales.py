@@ -20,6 +20,7 @@ DECADE_STEPS = (1.0,), (1.0, 3.0), (1.0, 2.0, 5.0)
 """Values within a decade that are written beside a logarithmic axis: the first that are more than `ENOUGH`."""
 
 ENOUGH = 2
+"""Values beside an axis with which it can be read."""
 
 ROOM = 0.04
 """Share of an axis that stays free at either end."""

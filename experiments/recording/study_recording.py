@@ -25,7 +25,7 @@ from idbench.experiments.study.study_results import command, worst_runs
 from idbench.experiments.text import FORMS, GREY, JOINTS, Color, lighter
 from idbench.identify import Array
 
-PERCENT = 100.0
+PERCENT = 100.0  # of a share
 
 DOTS = 150
 """Runs of a cell that are drawn."""

@@ -80,7 +80,7 @@ Identify = Callable[[int, Servo, Sequence[ServoRun]], Identified]
 """Identifies one joint by its number, what is known of its servo, and its runs."""
 
 
-UNLOADED = JointLoad(*(np.zeros(()) for _ in range(4)))
+UNLOADED = JointLoad(*(np.zeros(()) for _ in range(4)))  # stands in while columns are checked
 
 
 class JointsLog(NamedTuple):

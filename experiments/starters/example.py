@@ -9,7 +9,7 @@ from idbench.sim import Robot, load_scenario, run
 from idbench.sim.trajectories import RandomMoves
 
 ROBOT = "puma560"
-FS = 250.0
+FS = 250.0  # [Hz], of a common robot controller
 DELAY = 0.002
 """Robot, sampling frequency [Hz], and delay of the torques [s], which no file of the example states."""
 

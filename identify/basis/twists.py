@@ -26,7 +26,7 @@ class Vector(NamedTuple):
 Matrix: TypeAlias = tuple[Vector, Vector, Vector]
 """Three rows."""
 
-ZERO = Vector(0.0, 0.0, 0.0)
+ZERO = Vector(0.0, 0.0, 0.0)  # of a twist that has no such part
 
 
 def is_zero(a: Term) -> bool:

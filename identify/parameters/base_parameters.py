@@ -200,7 +200,7 @@ def _large(tree: KinematicTree, standard: Basis, length: Array) -> Array:
     return np.maximum(large, ROUNDING * length.max() / DEPENDENT)
 
 
-JOINTS = 2
+JOINTS = 2  # of the paper's SCARA
 
 
 @cache

@@ -39,7 +39,7 @@ Prior = Literal["pullback", "entropic"]
 """Distance to the given model: constant pull-back, tr((S0^-1 dS)^2), or entropic, 2 (tr(S0^-1 S) - ln det(S0^-1 S) - 4), of
 each link's pseudo-inertia S. Both are the same near the given model; the entropic one keeps bodies from becoming thin."""
 
-_ROOT2 = np.sqrt(2.0)
+_ROOT2 = np.sqrt(2.0)  # weight of what a symmetric matrix has on both sides
 _PLACES = [(i, j) for j in range(4) for i in range(j, 4)]
 """Of the entries of a lower triangular matrix."""
 

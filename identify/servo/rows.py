@@ -61,7 +61,7 @@ DELAYS = np.array([*np.arange(0.0, 0.0601, 0.005), 0.08, 0.1, 0.13, 0.16, 0.2, 0
 RATES = 10
 """Rate limits that are tried, between half and 1.3 times the largest speed of a joint, beside none."""
 
-DECIMATION = max(1, int(0.25 / CUTOFF))
+DECIMATION = max(1, int(0.25 / CUTOFF))  # rows at twice the rate that the band of the smoothing needs
 
 COLUMNS = ("a", "b", "Ia", "Fs", "offset")
 

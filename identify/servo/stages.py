@@ -20,9 +20,13 @@ SHAKEN = 2
 """Times that a search leaves its valley for others, at most."""
 
 SCALES = (0.7, 1.0, 1.4)
+"""Factors on all torques that are tried from there."""
+
 ROTORS = (0.25, 1.0, 4.0)
+"""Further factors on the armature that are tried."""
+
 LATER = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
-"""Factors on all torques, further ones on the armature, and changes of the delay [samples] that are tried from there."""
+"""Changes of the delay that are tried [samples]."""
 
 VALLEYS = 3
 """Other valleys that are searched."""
@@ -174,9 +178,13 @@ MOST_RUNS = 120
 """Runs that a search looks at; of more, as many evenly spread ones."""
 
 COARSE = 0.4
+"""Longest step of the first stages, as a share of the sampling time."""
+
 MEDIUM = 0.2
+"""Longest step of the last stage with whole runs."""
+
 FINE = 0.1
-"""Longest steps, as shares of the sampling time: of first stages, of the last with whole runs, and with pieces."""
+"""Longest step of the last stage with pieces."""
 
 PLAYS = np.array([0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
 """Backlash that is tried first [counts]."""

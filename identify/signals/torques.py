@@ -12,7 +12,7 @@ from idbench.identify.data.motion_log import Meaning, TorqueChannel
 from idbench.identify.plugins import Table
 from idbench.identify.signals.filters import REACH, averaged, shift, slide
 
-_DIFFERENCE = np.array([-0.5, 0.0, 0.5])
+_DIFFERENCE = np.array([-0.5, 0.0, 0.5])  # of two neighbours, over two periods
 
 
 class Reading(NamedTuple):

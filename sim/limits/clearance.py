@@ -16,6 +16,7 @@ ALWAYS = 100
 """Random postures: pairs that are too near in all of them are made so, and are left out."""
 
 SEED = 0
+"""Of the random postures: the same for everybody."""
 
 ROOM = 0.02
 """Distance [m] beyond the least from which on nearness costs, where a pair can get so far apart."""

@@ -59,6 +59,7 @@ class CoulombFriction(AbstractFriction):
 
 
 START, RANGE = 0.2, (0.01, 5.0)
+"""Velocity over which friction rises: where it is looked for first, and within [rad/s]."""
 
 
 @final

@@ -173,8 +173,9 @@ class StribeckFriction(AbstractFriction):
         return np.exp(-((np.abs(qd) / self.vs) ** self.exponent)) * np.sign(qd)
 
 
+# Stribeck velocities of published joints are 0.02 to 0.5 rad/s, exponents 0.5 to 2 (Armstrong-Helouvry et al., 1994).
 SPEED = Shape("vs", "vs", "rad/s", 0.1, (0.02, 1.0))
-EXPONENT = Shape("exponent", "ds", "1", 1.0, (0.5, 3.0))
+EXPONENT = Shape("exponent", "ds", "1", 1.0, (0.5, 3.0))  # 1 is Tustin's, 2 Gaussian
 
 
 def stribeck() -> ShapedFriction:

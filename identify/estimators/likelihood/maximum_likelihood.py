@@ -101,11 +101,14 @@ def _windows(inverse: BandMatrix, n: int) -> Array:
 
 
 FAR = 15.0
+"""Sigmas from the generalized least-squares estimate beyond which a fit is not accepted: noise alone, of a 10-bit encoder,
+takes one 7 sigma far. Where torques do not belong to the motion, parameters of zero, with which nothing moves, are as good as any."""
+
 APART = 3.0
+"""The same where its own sigma is below the share `SMALL` of that estimate's."""
+
 SMALL = 1e-2
-"""Sigmas from the generalized least-squares estimate beyond which a fit is not believed; those where its own sigma is below
-this share of that. Where torques do not belong to the motion, parameters of zero, with which nothing moves, are as good as any.
-Noise alone, of a 10-bit encoder, takes a fit 7 sigma far."""
+"""Share of sigma below which a fit claims to know far more than the estimate that it began with."""
 
 NOTHING = 0.9
 """Share of the rms torque above which noise that is found leaves nothing to the motion: less than a fifth of its square."""
