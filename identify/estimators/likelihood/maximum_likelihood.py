@@ -102,7 +102,8 @@ def _windows(inverse: BandMatrix, n: int) -> Array:
 
 FAR = 15.0
 """Sigmas from the generalized least-squares estimate beyond which a fit is not accepted: noise alone, of a 10-bit encoder,
-takes one 7 sigma far. Where torques do not belong to the motion, parameters of zero, with which nothing moves, are as good as any."""
+takes one 7 sigma far. Where torques do not belong to the motion, parameters of zero, with which nothing moves, are as good as
+any."""
 
 APART = 3.0
 """The same where its own sigma is below the share `SMALL` of that estimate's."""
