@@ -1,8 +1,9 @@
 """Tables and numbers as text."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from copy import copy
 from dataclasses import replace
+from io import StringIO
 from itertools import groupby
 from math import isnan
 
@@ -180,3 +181,10 @@ def probability(p: float) -> str:
 def error_percentage(share: float) -> str:
     """Return a percentage to two digits with its sign, to none from ten on; beyond a thousand it says no more."""
     return f"{share:.2g} %" if share < 10 else f"{share:.0f} %" if share < 1000 else "more than 1000 %"
+
+
+def printed(show: Callable[[Console], object], width: int = 160) -> str:
+    """Return what is printed on a console of so many characters."""
+    file = StringIO()
+    show(Console(file=file, width=width))
+    return file.getvalue()

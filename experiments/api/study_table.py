@@ -13,6 +13,7 @@ from idbench.experiments.study.statistics import Cell, cells
 from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study import Study
 from idbench.experiments.study.study_results import print_study, summary_of
+from idbench.experiments.text import printed
 
 WIDTH = 160
 """Characters of a line."""
@@ -47,10 +48,7 @@ class StudyTable:
         return {(*cell.settings.values(), *cell.names): float(cell.typical) if cell.runs else np.nan for cell in self.cells}
 
     def __repr__(self) -> str:
-        console = Console(file=StringIO(), width=WIDTH)
-        print_study(console, self.study, self.cells)
-        assert isinstance(console.file, StringIO)
-        return console.file.getvalue()
+        return printed(lambda console: print_study(console, self.study, self.cells))
 
     def _repr_html_(self) -> str:
         console = Console(file=StringIO(), width=WIDTH, record=True)

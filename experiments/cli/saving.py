@@ -45,6 +45,13 @@ def saved(page: Page, folder: ResultsFolder, summary: dict[str, Any], files: Fil
         page.print(f"written to {folder.out}{hint}", soft_wrap=True)
 
 
+def save_summary(page: Page, folder: ResultsFolder | None) -> None:
+    """Write what was found so far, in the place of earlier results of the same folder."""
+    if folder is not None:
+        with folder.complete() as hidden:
+            write_summary(hidden / "summary.json", page.found)
+
+
 def write_scenario(scenario: Scenario, path: Path) -> None:
     """Write a scenario as TOML."""
     path.write_text(to_toml(scenario), encoding="utf-8", errors="backslashreplace")

@@ -3,6 +3,7 @@
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,8 +15,10 @@ from idbench.experiments.identification.reading import file_of
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel, absolute
 from idbench.experiments.loads.known_load import LoadJudgement, known_of
+from idbench.experiments.loads.loads_text import gains_summary, payload_summary, print_gains, print_payloads
 from idbench.experiments.loads.simulated import Pairs
 from idbench.experiments.requests.jobs import GainsRequest, LoadRequest, PayloadRequest
+from idbench.experiments.text import printed
 from idbench.identify import Array, IdentificationError
 from idbench.identify.loads.drive_gains import GainEstimate, identify_drive_gains
 from idbench.identify.loads.loaded_robot import LETTERS, LoadedRobot
@@ -38,6 +41,16 @@ class PayloadFit:
     notes: tuple[str, ...]
     """What was read, done and assumed."""
 
+    def summary(self) -> dict[str, Any]:
+        """Return what `idbench payload` writes into summary.json, but for the names of files."""
+        doubts = self.judgement.warnings(self.leading)
+        judged = {"judgement": self.judgement.summary(self.judgement.word(doubts))}
+        return {"robot": self.judgement.request.robot_model.name, **payload_summary(self.found), **judged}
+
+    def __repr__(self) -> str:
+        joints = self.judgement.request.robot_model.robot.joints
+        return printed(lambda console: print_payloads(console, self.found, joints[-1]))
+
     @property
     def leading(self) -> PayloadEstimate:
         """The payload by the first way that gives one."""
@@ -56,6 +69,17 @@ class GainsFit:
     """Those with which the logs were read, shape (joint,)."""
     notes: tuple[str, ...]
     """What was read, done and assumed."""
+
+    def summary(self) -> dict[str, Any]:
+        """Return what `idbench gains` writes into summary.json, but for the names of files."""
+        robot_model = self.judgement.request.robot_model
+        judged = {"judgement": self.judgement.summary(self.judgement.word(self.judgement.warnings(None)))}
+        found = gains_summary(self.found, self.given.tolist(), robot_model.robot.joints)
+        return {"robot": robot_model.name, **found, **judged}
+
+    def __repr__(self) -> str:
+        joints = self.judgement.request.robot_model.robot.joints
+        return printed(lambda console: print_gains(console, self.found, self.given.tolist(), joints))
 
     @property
     def gains(self) -> Array:

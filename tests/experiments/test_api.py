@@ -116,6 +116,27 @@ def test_tables_motions_and_sets_are_those_of_their_commands(files, tmp_path, mo
     assert {k: v for k, v in as_json(row).items() if k not in times} == {k: v for k, v in written.items() if k not in times}
 
 
+@pytest.mark.thorough
+def test_payloads_gains_and_servos_are_those_of_their_commands(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    loaded = idbench.load_scenario("payload")
+    for name, scenario in (("with", loaded), ("without", replace(loaded, payload=type(loaded.payload)()))):
+        write_log(idbench.simulate(scenario).log, tmp_path / f"{name}.parquet")
+    words = ["with.parquet", "--unloaded", "without.parquet", "--robot", loaded.robot]
+    keys = {"unloaded": "without.parquet", "robot": loaded.robot}
+    assert main(["payload", *words, "--out", "payload"]) == 0
+    assert as_json(idbench.fit_payload("with.parquet", **keys).summary()) == summary(tmp_path / "payload")
+    assert main(["gains", *words, "--mass", f"{loaded.payload.mass}", "--out", "gains"]) == 0
+    made = idbench.fit_gains("with.parquet", **keys, mass=loaded.payload.mass)
+    assert as_json(made.summary()) == summary(tmp_path / "gains")
+    assert main(["run", "servo", "--no-rerun", "--out", "ran"]) == 0
+    robot = idbench.load_scenario("servo").robot
+    words = ["ran/log.parquet", "--robot", robot, "--servo", "ran/servo.toml", "--no-rerun", "--out", "servo"]
+    assert main(["servo", *words]) == 0
+    written = {key: x for key, x in summary(tmp_path / "servo").items() if key not in ("robot", "friction")}
+    assert as_json(idbench.fit_servos("ran/log.parquet", robot, "ran/servo.toml").summary()) == written
+
+
 def test_numbers_have_units_and_errors_and_torques_are_predicted(files, robot):
     fit = idbench.fit(files / "first.parquet", model="explicit", estimator="WLS")
     estimate = fit.fit.estimates["explicit"]

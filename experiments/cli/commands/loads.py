@@ -8,6 +8,7 @@ from rich.text import Text
 
 from idbench.experiments.cli.command import command_of, with_own_parts
 from idbench.experiments.cli.options.jobs import IdentifyGains, IdentifyPayload
+from idbench.experiments.cli.saving import save_summary
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.loads.job import GainsFit, PayloadFit, files_of, gains_of, payload_of, simulated_pairs
@@ -17,7 +18,7 @@ from idbench.experiments.loads.simulated import PairScore
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import Page, new_page, progress_of, shown, stages_of
-from idbench.experiments.results.writing import require_free, write_summary, write_text
+from idbench.experiments.results.writing import require_free, write_text
 from idbench.experiments.text import new_table, print_titled
 from idbench.identify.loads.payload import PayloadEstimate
 from idbench.sim.robot.rewrite import with_body
@@ -92,7 +93,7 @@ def _judge(
         page.print(Text(f"{name}: {verdict.word}: {'; '.join(verdict.reasons)}"), soft_wrap=True)
     page.found |= {"judgement": judgement.summary(word)}
     page.warn(doubts)
-    attempts.attempt("summary.json", lambda: _save(page, folder))
+    attempts.attempt("summary.json", lambda: save_summary(page, folder))
 
 
 def _write_mjcf(page: Page, options: IdentifyPayload, robot_model: RobotModel, found: PayloadEstimate) -> None:
@@ -163,16 +164,10 @@ def _folder(options: IdentifyPayload | IdentifyGains, experiment: str) -> Result
     return folder
 
 
-def _save(page: Page, folder: ResultsFolder | None) -> None:
-    if folder is not None:
-        with folder.complete() as hidden:
-            write_summary(hidden / "summary.json", page.found)
-
-
 def _finish(page: Page, folder: ResultsFolder | None) -> Attempts:
     """Show and save what was found; return what keeps it while it is shown in other ways."""
     page.show()
-    _save(page, folder)
+    save_summary(page, folder)
     if folder is not None:
         page.print(f"written to {folder.out}", soft_wrap=True)
     return Attempts("the results are printed" + (f", and in {folder.out}" if folder else ""), folder)

@@ -9,13 +9,14 @@ from rich.text import Text
 
 from idbench.experiments.cli.command import command_of
 from idbench.experiments.cli.options.jobs import IdentifyServo
+from idbench.experiments.cli.saving import save_summary
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import absolute
 from idbench.experiments.recording.audience import Audience
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.page import Page, new_page, shown, stages_of
-from idbench.experiments.results.writing import require_free, write_summary, write_text
+from idbench.experiments.results.writing import require_free, write_text
 from idbench.experiments.servo.identification import Servos
 from idbench.experiments.servo.job import ServosFit, files_of, servos_identified
 from idbench.experiments.servo.joints import Identified
@@ -57,11 +58,11 @@ def servo(options: IdentifyServo) -> None:
         for line in made.verdicts:
             page.print(Text(line), soft_wrap=True)
         page.show()
-        _save(page, folder)
+        save_summary(page, folder)
         with Attempts("the results are printed" + (f", and in {folder.out}" if folder else ""), folder) as attempts:
             if options.write_mjcf is not None:
                 attempts.attempt("--write-mjcf", lambda: _write(page, options, servos, others, found))
-                attempts.attempt("summary.json", lambda: _save(page, folder))
+                attempts.attempt("summary.json", lambda: save_summary(page, folder))
             if options.write is not None:
                 attempts.attempt("--write", lambda: _write_function(page, options, servos, found))
             if options.watching.rerun and (folder is not None or audience is not None):
@@ -80,7 +81,7 @@ def _identified(page: Page, folder: ResultsFolder | None, options: IdentifyServo
         last[:] = [made]
         page.found |= made.parameters()
         if page.found["joints"]:
-            _save(page, folder)
+            save_summary(page, folder)
 
     try:
         with stages_of("identifying"):
@@ -136,9 +137,3 @@ def _folder(options: IdentifyServo) -> ResultsFolder | None:
     folder = ResultsFolder(options.out, "servo", command, options.force, files_of(options))
     folder.check()
     return folder
-
-
-def _save(page: Page, folder: ResultsFolder | None) -> None:
-    if folder is not None:
-        with folder.complete() as hidden:
-            write_summary(hidden / "summary.json", page.found)
