@@ -96,7 +96,7 @@ def read_log(path: Path | str, torque: TorqueChannel | None = None, joints: Sequ
         raise LogError(f"{path} names its joints, {', '.join(found.joints)}: say their order with joints=(...)")
     found = found.ordered(joints) if joints else found
     if found.t_tau is not None:
-        raise LogError(f"{path} has torques at times of their own: idbench.identify.data.resample.Repaired.of puts them on one clock")
+        raise LogError(f"{path} has torques at times of their own: idbench.read_log(..., resample=True) puts them on one clock")
     channel = torque or found.torque
     if channel is None:
         raise LogError(
