@@ -10,13 +10,13 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.chain_settings import chain_of
 from idbench.experiments.identification.fit import Fit, fit
 from idbench.experiments.identification.friction_choice import summary, words
+from idbench.experiments.identification.iterations import iterations
 from idbench.experiments.identification.load import Loaded, in_band, load, with_held_out
 from idbench.experiments.identification.log_warnings import warnings_of_log
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.reading import ReadOptions, file_of, stated_by
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import SCARA, RobotModel, absolute
-from idbench.experiments.reports.iterations import iterations
 from idbench.experiments.requests.jobs import IdentifyRequest
 from idbench.experiments.requests.shared import CHAIN, LogRequest
 from idbench.identify import ESTIMATORS, MODELS, IdentificationError

@@ -9,9 +9,9 @@ import numpy as np
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.fit import Fit, fit
+from idbench.experiments.identification.iterations import iterations
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
-from idbench.experiments.reports.iterations import iterations
 from idbench.sim.engine.run import Run
 from idbench.sim.engine.simulation import Progress, simulate
 from idbench.sim.engine.watch import Watch

@@ -10,12 +10,12 @@ from rich.text import Text
 
 from idbench.experiments.identification.consistent_estimate import words_of_consistency
 from idbench.experiments.identification.fit import Fit
+from idbench.experiments.identification.iterations import words_of_iterations
 from idbench.experiments.identification.lack import words_of_lack
 from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.judgement.judgement import Unjudged
 from idbench.experiments.judgement.remedies import SURE
 from idbench.experiments.reports.estimates import EstimatesTable, in_lines, leading
-from idbench.experiments.reports.iterations import words_of_iterations
 from idbench.experiments.text import WORTHLESS, new_table, percentage, print_titled
 from idbench.identify import AsLogged, Estimate
 
