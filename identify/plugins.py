@@ -1,11 +1,14 @@
 """Tables of parts that can be exchanged: the names this package knows, and those that users and other packages add."""
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
 from functools import cached_property
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
+from itertools import count
 from typing import Generic, TypeVar
 
 from idbench.identify.blame import is_mistake
@@ -38,6 +41,7 @@ class Table(Mapping[str, Callable[[], T]], Generic[T]):
         self.kind: type[T] = kind
         self._builtin, self._check = builtin, check
         self._loaded: dict[str, Callable[[], T]] = {}
+        self._objects: dict[str, T] = {}
 
     @property
     def builtin(self) -> tuple[str, ...]:
@@ -72,8 +76,8 @@ class Table(Mapping[str, Callable[[], T]], Generic[T]):
         module, colon, short = name.partition(":")
         if not colon:
             return name
-        if short in self._builtin:
-            raise PluginError(f"{name}: {short} is built into the {self.point}, rename the class")
+        if short in self and short not in self._loaded:
+            raise PluginError(f"{name}: {short} is built into the {self.point}, or installed: rename the class")
         with _own_mistakes(f"{name} cannot be loaded"):
             self._loaded[short] = getattr(import_module(module), short)
         return short
@@ -88,18 +92,24 @@ class Table(Mapping[str, Callable[[], T]], Generic[T]):
         """
         if isinstance(part, str):
             return part
-        made = part() if isinstance(part, type) else part
+        with _own_mistakes(f"{part!r:.60} cannot be made without arguments"):
+            made = part() if isinstance(part, type) else part
         if not isinstance(made, self.kind):
             raise PluginError(f"{made!r:.60} is none of the {self.point}: give a name, or an object of {self.kind.__name__}")
         for name, factory in {**self._builtin, **self._loaded}.items():
-            if isinstance(factory, type) and type(made) is factory and made == factory():
+            if _alike(made, self._objects.get(name, factory)):
                 return name
-        name = type(made).__name__
-        known = self._loaded.get(name)
-        if name in self._builtin or (known is not None and known() != made):
-            name = repr(made)  # settings of its own tell it from others of its class
+        first = _called(made)
+        names = (first if k == 1 else f"{first}-{k}" for k in count(1))
+        name = next(each for each in names if each not in self)
         self._loaded[name] = lambda: made
+        self._objects[name] = made
         return name
+
+    def require_one(self, name: str) -> None:
+        """Raise PluginError if several objects have been given that are called like that: which is meant?"""
+        if f"{name}-2" in self._objects:
+            raise PluginError(f"{name} of the {self.point} was defined more than once: give the object, not its name")
 
     def create(self, name: str) -> T:
         """Return the part `name` with its default settings.
@@ -171,6 +181,24 @@ class PluginTable(Table[T]):
         with _own_mistakes(f"plug-in {entry.name!r} ({entry.value}) cannot be loaded"):
             factory: Callable[[], T] = entry.load()
         return factory
+
+
+def _alike(made: object, other: object) -> bool:
+    """Return whether a table has an object under another's name: the same, or equal to what a class makes by itself."""
+    try:
+        if isinstance(other, type):
+            return type(made) is other and bool(made == other())
+        return made is other or (type(made) is type(other) and bool(made == other))
+    except (TypeError, ValueError):  # settings that are arrays, or without defaults
+        return False
+
+
+def _called(made: object) -> str:
+    """Return the name of an object: its class, and the settings that are not their defaults."""
+    known = fields(made) if is_dataclass(made) else ()
+    own = [str(getattr(made, each.name)) for each in known if f"{getattr(made, each.name)}" != f"{each.default}"]
+    words = ",".join("".join(text.split())[:20] for text in own)
+    return type(made).__name__ + (f"({re.sub(r'[^-.,0-9A-Za-z_]', '', words)})" if words else "")
 
 
 @contextmanager

@@ -1,23 +1,32 @@
 """Robots, logs, fits and simulations: each function makes a request of its arguments, and does what its command does."""
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from idbench.experiments.api.logs import given_log, motion_log
+from idbench.experiments.api.logs import given_log, late, motion_log
 from idbench.experiments.api.results import Identification, SimulatedRun
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.identification.job import chooses_band, fit_of, identified, read_options, request_of
+from idbench.experiments.identification.friction_laws import AUTO
+from idbench.experiments.identification.job import (
+    chooses_band,
+    fit_of,
+    identified,
+    read_options,
+    request_of,
+    robot_of,
+    truth_of,
+)
 from idbench.experiments.identification.load import judged_on, prepared, with_held_out
 from idbench.experiments.identification.reading import ReadLog, file_of, read
-from idbench.experiments.identification.request import Request
-from idbench.experiments.identification.robot_model import RobotModel, absolute
+from idbench.experiments.identification.robot_model import SCARA, RobotModel, absolute
 from idbench.experiments.requests import jobs
-from idbench.experiments.requests.shared import LogRequest, MountingOptions, Parameters
+from idbench.experiments.requests.shared import ColumnOptions, LogRequest, MountingOptions, Parameters
 from idbench.experiments.requests.table import keys_of, request_from
 from idbench.identify import BLOCKS, CHAINS, ESTIMATORS, MODELS, MotionLog
-from idbench.identify.plugins import Table
+from idbench.identify.plugins import Table, did_you_mean
 from idbench.sim.engine.simulation import simulate as simulated
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import load as load_scenario
@@ -56,7 +65,9 @@ def load_robot(robot: str | Path, **keys: Any) -> RobotModel:
     return made
 
 
-def read_log(path: str | Path, torque: str | None = None, robot: RobotModel | None = None, **keys: Any) -> MotionLog:
+def read_log(
+    path: str | Path, torque: str | None = None, robot: RobotModel | str | Path | None = None, **keys: Any
+) -> MotionLog:
     """Return the log of a file, or of the folder of a run.
 
     Parameters
@@ -65,7 +76,7 @@ def read_log(path: str | Path, torque: str | None = None, robot: RobotModel | No
         CSV and other text, Parquet, NumPy, Matlab, a ROS bag.
     torque : {"held", "instantaneous", "averaged"}, optional
         What a torque sample means; needed unless the file states it.
-    robot : RobotModel, optional
+    robot : RobotModel, str or Path, optional
         Whose joints give the order of the columns; by default the order of the file, with the names that it has.
     **keys
         Options of `idbench identify` for reading: torque_delay, unwrap, resample, columns, units, rows, gain, layout.
@@ -75,6 +86,9 @@ def read_log(path: str | Path, torque: str | None = None, robot: RobotModel | No
     ExperimentError, LogError
         If the file cannot be read, or makes no log.
     """
+    if not isinstance(path, str | Path):
+        raise ExperimentError(f"read_log: {path!r:.60} is no file: give its name")
+    robot = load_robot(robot) if isinstance(robot, str | Path) else robot
     table = keys if torque is None else {**keys, "torque": torque}
     taken = _others((Parameters, MountingOptions), but=True) | {"robot", "mask_speed", "cutoff", "estimator"}
     asked = request_from(LogRequest, table, "read_log", taken=taken)
@@ -123,21 +137,27 @@ def fit(
     logs = several(log)
     held_out = several(validate)
     model = robot if isinstance(robot, RobotModel) else None
+    _require_logs(logs, held_out, keys)
     table = named(keys) | ({} if robot is None or model else {"robot": robot})
     paths = {name: tuple(map(Path, given)) for name, given in (("log", logs), ("validate", held_out)) if _files(given)}
     asked = request_from(jobs.IdentifyRequest, table | paths, "fit", taken={"label"})
     delay_given = asked.torque_delay != "estimate"
     if model is None and _files(logs) and _files(held_out) and truth is None:
         return Identification(identified(asked), delay_given)
-    model = _with_keys(model, asked, table) if model else _model_of(asked)
-    request = request_of(asked, model)
-    every = [_read(k, each, asked, model) for k, each in enumerate(logs)]
-    loaded = prepared(every, request, seek_delay=not delay_given, band=chooses_band(asked))
-    if _files(held_out):
-        found = with_held_out(loaded, asked.validate, read_options(asked), truth)
+    if model is not None:
+        model = _with_keys(model, asked, table)
     else:
-        others = {f"{k + 1}": _read(k, each, asked, model) for k, each in enumerate(held_out)}
-        found = judged_on(loaded, others, truth, not delay_given)
+        model = RobotModel(_name_of(asked), asked.parameters, asked.mounting.mounting)
+    request = request_of(asked, model)
+    _require_truth(truth, model)
+    loaded = prepared(_read(logs, asked, model), request, seek_delay=not delay_given, band=chooses_band(asked))
+    known = truth if truth is not None or not _files(logs) else truth_of(asked, request)
+    if held_out and _files(held_out):
+        found = with_held_out(loaded, asked.validate, read_options(asked), known)
+    else:
+        others = _read(held_out, asked, model)
+        others = others if delay_given else [late(each, loaded.read[0].channel.delay) for each in others]
+        found = judged_on(loaded, {f"{k + 1}": each for k, each in enumerate(others)}, known, not delay_given)
     return Identification(fit_of(loaded.request, found), delay_given)
 
 
@@ -166,11 +186,18 @@ def simulate(scenario: str | Path | Scenario, seed: int | None = None, **keys: A
 
 def named(keys: Mapping[str, Any]) -> dict[str, Any]:
     """Return keys with names in the place of objects and classes, which the tables have from now on."""
-    return {key: _names(PARTS[key], value) if key in PARTS else value for key, value in keys.items()}
+    return {key: _names(key, value) if key in PARTS else value for key, value in keys.items()}
 
 
-def _names(table: Table[Any], value: Any) -> Any:
-    return tuple(map(table.name_of, value)) if isinstance(value, list | tuple) else table.name_of(value)
+def _names(key: str, value: Any) -> Any:
+    names = tuple(map(PARTS[key].name_of, several(value)))
+    for word in (
+        word for name, each in zip(names, several(value), strict=True) if name == each for word in re.split(r"[\s=+]", name)
+    ):
+        PARTS[key].require_one(word)
+    if key == "friction" and len(names) > 1 and not any("=" in name or name == AUTO for name in names):
+        return ("+".join(names),)  # laws of all joints, one beside the other
+    return names if isinstance(value, list | tuple) else names[0]
 
 
 def several(given: Any) -> tuple[Any, ...]:
@@ -193,8 +220,38 @@ def _others(groups: Sequence[type], *, but: bool = False) -> set[str]:
     return own if but else keys_of(LogRequest).keys() - own
 
 
-def _model_of(asked: jobs.IdentifyRequest) -> RobotModel:
-    return RobotModel(absolute(asked.robot or Request().robot_model.name), asked.parameters, asked.mounting.mounting)
+def _name_of(asked: jobs.IdentifyRequest) -> str:
+    """Return the robot that is named, or that of the run, or the SCARA."""
+    return robot_of(asked) if asked.log else absolute(asked.robot or SCARA)
+
+
+def _require_logs(logs: Sequence[Any], held_out: Sequence[Any], keys: Mapping[str, Any]) -> None:
+    """Raise ExperimentError if something is no log, or keys say how logs are read that were read already."""
+    if not logs:
+        raise ExperimentError("fit: name a log, or several of one fit")
+    if wrong := [each for each in (*logs, *held_out) if not isinstance(each, AnyLog)]:
+        raise ExperimentError(f"fit: {wrong[0]!r:.60} is no log: give a MotionLog, as read_log returns it, or a file")
+    reading = {
+        *keys_of(ColumnOptions),
+        "torque",
+        "unwrap",
+        *(("torque_delay",) if keys.get("torque_delay") != "estimate" else ()),
+    }
+    if not _files(logs) and (given := [key for key in keys if key in reading]):
+        raise ExperimentError(f"fit: {', '.join(given)} is how a log is read, and this one is: give it to read_log")
+
+
+def _require_truth(truth: Mapping[str, float] | None, model: RobotModel) -> None:
+    """Raise ExperimentError if a true parameter is unknown, or one has none."""
+    if truth is None:
+        return
+    names = model.basis.names
+    if unknown := [name for name in truth if name not in names]:
+        raise ExperimentError(
+            f"truth: there is no parameter {unknown[0]}{did_you_mean(unknown[0], names)}; there are {', '.join(names)}"
+        )
+    if missing := [name for name in names if name not in truth]:
+        raise ExperimentError(f"truth: {', '.join(missing)} is missing: give 0 for what the robot does not have")
 
 
 def _with_keys(model: RobotModel, asked: jobs.IdentifyRequest, table: Mapping[str, Any]) -> RobotModel:
@@ -203,11 +260,16 @@ def _with_keys(model: RobotModel, asked: jobs.IdentifyRequest, table: Mapping[st
         given = {key: getattr(getattr(asked, name), key) for key in keys_of(group) if key in table}
         if given and name == "mounting":
             raise ExperimentError(f"fit: {', '.join(given)} is what the robot is loaded with: give it to load_robot")
+        if "add" in given:  # beside its own
+            given["add"] = (*model.asked.add, *given["add"])
         model = replace(model, asked=replace(model.asked, **given)) if given else model
     return model
 
 
-def _read(k: int, log: AnyLog, asked: jobs.IdentifyRequest, model: RobotModel) -> ReadLog:
-    if isinstance(log, MotionLog):
-        return given_log(f"log {k + 1}", log, model)
-    return read(file_of(Path(log)), read_options(asked), model)
+def _read(logs: Sequence[AnyLog], asked: jobs.IdentifyRequest, model: RobotModel) -> list[ReadLog]:
+    """Return logs, those of Python as if they had been read."""
+    options = read_options(asked)
+    return [
+        given_log(f"log {k + 1}", log, model) if isinstance(log, MotionLog) else read(file_of(Path(log)), options, model)
+        for k, log in enumerate(logs)
+    ]

@@ -1,15 +1,15 @@
 """The other jobs: studies, payloads, gains, servos, motions, sets of logs, the paper's tables."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from idbench.experiments.api.calls import PARTS, Logs, named, several
+from idbench.experiments.api.calls import PARTS, named, several
 from idbench.experiments.api.study_table import StudyTable
 from idbench.experiments.benchmark.job import rows_of
-from idbench.experiments.errors import ExperimentError
+from idbench.experiments.errors import ExperimentError, StudyError
 from idbench.experiments.excite.excited import Excited
 from idbench.experiments.excite.job import excited
 from idbench.experiments.loads.job import GainsFit, PayloadFit, gains_of, payload_of
@@ -22,8 +22,12 @@ from idbench.experiments.servo.job import ServosFit, servos_identified
 from idbench.experiments.study.job import LARGEST_SHARD, pool_of, runs_of_shard
 from idbench.experiments.study.run_study import run_missing
 from idbench.experiments.study.store import Store
+from idbench.experiments.study.study import Study
 from idbench.experiments.study.study_file import load_study
 from idbench.identify import BLOCKS
+
+Files = str | Path | Sequence[str | Path]
+"""Logs, by the names of their files."""
 
 
 def study(
@@ -64,24 +68,34 @@ def study(
     described = replace(described, **changed) if seeds is None else replace(described, **changed).with_seeds(seeds)
     asked = jobs.StudyRequest(threads=threads)
     with TemporaryDirectory(prefix="idbench-") as folder:
-        store = Store.new(described, Path(folder) / described.name if out is None else Path(out))
+        store = _store(described, Path(folder) / described.name if out is None else Path(out))
         with store.held(), pool_of(asked, store) as pool:
             if pool is not None:
                 run_missing(store, pool, min(LARGEST_SHARD, runs_of_shard(asked, store)), _unheard)
         return StudyTable.of(store)
 
 
-def fit_payload(log: Logs, unloaded: Logs = (), **keys: Any) -> PayloadFit:
+def _store(described: Study, out: Path) -> Store:
+    """Return the folder of a study; that of the same study goes on."""
+    if not (out / "study.toml").is_file():
+        return Store.new(described, out)
+    store = Store.open(out)
+    if store.study.fingerprint != described.fingerprint:
+        raise StudyError(f"{out} holds another study, or the same with other settings: choose another folder")
+    return store
+
+
+def fit_payload(log: Files, unloaded: Files = (), **keys: Any) -> PayloadFit:
     """Return what the gripper holds, as `idbench payload` finds it; files of logs, and its options by keyword."""
     return payload_of(_asked(jobs.PayloadRequest, "fit_payload", keys, log=log, unloaded=unloaded))
 
 
-def fit_gains(log: Logs, unloaded: Logs = (), **keys: Any) -> GainsFit:
+def fit_gains(log: Files, unloaded: Files = (), **keys: Any) -> GainsFit:
     """Return the torque constants of the drives, as `idbench gains` finds them; files of logs, and its options by keyword."""
     return gains_of(_asked(jobs.GainsRequest, "fit_gains", keys, log=log, unloaded=unloaded))
 
 
-def fit_servos(log: Logs, robot: str | Path, servo: str | Path, **keys: Any) -> ServosFit:
+def fit_servos(log: Files, robot: str | Path, servo: str | Path, **keys: Any) -> ServosFit:
     """Return servos, identified from commands and positions as `idbench servo` does; files, and its options by keyword."""
     return servos_identified(_asked(jobs.ServoRequest, "fit_servos", {**keys, "robot": robot, "servo": servo}, log=log))
 
@@ -99,7 +113,7 @@ def benchmark(*sets: str | Path, out: str | Path = Path("runs") / "benchmark", f
 
 def table1(**keys: Any) -> Table1:
     """Return the paper's simulation comparison (Table 1); options of `idbench table1`: chain, seed, scenario."""
-    return table1_of(_asked(jobs.Table1Request, "table1", keys))
+    return table1_of(_asked(jobs.Table1Request, "table1", keys, taken=("motions",)))
 
 
 def table2(**keys: Any) -> Table2:
@@ -111,6 +125,9 @@ def _unheard(*_: object) -> None:
     """Show no progress: `idbench.identify.telling.listening` hears it."""
 
 
-def _asked(request: type[Any], where: str, keys: Mapping[str, Any], **files: Any) -> Any:
+def _asked(request: type[Any], where: str, keys: Mapping[str, Any], taken: Sequence[str] = (), **files: Any) -> Any:
+    every = [each for value in files.values() for each in several(value)]
+    if wrong := [each for each in every if not isinstance(each, str | Path)]:
+        raise ExperimentError(f"{where}: {wrong[0]!r:.60} is no file: give the names of files")
     given = {name: tuple(map(Path, several(value))) for name, value in files.items()}
-    return request_from(request, {**named(keys), **{name: value for name, value in given.items() if value}}, where)
+    return request_from(request, {**named(keys), **{name: value for name, value in given.items() if value}}, where, taken=taken)

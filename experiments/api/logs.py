@@ -29,11 +29,17 @@ def given_log(name: str, log: MotionLog, robot_model: RobotModel) -> ReadLog:
         _ = columns.ordered(joints)
     except LogError as error:
         raise ExperimentError(f"{name}: {error}") from error
-    if log.joints and log.joints != joints:
-        place = [log.joints.index(joint) for joint in joints]
+    names = tuple(joint.removeprefix(columns.prefixed(joints)) for joint in log.joints)
+    if names and names != joints:
+        place = [names.index(joint) for joint in joints]
         gain = np.asarray(log.torque.gain)
         torque = replace(log.torque, gain=tuple(gain[place].tolist())) if gain.size > 1 else log.torque
         conditions = {key: x[..., place] if x.shape[-1] > 1 else x for key, x in log.conditions.items()}
         log = replace(log, q=log.q[..., place], tau=log.tau[..., place], torque=torque, conditions=conditions, joints=joints)
     columns = LogColumns(log.t, log.q, log.tau, log.torque, joints)
     return ReadLog(Path(name), (replace(log, joints=()),), columns, log.torque)
+
+
+def late(log: ReadLog, delay: float) -> ReadLog:
+    """Return a log whose torques have a delay [s]."""
+    return replace(log, logs=tuple(replace(each, torque=replace(each.torque, delay=delay)) for each in log.logs))

@@ -1,5 +1,6 @@
 """Results as a Python session sees them: verdict first, then a table with units."""
 
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -8,23 +9,25 @@ from typing import Any, final
 
 import numpy as np
 
-from idbench.experiments.api.logs import given_log
+from idbench.experiments.api.logs import given_log, late
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.exports.exports import EXPORTS
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.job import summary_of
+from idbench.experiments.identification.load import within
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.judgement.held_out import Verdict
 from idbench.experiments.judgement.judgement import Judgement, judge
 from idbench.experiments.judgement.remedies import checks
 from idbench.experiments.reports.estimates import conclusion
 from idbench.experiments.results.attempts import Attempts
-from idbench.experiments.results.writing import write_text
+from idbench.experiments.results.writing import require_free, write_text
 from idbench.identify import Array, MotionLog, Problem, State, Validation, validate
 from idbench.identify.arrays import combined
 from idbench.identify.rows.rows import manageable
 from idbench.identify.tables import html_table, significant, text_table
 from idbench.sim.engine.run import Run
+from idbench.sim.robot.robot import Robot
 
 
 @final
@@ -122,14 +125,14 @@ class Identification:
         return judge(self.fit)
 
     @cached_property
-    def warnings(self) -> Mapping[str, Sequence[str]]:
+    def doubts(self) -> Mapping[str, Sequence[str]]:
         """What to check, by what it is about."""
         return checks(self.judgement, delay=self.delay_given)
 
     @property
     def verdict(self) -> str:
         """The verdict on held-out data in one sentence, and what to check first."""
-        return conclusion(self.judgement, self.warnings)
+        return conclusion(self.judgement, self.doubts)
 
     def predict(self, q: Array, qd: Array, qdd: Array, model: str | None = None) -> Array:
         """Return the torques of motions [N m, N], of the shape of q.
@@ -165,7 +168,12 @@ class Identification:
             If the log has other joints, or no rows on which torques can be judged.
         """
         robot, estimate = self.robot, self._of(model)
-        held_out = given_log("the held-out log", log, robot).longest
+        if not isinstance(log, MotionLog):
+            raise ExperimentError(f"score: {log!r:.60} is no log: give a MotionLog, as read_log returns it")
+        read = given_log("the held-out log", log, robot)
+        held_out = (read if self.delay_given else late(read, self.fit.logs.fitted[0].torque.delay)).longest
+        if any(within(held_out, other) for other in self.fit.logs.fitted):
+            raise ExperimentError("score: the log holds the motion that is identified: give another motion")
         problem = Problem((manageable([held_out])[0],), self.fit.basis, self.fit.problem.model, self.fit.processing)
         found = validate(problem, estimate.X, estimate.covariance)
         units = tuple(robot.units(j)[0] for j in range(self.fit.basis.n))
@@ -176,16 +184,26 @@ class Identification:
 
         Raises
         ------
-        ExperimentError, ResultsError
-            If a name ends with something else, a file is there that idbench did not write, or cannot be written.
+        ExperimentError, ResultsError, IdentificationError, BenchError
+            If a name ends with something else, a file is there that idbench did not write, or cannot be written; if the robot
+            has no consistent bodies, or what finds them is missing (extra `consistent`).
+
+        Warns
+        -----
+        UserWarning
+            If the file lacks something that was identified.
         """
+        read = (Robot.path(self.robot.name),)  # never written over
         for path in map(Path, paths):
             if path.suffix not in EXPORTS:
                 raise ExperimentError(f"{path}: its name must end with {', '.join(EXPORTS)}")
-            _, render, check = EXPORTS[path.suffix]
-            check(self.robot, path)
-            text, _ = render(self.fit, self.model, path)
-            write_text(path, text, "write", force=force)
+            require_free(path, "write", force=force, read=read)
+            EXPORTS[path.suffix][2](self.robot, path)
+        for path in map(Path, paths):
+            text, doubts = EXPORTS[path.suffix][1](self.fit, self.model, path)
+            write_text(path, text, "write", force=force, read=read)
+            for doubt in doubts:
+                warnings.warn(f"{path}: {doubt}", stacklevel=2)
 
     def report(self, path: str | Path, force: bool = False) -> None:
         """Write the report: one HTML file with verdict, parameters, torques, residuals.
@@ -198,7 +216,7 @@ class Identification:
         from idbench.experiments.reports.page import report
 
         with Attempts("the fit is kept") as attempts:
-            text = report(self.judgement, self.warnings, self.fit.logs.notes, "idbench.fit(...)", attempts)
+            text = report(self.judgement, self.doubts, self.fit.logs.notes, "idbench.fit(...)", attempts)
             write_text(Path(path), text, "report", force=force)
 
     def summary(self) -> dict[str, Any]:

@@ -70,7 +70,7 @@ class Definition:
     def request(self, folder: Path) -> IdentifyRequest | ServoRequest:
         """Return what the set asks for, its files in a folder; ExperimentError if a key is unknown, or a value wrong."""
         table = self.servo if self.identify is None else self.identify
-        asked = request_from(REQUESTS[self.job], table or {}, f"{FILE}, [{self.job}]", folder, TAKEN)
+        asked = request_from(REQUESTS[self.job], table or {}, f"{folder / FILE}, [{self.job}]", folder, TAKEN)
         fit, held_out = (tuple(folder / name for name in names) for names in (self.fit, self.held_out))
         return replace(asked, log=fit, validate=held_out)
 
@@ -116,7 +116,7 @@ def _refuse_options(content: Mapping[str, Any]) -> None:
         return
     job = "servo" if content.get("command") == "servo" else "identify"
     try:
-        keys = as_table(REQUESTS[job], words)
+        keys = as_table(REQUESTS[job], words, TAKEN)
     except (ValueError, AttributeError, TypeError):
         keys = "..."
     raise ScenarioError(f"options and command are not read any more: a file names no code; write {job} = {{{keys}}} instead")

@@ -43,9 +43,11 @@ def lines_of(fit: Fit, values: Mapping[str, float]) -> list[str]:
         shapes = {shape.setting: shape.letters for shape in getattr(inner, "shapes", ())}
         text = LOAD if isinstance(law, LoadFriction) else law.source()
         each = {
-            name: [values.get(named(shapes.get(name, ""), j), _fixed(law, name)) for j in range(n)] for name in _settings(law)
+            name: _array([values.get(named(shapes.get(name, ""), j), x) for j, x in enumerate(_fixed(law, name, n))])
+            for name in _settings(law)
+            if f"{{{name}}}" in text
         }
-        torque = text.format(**{name: _array(x) for name, x in each.items()})
+        torque = text.format(**each)
         lines.append(f"tau = tau + {_array([values.get(named(letters, j), 0.0) for j in range(n)])} * ({torque})")
     return lines
 
@@ -60,9 +62,12 @@ def _settings(law: Any) -> tuple[str, ...]:
     return tuple(each.name for each in fields(law)) if is_dataclass(law) else ()
 
 
-def _fixed(law: Any, setting: str) -> float:
-    """Return what a setting is where it is no parameter."""
-    return float(np.max(getattr(law, setting)))
+def _fixed(law: Any, setting: str, n: int) -> list[float]:
+    """Return what a setting of each joint is where it is no parameter."""
+    values = np.ravel(np.asarray(getattr(law, setting), dtype=np.float64))
+    if values.size not in (1, n):
+        raise ExperimentError(f"{setting} of {type(law).__name__} has {values.size} values for {n} joints")
+    return [float(x) for x in np.broadcast_to(values, (n,))]
 
 
 def _array(values: list[float]) -> str:

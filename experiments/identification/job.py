@@ -1,7 +1,6 @@
 """The job `identify`: a request becomes logs, a fit, and a judgement."""
 
 import re
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -51,7 +50,7 @@ def request_of(asked: IdentifyRequest, robot_model: RobotModel | None = None) ->
     own = [path / "scenario.toml" for path in asked.log]
     loops = asked.loop or ([str(own[0])] if len(own) == 1 and own[0].is_file() else [])
     request = Request(
-        robot_model or RobotModel(_robot_of(asked), asked.parameters, asked.mounting.mounting),
+        robot_model or RobotModel(robot_of(asked), asked.parameters, asked.mounting.mounting),
         tuple(MODELS) if asked.model in (None, "all") else (asked.model,),
         asked.chain,
         asked.estimator,
@@ -73,10 +72,10 @@ def files_of(asked: IdentifyRequest) -> tuple[Path, ...]:
     logs = [file_of(path).absolute() for path in (*asked.log, *asked.validate)]
     named = (asked.chain_file, asked.reading.layout, *asked.loop)
     more = [Path(name) for name in named if name is not None]
-    return (*logs, Robot.path(_robot_of(asked)), *(path.absolute() for path in more if path.suffix))
+    return (*logs, Robot.path(robot_of(asked)), *(path.absolute() for path in more if path.suffix))
 
 
-def _robot_of(asked: IdentifyRequest) -> str:
+def robot_of(asked: IdentifyRequest) -> str:
     """Return the robot that is named, or that of the run."""
     return str(stated_by(asked.log[0]).get("robot", SCARA)) if asked.robot is None else absolute(asked.robot)
 
@@ -89,8 +88,7 @@ def read_logs(asked: IdentifyRequest, request: Request) -> Loaded:
 def loaded_logs(asked: IdentifyRequest, request: Request) -> tuple[Request, Logs]:
     """Return the request with the band that suits the logs, and the logs, those that are held out among them."""
     loaded = read_logs(asked, request)
-    truth = _truth(stated_by(asked.log[0]), request)
-    return loaded.request, with_held_out(loaded, asked.validate, read_options(asked), truth)
+    return loaded.request, with_held_out(loaded, asked.validate, read_options(asked), truth_of(asked, request))
 
 
 def fit_of(request: Request, logs: Logs) -> Fit:
@@ -116,9 +114,9 @@ def notes_of(made: Fit) -> tuple[str, ...]:
     return (*made.logs.notes, *laws)
 
 
-def _truth(stated: Mapping[str, Any], request: Request) -> dict[str, float] | None:
+def truth_of(asked: IdentifyRequest, request: Request) -> dict[str, float] | None:
     """Return the truth that the folder of a run states, if it is of the same parameters."""
-    truth: dict[str, float] | None = stated.get("truth")
+    truth: dict[str, float] | None = stated_by(asked.log[0]).get("truth")
     return truth if truth and tuple(truth) == request.robot_model.basis.names else None
 
 

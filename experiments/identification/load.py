@@ -120,7 +120,7 @@ def judged_on(loaded: Loaded, every: Mapping[str, ReadLog], truth: Mapping[str, 
     for name, one in every.items():
         pieces = [f"of its {len(one.logs)} pieces the longest is judged"] if len(one.logs) > 1 else []
         said += [(one.path.name, note) for note in (*one.notes, *pieces)]
-        if any(_within(one.longest, log) for log in loaded.logs()):
+        if any(within(one.longest, log) for log in loaded.logs()):
             raise ExperimentError(f"--validate {name} holds the motion that is identified: give another motion, or none")
     held_out, notes = {name: one.longest for name, one in every.items()}, (*loaded.notes, *of_each(said))
     return Logs(loaded.logs(), loaded.names, held_out, notes, truth, delay_sought, tuple(every.values()))
@@ -140,7 +140,7 @@ def _require_other_samples(every: Sequence[ReadLog]) -> None:
             raise ExperimentError(f"{other.path} holds the same samples as {one.path}: they would count twice; leave one out")
 
 
-def _within(one: MotionLog, other: MotionLog) -> bool:
+def within(one: MotionLog, other: MotionLog) -> bool:
     """Return whether a log is a part of another, or the other of it."""
     short, long = sorted((one, other), key=lambda log: log.samples)
     starts = np.flatnonzero((long.q[: long.samples - short.samples + 1] == short.q[0]).all(axis=1)) if short.n == long.n else ()

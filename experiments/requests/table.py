@@ -79,7 +79,7 @@ def files_named(request: Any, folder: Path = Path()) -> tuple[Path, ...]:
     return tuple(sorted(found))
 
 
-def as_table(request: Any, words: str) -> str:
+def as_table(request: Any, words: str, taken: Container[str] = ()) -> str:
     """Return options of a command line as keys in one line of TOML; nothing that they name is loaded."""
     known = keys_of(request)
     found = dict[str, Any]()
@@ -91,7 +91,7 @@ def as_table(request: Any, words: str) -> str:
             found[key] = [value] if mark else not off
         elif key:
             found[key] = [*(found[key] if isinstance(found[key], list) else []), word]
-    made = {name: _as_value(known[name][1], value) for name, value in found.items() if name in known}
+    made = {name: _as_value(known[name][1], value) for name, value in found.items() if name in known and name not in taken}
     return ", ".join(f"{name} = {json.dumps(value)}" for name, value in made.items())
 
 
@@ -119,6 +119,9 @@ def _checked(where: str, hint: Any, value: Any) -> Any:
         value = (value,)
     if _plain(hint) in (str, str | None) and isinstance(value, int | float | Path) and not isinstance(value, bool):
         value = str(value)
+    several = value if isinstance(value, list | tuple) else (value,)
+    if "bool" not in plain and any(isinstance(each, bool) for each in several):
+        raise ExperimentError(f"{where} = {value!r:.60}: true and false are no values of it")
     try:
         return TypeAdapter(hint, config=ConfigDict(arbitrary_types_allowed=True)).validate_python(value)
     except ValidationError as error:

@@ -5,7 +5,7 @@ import inspect
 import re
 from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from textwrap import dedent
 from typing import Any, ClassVar, final
 
@@ -96,15 +96,22 @@ class AbstractFriction(AbstractJointLaw):
         SettingError
             If it is more than one expression of these.
         """
-        lines: Any = ast.parse(dedent(inspect.getsource(type(self).force))).body[0]
+        try:
+            lines: Any = ast.parse(dedent(inspect.getsource(type(self).force))).body[0]
+        except (OSError, TypeError, SyntaxError) as error:
+            raise SettingError(f"the force of {type(self).__name__} cannot be written: its source is in no file") from error
         code = [line for line in lines.body if not isinstance(line, ast.Delete | ast.Expr)]
-        names = {node.id for line in code for node in ast.walk(line) if isinstance(node, ast.Name)}
-        if len(code) != 1 or not isinstance(code[0], ast.Return) or not names <= {"q", "qd", "np", "self"}:
+        nodes = [node for line in code for node in ast.walk(line)]
+        names = {node.id for node in nodes if isinstance(node, ast.Name)}
+        own = {ast.unparse(node) for node in nodes if isinstance(node, ast.Attribute) and ast.unparse(node.value) == "self"}
+        known: set[str] = {f"self.{each.name}" for each in fields(self)} if is_dataclass(self) else set()
+        value = code[0].value if len(code) == 1 and isinstance(code[0], ast.Return) else None
+        text = "{" if value is None else ast.unparse(value)
+        if not names <= {"q", "qd", "np", "self"} or not own <= known or "{" in text:
             raise SettingError(
-                f"the force of {type(self).__name__} cannot be written: let it return one expression of q, qd, np and self"
+                f"the force of {type(self).__name__} cannot be written: let it return one expression of q, qd, np and settings"
             )
-        expression: Any = code[0].value
-        return re.sub(r"\bself\.(\w+)", r"{\1}", ast.unparse(expression))
+        return re.sub(r"\bself\.(\w+)", r"{\1}", text)
 
     @final
     def letters(self) -> Mapping[str, tuple[Kind, str]]:

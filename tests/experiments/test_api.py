@@ -10,7 +10,7 @@ import pytest
 
 import idbench
 from idbench.experiments.cli import main
-from idbench.identify import ESTIMATORS, AbstractEstimator, Estimate, WeightedLeastSquares
+from idbench.identify import ESTIMATORS, AbstractEstimator, AbstractFriction, Estimate, WeightedLeastSquares
 from idbench.identify.files.log_file import write_log
 from idbench.sim.trajectories import RandomMoves
 
@@ -96,7 +96,7 @@ def test_a_study_is_that_of_the_command(tmp_path, monkeypatch):
     assert {k: v for k, v in made.items() if k not in seconds} == {k: v for k, v in written.items() if k not in seconds}
     assert "1024" in repr(table)
     own = idbench.study("short.toml", estimators=["WLS", Ridge(), Ridge(1e-3)])
-    assert {names[1] for _, *names in own.typical_errors()} == {"WLS", "Ridge", "Ridge(strength=0.001)"}
+    assert {names[1] for _, *names in own.typical_errors()} == {"WLS", "Ridge", "Ridge(0.001)"}
 
 
 @pytest.mark.thorough
@@ -181,6 +181,89 @@ def test_joints_are_put_in_the_order_of_the_robot(files):
     np.testing.assert_array_equal(one.fit.estimates["explicit"].X, two.fit.estimates["explicit"].X)
 
 
+def test_objects_keep_what_they_are():
+    """Classes that are defined again, settings that are arrays: each object has a name of its own."""
+
+    def made(factor):
+        @dataclass(frozen=True)
+        class Weighted(AbstractEstimator):
+            factor_: float = factor
+
+            def solve(self, problem):
+                raise NotImplementedError
+
+        return Weighted()
+
+    first, second = made(1.0), made(1.0)
+    names = [ESTIMATORS.name_of(each) for each in (first, second, first)]
+    assert names[0] == names[2] != names[1]
+    assert (ESTIMATORS.create(names[0]), ESTIMATORS.create(names[1])) == (first, second)
+    assert ESTIMATORS.create(names[0]) is first
+    with pytest.raises(idbench.IdentificationError, match="defined more than once"):
+        idbench.fit(idbench.simulate("ideal").log, "scara", estimator="Weighted")
+
+
+def test_a_delay_that_was_found_holds_for_held_out_logs():
+    moves = RandomMoves(moves=8, durations=(0.6, 1.2), rest=0.3, seed=3)
+    late = replace(idbench.load_scenario("delay"), trajectory=moves)
+    log, other = (replace(idbench.simulate(replace(late, seed=k)).log) for k in (0, 1))
+    undelayed = [replace(each, torque=replace(each.torque, delay=0.0)) for each in (log, other)]
+    fit = idbench.fit(undelayed[0], "scara", model="explicit", estimator="WLS", torque_delay="estimate")
+    brisk = idbench.simulate("brisk").log
+    score = fit.score(replace(brisk, torque=replace(brisk.torque, delay=0.0)))
+    assert np.isfinite(score.rms).all()
+    with pytest.raises(idbench.ExperimentError, match="holds the motion that is identified"):
+        fit.score(undelayed[0])
+
+
+def test_laws_that_are_objects_are_summed():
+    @dataclass(frozen=True)
+    class Drag(AbstractFriction):
+        symbol = "Fq"
+        unit = "N m"
+        power: float = 2.0
+
+        def force(self, q, qd):
+            return np.abs(qd) ** self.power * np.sign(qd)
+
+    robot = idbench.load_robot("scara", friction=["standard", Drag(power=1.7)], add="offset")
+    assert {"Fv1", "Fs1", "Fq1", "off1"} <= set(robot.basis.names)
+    log = idbench.simulate("ideal").log
+    fit = idbench.fit(log, robot, add=Drag(power=3.0), friction="standard", model="explicit", estimator="OLS")
+    assert {"Fq1", "off1"} <= set(fit.parameters)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda log: idbench.fit(None), "is no log"),
+        (lambda log: idbench.fit([]), "name a log"),
+        (lambda log: idbench.fit(log, torque_delay=0.007), "torque_delay is how a log is read"),
+        (lambda log: idbench.fit(log, gain=2.0), "gain is how a log is read"),
+        (lambda log: idbench.fit(log, cutoff=True), "true and false are no values of it"),
+        (lambda log: idbench.fit(log, truth={"Fs1": 0.5}), "ZZR1, Fv1"),
+        (lambda log: idbench.fit(log, truth={"Fs9": 0.5}), "there is no parameter Fs9"),
+        (lambda log: idbench.read_log(None), "is no file"),
+        (idbench.fit_payload, "is no file"),
+        (lambda log: idbench.table1(motions=3), "unknown key 'motions'"),
+        (lambda log: idbench.fit(log, estimator="OLS").score("log.csv"), "is no log"),
+        (lambda log: idbench.fit(log, estimator="OLS").predict([0, 0], [0], [0, 0]), "shapes"),
+    ],
+)
+def test_wrong_values_are_refused_by_name(files, call, words):
+    with pytest.raises((idbench.ExperimentError, idbench.IdentificationError)) as refused:
+        call(idbench.read_log(files / "first.parquet"))
+    assert words in str(refused.value)
+
+
+def test_a_study_in_a_folder_goes_on_there(tmp_path):
+    keys = {"seeds": 2, "chains": ["idbench"], "models": ["explicit"], "estimators": ["OLS"], "out": tmp_path / "kept"}
+    one, two = idbench.study("encoder", **keys), idbench.study("encoder", **keys)
+    np.testing.assert_array_equal(one.rows["run"], two.rows["run"])
+    with pytest.raises(idbench.ExperimentError, match="holds another study"):
+        idbench.study("encoder", **{**keys, "seeds": 3})
+
+
 @pytest.mark.parametrize(
     ("keys", "words"),
     [
@@ -205,7 +288,8 @@ def test_wrong_keys_are_refused_by_name(files, keys, words):
 def test_results_are_tables_in_a_notebook(files):
     log, robot = idbench.read_log(files / "first.parquet"), idbench.load_robot("scara")
     fit = idbench.fit(log, robot, model="explicit", estimator="WLS")
-    for shown in (log, robot, fit, fit.score(log), fit.fit.estimates["explicit"]):
+    score = fit.score(idbench.read_log(files / "second.parquet"))
+    for shown in (log, robot, fit, score, fit.fit.estimates["explicit"]):
         assert shown._repr_html_().count("<tr>") > 2
         assert "object at 0x" not in repr(shown)
     assert repr(fit).startswith("Result: ")

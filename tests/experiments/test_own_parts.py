@@ -80,7 +80,7 @@ def test_estimators_and_laws_of_ones_own_are_named_in_every_command(own, idbench
     [
         ("own_parts:Nothing", "own_parts:Nothing cannot be loaded: AttributeError"),
         ("nowhere:Model", "nowhere:Model cannot be loaded: ModuleNotFoundError"),
-        ("own_parts:explicit", "explicit is built into the models, rename the class"),
+        ("own_parts:explicit", "explicit is built into the models, or installed: rename the class"),
         ("own_parts:slow", "makes Chain, not AbstractModel"),
     ],
 )
