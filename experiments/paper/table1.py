@@ -11,6 +11,7 @@ from typing import Any
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.results.writing import summarize
+from idbench.experiments.text import printed
 from idbench.identify import (
     CHAINS,
     MODELS,
@@ -82,6 +83,11 @@ class Table1:
     """The motion."""
     chains: tuple[str, ...]
     """Names of the chains to compare."""
+
+    def __repr__(self) -> str:
+        from idbench.experiments.paper.table1_text import print_table1
+
+        return printed(lambda console: print_table1(console, self))
 
     def __post_init__(self) -> None:
         for name in self.chains:

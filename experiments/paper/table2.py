@@ -20,7 +20,7 @@ from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.paper.attribution import Attribution, Errors
-from idbench.experiments.text import new_table, percent, print_table
+from idbench.experiments.text import new_table, percent, print_table, printed
 from idbench.identify import CHAINS, Estimate, TorqueChannel
 from idbench.sim.engine.run import Run
 from idbench.sim.engine.simulation import Progress, simulate
@@ -86,6 +86,9 @@ class Table2:
     """Receives how much of the simulation is done."""
     watch: Watch | None = None
     """Receives what happens in the first realization."""
+
+    def __repr__(self) -> str:
+        return printed(lambda console: print_table2(console, self))
 
     def __post_init__(self) -> None:
         scara_truth(self.scenario.real_robot)

@@ -15,6 +15,9 @@ from idbench.sim.robot.motors import Array
 from idbench.sim.robot.robot import Robot
 from idbench.sim.settings import EachNotNegative, EachNumber, Number, Positive, per_joint, settings
 
+ANGLES = 9
+"""Positions within a turn at which a law may jump."""
+
 SLOW, JUMP = 1e-9, 1e-6
 """Speed at which a joint is as good as at rest [rad/s], and change of a unit law over twice that which is a jump."""
 
@@ -115,8 +118,8 @@ class _LawContact(AbstractContact):
         self._Fs = Fs.copy()
         self._size = size
         self._q = plant.bind("qpos")
-        still = np.zeros(Fs.shape)
-        ahead, back = (law.force(still, still + x) for x in (SLOW, -SLOW))
+        q = np.linspace(-np.pi, np.pi, ANGLES)[:, None] * np.ones(Fs.shape[-1])
+        ahead, back = (law.force(q, np.full(q.shape, x)) for x in (SLOW, -SLOW))
         self._frictionloss = plant.expand("dof_frictionloss") if np.any(np.abs(ahead - back) > JUMP) else None
 
     def torque(self, qd: Array) -> Array | float:
