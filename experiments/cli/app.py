@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
+import tyro
 from tyro.extras import SubcommandApp
 
 from idbench.experiments.cli.interruption import INTERRUPTED, Notice, TerminatedError, importing, noticing, terminating
@@ -30,9 +31,8 @@ idbench: identify the dynamics of robots, on simulated data whose truth is known
   idbench list, idbench --help    what can be combined, all commands"""
 """What `idbench` alone prints."""
 
-APP = SubcommandApp()
 COMMANDS: dict[str, type] = {}
-"""The commands by name, and what the parser makes of them."""
+"""The commands by name."""
 
 ENVIRONMENT = {
     "MUJOCO_GL": "disable",  # nothing is drawn by MuJoCo, and what would draw takes a tenth of a second to load
@@ -95,8 +95,18 @@ def parsed(words: list[str]) -> Callable[[], None] | None:
     words = without_short(words)
     require_once(words)
     with refused(words, COMMANDS):
-        made: Callable[[], None] = untyped(APP.cli(prog="idbench", description=DESCRIPTION, args=words))
+        made: Callable[[], None] = untyped(_parsed(words))
     return made
+
+
+def _parsed(words: list[str]) -> object:
+    """Return what the library makes of words; the list of all commands needs nothing of their options."""
+    if words[0] in COMMANDS:
+        return tyro.cli(typed(COMMANDS[words[0]]), prog=f"idbench {words[0]}", args=words[1:])
+    all_ = SubcommandApp()
+    for name, options in COMMANDS.items():
+        all_.command(name=name)(options)
+    return all_.cli(prog="idbench", description=DESCRIPTION, args=words)
 
 
 def command(name: str) -> Callable[[type], type]:
@@ -104,7 +114,6 @@ def command(name: str) -> Callable[[type], type]:
 
     def register(options: type) -> type:
         COMMANDS[name] = options
-        APP.command(name=name)(typed(options))
         return options
 
     return register

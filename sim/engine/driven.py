@@ -140,12 +140,12 @@ def _start(
     vary: Mapping[str, npt.ArrayLike] | None = None,
     threads: int = 1,
 ) -> tuple[Plant, Array]:
-    """Return robots in states [rad, rad/s], and the torques of a log in every physics step, shape (time, step, joint)."""
+    """Return robots in states [rad, rad/s], and the torques of a log in every physics step, shape (step, time, joint)."""
     physics = physics or Physics()
     h, per_sample = physics_steps(log.fs, physics.step)
     plant = Plant(robot, len(q), physics, h, vary or {}, threads)
     plant.q[:], plant.qd[:] = q, qd
-    return plant, mean_torques(log, h, per_sample)
+    return plant, np.ascontiguousarray(mean_torques(log, h, per_sample).swapaxes(0, 1))
 
 
 def _driven(
@@ -156,11 +156,11 @@ def _driven(
     found = np.full((len(first), count, torques.shape[-1]), np.nan)
     for k in range(count):
         found[:, k] = plant.q
-        acting = torques[first + k]
+        acting = torques.take(first + k, axis=1)
         if feedback is not None:
-            acting = acting + feedback(k, plant)
+            acting += feedback(k, plant)
         if k + 1 < count:
-            plant.step(np.ascontiguousarray(np.swapaxes(acting, 0, 1)), torques.shape[1])
+            plant.step(acting, len(torques))
     return found, list(plant.troubles)
 
 
