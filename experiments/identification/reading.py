@@ -102,35 +102,17 @@ def read(path: Path, options: ReadOptions, robot_model: RobotModel | None) -> Re
 
     Joints are in the order of the robot; without one in that of the file.
     """
-    columns = columns_of(path, options.columns)
-    delay = options.delay
-    before = ""
-    if robot_model is not None:
-        joints = robot_model.mounting.joints
-        columns = columns if columns.joints or len(joints) != columns.n else replace(columns, joints=joints)
-        before = columns.prefixed(robot_model.robot.joints)
-        try:
-            columns = columns.ordered(robot_model.robot.joints)
-        except LogError as error:
-            raise ExperimentError(
-                f"{path}: {error}; name the robot of the log with --robot{_joints_of(columns, robot_model)}"
-            ) from error
+    columns, before = _ordered(path, columns_of(path, options.columns), robot_model)
     names = columns.joints if robot_model is None else robot_model.robot.joints
     names = names or tuple(f"joint {j + 1}" for j in range(columns.n))
     hinges = [True] * columns.n if robot_model is None else [joint.kind == "hinge" for joint in robot_model.tree.joints]
     stated = columns.torque or options.fallback
-    meaning = options.torque or (stated.meaning if stated else None)
-    if meaning is None:
-        raise ExperimentError(
-            f"{path} does not say what its torque means: add --torque held (a controller's command), instantaneous (a "
-            "measurement) or averaged, and --torque-delay SECONDS or estimate"
-        )
-    channel = channel_of(stated, meaning, delay)
+    channel = channel_of(stated, _meaning(path, options, stated), options.delay)
     _require_seconds(path, columns.t)
     if not np.any(columns.tau) and np.ptp(columns.q, axis=0).any():
         raise ExperimentError(f"{path}: all torques are 0: there is nothing to identify")
     columns = replace(columns, q=_turned(path, columns.q, names, hinges, options.unwrap))
-    assumed = delay is None and stated is None
+    assumed = options.delay is None and stated is None
     notes = [columns.said] if columns.said else []
     notes += [f"names of the log's joints have {before!r} before those of the robot's"] if before else []
     notes += ["no --torque-delay was given, 0 is assumed: `estimate` finds it"] if assumed else []
@@ -144,9 +126,34 @@ def read(path: Path, options: ReadOptions, robot_model: RobotModel | None) -> Re
         late = f" --torque-delay {channel.delay:g}" if channel.delay else ""
         raise ExperimentError(
             f"{path}: {error}: add --resample, or write it anew and look: uv run idbench resample {shlex.quote(str(path))} "
-            f"--torque {meaning}{late} --out uniform.parquet"
+            f"--torque {channel.meaning}{late} --out uniform.parquet"
         ) from error
     return ReadLog(path, (log,), columns, channel, None, tuple(notes))
+
+
+def _ordered(path: Path, columns: LogColumns, robot_model: RobotModel | None) -> tuple[LogColumns, str]:
+    """Return columns in the order of a robot's joints, and what their names have before those of the joints."""
+    if robot_model is None:
+        return columns, ""
+    joints = robot_model.mounting.joints
+    columns = columns if columns.joints or len(joints) != columns.n else replace(columns, joints=joints)
+    try:
+        return columns.ordered(robot_model.robot.joints), columns.prefixed(robot_model.robot.joints)
+    except LogError as error:
+        raise ExperimentError(
+            f"{path}: {error}; name the robot of the log with --robot{_joints_of(columns, robot_model)}"
+        ) from error
+
+
+def _meaning(path: Path, options: ReadOptions, stated: TorqueChannel | None) -> Meaning:
+    """Return what the torque of a log means; raise ExperimentError if nobody says it."""
+    meaning = options.torque or (stated.meaning if stated else None)
+    if meaning is None:
+        raise ExperimentError(
+            f"{path} does not say what its torque means: add --torque held (a controller's command), instantaneous (a "
+            "measurement) or averaged, and --torque-delay SECONDS or estimate"
+        )
+    return meaning
 
 
 def read_as(first: Path, path: Path, options: ReadOptions, robot_model: RobotModel | None) -> ReadLog:
