@@ -79,21 +79,24 @@ class Bench:
         )
         self._failures = Failures(robot, planned, seeds)
         self._going: npt.NDArray[np.intp] | None = None
-        at_rest = every(planned.q[0], nsim) if planned.q.ndim == 2 else planned.q[0]
-        self._at_rest, still = at_rest, np.zeros((nsim, n))
-        by_position = scenario.controller.commanded == "position"
-        held = every(np.zeros(n), nsim) + at_rest if by_position else InverseDynamics(robot, nsim, vary)(at_rest, still, still)
-        self._before = self._command = self._demand = held
+        self._at_rest = every(planned.q[0], nsim) if planned.q.ndim == 2 else planned.q[0]
+        self._before = self._command = self._demand = _holding(scenario, robot, self._at_rest, vary)
         self._qd = np.zeros((nsim, n))
         self._steps = 1
         self._instants = dict[int, Array]()
         self._steady = scenario.drive.steady and scenario.ripple.steady
-        watched = scenario.timing.jitter or scenario.timing.refresh or scenario.torque.source == "current"
-        one_by_one = watched or not scenario.friction.steady
-        self._most = 1 if one_by_one else clock.per_sample if self._steady else max(1, round(BLOCK / self._h))
+        self._most = self._longest()
         self._measured, self._commands, self._currents, self._q, self._speeds, self._tau = np.zeros((6, samples, nsim, n))
         self._gaps = np.zeros((samples, nsim, n)) if self._plant.has_play else np.zeros(0)
         self.steps = samples * clock.per_sample + clock.late
+
+    def _longest(self) -> int:
+        """Return over how many physics steps the motion of the rotors may be predicted at most."""
+        scenario = self._scenario
+        watched = scenario.timing.jitter or scenario.timing.refresh or scenario.torque.source == "current"
+        if watched or not scenario.friction.steady:
+            return 1
+        return self._clock.per_sample if self._steady else max(1, round(BLOCK / self._h))
 
     def _drawn_jitter(self, samples: int) -> Array:
         """Return by how many steps each sample is off its claimed instant, or older, shape (sample, nsim)."""
@@ -233,6 +236,14 @@ class Bench:
             failed = list(failures.reasons)
             plant.put(self._at_rest[failed], np.array(failed))
             self._going = np.setdiff1d(np.arange(len(self._seeds)), failed)
+
+
+def _holding(scenario: Scenario, robot: Robot, at_rest: Array, vary: Mapping[str, npt.ArrayLike]) -> Array:
+    """Return the command that holds robots at rest, shape (nsim, joint): positions, or their gravity torques [N m]."""
+    if scenario.controller.commanded == "position":
+        return at_rest.copy()
+    still = np.zeros_like(at_rest)
+    return InverseDynamics(robot, len(at_rest), vary)(at_rest, still, still)
 
 
 def _started(settings: object, made: T, kind: type) -> T:
