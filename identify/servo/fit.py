@@ -77,7 +77,7 @@ class ServoFit:
         """Standard errors that the rounding of the encoder alone leaves (Cramer-Rao)."""
         J, n = self.found.sensitivity, len(self.free)
         rounded = replace(self.found.beginning, certainty=1.0)
-        free = rounded.free_of(J, np.ones(J.shape[:2])).reshape(-1, n)
+        free = rounded.weighted(np.ones(J.shape[:2])).without(J).reshape(-1, n)
         J = J.reshape(-1, n)
         size = np.sqrt((J**2).sum(axis=0))
         size = np.where(size > 0, size, 1.0)

@@ -47,7 +47,7 @@ def per_offset(fit: ServoFit, other: Sequence[ServoRun]) -> Array:
     with one_thread():
         q, moved = (ServoLoop(fit.servo, runs, fit.loop.h).simulate(fit.p)[0] for runs in (fit.loop.runs, other))
     w = (1 + np.abs(found.residual) / (3 * fit.scale)) ** -2
-    free = found.beginning.free_of(found.sensitivity / size, w) * w[..., None]
+    free = found.beginning.weighted(w).without(found.sensitivity / size) * w[..., None]
     curvature = np.einsum("rti,rtj->ij", free, found.sensitivity / size)
     pull = np.einsum("rti,rt->i", free, (q - moved) / APART * fit.loop.kept)
     return np.asarray(np.linalg.pinv(curvature, 1e-12) @ pull / size)

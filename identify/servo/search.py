@@ -12,6 +12,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from idbench.identify.arrays import Array
+from idbench.identify.nuisances import Nuisances
 from idbench.identify.servo.closed_loop import ServoLoop
 from idbench.identify.servo.parameters import SERVO_PARAMETERS, limits_of, step_of
 
@@ -52,11 +53,9 @@ class Beginning:
     certainty: float
     """Variance of residuals over that of a position that was rounded."""
 
-    def free_of(self, J: Array, w: Array) -> Array:
-        """Return sensitivities, shape (run, sample, parameter), without what other beginnings would do, weighted by w."""
-        whole = (w * self.sensitivity**2).sum(axis=1) + self.certainty
-        share = np.einsum("rt,rtp->rp", w * self.sensitivity, J) / whole[:, None]
-        return np.asarray(J - self.sensitivity[..., None] * share[:, None])
+    def weighted(self, w: Array) -> Nuisances:
+        """Return other beginnings as unknowns of runs whose samples have weights w, shape (run, sample)."""
+        return Nuisances(self.sensitivity[..., None], self.certainty, w)
 
 
 @final
@@ -229,17 +228,17 @@ class _Normal:
     """
 
     def __init__(self, J: Array, r: Array, w: Array, beginning: Beginning) -> None:
-        J0, flat = beginning.sensitivity, J.reshape(-1, J.shape[-1])
-        self._whole = (w * J0**2).sum(axis=1) + beginning.certainty
-        self._mixed = np.einsum("rt,rtp->rp", w * J0, J)
-        self._pull = (w * J0 * r).sum(axis=1) - beginning.certainty * beginning.ahead
-        share = self._mixed / self._whole[:, None]
-        A = flat.T @ (flat * w.reshape(-1, 1)) - self._mixed.T @ share
+        begins, p = beginning.weighted(w), J.shape[-1]
+        known = np.concatenate([J, r[..., None]], axis=-1)
+        follow, free = begins.following(known)[:, 0], begins.without(known).reshape(-1, p + 1)
+        both = (J * w[..., None]).reshape(-1, p).T @ free
+        self._follow, self._pull = follow[:, :p], follow[:, p] - begins.drawn(beginning.ahead[:, None])[:, 0]
+        A = both[:, :p]
         self.size = np.sqrt(np.maximum(np.diagonal(A), 1e-24))
         self.A = A / np.outer(self.size, self.size)
-        self.gradient = (flat.T @ (w * r).ravel() - share.T @ self._pull) / self.size
+        self.gradient = (both[:, p] + beginning.certainty * follow[:, :p].T @ beginning.ahead) / self.size
         self.inverse = np.linalg.pinv(self.A, 1e-6, hermitian=True)
 
     def begin(self, steps: Array) -> Array:
         """Return how far beginnings move with steps of the parameters, shape (lane, parameter), as (lane, run)."""
-        return np.asarray((self._pull - steps @ self._mixed.T) / self._whole)
+        return np.asarray(self._pull - steps @ self._follow.T)

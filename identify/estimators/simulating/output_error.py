@@ -15,6 +15,7 @@ from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.simulating.row_products import Solved
 from idbench.identify.estimators.simulating.simulated_rounds import AbstractSimulating, Rounds, require_explicit, small_steps
 from idbench.identify.estimators.simulator import AbstractPlant
+from idbench.identify.nuisances import Nuisances
 
 STEP_Q, STEP_QD = 1e-5, 1e-4
 """Changes of a state at the beginning of a segment [rad, rad/s]."""
@@ -136,8 +137,8 @@ class _Shots:
         steps = np.array([*([STEP_Q] * n), *([STEP_QD] * n)])
         parameters = np.concatenate([X[None], X + np.diag(h), np.tile(X, (2 * n, 1))])
         moved = np.concatenate([np.zeros((1 + p, 2 * n)), np.diag(steps)])
-        states = moved[:, None] + self._states
-        every = np.repeat(parameters, segments, axis=0), states.reshape(-1, 2 * n)
+        begin = moved[:, None] + self._states
+        every = np.repeat(parameters, segments, axis=0), begin.reshape(-1, 2 * n)
         first = np.tile(self._first, len(parameters))
         q = self._plant.shoot(every[0], every[1][:, :n], every[1][:, n:], self._log, first, self._count)
         q = q.reshape(len(parameters), segments, self._count, n)
@@ -149,12 +150,10 @@ class _Shots:
         e = np.where(good[:, None, None], self._measured - q[0], 0.0)
         slopes = np.where(good[:, None, None, None], np.moveaxis(q[1:] - q[0], 0, -1) / np.concatenate([h, steps]), 0.0)
         flat = slopes.reshape(segments, -1, p + 2 * n)
-        Q, R = np.linalg.qr(flat[..., p:])
+        states = Nuisances(np.where(good[:, None, None], flat[..., p:], np.eye(flat.shape[1], 2 * n)))
         both = np.concatenate([flat[..., :p], e.reshape(segments, -1, 1)], axis=-1)
-        inside = np.swapaxes(Q, -1, -2) @ both
-        back = np.linalg.solve(np.where(good[:, None, None], R, np.eye(2 * n)), inside)
-        self._of_X, self._rest = back[..., :p], back[..., p]
-        free = both - Q @ inside
+        follow, free = states.following(both), states.without(both)
+        self._of_X, self._rest = follow[..., :p], follow[..., p]
         return free[..., p].reshape(e.shape)[good], free[..., :p].reshape(*e.shape, p)[good]
 
     def move(self, step: Array) -> None:
