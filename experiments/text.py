@@ -37,14 +37,19 @@ FORMS: dict[str, Color] = {
     "implicit": (148, 103, 189),
     "power": (214, 39, 40),
     "energy": (0, 110, 90),
+    "integral": (60, 90, 160),
 }
 """Colours of the models."""
+
+UNITS = {"power": "W", "energy": "J", "integral": "N m s"}
+"""Units of the rows of models that have no torques."""
 
 AGAIN: dict[str, tuple[Color, ...]] = {
     "explicit": ((190, 230, 120), (0, 150, 150)),
     "implicit": ((215, 190, 240), (90, 100, 230)),
     "power": ((250, 150, 150), (170, 20, 60)),
     "energy": ((120, 190, 170), (0, 70, 60)),
+    "integral": ((150, 170, 220), (20, 50, 110)),
 }
 """Colours of the models in a second and a third identification of a log."""
 

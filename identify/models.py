@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import final
+from typing import ClassVar, final
 
 import numpy as np
 
@@ -81,6 +81,9 @@ class Equations:
 class AbstractModel(ABC):
     """An identification model B tau = [c + s e] X with s = d/dt: it takes B, c and e from a basis, and never filters."""
 
+    integrated: ClassVar[bool] = False
+    """Whether its rows are integrals over windows, by whatever operator the chain has."""
+
     @abstractmethod
     def B(self, state: State) -> Multipliers:
         """Return what torques are multiplied by, (row of an instant, joint) -> (..., time) or a constant, where it is not 0."""
@@ -106,6 +109,12 @@ class AbstractModel(ABC):
             {address: average(column) for address, column in self.e(basis, state).items()},
             basis.names,
         )
+
+
+def rows_at_an_instant(model: AbstractModel, n: int) -> int:
+    """Return how many rows a model has at an instant of a robot of `n` joints: n, or 1 of power."""
+    still = np.zeros((n, 2))
+    return 1 + max(row for row, _ in model.B(State(still, still, lambda x: x)))
 
 
 def each_joint(state: State) -> Multipliers:
@@ -168,6 +177,42 @@ class PowerModel(AbstractModel):
         return basis.energy(state)
 
 
+@final
+@dataclass(frozen=True)
+class OverWindows(AbstractModel):
+    """Another model, integrated over windows [ta, tb] of the chain's operator, or of 0.1 s where that makes no integrals."""
+
+    integrated: ClassVar[bool] = True
+
+    of: AbstractModel
+    """The model."""
+
+    def B(self, state: State) -> Multipliers:
+        """Return what the other model multiplies torques by."""
+        return self.of.B(state)
+
+    def c(self, basis: Basis, state: State) -> Columns:
+        """Return the other model's columns, to be integrated."""
+        return self.of.c(basis, state)
+
+    def e(self, basis: Basis, state: State) -> Columns:
+        """Return the other model's columns whose differences over a window are taken."""
+        return self.of.e(basis, state)
+
+
+def energy() -> OverWindows:
+    """Energy model, int qd' tau dt = [int qd' Gamma_f dt + h(tb) - h(ta)] X (Eq. 11, 20): power over windows."""
+    return OverWindows(PowerModel())
+
+
+def integral() -> OverWindows:
+    """Integral of the implicit model, int tau dt = [int R dt + M_i qd (tb) - M_i qd (ta)] X (after Eq. 9)."""
+    return OverWindows(ImplicitModel())
+
+
+THREE = ("explicit", "implicit", "power")
+"""The paper's models, which are compared where no other is asked for."""
+
 MODELS: Table[AbstractModel] = Table(
     "models",
     AbstractModel,  # type: ignore[type-abstract]  # only asked whether an instance is one
@@ -175,5 +220,7 @@ MODELS: Table[AbstractModel] = Table(
         "explicit": ExplicitModel,
         "implicit": ImplicitModel,
         "power": PowerModel,
+        "energy": energy,
+        "integral": integral,
     },
 )

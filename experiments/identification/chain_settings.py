@@ -51,13 +51,23 @@ def replaced(part: Any, path: list[str], value: Any) -> Any:
     if len(path) > 1:
         value = replaced(getattr(part, path[0]), path[1:], value)
     elif path[0] in STAGES and isinstance(part, Chain):
-        if not isinstance(value, str):
-            raise ExperimentError(f"{value!r:.60}: give names, among {', '.join(STAGES[path[0]])}")
-        value = STAGES[path[0]].create(value)
+        value = _stage(path[0], value)
     try:
         return replace(part, **{path[0]: value})
     except (SettingError, TypeError, ValueError) as error:
         raise ExperimentError(str(error)) from error
+
+
+def _stage(stage: str, value: Any) -> Any:
+    """Return a stage by its name, or by a table with its name as `kind` and its settings; raise ExperimentError."""
+    table, named = STAGES[stage], value if isinstance(value, dict) else {KIND: value}
+    if not isinstance(named.get(KIND), str):
+        raise ExperimentError(f"{value!r:.60}: give names, among {', '.join(table)}, or tables such as {{kind = NAME, ...}}")
+    part = table.create(named[KIND])
+    for key, setting in named.items():
+        if key != KIND:
+            part = replaced(part, [key], setting)
+    return part
 
 
 def chain_of(file: Path) -> tuple[str, Chain]:

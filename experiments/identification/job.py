@@ -19,6 +19,7 @@ from idbench.experiments.identification.robot_model import SCARA, RobotModel, ab
 from idbench.experiments.requests.jobs import IdentifyRequest
 from idbench.experiments.requests.shared import CHAIN, LogRequest
 from idbench.identify import ESTIMATORS, MODELS, IdentificationError
+from idbench.identify.models import THREE
 from idbench.identify.signals.masks import NoMask
 from idbench.sim.robot.robot import Robot
 from idbench.sim.scenario.scenario_file import load as load_scenario
@@ -51,7 +52,7 @@ def request_of(asked: IdentifyRequest, robot_model: RobotModel | None = None) ->
     loops = asked.loop or ([str(own[0])] if len(own) == 1 and own[0].is_file() else [])
     request = Request(
         robot_model or RobotModel(robot_of(asked), asked.parameters, asked.mounting.mounting),
-        tuple(MODELS) if asked.model in (None, "all") else (asked.model,),
+        THREE if asked.model is None else tuple(MODELS) if asked.model == "all" else (asked.model,),
         asked.chain,
         asked.estimator,
         name=asked.label,

@@ -13,6 +13,7 @@ from idbench.experiments.requests.words import Consistency, Start
 from idbench.identify import CHAINS, ESTIMATORS, MODELS, AbstractEstimator, Chain, ExplicitModel, MotionLog, Problem, Simulation
 from idbench.identify.blame import blamed
 from idbench.identify.estimators.settle import settled
+from idbench.identify.models import THREE
 from idbench.identify.signals.masks import ReversalMask
 from idbench.sim.scenario.scenario import Scenario
 
@@ -29,7 +30,7 @@ class Request:
 
     robot_model: RobotModel = field(default_factory=RobotModel)
     """The robot."""
-    models: tuple[str, ...] = ("explicit", "implicit", "power")
+    models: tuple[str, ...] = THREE
     """Names of the models."""
     chain: str = CHAIN
     """Name of the chain."""

@@ -6,11 +6,10 @@ the power model alone; a gain error scales everything.
 """
 
 import json
-import threading
-from concurrent.futures import CancelledError, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
+from idbench.experiments.study.run_study import LocalPool
 from idbench.identify import (
     Array,
     AsLogged,
@@ -93,10 +92,9 @@ class Attribution:
 
     def __init__(self, table2: Scenario, threads: int = 2) -> None:
         self._imperfections = imperfections(table2)
-        self._stop = threading.Event()
-        self._pool = ThreadPoolExecutor(threads)
-        every = dict.fromkeys(_key(one) for one in self._imperfections)
-        self._logs = {key: self._pool.submit(_simulated, key, self._go_on) for key in every}
+        every = list(dict.fromkeys(_key(one) for one in self._imperfections))
+        self._pool = LocalPool(lambda which, progress: _simulated(every[which.start], progress), threads)
+        self._logs = {key: self._pool.submit(range(k, k + 1)) for k, key in enumerate(every)}
 
     def errors(self, progress: Progress | None = None) -> dict[str, Errors]:
         """Return, for every imperfection, the signed error [%] of every parameter in each model."""
@@ -112,14 +110,7 @@ class Attribution:
 
     def stop(self) -> None:
         """End simulations that are not finished."""
-        self._stop.set()
-        self._pool.shutdown(cancel_futures=True)
-
-    def _go_on(self, share: float) -> None:
-        """Raise CancelledError in a simulation that nobody waits for any more."""
-        del share
-        if self._stop.is_set():
-            raise CancelledError
+        self._pool.close()
 
 
 def errors_of(imperfection: Imperfection, log: MotionLog, truth: list[float]) -> Errors:

@@ -5,9 +5,12 @@ motion. So random motions of the class are drawn, those with the paper's conditi
 their errors is laid beside the paper's. No error decides which motion is kept.
 """
 
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import groupby
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -15,14 +18,13 @@ import numpy.typing as npt
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.paper.table1 import PAPER
-from idbench.identify import CHAINS, MODELS, Array, MotionLog, OrdinaryLeastSquares, TorqueChannel, identify_each, scara
+from idbench.experiments.study.run_study import local_pool
+from idbench.experiments.study.study import Study
+from idbench.experiments.study.study_file import load_study
+from idbench.identify import Array
 from idbench.sim.engine.simulation import Progress
-from idbench.sim.errors import ScenarioError
-from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.scara import scara_truth
-from idbench.sim.trajectories.point_to_point import PointToPoint, at_rest
-from idbench.sim.trajectories.quintic import draw_waypoint
 
 COMPARED = ("paper", "paper_masked")
 """Chains whose errors are compared with the paper's."""
@@ -32,41 +34,6 @@ TOGETHER = 50
 
 BAND = (5.0, 95.0)
 """Percentiles between which the paper's error counts as explained."""
-
-
-@dataclass(frozen=True)
-class Pace:
-    """The class of motions."""
-
-    moves: tuple[int, int] = (16, 30)
-    """Fewest and most moves."""
-    shortest: float = 1.3
-    """Least time of a move [s]."""
-    motion: float = 40.0
-    """Time of all moves [s]."""
-    rest: float = 3.0
-    """Time at rest at either end [s]."""
-    fs: float = 100.0
-    """Sampling frequency [Hz]; moves last whole samples."""
-    clearance: float = 0.2
-    """Least distance to the ends of the joints' ranges [rad]."""
-    smallest_move: float = 0.1
-    """Least distance of every joint in every move [rad]."""
-    velocity: float = 7.0
-    """Limit of the joints' speed [rad/s]."""
-
-    def draw(self, rng: np.random.Generator, robot: Robot) -> PointToPoint:
-        """Return a motion of the class: number, times and amplitudes of its moves are random."""
-        count = int(rng.integers(self.moves[0], self.moves[1] + 1))
-        edges = np.sort(rng.integers(0, round((self.motion - count * self.shortest) * self.fs) + 1, count - 1))
-        spare = np.diff(np.concatenate([[0], edges, [round((self.motion - count * self.shortest) * self.fs)]]))
-        middle, half = robot.ranges.mean(axis=1), np.diff(robot.ranges, axis=1)[:, 0] / 2 - self.clearance
-        room = half * rng.uniform(0.2, 1.0, robot.n)
-        around = np.stack([middle - room, middle + room], axis=1) + (rng.uniform(-1, 1, robot.n) * (half - room))[:, None]
-        points = np.zeros((count + 1, robot.n))
-        for k in range(count + 1):
-            points[k] = draw_waypoint(rng, around, points[max(k - 1, 0) : k], 0.0, self.smallest_move)
-        return at_rest(points, self.shortest + spare / self.fs, self.rest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,8 +77,6 @@ class Table1Motions:
     """How many are drawn."""
     seed: int = 0
     """Of the first; motion i of a seed is the same whatever their number."""
-    pace: Pace = Pace()  # frozen
-    """Their class."""
     tolerance: float = 0.3
     """Motions are kept whose condition numbers are within this share of the paper's, in the chain itself."""
     progress: Progress | None = None
@@ -122,66 +87,49 @@ class Table1Motions:
             raise ExperimentError(f"--motions {self.motions} must be at least 1, and --seed {self.seed} at least 0")
 
     @cached_property
-    def robot(self) -> Robot:
-        """The SCARA."""
-        return Robot.load("scara")
+    def study(self) -> Study:
+        """The study that ships as `motions`, with as many."""
+        return replace(load_study("motions"), seeds=max(2, self.motions), seed=self.seed)
 
     @cached_property
     def truth(self) -> dict[str, float]:
-        """Its true parameters."""
-        return scara_truth(self.robot)
+        """True parameters of the SCARA."""
+        return scara_truth(Robot.load("scara"))
 
     @cached_property
     def errors(self) -> dict[str, Errors]:
         """The errors of each chain; raise ExperimentError if no motion is kept."""
-        found: dict[str, list[dict[str, tuple[Array, Array]]]] = {chain: [] for chain in COMPARED}
-        drawn = 0
-        for first in range(0, self.motions, TOGETHER):
-            log = self._logs(range(first, min(first + TOGETHER, self.motions)))
-            if log is not None:
-                drawn += len(log.q)
+        found: dict[str, list[tuple[Array, Array]]] = {chain: [] for chain in COMPARED}
+        with local_pool(self.study, os.cpu_count() or 1) as pool:
+            shards = [pool.submit(range(k, min(k + TOGETHER, self.motions))) for k in range(0, self.motions, TOGETHER)]
+            for number, shard in enumerate(shards, 1):
+                rows = shard.result().rows
                 for chain in COMPARED:
-                    found[chain].append(self._identified(chain, log))
-            if self.progress:
-                self.progress(min(1.0, (first + TOGETHER) / self.motions))
-        return {chain: self._kept(parts, drawn) for chain, parts in found.items()}
+                    found[chain] += self._of_motions([row for row in rows if row["chain"] == chain])
+                if self.progress:
+                    self.progress(number / len(shards))
+        return {chain: self._kept(each) for chain, each in found.items()}
 
-    def _logs(self, numbers: Sequence[int]) -> MotionLog | None:
-        """Return ideal data of the motions that keep the robot's limits of speed and torque."""
-        kept = []
-        for i in numbers:
-            rng = np.random.default_rng([self.seed, i])
-            try:
-                plan = self.pace.draw(rng, self.robot)
-            except ScenarioError:  # so small an amplitude leaves no room for the smallest move
-                continue
-            if plan.peak_velocity.max() <= self.pace.velocity:
-                kept.append(plan.sample(self.pace.fs))
-        if not kept:
-            return None
-        q, qd, qdd = (np.stack([getattr(motion, x) for motion in kept]) for x in ("q", "qd", "qdd"))
-        flat = [x.reshape(-1, self.robot.n) for x in (q, qd, qdd)]
-        tau = (inverse_dynamics(self.robot, *flat) + coulomb_torque(self.robot, flat[1])).reshape(q.shape)
-        able = (np.abs(tau).max(axis=1) <= self.robot.torque_limits).all(axis=-1)
-        return MotionLog(self.pace.fs, q[able], tau[able], TorqueChannel("instantaneous")) if able.any() else None
+    def _of_motions(self, rows: Sequence[Mapping[str, Any]]) -> Iterator[tuple[Array, Array]]:
+        """Yield condition numbers, shape (model,), and errors [%], shape (model, p), of motions within the robot's limits."""
+        for _, each in groupby(rows, key=itemgetter("run")):
+            models = {row["model"]: row for row in each if row["failure"] is None}
+            if set(models) == set(PAPER):
+                X = np.array([[models[model][name] for name in self.truth] for model in PAPER])
+                truth = np.array(list(self.truth.values()))
+                yield np.array([models[m]["condition_number"] for m in PAPER]), 100 * np.abs(X / truth - 1)
 
-    def _identified(self, name: str, log: MotionLog) -> dict[str, tuple[Array, Array]]:
-        """Return condition numbers and errors of every model."""
-        chain = replace(CHAINS.create(name), trim=self.pace.rest)
-        models = {model: MODELS.create(model) for model in PAPER}
-        found = identify_each(log, scara(), models, chain, OrdinaryLeastSquares(), throw=False)
-        truth = list(self.truth.values())
-        return {model: (e.condition_number, e.relative_error_percent(truth)) for model, e in found.items()}
-
-    def _kept(self, parts: Sequence[Mapping[str, tuple[Array, Array]]], drawn: int) -> Errors:
-        every = {m: [np.concatenate([part[m][k] for part in parts]) for k in (0, 1)] for m in PAPER} if parts else {}
-        near = [np.abs(np.log(every[m][0] / PAPER[m].condition_number)) <= np.log1p(self.tolerance) for m in every]
-        keep = np.logical_and.reduce([*near, *(np.isfinite(every[m][1]).all(axis=-1) for m in every)]) if every else np.zeros(0)
-        if not keep.any():
+    def _kept(self, found: Sequence[tuple[Array, Array]]) -> Errors:
+        """Return the errors of motions whose condition numbers are the paper's."""
+        paper = np.array([column.condition_number for column in PAPER.values()])
+        near = [(c, e) for c, e in found if (np.abs(np.log(c / paper)) <= np.log1p(self.tolerance)).all()]
+        if not near:
             raise ExperimentError(
-                f"none of {drawn} motions has the paper's condition numbers within {self.tolerance:.0%}: draw more (--motions)"
+                f"none of {len(found)} motions has the paper's condition numbers within {self.tolerance:.0%}: "
+                "draw more (--motions)"
             )
-        return Errors(drawn, {m: every[m][0][keep] for m in every}, {m: every[m][1][keep] for m in every})
+        conditions, percent = (np.stack(x, axis=1) for x in zip(*near, strict=True))
+        return Errors(len(found), dict(zip(PAPER, conditions, strict=True)), dict(zip(PAPER, percent, strict=True)))
 
     def summary(self) -> dict[str, Any]:
         """Return summary.json."""

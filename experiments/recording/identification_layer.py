@@ -13,7 +13,7 @@ from idbench.experiments.recording.lanes import Lanes, estimates_table, mask_sta
 from idbench.experiments.recording.layouts import tabs
 from idbench.experiments.recording.residual_charts import ResidualCharts, send_iterations, send_parameters
 from idbench.experiments.recording.stream import Stream
-from idbench.experiments.text import FORM_WIDTHS, GREY, JOINTS, Color, joint_colors, kind_colors, model_color
+from idbench.experiments.text import FORM_WIDTHS, GREY, JOINTS, UNITS, Color, joint_colors, kind_colors, model_color
 from idbench.identify import (
     Array,
     Estimate,
@@ -187,8 +187,10 @@ class Layer:
 
 
 def row_names(form: str, kinds: int, joints: Sequence[str]) -> Sequence[str]:
-    """Return what the kinds of row of a model are called: after their joint, or after the model."""
-    return joints if kinds == len(joints) and form != "power" else [form] * kinds
+    """Return what the kinds of row of a model are called: after their joint, or after the model if theirs is another unit."""
+    if form not in UNITS:
+        return joints if kinds == len(joints) else [form] * kinds
+    return [form] if kinds == 1 else [f"{form} {joint}" for joint in joints]
 
 
 def send_rows(  # noqa: PLR0913  # what to send, and how it looks

@@ -19,6 +19,7 @@ from idbench.experiments.recording.views import (
     text,
     window,
 )
+from idbench.experiments.text import UNITS
 from idbench.identify import BLOCKS
 from idbench.identify.basis.tree_links import KINDS
 
@@ -224,11 +225,11 @@ def _of_models(shelf: Shelf, kind: str, row: str) -> list[str]:
 
 
 def _rows(shelf: Shelf) -> list[str]:
-    return sorted(shelf.last("identify/*/*/residual/*"), key=lambda row: row == "power")
+    return sorted(shelf.last("identify/*/*/residual/*"), key=lambda row: row.partition(" ")[0] in UNITS)
 
 
 def _unit(row: str) -> str:
-    return "W" if row == "power" else "N m"
+    return UNITS.get(row.partition(" ")[0], "N m")
 
 
 def _letters(name: str) -> str:

@@ -46,7 +46,7 @@ def left_over(fit: Fit) -> dict[str, Instants]:
 
 def of_joints(fit: Fit, left: Mapping[str, Instants]) -> dict[str, Instants]:
     """Return the residuals of models that have a row for each joint."""
-    return {form: one for form, one in left.items() if form != "power" and len(one.residual) == fit.basis.n}
+    return {form: one for form, one in left.items() if form not in ("power", "energy") and len(one.residual) == fit.basis.n}
 
 
 def spectra(fit: Fit, left: Mapping[str, Instants]) -> Iterator[Spectrum]:

@@ -44,8 +44,8 @@ class IdentifyRequest(LogRequest):
     chain_file: File = None
     """TOML file with settings of the chain: chain = "idbench", then tables such as [operator] with cutoff = 20.0."""
     model: str | None = None
-    """all, explicit, implicit, power, or MODULE:CLASS of your own. Default: all; for robots of many joints the screen shows the
-    best one."""
+    """explicit, implicit, power, energy (power over windows), integral (implicit over windows), all, or MODULE:CLASS of your
+    own. Default: the first three; for robots of many joints the screen shows the best one."""
     loop: Scenarios = ()
     """Scenario of the control loop of each log, for IV, DIDIM, CLIE and CLOE: robot, motion, controller, timing, drive.
     Default: that of the run's folder."""

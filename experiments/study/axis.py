@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from dataclasses import field as field_of
 from functools import cached_property
 from itertools import product
 from typing import Any, Literal, final
@@ -40,14 +41,18 @@ class Axis:
     """Even differences, or even ratios."""
     also: tuple[str, ...] = ()
     """Further fields that take the same value."""
+    cases: dict[str, dict[str, Any]] = field_of(default_factory=dict)
+    """Instead of values: names of settings of the scenario that go together, each a table of them; `field` is what they are."""
 
     def __post_init__(self) -> None:
         spaced = self.lowest, self.highest, self.count
-        if self.values:
-            if any(x is not None for x in spaced):
-                raise ValueError(f"axis {self.field}: give values, or lowest, highest and count, not both")
+        if self.values or self.cases:
+            if any(x is not None for x in spaced) or (self.values and self.cases):
+                raise ValueError(f"axis {self.field}: give values, or lowest, highest and count, or cases: one of them")
+            if self.cases and (self.also or self.identification):
+                raise ValueError(f"axis {self.field}: cases are settings of a scenario, and have no also")
         elif None in spaced:
-            raise ValueError(f"axis {self.field} is empty: give values, or lowest, highest and count")
+            raise ValueError(f"axis {self.field} is empty: give values, or lowest, highest and count, or cases")
         elif not 2 <= (self.count or 0) <= MOST_VALUES or not (self.lowest or 0.0) < (self.highest or 0.0):
             raise ValueError(f"axis {self.field}: lowest must be below highest, and count between 2 and {MOST_VALUES}")
         elif self.spacing == "log" and (self.lowest or 0.0) <= 0:
@@ -61,8 +66,8 @@ class Axis:
     @cached_property
     def points(self) -> tuple[Any, ...]:
         """The values, those inside a range to six digits."""
-        if self.values:
-            return self.values
+        if self.values or self.cases:
+            return self.values or tuple(self.cases)
         low, high = self.lowest or 0.0, self.highest or 0.0
         space = np.geomspace if self.spacing == "log" else np.linspace
         return (low, *(float(f"{x:.6g}") for x in space(low, high, self.count or 0)[1:-1]), high)
@@ -76,6 +81,8 @@ class Axis:
         """Return a value as it stands in results: a number if all of the axis are, else text."""
         if self.numeric:
             return float(value)
+        if isinstance(value, dict) and isinstance(value.get("kind"), str):
+            return ", ".join([value["kind"], *(f"{key} {x}" for key, x in value.items() if key != "kind")])
         return value if isinstance(value, str) else repr(_plain(value))
 
     @property
@@ -103,6 +110,11 @@ class Setting:
 
     def into(self, content: dict[str, Any]) -> None:
         """Write the value into the tables of a scenario."""
+        if self.axis.cases:
+            merged = merge(content, self.axis.cases[self.value])
+            content.clear()
+            content.update(merged)
+            return
         for field in self.axis.all_fields:
             *path, key = field.split(".")
             table = content
@@ -131,6 +143,18 @@ class Setting:
             if root == "estimator":
                 estimator = _set(estimator, path, self.value, field)
         return estimator
+
+
+def merge(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings with changes, table by table; a part of another kind is replaced whole."""
+    result = dict(content)
+    for key, value in changes.items():
+        old = result.get(key)
+        if isinstance(old, dict) and isinstance(value, dict) and value.get("kind", old.get("kind")) == old.get("kind"):
+            result[key] = merge(old, value)
+        else:
+            result[key] = value
+    return result
 
 
 def _of_identification(field: str) -> bool:

@@ -4,7 +4,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from threadpoolctl import threadpool_limits
 
@@ -36,6 +36,8 @@ def _same(here: Mapping[str, Any], there: Mapping[str, Any], name: str) -> bool:
     return bool(here.get(name) == there[name] or (here.get(name) != here.get(name) and there[name] != there[name]))
 
 
+Part = TypeVar("Part")
+
 POLL = 0.2
 """How often [s] the progress is shown while shards are computed."""
 
@@ -47,32 +49,32 @@ class CancelledError(Exception):
     """Raised inside shards that shall not go on."""
 
 
-class LocalPool:
-    """Shards on the threads of this process: MuJoCo and NumPy let each other run.
+class LocalPool(Generic[Part]):
+    """Parts of a work on the threads of this process, such as shards: MuJoCo and NumPy let each other run.
 
     Parameters
     ----------
-    study : Study
-        What to run.
+    compute : callable
+        Makes the part of some numbers, such as those of runs; tells the share of it that is done.
     threads : int
-        Shards at a time, each on one native thread.
+        Parts at a time, each on one native thread.
     """
 
-    def __init__(self, study: Study, threads: int) -> None:
+    def __init__(self, compute: Callable[[range, Watch], Part], threads: int) -> None:
         self.width = threads
-        self._study = study
+        self._compute = compute
         self._stop = threading.Event()
         self._done = dict[int, float]()
         self._pool: Executor = ThreadPoolExecutor(threads)
         # Shards are the parallel work; a matrix product that forks would only be in their way.
         self._limits = threadpool_limits(1)
 
-    def submit(self, runs: range) -> Future[Shard]:
-        """Begin a shard."""
+    def submit(self, runs: range) -> Future[Part]:
+        """Begin a part."""
         return self._pool.submit(self._run, runs)
 
     def partial(self) -> float:
-        """Return how many runs the shards in progress amount to."""
+        """Return how many numbers the parts in progress amount to."""
         return sum(list(self._done.values()))
 
     def close(self) -> None:
@@ -81,22 +83,22 @@ class LocalPool:
         self._pool.shutdown(cancel_futures=True)
         self._limits.restore_original_limits()
 
-    def _run(self, runs: range) -> Shard:
+    def _run(self, runs: range) -> Part:
         def receive(share: float) -> None:
             self._done[runs[0]] = share * len(runs)
             if self._stop.is_set():
                 raise CancelledError
 
         try:
-            return run_shard(self._study, runs, progress=receive)
+            return self._compute(runs, receive)
         finally:
             self._done.pop(runs[0], None)
 
 
 @contextmanager
-def local_pool(study: Study, threads: int) -> Iterator[LocalPool]:
-    """Give a pool of threads, closed at the end."""
-    pool = LocalPool(study, threads)
+def local_pool(study: Study, threads: int) -> Iterator[LocalPool[Shard]]:
+    """Give a pool of threads for the shards of a study, closed at the end."""
+    pool = LocalPool(lambda runs, progress: run_shard(study, runs, progress=progress), threads)
     try:
         yield pool
     finally:
@@ -104,7 +106,7 @@ def local_pool(study: Study, threads: int) -> Iterator[LocalPool]:
 
 
 def run_missing(
-    store: Store, pool: LocalPool, shard: int, watch: Watch, finished_shard: Callable[[range], None] | None = None
+    store: Store, pool: LocalPool[Shard], shard: int, watch: Watch, finished_shard: Callable[[range], None] | None = None
 ) -> None:
     """Run what a study lacks; what is finished when this is interrupted is kept.
 

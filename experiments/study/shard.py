@@ -17,7 +17,7 @@ from idbench.experiments.study.statistics import BOUNDS
 from idbench.experiments.study.study import Study
 from idbench.identify import Array, Estimate, ExplicitModel, IdentificationError, Problem, Simulation, Status, attempt_each
 from idbench.identify.estimators.settle import settled
-from idbench.sim.engine.run import Run
+from idbench.sim.engine.run import Run, ideal_run
 from idbench.sim.engine.simulation import Progress, simulate
 from idbench.sim.errors import BenchError
 from idbench.sim.scenario.scenario import Scenario
@@ -67,7 +67,7 @@ def run_shard(study: Study, runs: range, *, threads: int = 1, progress: Progress
     for together in _groups(study, scenarios, shard):
         start, tell = time.perf_counter(), _part(progress, done, len(together), steps * len(runs))
         try:
-            simulated = _simulate(scenarios, together, threads, tell)
+            simulated = _simulate(study, scenarios, together, threads, tell)
             known = {} if study.of_servos else {x: _known(study, model, simulated) for x, model in study.subjects.items()}
         except BenchError as error:
             _fail(shard, study, scenarios, list(together), str(error))
@@ -112,10 +112,14 @@ def _known(study: Study, robot_model: RobotModel, simulated: Run) -> tuple[dict[
 
 
 def _simulate(
-    scenarios: Mapping[int, Scenario], together: Mapping[int, Reference | None], threads: int, progress: Progress | None
+    study: Study, scenarios: Mapping[int, Scenario], together: Mapping[int, Reference | None], threads: int, progress: Progress
 ) -> Run:
+    """Return the first log of every run, then the second of every run, and so on, as so many simulations."""
     first, motions = scenarios[next(iter(together))], [motion for motion in together.values() if motion is not None]
-    seeds = [scenarios[run].seed for run in together]
+    seeds = [seed for each in zip(*map(study.seeds_of, together), strict=True) for seed in each]
+    motions *= study.most_logs
+    if study.data == "ideal":
+        return ideal_run(first, seeds, motions)
     return simulate(first, seeds, motions=motions, threads=threads, progress=progress, throw=False)
 
 
@@ -139,20 +143,22 @@ def _identify(
     simulation: Simulation,
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for every run and model."""
-    found: dict[str, Estimate | IdentificationError]
-    try:
-        problem = settled(
-            Problem((simulated.log,), study.subjects[method.friction].basis, ExplicitModel(), method.chain, simulation)
-        )
-        found = attempt_each(problem, study.created_models, method.estimator, throw=False)
-    except IdentificationError as error:
-        found = dict.fromkeys(study.models, error)
+    found = dict[str, Estimate | IdentificationError]()
+    for count in dict.fromkeys(map(study.logs_of, study.models)):
+        models = {name: model for name, model in study.created_models.items() if study.logs_of(name) == count}
+        logs = tuple(simulated.log.run((slice(k * len(runs), (k + 1) * len(runs)),)) for k in range(count))
+        try:
+            problem = settled(Problem(logs, study.subjects[method.friction].basis, ExplicitModel(), method.chain, simulation))
+            found |= attempt_each(problem, models, method.estimator, throw=False)
+        except IdentificationError as error:
+            found |= dict.fromkeys(models, error)
     for model in study.models:
         outcome = found[model]
         columns = _columns(outcome, truth, bounds) if isinstance(outcome, Estimate) else {}
         for i, run in enumerate(runs):
             common = _common(study, method, run, model, simulated.seeds[i])
-            if reason := simulated.failures.get(i) or _failure(outcome, i):
+            ends = (simulated.failures.get(i + k * len(runs)) for k in range(study.logs_of(model)))
+            if reason := next(filter(None, ends), None) or _failure(outcome, i):
                 yield common | {"failure": reason}
             else:
                 yield common | {name: values[i] for name, values in columns.items()}
@@ -168,7 +174,8 @@ def _simulation(
     start = None
     loop = ScenarioLoop(robot_model, (simulated.scenario,), (simulated.log,), motions) if "loop" in needs else None
     if study.start:
-        drawn = np.stack([np.random.default_rng([seed, START]).standard_normal(len(truth)) for seed in simulated.seeds])
+        first = simulated.seeds[: len(together)]
+        drawn = np.stack([np.random.default_rng([seed, START]).standard_normal(len(truth)) for seed in first])
         start = np.array(list(truth.values())) * (1 + study.start * np.clip(drawn, -FARTHEST, FARTHEST))
     return Simulation(loop, RobotPlant(robot_model) if "plant" in needs else None, start)
 

@@ -17,17 +17,21 @@ from idbench.experiments.requests.shared import CHAIN, ESTIMATOR, Parameters
 from idbench.experiments.study.axis import FRICTION, Axis, Method, Setting, combinations, methods_of, servo_methods, whole_first
 from idbench.experiments.study.servo_rows import SERVO, names_of
 from idbench.identify import MODELS, AbstractModel
+from idbench.identify.models import THREE, rows_at_an_instant
 from idbench.sim.drives import ServoDrive
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import from_dict
 from idbench.sim.settings import NotNegative, Seed, Truth, Whole, settings
-from idbench.sim.trajectories import RandomMoves, RandomSteps
+from idbench.sim.trajectories import RandomMoves, RandomPace, RandomSteps
 
 MOST_POINTS = 1_000_000
 """Combinations of settings of simulation, above which axes are taken for a slip: each is looked at before the first is run."""
 
 MOST_METHODS = 1000
 """Identifications of every run, above which axes are taken for a slip."""
+
+PLAIN = ("name", "question", "seeds", "seed", "motion", "start", "bound", "data", "realizations", "rows")
+"""Keys of a study whose values are no tables or lists."""
 
 Names = Annotated[tuple[str, ...], Field(min_length=1)]
 
@@ -59,7 +63,7 @@ class Study:
     """The same seed gives the same runs."""
     motion: Literal["drawn", "shared"] = "drawn"
     """drawn: every run draws a motion of its own (trajectory of kind random); shared: all follow the scenario's."""
-    models: Names = ("explicit", "implicit", "power")
+    models: Names = THREE
     """Names of models."""
     chains: Names = (CHAIN,)
     """Names of chains."""
@@ -73,6 +77,13 @@ class Study:
     each run; 0: they begin at the least-squares estimate."""
     bound: Truth = False
     """Whether the least error that encoders and torque noise allow is computed beside (Cramer-Rao)."""
+    data: Literal["simulated", "ideal"] = "simulated"
+    """simulated: closed loops; ideal: robots that follow their motions exactly, with exact sensors."""
+    realizations: Annotated[Whole, Field(ge=1)] = 1
+    """Logs of every run: its motion, realized so often with other noise, and identified in one fit."""
+    rows: Literal["own", "equal"] = "own"
+    """equal: models with one row per instant, power and energy, have as many more logs as the others have rows, so that all
+    have as many rows; own: all have the same logs."""
 
     def __post_init__(self) -> None:
         if not self.axes:
@@ -96,7 +107,33 @@ class Study:
             raise StudyError(f'models = {list(self.models)}: a study of servos has models = ["{SERVO}"], any other has not')
         if not self.of_servos:
             _ = self.created_models, self.subjects
+        self._require_realizations()
         self._require(next(self._points()))  # the whole grid is looked at when it is known not to be endless
+
+    def _require_realizations(self) -> None:
+        """Raise StudyError if several logs of a run, or ideal ones, go with nothing else that is asked for."""
+        several, ideal = self.most_logs > 1, self.data == "ideal"
+        loops = [method.estimator_name for method in self.methods if "loop" in method.estimator.needs]
+        refused = {
+            "a study of servos": self.of_servos and (several or ideal),
+            "bound = true": self.bound and (several or ideal),
+            f"estimator {', '.join(loops)}, which simulates the loop of one log": bool(loops) and (several or ideal),
+            "motion = 'shared'": ideal and self.motion == "shared",
+        }
+        if found := [what for what, wrong in refused.items() if wrong]:
+            raise StudyError(f"realizations, rows = 'equal' and data = 'ideal' do not go with {found[0]}")
+
+    def logs_of(self, model: str) -> int:
+        """Return how many logs of a run a model has."""
+        if self.of_servos or self.rows == "own":
+            return self.realizations
+        n = next(iter(self.subjects.values())).basis.n
+        return self.realizations * n // rows_at_an_instant(self.created_models[model], n)
+
+    @cached_property
+    def most_logs(self) -> int:
+        """Logs that every run makes."""
+        return max(map(self.logs_of, self.models))
 
     @property
     def size(self) -> int:
@@ -192,10 +229,20 @@ class Study:
             raise StudyError(f"run {run} does not exist: the study {self.name!r} has runs 0 to {self.size - 1}")
         point, number = divmod(run, self.seeds)
         scenario = self.points[point].scenario
-        drawn = np.random.SeedSequence(self.seed, spawn_key=(point, number)).generate_state(2, np.uint64) >> np.uint64(1)
+        drawn = self._drawn(point, number)
         if self.motion == "drawn":
-            scenario = replace(scenario, trajectory=replace(_random(scenario), seed=int(drawn[1])))
-        return replace(scenario, seed=int(drawn[0]))
+            scenario = replace(scenario, trajectory=replace(_random(scenario), seed=drawn[1]))
+        return replace(scenario, seed=drawn[0])
+
+    def seeds_of(self, run: int) -> list[int]:
+        """Return the seeds of all logs of a run, the first that of its scenario."""
+        first, _, *others = self._drawn(*divmod(run, self.seeds))
+        return [first, *others]
+
+    def _drawn(self, point: int, number: int) -> list[int]:
+        """Return the seeds of a run: of its first log, its motion, and further logs."""
+        drawn = np.random.SeedSequence(self.seed, spawn_key=(point, number)).generate_state(1 + self.most_logs, np.uint64)
+        return [int(x) for x in drawn >> np.uint64(1)]
 
     @cached_property
     def fingerprint(self) -> str:
@@ -217,16 +264,16 @@ class Study:
         """The study as the keys of a TOML document."""
         axes = []
         for axis in self.axes:
-            spaced = {k: getattr(axis, k) for k in ("lowest", "highest", "count", "spacing")} if not axis.values else {}
-            listed = {"values": list(axis.values)} if axis.values else {}
+            listed = {"values": list(axis.values)} if axis.values else {"cases": axis.cases} if axis.cases else {}
+            spaced = {k: getattr(axis, k) for k in ("lowest", "highest", "count", "spacing")} if not listed else {}
             axes.append({"field": axis.field, **listed, **spaced, **({"also": list(axis.also)} if axis.also else {})})
-        plain = {key: getattr(self, key) for key in ("name", "question", "seeds", "seed", "motion", "start", "bound")}
+        plain = {key: getattr(self, key) for key in PLAIN}
         lists = {key: list(getattr(self, key)) for key in ("models", "chains", "estimators", "friction")}
         return {**plain, **lists, "axes": axes, "scenario": self.scenario}
 
 
-def _random(scenario: Scenario) -> RandomMoves | RandomSteps:
+def _random(scenario: Scenario) -> RandomMoves | RandomPace | RandomSteps:
     """Return the trajectory of a scenario whose motion can be drawn."""
-    if not isinstance(scenario.trajectory, (RandomMoves, RandomSteps)):
-        raise StudyError("motion = 'drawn' needs a trajectory of kind random or steps: write one, or motion = 'shared'")
+    if not isinstance(scenario.trajectory, (RandomMoves, RandomPace, RandomSteps)):
+        raise StudyError("motion = 'drawn' needs a trajectory of kind random, pace or steps: write one, or motion = 'shared'")
     return scenario.trajectory

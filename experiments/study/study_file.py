@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from idbench.experiments.errors import StudyError
+from idbench.experiments.study.axis import merge
 from idbench.experiments.study.study import Study
 from idbench.identify.plugins import did_you_mean
 from idbench.sim.errors import ScenarioError
@@ -84,16 +85,4 @@ def _scenario(base: Any, changes: Any) -> dict[str, Any]:
     content = to_dict(load(base)) if isinstance(base, str) else base
     if not isinstance(changes, dict):
         raise StudyError(f"settings = {changes!r:.60} must be a table of settings of the scenario")
-    return to_dict(from_dict(_merged(content, changes)))
-
-
-def _merged(content: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """Return `content` with `changes`, table by table; a part of another kind is replaced whole."""
-    result = dict(content)
-    for key, value in changes.items():
-        old = result.get(key)
-        if isinstance(old, dict) and isinstance(value, dict) and value.get("kind", old.get("kind")) == old.get("kind"):
-            result[key] = _merged(old, value)
-        else:
-            result[key] = value
-    return result
+    return to_dict(from_dict(merge(content, changes)))

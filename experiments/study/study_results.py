@@ -22,6 +22,7 @@ from idbench.experiments.study.axis import FRICTION, Axis
 from idbench.experiments.study.cluster import versions
 from idbench.experiments.study.comparison import differences
 from idbench.experiments.study.figures import bars_figure, cost_figure, coverage_figure, error_figure, typical_figure
+from idbench.experiments.study.ratios import ratios, ratios_summary, ratios_table
 from idbench.experiments.study.statistics import BOUNDS, Cell, cells
 from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study import Study
@@ -51,6 +52,7 @@ def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folde
         overview=[_overview(cell) for cell in cells],
         families=[_family(title, group, main_axis(study)) for title, group in families(study, solved)],
         bars=[(title, bars_figure(group)) for title, group in _comparisons(study, solved)],
+        ratios=[[where(r.cell, cells), r.pair, str(r), f"{r.runs}"] for r in ratios(solved)] if study.rows == "equal" else [],
         differences=list(_differences(solved)),
         details=[row for cell in solved for row in _details(cell, where(cell, cells))],
         failed=[
@@ -194,6 +196,8 @@ def print_study(page: Console, study: Study, found: Sequence[Cell]) -> None:
         grid.add_row(*settings, method(cell, found), *numbers, *judged)
     grid.columns[0].header = axes[0]
     print_table(page, grid, len(axes) + 1)
+    if study.rows == "equal" and (pairs := list(ratios(found))):
+        print_table(page, ratios_table(pairs), 3)
     page.print(Text(answer(found, study.edges)))
     for reason in _reasons(found)[:MOST_REASONS]:
         page.print(Text(f"failed: {reason}"), soft_wrap=True)
@@ -228,6 +232,7 @@ def summary_of(study: Study, found: Sequence[Cell], seconds: dict[str, float]) -
         "answer": answer(found, study.edges),
         "parameters": list(study.parameters),
         "cells": [_cell(cell) for cell in found],
+        **({"ratios": ratios_summary(list(ratios(found)))} if study.rows == "equal" else {}),
         "seconds": {**seconds, "runs": study.size},
     }
 

@@ -44,9 +44,9 @@ class Problem:
     basis: Basis
     """The robot, linear in its parameters."""
     model: AbstractModel
-    """Explicit, implicit or power."""
+    """Explicit, implicit, power, energy or integral."""
     chain: Chain
-    """Signal processing."""
+    """Signal processing, of all models; `own_chain` makes the rows of this one."""
     simulation: Simulation = Simulation()  # noqa: RUF009  # frozen
     """How the robot is simulated, for estimators that need it."""
     _signals: tuple[Signals, ...] = field(default=(), repr=False)
@@ -59,6 +59,11 @@ class Problem:
     def names(self) -> tuple[str, ...]:
         """Names of the parameters X."""
         return self.basis.names
+
+    @property
+    def own_chain(self) -> Chain:
+        """The chain with the operator of the model."""
+        return self.chain.of_model(self.model)
 
     @cached_property
     def long(self) -> bool:
@@ -114,7 +119,7 @@ class Problem:
     @cached_property
     def share(self) -> float:
         """The share of all rows that the parts make: 1 but for logs too long for their rows to be kept."""
-        every = sum(self.chain.grid(log).count for log in self.logs)
+        every = sum(self.own_chain.grid(log).count for log in self.logs)
         return len(self.some_rows.time) / self.some_rows.kinds / every
 
     @cached_property
@@ -268,11 +273,11 @@ class Problem:
 
     def rows_of(self, signals: Signals) -> Rows:
         """Return the rows of the signals of one log, or of a piece of it."""
-        return self.chain.rows(signals, self.basis, self.model)
+        return self.own_chain.rows(signals, self.basis, self.model)
 
     @cached_property
     def _pieces(self) -> list[Piece]:
-        return pieces(self.chain, self.logs)
+        return pieces(self.own_chain, self.logs)
 
     def _of_pieces(self, reduced: Callable[[LogRows], Reduced]) -> list[Reduced]:
         """Return what is made of every piece of long logs; the plain factors of their rows are made in passing."""

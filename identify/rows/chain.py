@@ -11,8 +11,9 @@ from idbench.identify.data.motion_log import MotionLog, TorqueChannel
 from idbench.identify.errors import LogError, SettingError, require_not_negative
 from idbench.identify.models import AbstractModel
 from idbench.identify.plugins import Table
-from idbench.identify.rows.operators import FirLowPass, IirLowPass, Samples
+from idbench.identify.rows.operators import FirLowPass, IirLowPass, Samples, Windows
 from idbench.identify.rows.operators.low_pass import AbstractOperator
+from idbench.identify.rows.operators.windows import AbstractWeakForm
 from idbench.identify.rows.row_map import Grid
 from idbench.identify.rows.rows import Rows
 from idbench.identify.signals.filters import (
@@ -85,6 +86,12 @@ class Chain:
         rows = max(1, samples // grid.step)
         starts = [(grid.first + row * grid.step - reach, min(rows, grid.count - row)) for row in range(0, grid.count, rows)]
         return [(start, start + 2 * reach + count * grid.step) for start, count in starts]
+
+    def of_model(self, model: AbstractModel) -> "Chain":
+        """Return the chain whose operator makes the rows of a model: windows, where a model is integrated and this has none."""
+        if not model.integrated or isinstance(self.operator, AbstractWeakForm):
+            return self
+        return replace(self, operator=Windows())
 
     def halo(self, fs: float, channel: TorqueChannel) -> float:
         """Return how far [s] a row looks to either side of its instant, in a log at `fs` [Hz] with this torque channel."""

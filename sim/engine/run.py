@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from idbench.identify.data.motion_log import MotionLog, TorqueChannel
 from idbench.sim.robot.inverse_dynamics import coulomb_torque, inverse_dynamics
 from idbench.sim.robot.motors import Array
@@ -72,3 +74,24 @@ def ideal_log(robot: Robot, reference: Reference) -> MotionLog:
     require_in_range(robot, reference.q)
     tau = inverse_dynamics(robot, reference.q, reference.qd, reference.qdd) + coulomb_torque(robot, reference.qd)
     return MotionLog(reference.fs, reference.q, tau, TorqueChannel("instantaneous"))
+
+
+def ideal_run(scenario: Scenario, seeds: Sequence[int], motions: Sequence[Reference]) -> Run:
+    """Return the logs of robots that follow their motions exactly, as `simulate` returns those of closed loops.
+
+    A motion whose torques are beyond what the robot's actuators have, or its speeds beyond the `velocity` of its trajectory,
+    is one that failed.
+    """
+    robot = scenario.real_robot
+    logs = [ideal_log(robot, motion) for motion in motions]
+    q = np.stack([log.q for log in logs])
+    qd = np.stack([motion.qd for motion in motions])
+    tau = np.stack([log.tau for log in logs])
+    failures = dict[int, str]()
+    limits = {"speed": getattr(scenario.trajectory, "velocity", np.inf), "torque": robot.torque_limits}
+    for what, x in (("speed", qd), ("torque", tau)):
+        over = np.abs(x).max(axis=1) > np.asarray(limits[what])
+        for i, j in np.argwhere(over).tolist():
+            failures.setdefault(i, f"the {what} of {robot.joints[j]} would be {np.abs(x[i, :, j]).max():.3g}, beyond its limit")
+    log = MotionLog(scenario.fs, q, tau, TorqueChannel("instantaneous"))
+    return Run(scenario, tuple(seeds), [robot] * len(logs), motions[0], log, q, qd, tau, tau, failures)

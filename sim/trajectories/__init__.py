@@ -5,6 +5,7 @@ from idbench.sim.trajectories.fourier import Fourier as Fourier
 from idbench.sim.trajectories.point_to_point import PointToPoint as PointToPoint
 from idbench.sim.trajectories.quintic import Quintic as Quintic
 from idbench.sim.trajectories.quintic import RandomMoves as RandomMoves
+from idbench.sim.trajectories.quintic import RandomPace as RandomPace
 from idbench.sim.trajectories.recorded import Recorded as Recorded
 from idbench.sim.trajectories.steps import RandomSteps as RandomSteps
 from idbench.sim.trajectories.time_optimal import TimeOptimal as TimeOptimal
@@ -16,6 +17,7 @@ TRAJECTORIES: PluginTable[AbstractTrajectory] = PluginTable(
     AbstractTrajectory,  # type: ignore[type-abstract]  # only asked whether an instance is one
     {
         "fourier": Fourier,
+        "pace": RandomPace,
         "quintic": Quintic,
         "random": RandomMoves,
         "recorded": Recorded,

@@ -124,6 +124,55 @@ class RandomMoves(AbstractTrajectory):
         return at_rest(points, times, self.rest)
 
 
+@final
+@settings
+class RandomPace(AbstractTrajectory):
+    """Fifth-order moves that fill a time: their number, times and room are random, as those of a class of motions.
+
+    The paper specifies the class of its motion (fifth-order point-to-point moves in 40 s at 100 Hz), not the motion.
+    """
+
+    moves: tuple[Whole, Whole] = (16, 30)
+    """Fewest and most moves."""
+    shortest: Positive = 1.3
+    """Least time of a move [s]."""
+    moving: Positive = 40.0
+    """Time of all moves [s]."""
+    period: Positive = 0.01
+    """Moves last whole multiples of this time [s]."""
+    rest: NotNegative = 3.0
+    """Time at rest at either end [s]."""
+    clearance: NotNegative = 0.2
+    """Least distance to the ends of the joints' ranges [rad]."""
+    smallest_move: Positive = 0.1
+    """Least distance of every joint in every move [rad]."""
+    velocity: Positive = 7.0
+    """Largest speed [rad/s]; a motion that would be faster is none of the class."""
+    seed: Seed = 0
+    """The same seed gives the same motion."""
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.moves[0] <= self.moves[1] or self.moves[1] * self.shortest > self.moving:
+            raise ScenarioError(
+                f"moves = {list(self.moves)}: at least 1, the fewest first, and all of {self.shortest:g} s in {self.moving:g} s"
+            )
+
+    def plan(self, robot: Robot) -> PointToPoint:
+        """Draw number, times, room and waypoints."""
+        rng = np.random.default_rng(self.seed)
+        count = int(rng.integers(self.moves[0], self.moves[1] + 1))
+        spare = round((self.moving - count * self.shortest) / self.period)
+        edges = np.concatenate([[0], np.sort(rng.integers(0, spare + 1, count - 1)), [spare]])
+        ranges = room(robot)
+        middle, half = ranges.mean(axis=1), np.diff(ranges, axis=1)[:, 0] / 2 - self.clearance
+        reach = half * rng.uniform(0.2, 1.0, robot.n)
+        around = np.stack([middle - reach, middle + reach], axis=1) + (rng.uniform(-1, 1, robot.n) * (half - reach))[:, None]
+        points = np.zeros((count + 1, robot.n))
+        for k in range(count + 1):
+            points[k] = draw_waypoint(rng, around, points[max(k - 1, 0) : k], 0.0, self.smallest_move)
+        return at_rest(points, self.shortest + np.diff(edges) * self.period, self.rest)
+
+
 def room(robot: Robot) -> Array:
     """Return where joints move at random, shape (joint, 2): their ranges, or half a turn or metre to either side."""
     free = np.where(robot.slides, 0.5, np.pi)

@@ -7,10 +7,11 @@ import pytest
 
 from idbench.experiments.cli import main
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.paper.motions import COMPARED, Errors, Pace, Table1Motions
+from idbench.experiments.paper.motions import COMPARED, Errors, Table1Motions
 from idbench.experiments.paper.table1 import PAPER
 from idbench.identify import IirLowPass, ReversalMask
 from idbench.identify.rows.chain import CHAINS
+from idbench.sim.trajectories import RandomPace
 
 
 @pytest.fixture(scope="module")
@@ -20,9 +21,9 @@ def few():
 
 def test_motions_are_of_the_papers_class(robot):
     """40 s of fifth-order moves, each of whole samples and not shorter than the pace, inside the ranges."""
-    pace = Pace()
     for seed in range(20):
-        plan = pace.draw(np.random.default_rng(seed), robot)
+        pace = RandomPace(seed=seed)
+        plan = pace.plan(robot)
         assert plan.durations.sum() == pytest.approx(40.0)
         assert plan.durations.min() >= pace.shortest - 1e-9
         np.testing.assert_allclose(plan.durations * 100, np.rint(plan.durations * 100), atol=1e-6)

@@ -85,10 +85,10 @@ def test_a_transposed_log_is_guessed():
     [
         (lambda: Chain(*[None] * 5, trim=np.nan), "trim = nan must be"),
         (lambda: Chain(*[None] * 5, trim=-1.0), r"trim = -1\.0 must be"),
-        (lambda: ButterworthPrefilter(order=2), "order = 2 must be a whole number, at least 3"),
+        (lambda: ButterworthPrefilter(order=0), "order = 0 must be a whole number, at least 1"),
         (lambda: ButterworthPrefilter(order=4.5), r"order = 4\.5 must be a whole number"),
         (lambda: ButterworthPrefilter("8 Hz"), "cutoff = '8 Hz' must be a finite number"),
-        (lambda: IirLowPass(order=1), "order = 1 must be a whole number, at least 2"),
+        (lambda: IirLowPass(order=0), "order = 0 must be a whole number, at least 1"),
         (lambda: ModulatingFunctions(degree=np.nan), "degree = nan must be a whole number"),
         (lambda: MotionLog("100", Q, Q, HELD), "fs = '100' must be a finite number"),
     ],

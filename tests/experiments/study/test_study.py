@@ -151,7 +151,7 @@ def test_every_study_that_ships_can_be_run(name):
             "mixes settings of simulation and identification",
         ),
         ({"axes": 3}, r"write \[\[axes\]\]"),
-        ({"axes": [{"field": "chain.operator", "values": [{"kind": "fir"}]}]}, "give names, among fir"),
+        ({"axes": [{"field": "chain.operator", "values": [{"cutoff": 2.0}]}]}, "give names, among fir"),
         ({"axes": [{"field": "seed", "values": [1, 2]}]}, "an axis varies seed"),
         ({"axes": [{"field": "fs", "values": [50.0]}, {"field": "fs", "values": [60.0]}]}, "two axes vary fs"),
         ({"axes": [{"field": "chain.operatr.cutoff", "values": [1.0]}]}, r"no such setting \(did you mean 'operator'\?\)"),

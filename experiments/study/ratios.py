@@ -1,0 +1,104 @@
+"""Ratios of the errors of models, on the same runs."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from idbench.experiments.study.answer import combination
+from idbench.experiments.study.statistics import CONFIDENCE, MIN_ERROR, Cell
+from idbench.experiments.text import new_table
+from idbench.identify import Array
+
+DRAWS = 2000
+"""Of a bootstrap: the ends of an interval are then known to some 3 % of its width."""
+
+PAIRS = (("implicit", "explicit"), ("power", "explicit"), ("energy", "power"), ("integral", "implicit"))
+"""Models that the paper compares: the one whose errors are divided, and by whose."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ratio:
+    """The typical error of a cell over that of another, on the runs that both identified."""
+
+    cell: Cell
+    """The one above."""
+    base: Cell
+    """The one below."""
+    value: float
+    """Ratio of the geometric means, over the parameters, of the rms over the runs."""
+    low: float
+    """Lower end of its confidence interval, by the bootstrap over runs."""
+    high: float
+    """Upper end."""
+    runs: int
+    """Runs that both identified."""
+
+    @property
+    def pair(self) -> str:
+        """Names of both models."""
+        return f"{self.cell.names[2]} / {self.base.names[2]}"
+
+    def __str__(self) -> str:
+        return f"{self.value:.2g} ({self.low:.2g} to {self.high:.2g})"
+
+
+def ratio(cell: Cell, base: Cell) -> Ratio:
+    """Return the ratio of the typical errors of two cells, NaN if no run has both; the same at every call."""
+    _, mine, theirs = np.intersect1d(cell.run, base.run, return_indices=True)
+    if not len(mine):
+        return Ratio(cell, base, np.nan, np.nan, np.nan, 0)
+    known = cell.relative & base.relative
+    squares = [each.error[index][:, known] ** 2 for each, index in ((cell, mine), (base, theirs))]
+    draws = np.random.default_rng(0).integers(len(mine), size=(DRAWS, len(mine)))
+    drawn = np.array([_gap(*(x[draw] for x in squares)) for draw in draws])
+    low, high = np.exp(np.quantile(drawn, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2]))
+    return Ratio(cell, base, float(np.exp(_gap(*squares))), float(low), float(high), len(mine))
+
+
+def _gap(above: Array, below: Array) -> float:
+    """Return ln of the ratio of typical errors, of squares of shape (run, p)."""
+    means = (np.log(np.maximum(x.mean(axis=0), MIN_ERROR**2)) for x in (above, below))
+    return float(np.mean(next(means) - next(means)) / 2)
+
+
+def ratios(cells: Sequence[Cell]) -> Iterator[Ratio]:
+    """Yield the ratios of `PAIRS` of cells that differ in their model alone."""
+    groups: dict[tuple[Any, ...], dict[str, Cell]] = {}
+    for cell in cells:
+        if cell.runs:
+            groups.setdefault((*map(str, cell.settings.values()), *cell.names[:2]), {})[cell.names[2]] = cell
+    for group in groups.values():
+        for above, below in PAIRS:
+            if above in group and below in group:
+                yield ratio(group[above], group[below])
+
+
+def ratios_table(found: Sequence[Ratio]) -> Any:
+    """Return the ratios as a table: a line for each way of identification, a column for each pair of models."""
+    pairs = list(dict.fromkeys(each.pair for each in found))
+    lines: dict[tuple[str, ...], dict[str, str]] = {}
+    for each in found:
+        lines.setdefault((combination(each.cell), *each.cell.names[:2]), {})[each.pair] = str(each)
+    grid = new_table("ratios of typical errors, with 95 % intervals", ["chain", "estimator", *pairs])
+    for (settings, chain, estimator), row in lines.items():
+        grid.add_row(settings, chain, estimator, *(row.get(pair, "") for pair in pairs))
+    return grid
+
+
+def ratios_summary(found: Sequence[Ratio]) -> list[dict[str, Any]]:
+    """Return the ratios as summary.json has them."""
+    return [
+        {
+            "settings": dict(each.cell.settings),
+            "chain": each.cell.names[0],
+            "estimator": each.cell.names[1],
+            "models": [each.cell.names[2], each.base.names[2]],
+            "ratio": each.value,
+            "low": each.low,
+            "high": each.high,
+            "runs": each.runs,
+        }
+        for each in found
+    ]

@@ -1,0 +1,130 @@
+"""Studies that give every model as many rows, have ideal data, or settings that go together; and the ratios of errors."""
+
+import numpy as np
+import pytest
+
+from idbench.experiments.errors import StudyError
+from idbench.experiments.study.axis import Axis
+from idbench.experiments.study.ratios import ratio
+from idbench.experiments.study.shard import run_shard
+from idbench.experiments.study.statistics import Cell
+from idbench.experiments.study.study_file import study_from
+from idbench.identify import MODELS, ExplicitModel, PowerModel, idbench_chain, identify, identify_each, scara
+from idbench.identify.models import THREE, OverWindows
+from idbench.identify.rows.operators import Windows
+
+EVERY = ["explicit", "implicit", "power", "energy", "integral"]
+
+
+@pytest.fixture
+def equal(content):
+    return study_from(
+        {**content, "seeds": 2, "models": EVERY, "rows": "equal", "axes": [{"field": "encoder.lines", "values": [65536]}]},
+        "study",
+    )
+
+
+def test_every_model_has_as_many_rows(equal):
+    """Power and energy have one row at an instant, the others two: they get twice the logs."""
+    rows = run_shard(equal, range(1)).rows
+    found = {row["model"]: row["rows"] for row in rows}
+    assert found["explicit"] == found["implicit"] == found["power"]
+    assert found["energy"] > found["integral"]  # of which windows that touch a reversal are void
+    assert {name: equal.logs_of(name) for name in EVERY} == {
+        "explicit": 1,
+        "implicit": 1,
+        "power": 2,
+        "energy": 2,
+        "integral": 1,
+    }
+
+
+def test_realizations_have_other_noise_and_the_first_is_the_run_alone(equal, content):
+    alone = study_from({**content, "seeds": 2, "models": ["explicit"], "axes": equal.content["axes"]}, "study")
+    own, among = (run_shard(study, range(1)).rows[0] for study in (alone, equal))
+    assert own["ZZR1"] == among["ZZR1"]
+    assert len(set(equal.seeds_of(0))) == 2
+    assert equal.seeds_of(0)[0] == equal.scenario_of(0).seed == alone.scenario_of(0).seed
+
+
+def test_more_logs_make_errors_smaller(content):
+    """Four realizations halve the standard errors of noise."""
+    few, many = (
+        study_from({**content, "models": ["explicit"], "realizations": k, "axes": content["axes"][:1]}, "study") for k in (1, 4)
+    )
+    one, four = (run_shard(study, range(1)).rows[0]["ZZR1.sigma"] for study in (few, many))
+    assert four == pytest.approx(one / 2, rel=0.3)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"realizations": 2, "bound": True}, "bound = true"),
+        ({"rows": "equal", "estimators": ["DIDIM"]}, "simulates the loop of one log"),
+        ({"data": "ideal", "motion": "shared"}, "motion = 'shared'"),
+        ({"realizations": 0}, "realizations"),
+        ({"rows": "fair"}, "rows"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(content, change, message):
+    with pytest.raises(StudyError, match=message):
+        study_from({**content, **change}, "study")
+
+
+def test_ideal_data_are_exact(content):
+    """Of noise-free moves along polynomials nothing is left of chain idbench's errors."""
+    content["settings"] = {"trajectory": content["settings"]["trajectory"]}
+    study = study_from({**content, "data": "ideal", "axes": [{"field": "chain.trim", "values": [0.6]}]}, "study")
+    for row in run_shard(study, range(2)).rows:
+        assert row["ZZR1"] == pytest.approx(row["ZZR1.truth"], rel=1e-6)
+
+
+def test_cases_are_settings_that_go_together(content):
+    cases = {"coarse": {"encoder": {"lines": [512]}, "torque": {"noise": [0.2]}}, "fine": {"encoder": {"lines": [65536]}}}
+    study = study_from({**content, "axes": [{"field": "noise", "cases": cases}]}, "study")
+    scenarios = [point.scenario for point in study.points]
+    assert [s.encoder.lines for s in scenarios] == [(512.0,), (65536.0,)]
+    assert [s.torque.noise for s in scenarios] == [(0.2,), (0.1, 0.01)]
+    assert study_from(study.content, "study").fingerprint == study.fingerprint
+    with pytest.raises(ValueError, match="one of them"):
+        Axis(field="noise", values=(1,), cases=cases)
+
+
+def test_a_stage_with_its_settings_is_a_value(content):
+    stages = [{"kind": "windows", "length": 0.3}, "fir", {"kind": "iir", "order": 1}]
+    study = study_from({**content, "axes": [{"field": "chain.operator", "values": stages}]}, "study")
+    assert study.methods[0].chain.operator == Windows(0.3)
+    assert study.methods[2].chain.operator.order == 1
+    assert [method.settings[0].label for method in study.methods] == ["windows, length 0.3", "fir", "iir, order 1"]
+
+
+def test_energy_is_power_over_windows(log):
+    """The model takes the windows of its chain, or those of 0.1 s; noise is that of the explicit model's own rows."""
+    chain = idbench_chain()
+    found = identify_each(log, scara(), {name: MODELS.create(name) for name in EVERY}, chain)
+    alone = identify(log, scara(), MODELS.create("energy"), chain)
+    np.testing.assert_array_equal(found["energy"].X, alone.X)
+    assert found["energy"].problem.own_chain.operator == Windows(0.1)
+    assert found["power"].problem.own_chain == chain
+    assert tuple(EVERY[:3]) == THREE
+    by_parts = OverWindows(PowerModel()).e(scara(), found["energy"].problem.signals[0].state)
+    assert by_parts.keys() == PowerModel().e(scara(), found["energy"].problem.signals[0].state).keys()
+    assert not ExplicitModel().integrated
+
+
+def cell(name, X):
+    runs = len(X)
+    ones = np.ones((runs, 1))
+    return Cell({}, ("c", "OLS", name), ("a",), np.arange(runs), X[:, None], ones, ones, ones, {})
+
+
+def test_a_ratio_of_known_errors_lies_in_its_interval():
+    """Errors of power are three times as large: of 300 draws some 95 % of intervals contain 3."""
+    rng = np.random.default_rng(0)
+    inside = 0
+    for _ in range(60):
+        one, other = (cell(name, 1 + size * rng.standard_normal(200)) for name, size in (("power", 0.3), ("explicit", 0.1)))
+        found = ratio(one, other)
+        assert found.low < found.value < found.high
+        inside += found.low <= 3.0 <= found.high
+    assert inside >= 50  # of 60, 57 are expected, with a standard deviation of 1.7
