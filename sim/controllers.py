@@ -80,6 +80,11 @@ class AbstractController(ABC):
     def start(self, task: Task) -> AbstractLaw:
         """Return the law at the start of a motion."""
 
+    def wdyn(self, n: int) -> Array | None:
+        """Return the bandwidth of the position loop, w_dyn [rad/s], shape (joint,); None where the controller closes none."""
+        w = getattr(self, "bandwidth", None)
+        return None if w is None else np.broadcast_to(per_joint(w, n, "controller.bandwidth"), n)
+
 
 class Error:
     """Control error e = q_ref - q and its low-passed difference quotient.

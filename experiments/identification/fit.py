@@ -10,6 +10,7 @@ from idbench.experiments.identification.consistent_estimate import made_consiste
 from idbench.experiments.identification.friction_choice import chosen_in_turns, masked_laws, suited_mask
 from idbench.experiments.identification.lack import advice_on_lack
 from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.rates import Rates
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.results.writing import finite, summarize
@@ -153,6 +154,18 @@ class Fit:
         return None if known is None else {name: known.get(name, 0.0) for name in self.basis.names}
 
     @cached_property
+    def rates(self) -> Rates:
+        """Sampling and filter frequencies, in multiples of the bandwidth of the position loop."""
+        stated, source = self.request.wdyn, "as stated"
+        if stated is None and self.request.loops:
+            stated, source = self.request.loops[0].wdyn, "of the scenario's controller"
+        source = "of the motion; --wdyn states the loop's" if stated is None else source
+        first = self.problem.parts[0].signals
+        qd = first.state.qd[(0,) * (first.state.qd.ndim - 2)]
+        rows = next(iter(self.estimates.values())).row_count
+        return Rates.of(self.processing, first.fs, int(np.max(rows)), stated, source, qd)
+
+    @cached_property
     def estimates(self) -> dict[str, Estimate]:
         """The estimates, of the models that have one."""
         return {name: outcome for name, outcome in self.outcomes.items() if isinstance(outcome, Estimate)}
@@ -260,6 +273,7 @@ class Fit:
             "failures": self.failures,
             "hidden": list(self.hidden),
             "mask_speed": list(self.request.mask_speed),
+            "rates": self.rates.summary(),
             "cutoff": cutoff,
             "logs": [self._of_log(k) for k in range(len(self.logs.fitted))],
         }

@@ -60,6 +60,7 @@ def request_of(asked: IdentifyRequest, robot_model: RobotModel | None = None) ->
         start=asked.start,
         consistent=asked.consistent,
         mask_speed=asked.mask_speed,
+        wdyn=asked.wdyn,
     )
     if asked.loop and "loop" not in request.solver.needs:
         raise ExperimentError(

@@ -12,9 +12,11 @@ from idbench.experiments.identification.fit import Fit, fit
 from idbench.experiments.identification.iterations import iterations
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
+from idbench.sim.engine.rejection import Rejection, rejection
 from idbench.sim.engine.run import Run
 from idbench.sim.engine.simulation import Progress, simulate
 from idbench.sim.engine.watch import Watch
+from idbench.sim.scenario.measurement import Ripple
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import to_dict
 
@@ -63,6 +65,11 @@ class ScenarioRun:
             raise ExperimentError(f"scenario {self.scenario.name}: all torques of the log are 0: {self._why_nothing}")
         return fit(replace(self.request, loops=(self.scenario,)), Logs((log,), truth=truth))
 
+    @cached_property
+    def rejection(self) -> Rejection | None:
+        """What the loop commands against the ripple of the drives, if these have any."""
+        return rejection(self.run) if self.scenario.ripple != Ripple() else None
+
     @property
     def _why_nothing(self) -> str:
         """What makes all torques zero."""
@@ -80,4 +87,5 @@ class ScenarioRun:
             "scenario": to_dict(self.scenario),
             **self.fit.summary(),
             "iterations": iterations(self.fit),
+            **({} if self.rejection is None else {"rejection_rms": self.rejection.rejected.std(axis=0).tolist()}),
         }

@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import Any
 
 from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.rates import Rates
 from idbench.experiments.results.writing import summarize
 from idbench.experiments.text import printed
 from idbench.identify import (
@@ -19,8 +20,6 @@ from idbench.identify import (
     Estimate,
     MotionLog,
     OrdinaryLeastSquares,
-    Windows,
-    identify,
     identify_each,
     scara,
 )
@@ -118,6 +117,13 @@ class Table1:
         """The estimate of every form, by chain."""
         return {name: self._identified(self._settled(name)) for name in self.chains}
 
+    @property
+    def rates(self) -> dict[str, Rates]:
+        """Sampling and filter frequencies of each chain, in multiples of what the motion has of the loop's bandwidth."""
+        log, qd = self.log, self.reference.qd.T
+        rows = {name: int(found["explicit"].row_count) for name, found in self.estimates.items()}
+        return {name: Rates.of(CHAINS.create(name), log.fs, rows[name], None, "of the motion", qd) for name in self.chains}
+
     def summary(self) -> dict[str, Any]:
         """Return summary.json: `models` holds the last of the chains, `<name>_chain` the others."""
         truth = list(self.truth.values())
@@ -142,10 +148,6 @@ class Table1:
         return replace(chain, trim=rest)
 
     def _identified(self, chain: Chain) -> dict[str, Estimate]:
-        """Return the estimates of the three models, and of the energy form: the power model over windows (Eq. 11, 20)."""
-        models = {name: MODELS.create(name) for name in PAPER}
-        windows = replace(chain, operator=Windows())
-        return {
-            **identify_each(self.log, scara(), models, chain, OrdinaryLeastSquares()),
-            "energy": identify(self.log, scara(), models["power"], windows, OrdinaryLeastSquares()),
-        }
+        """Return the estimates of the three models, and of two integrated ones: energy (Eq. 11, 20), integral (after Eq. 9)."""
+        models = {name: MODELS.create(name) for name in MODELS}
+        return identify_each(self.log, scara(), models, chain, OrdinaryLeastSquares())

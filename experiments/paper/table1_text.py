@@ -27,6 +27,9 @@ from idbench.identify import (
 )
 from idbench.identify.rows.chain import SCHOOL
 
+OVER = {"energy": "power", "integral": "implicit"}
+"""Models that are others, integrated."""
+
 
 def _finer(chain: Chain) -> Chain:
     return replace(chain, differentiator=CentralDifference(6))
@@ -94,7 +97,10 @@ EXACT = (
 
 def print_table1(console: Console, table: Table1) -> None:
     """Print, for each model, estimates and errors of every chain beside the paper's, Cond(W) and rows."""
-    console.print(Text(f"Trajectory {table.scenario.name}: {table.scenario.origin}\n"))
+    console.print(Text(f"Trajectory {table.scenario.name}: {table.scenario.origin}"))
+    for name, rates in table.rates.items():
+        console.print(Text(f"chain {name}: {rates}"), soft_wrap=True)
+    console.print()
     for form in next(iter(table.estimates.values())):
         print_table(console, _model_table(table, form), 2)
     if {"paper", "paper_masked"} <= set(table.chains):
@@ -107,7 +113,7 @@ def print_table1(console: Console, table: Table1) -> None:
 def _model_table(table: Table1, form: str) -> Table:
     """Return a model's table: truth, what the paper prints, and what every chain gives."""
     paper, estimates = PAPER.get(form), [found[form] for found in table.estimates.values()]
-    title = f"{form} model" if paper else f"{form} form (power over windows)"
+    title = f"{form} model" if paper else f"{form} model ({OVER[form]} over windows)"
     grid = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE_HEAD, pad_edge=False)
     grid.add_column("")
     sources = (*(("paper's\nTable 1",) if paper else ()), *(f"chain\n{chain}" for chain in table.chains))

@@ -74,6 +74,8 @@ class RunRecording:
     def finish(self, ran: ScenarioRun) -> list[tuple[str, Stream]]:
         """Add what only the end of a run gives, and the identification; return the streams by the name of their file."""
         streams = self.end(ran.run)
+        if ran.rejection is not None:
+            self.base.also("torque/rejection", ran.rejection.rejected)
         self.base.finish(about(ran.scenario.name, ran.scenario.origin, ROLES))
         if is_long([ran.run.alone()]):  # of which no rows are kept
             return streams

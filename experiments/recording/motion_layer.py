@@ -124,6 +124,12 @@ class Base:
             now = slice(first, first + step)
             self.add(first, {p: x[now] for p, x in all_signals.items()}, dict.fromkeys(self._roles, log.q[now]), qd[now])
 
+    def also(self, path: str, values: Array) -> None:
+        """Send curves of the whole motion, shape (time, joint), that are known at its end."""
+        t = np.arange(len(values)) / self._fs
+        kept = self._kept(0, t)
+        self._curves(self.stream, path, time_columns(t[kept], self._fs)[:1], values[kept])
+
     def make_room(self, q: Array) -> None:
         """Draw the way of the tool along planned positions [rad], shape (time, joint), before anything moves."""
         self._arm.trace(q)

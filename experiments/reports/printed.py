@@ -79,6 +79,7 @@ def _told(fit: Fit) -> Iterator[str]:
     channel = fit.logs.fitted[0].torque
     ignored = f", which chain {fit.request.chain} ignores: it takes it as logged"
     logged = isinstance(fit.processing.alignment, AsLogged)
+    yield str(fit.rates)
     yield f"torque: {channel.meaning}, delay {1e3 * channel.delay:.4g} ms{ignored if logged else ''}"
     if fit.delay is not None:
         delay, sigma = (1e3 * x for x in fit.delay)

@@ -46,6 +46,9 @@ class IdentifyRequest(LogRequest):
     model: str | None = None
     """explicit, implicit, power, energy (power over windows), integral (implicit over windows), all, or MODULE:CLASS of your
     own. Default: the first three; for robots of many joints the screen shows the best one."""
+    wdyn: float | None = None
+    """Bandwidth of the position loop [Hz], in whose multiples sampling and filters are stated. Default: that of the run, else
+    the frequency up to which the motion goes."""
     loop: Scenarios = ()
     """Scenario of the control loop of each log, for IV, DIDIM, CLIE and CLOE: robot, motion, controller, timing, drive.
     Default: that of the run's folder."""

@@ -2,6 +2,7 @@
 
 from idbench.identify.estimators.estimate import Estimate as Estimate
 from idbench.identify.estimators.estimator import AbstractEstimator as AbstractEstimator
+from idbench.identify.estimators.least_squares.chosen_rows import ChosenRows as ChosenRows
 from idbench.identify.estimators.least_squares.iteratively_reweighted import IterativelyReweighted as IterativelyReweighted
 from idbench.identify.estimators.least_squares.ordinary_weighted_generalized import (
     GeneralizedLeastSquares as GeneralizedLeastSquares,
@@ -32,6 +33,7 @@ ESTIMATORS: PluginTable[AbstractEstimator] = PluginTable(
     AbstractEstimator,  # type: ignore[type-abstract]  # only asked whether an instance is one
     {
         "OLS": OrdinaryLeastSquares,
+        "OLS-chosen": ChosenRows,
         "WLS": WeightedLeastSquares,
         "GLS": GeneralizedLeastSquares,
         "ML": MaximumLikelihood,

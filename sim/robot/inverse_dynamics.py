@@ -49,6 +49,11 @@ class InverseDynamics:
         # Sums along an axis of each state: the bits do not depend on how many states there are.
         return (self._M * qdd[:, None, :]).sum(axis=-1) + self._bias - self._passive
 
+    @property
+    def mass_matrix(self) -> Array:
+        """M at the states of the last call [kg m^2], shape (state, joint, joint)."""
+        return self._M
+
     def inertia(self) -> Array:
         """Return the diagonal of M at the states of the last call [kg m^2], shape (state, joint)."""
         return np.diagonal(self._M, axis1=1, axis2=2)

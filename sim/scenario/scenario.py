@@ -2,6 +2,7 @@
 
 from typing import Annotated, Literal, final
 
+import numpy as np
 from pydantic import Field
 
 from idbench.identify.data.motion_log import TorqueChannel
@@ -106,6 +107,12 @@ class Scenario:
     def nominal_robot(self) -> Robot:
         """The robot as its maker describes it."""
         return Robot.load(self.robot)
+
+    @property
+    def wdyn(self) -> float | None:
+        """The bandwidth of the position loop, that of its fastest joint [Hz]; None where the controller closes none."""
+        w = self.controller.wdyn(self.real_robot.n)
+        return None if w is None else float(w.max()) / (2 * np.pi)
 
     @property
     def channel(self) -> TorqueChannel:

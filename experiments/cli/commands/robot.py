@@ -1,6 +1,7 @@
 """The command that shows what can be identified of a robot."""
 
 import sys
+from dataclasses import asdict
 from math import isfinite
 from typing import Any
 
@@ -15,6 +16,7 @@ from idbench.experiments.judgement.warnings import FILE, warnings_of_robot
 from idbench.experiments.reports.budget import Budget
 from idbench.experiments.results.page import new_page
 from idbench.experiments.text import new_table, print_titled
+from idbench.identify.basis.operations import COLUMNS, operations
 from idbench.sim.errors import BenchError
 from idbench.sim.trajectories import RandomMoves
 
@@ -55,6 +57,7 @@ def _summary(robot_model: RobotModel, truth: dict[str, float]) -> dict[str, Any]
             {"name": p.name, "unit": p.unit, "kind": p.kind, "joint": p.joint, "value": truth[p.name]}
             for p in robot_model.basis.parameters
         ],
+        "operations": {model: asdict(operations(robot_model.basis, model)) for model in COLUMNS},
         "made_of": robot_model.grouping.groupings,
     }
 
@@ -82,6 +85,8 @@ def _print_parameters(page: Console, robot_model: RobotModel, truth: dict[str, f
     print_titled(page, f"{len(basis.names)} parameters that a motion can identify", grid)
     if base.without_effect:
         page.print(Text(f"no motion excites {', '.join(base.without_effect)}"), soft_wrap=True)
+    counts = {model: operations(basis, model) for model in COLUMNS}
+    page.print(Text(f"columns of an instant: {'; '.join(f'{model} {x}' for model, x in counts.items())}"), soft_wrap=True)
     page.print()
 
 

@@ -76,5 +76,7 @@ def _as_servos(scenario: Scenario, out: Path) -> str:
 def _print_run(page: Page, ran: ScenarioRun) -> None:
     """Print the estimates, and what to check."""
     print_fit(page, ran.fit, f"Scenario {ran.scenario.name}", shown_whole(ran.fit, asked=False))
+    if ran.rejection is not None:
+        page.print(Text(ran.rejection.words(ran.run.robots[0].joints, ran.scenario.wdyn)), soft_wrap=True)
     of_log = warnings_of_log(ran.run.alone(), ran.fit.robot_model.tree)
     page.warn({LOG: of_log, FILE: [*warnings_of_robot(ran.run.robots[0]), *plugin_conflicts()]})

@@ -90,11 +90,20 @@ class Windows(AbstractWeakForm):
 
     length: float = 0.1
     """Tb - ta [s]; the paper's n_d / fs."""
+    spacing: float | None = None
+    """From ta of a window to that of the next [s]; by default the length. Of windows that overlap, estimator OLS-chosen takes
+    those that say most."""
 
     def __post_init__(self) -> None:
         require_positive(length=self.length)
+        if self.spacing is not None:
+            require_positive(spacing=self.spacing)
 
     def step(self, fs: float) -> int:
+        """Return the samples from window to window."""
+        return self.samples(fs) if self.spacing is None else max(1, round(self.spacing * fs))
+
+    def samples(self, fs: float) -> int:
         """Return the samples of a window, at least 2."""
         samples = round(self.length * fs)
         if samples < 2:
@@ -105,7 +114,7 @@ class Windows(AbstractWeakForm):
 
     def kernels(self, fs: float) -> Kernels:
         """Return Simpson's rule, and the difference of the window's ends."""
-        intervals = self.step(fs)
+        intervals = self.samples(fs)
         ends = np.zeros(intervals + 1)
         ends[0], ends[-1] = -1.0, 1.0
         return Kernels(_simpson(intervals) / fs, ends)

@@ -1,0 +1,55 @@
+"""Sampling and filter frequencies in multiples of the bandwidth of the position loop, as the paper's rules have them."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from idbench.identify import Array, Chain
+
+MOST = 0.99
+"""Share of the velocities' power up to whose frequency a motion goes."""
+
+
+@dataclass(frozen=True)
+class Rates:
+    """The frequencies of a fit beside the rules of section 6: fs = 100 wdyn, wfp = 5 wdyn, wfq above 10 wdyn."""
+
+    wdyn: float
+    """Bandwidth of the position loop, or what the motion has of it [Hz]."""
+    source: str
+    """Where that is from."""
+    fs: float
+    """Sampling frequency [Hz]."""
+    wfp: float | None
+    """Cut-off of the filter before the decimation [Hz]; None of integrals."""
+    wfq: float | None
+    """Cut-off of the prefilter [Hz]; None without one."""
+    step: int
+    """Samples from row to row, n_d."""
+    rows: int
+    """Rows of the first model."""
+
+    @classmethod
+    def of(cls, chain: Chain, fs: float, rows: int, stated: float | None, source: str, qd: Array) -> "Rates":
+        """Return the rates of a chain; without a stated wdyn, that of the log's velocities qd, shape (joint, time)."""
+        wdyn = moved(qd, fs) if stated is None else stated
+        wfp, wfq = (getattr(stage, "cutoff", None) for stage in (chain.operator, chain.prefilter))
+        return cls(wdyn, source, fs, wfp, wfq, chain.operator.step(fs), rows)
+
+    def __str__(self) -> str:
+        shares = {"fs": self.fs, "wfp": self.wfp, "wfq": self.wfq}
+        each = [f"{name} {x / self.wdyn:.3g} wdyn ({x:g} Hz)" for name, x in shares.items() if x is not None]
+        return f"wdyn {self.wdyn:.3g} Hz ({self.source}); {', '.join(each)}, n_d {self.step}, rows {self.rows}"
+
+    def summary(self) -> dict[str, Any]:
+        """Return what summary.json says of them."""
+        return {"wdyn": self.wdyn, "source": self.source, "fs": self.fs, "wfp": self.wfp, "wfq": self.wfq, "n_d": self.step}
+
+
+def moved(qd: Array, fs: float) -> float:
+    """Return up to which frequency [Hz] velocities, shape (joint, time), have `MOST` of their power, of the fastest joint."""
+    power = np.cumsum(np.abs(np.fft.rfft(qd - qd.mean(axis=-1, keepdims=True))) ** 2, axis=-1)
+    share = power / np.maximum(power[..., -1:], np.finfo(float).tiny)
+    first = np.argmax(share >= MOST, axis=-1)
+    return max(float(np.fft.rfftfreq(qd.shape[-1], 1 / fs)[first].max()), fs / qd.shape[-1])

@@ -1,0 +1,38 @@
+"""Frequencies in multiples of wdyn, of scenarios, logs and tables."""
+
+import numpy as np
+import pytest
+
+from idbench.experiments.cli import main
+from idbench.experiments.identification.rates import Rates, moved
+from idbench.identify import idbench_chain, paper_chain
+from idbench.sim import load_scenario
+
+
+def test_a_sine_moves_up_to_its_frequency():
+    t = np.arange(0, 20, 0.01)
+    assert moved(np.stack([np.sin(2 * np.pi * 0.5 * t), np.cos(2 * np.pi * 3.0 * t)]), 100.0) == pytest.approx(3.0, abs=0.05)
+
+
+def test_a_scenario_states_the_bandwidth_of_its_controller():
+    """15 rad/s are 2.39 Hz."""
+    assert load_scenario("ideal").wdyn == pytest.approx(15 / (2 * np.pi))
+
+
+def test_the_papers_chain_obeys_the_papers_rules():
+    """fs = 100 wdyn, wfp = 4 to 5 wdyn, wfq = 8 to 10 wdyn, for a motion of 1 Hz."""
+    found = Rates.of(paper_chain(), 100.0, 800, 1.0, "as stated", np.zeros((2, 10)))
+    assert str(found) == ("wdyn 1 Hz (as stated); fs 100 wdyn (100 Hz), wfp 4 wdyn (4 Hz), wfq 8 wdyn (8 Hz), n_d 10, rows 800")
+    assert "wfq" not in str(Rates.of(idbench_chain(), 100.0, 800, 1.0, "as stated", np.zeros((2, 10))))
+
+
+def test_identify_states_it(tmp_path, capsys):
+    assert main(["run", "ideal", "--no-rerun", "--out", str(tmp_path / "run")]) == 0
+    assert "wdyn 2.39 Hz (of the scenario's controller)" in capsys.readouterr().out
+    log = str(tmp_path / "run" / "log.parquet")
+    assert main(["identify", log, "--torque", "held", "--wdyn", "2", "--no-rerun"]) == 0
+    assert "wdyn 2 Hz (as stated); fs 50 wdyn" in capsys.readouterr().out
+
+
+def test_a_bandwidth_that_is_none_is_refused(complaint, tmp_path):
+    assert "--wdyn 0 must be above 0" in complaint("identify", str(tmp_path / "log.csv"), "--torque", "held", "--wdyn", "0")
