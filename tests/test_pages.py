@@ -92,7 +92,7 @@ def test_diagrams_are_those_of_their_script(root):
 def test_notebooks_are_those_of_their_scripts(root):
     """What the site runs are the scripts; the notebooks beside them hold the same cells, without outputs."""
     scripts = sorted((root / "docs" / "notebooks").glob("*.py"))
-    assert len(scripts) == 5
+    assert len(scripts) == 6
     for script in scripts:
         cells = json.loads(script.with_suffix(".ipynb").read_text())["cells"]
         code = ["".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"]
@@ -104,7 +104,7 @@ def test_notebooks_are_those_of_their_scripts(root):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("name", ["comparison", "first_fit", "own_estimator", "own_law", "your_arm"])
+@pytest.mark.parametrize("name", ["comparison", "first_fit", "half_an_hour", "own_estimator", "own_law", "your_arm"])
 def test_a_notebook_runs_from_top_to_bottom(root, tmp_path, name):
     source = (root / "docs" / "notebooks" / f"{name}.py").read_text()
     code = source.split("from idbench.experiments.recording.notebook")[0]  # a viewer is for notebooks alone

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmark_tables import BENCHMARK_TABLES
+from conclusion_tables import CONCLUSION_TABLES, keep_conclusion
 from estimator_tables import compared, compared_in_birdys_shape
 from excitation_tables import coarse, criteria, foretold, motions, ranks
 from results import DOCS, RESULTS, Cell, Column, by_settings, cells, coverage, keep, table, typical
@@ -22,7 +23,16 @@ from reversal_tables import reversals
 from simulated_tables import SIMULATED_TABLES
 
 sys.path.insert(0, str(DOCS.parent))
-PAGES = ("answers.md", "any-arm.md", "estimators.md", "excitation.md", "noise.md", "appendix.md", "benchmark.md")
+PAGES = (
+    "answers.md",
+    "any-arm.md",
+    "estimators.md",
+    "excitation.md",
+    "noise.md",
+    "appendix.md",
+    "benchmark.md",
+    "conclusion.md",
+)
 MARK = re.compile(r"<!-- table: ([\w-]+) -->\n.*?<!-- end -->", re.DOTALL)
 
 I, P = "idbench", "paper"
@@ -168,6 +178,7 @@ TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "estimators-unfiltered": compared("unfiltered"),
     "estimators-puma560": compared_in_birdys_shape,
     **BENCHMARK_TABLES,
+    **CONCLUSION_TABLES,
     **SIMULATED_TABLES,
 }
 
@@ -175,5 +186,6 @@ if __name__ == "__main__":
     RESULTS.mkdir(exist_ok=True)
     for place in sys.argv[1:]:
         keep(Path(place))
+        keep_conclusion(Path(place))
     for page in PAGES:
         (DOCS / page).write_text(filled((DOCS / page).read_text()))

@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from idbench.experiments.paper.attribution import COMPARED
+from idbench.experiments.paper.conclusion import conclusion_lines
 from idbench.experiments.paper.table1 import PAPER, Table1
 from idbench.experiments.text import print_table
 from idbench.identify import (
@@ -108,6 +109,8 @@ def print_table1(console: Console, table: Table1) -> None:
         print_table(console, _causes_table(table))
     if "idbench" in table.chains:
         console.print(Text(EXACT))
+    for line in conclusion_lines():
+        console.print(Text(line))
 
 
 def _model_table(table: Table1, form: str) -> Table:

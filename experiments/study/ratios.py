@@ -1,8 +1,8 @@
 """Ratios of the errors of models, on the same runs."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -16,6 +16,21 @@ DRAWS = 2000
 
 PAIRS = (("implicit", "explicit"), ("power", "explicit"), ("energy", "power"), ("integral", "implicit"))
 """Models that the paper compares: the one whose errors are divided, and by whose."""
+
+
+NOISES = {
+    "ripple": "with ripple, the paper's experiment",
+    "torque": "with white torque noise",
+    "encoder": "with a 14-bit encoder alone",
+    "all": "with all of them",
+}
+"""Noises of the study, in words."""
+
+STATED = "idbench", "OLS"
+"""Chain and estimator whose ratios are stated one by one: the paper solves by ordinary least squares."""
+
+RatioRow: TypeAlias = Mapping[str, Any]
+"""A ratio as `summary.json` of the study has it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +102,7 @@ def ratios_table(found: Sequence[Ratio]) -> Any:
     return grid
 
 
-def ratios_summary(found: Sequence[Ratio]) -> list[dict[str, Any]]:
+def ratios_summary(found: Sequence[Ratio]) -> list[RatioRow]:
     """Return the ratios as summary.json has them."""
     return [
         {
@@ -102,3 +117,26 @@ def ratios_summary(found: Sequence[Ratio]) -> list[dict[str, Any]]:
         }
         for each in found
     ]
+
+
+def conclusion(found: Sequence[RatioRow]) -> str:
+    """Return the conclusion in two sentences, with 95 % intervals, from the ratios of a study with the axis `noise`."""
+    implicit, power = (_of(found, pair) for pair in (["implicit", "explicit"], ["power", "explicit"]))
+    stated = {row["settings"]["noise"]: row for row in power if (row["chain"], row["estimator"]) == STATED}
+    least = _of(power, ["power", "explicit"], estimator="GLS")
+    each = [f"{_interval(stated[noise])} {words}" for noise, words in NOISES.items() if noise in stated]
+    best, worst = (pick(least, key=lambda row: row["ratio"]) for pick in (min, max))
+    return (
+        f"The implicit model brings nothing: its errors are {min(row['ratio'] for row in implicit):.2g} to "
+        f"{max(row['ratio'] for row in implicit):.2g} times the explicit model's, over {len(implicit)} combinations of noise, "
+        f"chain and estimator. With as many rows, the power model's errors are, by least squares in chain {STATED[0]}, "
+        f"{', '.join(each)} times the explicit model's; by generalized least squares {_interval(best)} to {_interval(worst)}."
+    )
+
+
+def _of(found: Sequence[RatioRow], pair: list[str], **given: str) -> list[RatioRow]:
+    return [row for row in found if row["models"] == pair and all(row[key] == x for key, x in given.items())]
+
+
+def _interval(row: RatioRow) -> str:
+    return f"{row['ratio']:.2g} ({row['low']:.2g} to {row['high']:.2g})"

@@ -22,7 +22,7 @@ from idbench.experiments.study.axis import FRICTION, Axis
 from idbench.experiments.study.cluster import versions
 from idbench.experiments.study.comparison import differences
 from idbench.experiments.study.figures import bars_figure, cost_figure, coverage_figure, error_figure, typical_figure
-from idbench.experiments.study.ratios import ratios, ratios_summary, ratios_table
+from idbench.experiments.study.ratios import conclusion, ratios, ratios_summary, ratios_table
 from idbench.experiments.study.statistics import BOUNDS, Cell, cells
 from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study import Study
@@ -46,7 +46,7 @@ def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folde
         study=study,
         methods=len(study.methods),
         headline=headline(solved, study.edges) if solved else "",
-        answer=answer(cells, study.edges),
+        answer=said_of(study, cells),
         typical=typical_figure(dict(families(study, solved)), main_axis(study), study.edges) if solved else "",
         axes=[short(name) for name in cells[0].settings],
         overview=[_overview(cell) for cell in cells],
@@ -65,6 +65,14 @@ def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folde
         versions=versions(),
         toml=tomli_w.dumps(study.content),
     )
+
+
+def said_of(study: Study, found: Sequence[Cell]) -> str:
+    """Return the answer of a study; of one that gives every model as many rows, with the ratios of their errors first."""
+    compares = study.rows == "equal" and {"explicit", "implicit", "power"} <= set(study.models) and "GLS" in study.estimators
+    noises = any(axis.field == "noise" for axis in study.axes)
+    ratio = conclusion(ratios_summary(list(ratios(found)))) if compares and noises and any(c.runs for c in found) else ""
+    return " ".join(filter(None, [ratio, answer(found, study.edges)]))
 
 
 def main_axis(study: Study) -> Axis:
@@ -198,7 +206,7 @@ def print_study(page: Console, study: Study, found: Sequence[Cell]) -> None:
     print_table(page, grid, len(axes) + 1)
     if study.rows == "equal" and (pairs := list(ratios(found))):
         print_table(page, ratios_table(pairs), 3)
-    page.print(Text(answer(found, study.edges)))
+    page.print(Text(said_of(study, found)))
     for reason in _reasons(found)[:MOST_REASONS]:
         page.print(Text(f"failed: {reason}"), soft_wrap=True)
 
@@ -229,7 +237,7 @@ def summary_of(study: Study, found: Sequence[Cell], seconds: dict[str, float]) -
         "seed": study.seed,
         "study": study.content,
         "scenario": study.scenario,
-        "answer": answer(found, study.edges),
+        "answer": said_of(study, found),
         "parameters": list(study.parameters),
         "cells": [_cell(cell) for cell in found],
         **({"ratios": ratios_summary(list(ratios(found)))} if study.rows == "equal" else {}),

@@ -1,0 +1,178 @@
+"""The tables and the picture of the paper's conclusion, from the results of the studies of models."""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from results import DOCS, RESULTS, Cell, cells, table, typical
+
+SHIPPED = DOCS.parent / "experiments" / "paper" / "conclusion.json"
+"""The ratios that `idbench table1` and `table2` state."""
+
+NOISES = {"torque": "white torque noise", "encoder": "14-bit encoder", "ripple": "ripple, 16 bits", "all": "all of them"}
+PAIRS = (("implicit", "explicit"), ("power", "explicit"), ("energy", "power"))
+ROBOTS = {"models-puma560": "PUMA 560, six joints", "models-panda": "Panda, seven joints"}
+DIGITS = 4
+
+Ratio = dict[str, Any]
+
+
+def keep_ratios(folder: Path) -> None:
+    """Keep the ratios of the studies of models whose results a folder has."""
+    for path in sorted(folder.glob("models*/summary.json")):
+        summary = json.loads(path.read_text())
+        rows = []
+        for row in summary["ratios"]:
+            numbers = {key: float(f"{row[key]:.{DIGITS}g}") for key in ("ratio", "low", "high")}
+            settings = {"noise": row["settings"]["noise"]}
+            rows.append(
+                {"settings": settings, **{key: row[key] for key in ("chain", "estimator", "models", "runs")}, **numbers}
+            )
+        name = path.parent.name
+        place = SHIPPED if name == "models" else RESULTS / f"{name}-ratios.json"
+        lines = ",\n".join(json.dumps(row) for row in rows)
+        place.write_text(f'{{"study": "{name}", "seeds": {summary["study"]["seeds"]}, "ratios": [\n{lines}\n]}}\n')
+
+
+def ratios(study: str) -> list[Ratio]:
+    """Return the ratios that are kept of a study."""
+    place = SHIPPED if study == "models" else RESULTS / f"{study}-ratios.json"
+    found: list[Ratio] = json.loads(place.read_text())["ratios"]
+    return found
+
+
+def _interval(row: Ratio | None) -> str:
+    if row is None:
+        return ""
+    return f"{row['ratio']:.2g} ({row['low']:.2g} to {row['high']:.2g})"
+
+
+def _of_models(study: str, first: str = "noise") -> Iterator[str]:
+    """Yield ratios with their intervals, a row for each noise, chain and estimator."""
+    found = {(r["settings"]["noise"], r["chain"], r["estimator"], *r["models"]): r for r in ratios(study)}
+
+    def rows() -> Iterator[Sequence[str]]:
+        for noise, chain, estimator in dict.fromkeys(key[:3] for key in found):
+            yield [
+                NOISES[noise],
+                chain,
+                estimator,
+                *(_interval(found.get((noise, chain, estimator, *pair))) for pair in PAIRS),
+            ]
+
+    yield from table([first, "chain", "estimator", *(f"{a} / {b}" for a, b in PAIRS)], rows())
+
+
+def _many_joints() -> Iterator[str]:
+    for study, robot in ROBOTS.items():
+        yield from _of_models(study, robot)
+
+
+def _grid(study: str, row: str, column: str, model: str, head: str, **fixed: Any) -> Callable[[], Iterator[str]]:
+    """Return what makes a table of typical errors over two settings, of one model."""
+
+    def made() -> Iterator[str]:
+        found: dict[tuple[Any, Any], Cell] = {}
+        for cell in cells(study):
+            settings = cell["settings"]
+            if cell["model"] == model and all(settings[key] == x for key, x in fixed.items()):
+                found[settings[row], settings[column]] = cell
+        columns = list(dict.fromkeys(c for _, c in found))
+        rows = ([_label(r), *(typical(found[r, c]) for c in columns)] for r in dict.fromkeys(r for r, _ in found))
+        yield from table([head, *map(_label, columns)], rows)
+
+    return made
+
+
+def _label(x: Any) -> str:
+    return f"{x:g}" if isinstance(x, float) else str(x)
+
+
+def _windows() -> Iterator[str]:
+    """Yield typical errors of the energy model: of the torque's noise alone, with an offset, and of chosen windows."""
+    found = {
+        (c["settings"]["chain.operator"], c["settings"]["torque"], c["estimator"]): c
+        for c in cells("windows")
+        if c["model"] == "energy"
+    }
+    labels = list(dict.fromkeys(key[0] for key in found))
+    cases = (("noise", "OLS"), ("offset", "OLS"), ("noise", "OLS-chosen"), ("offset", "OLS-chosen"))
+    rows = ([label.removeprefix("windows, "), *(typical(found[label, *case]) for case in cases)] for label in labels)
+    yield from table(["windows [s]", "noise", "noise, offset", "chosen, noise", "chosen, noise, offset"], rows)
+
+
+def _quality() -> Iterator[str]:
+    """Yield typical errors over the number of moves."""
+    found = {(c["settings"]["trajectory.moves"], c["chain"], c["model"]): c for c in cells("quality")}
+    moves, ways = (list(dict.fromkeys(key[part] for key in found)) for part in (slice(0, 1), slice(1, 3)))
+    rows = ([f"{m:g}", *(typical(found[m, *way]) for way in ways)] for (m,) in moves)
+    yield from table(["moves", *(f"{model}, {chain}" for chain, model in ways)], rows)
+
+
+def _operations() -> Iterator[str]:
+    from idbench.experiments.identification.robot_model import RobotModel
+    from idbench.identify.basis.operations import COLUMNS, operations
+
+    def rows() -> Iterator[Sequence[str]]:
+        for robot in ("scara", "puma560", "panda"):
+            counts = [operations(RobotModel(robot).basis, model) for model in COLUMNS]
+            shares = [f"{c.multiplications} / {c.additions} / {c.differentiated}" for c in counts]
+            yield [robot, *shares, *(f"{c.total / counts[0].total:.2f}" for c in counts[1:])]
+
+    names = [f"{model} x / + / s" for model in COLUMNS]
+    yield from table(["", *names, "implicit / explicit", "power / explicit"], rows())
+
+
+CONCLUSION_TABLES: dict[str, Callable[[], Iterator[str]]] = {
+    "models": lambda: _of_models("models"),
+    "models-joints": _many_joints,
+    "windows": _windows,
+    "orders": _grid("orders", "chain.prefilter.order", "chain.operator.order", "explicit", "prefilter \\ decimation"),
+    "rules-fs": _grid(
+        "rules", "fs", "chain.prefilter.cutoff", "explicit", "fs [wdyn] \\ wfq [wdyn]", **{"chain.operator.cutoff": 5.0}
+    ),
+    "rules-wfp": _grid("rules", "chain.prefilter.cutoff", "chain.operator.cutoff", "explicit", "wfq \\ wfp [wdyn]", fs=100.0),
+    "quality": _quality,
+    "operations": _operations,
+}
+
+
+def picture(place: Path) -> None:
+    """Draw the errors of the implicit and the power model over the explicit model's, for four noises."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9, 3.6), layout="constrained")
+    axes = figure.subplots()
+    styles = {
+        ("implicit", "OLS"): ("#9467bd", "s", "implicit, least squares"),
+        ("implicit", "GLS"): ("#9467bd", "o", "implicit, generalized least squares"),
+        ("power", "OLS"): ("#d62728", "s", "power, least squares"),
+        ("power", "GLS"): ("#d62728", "o", "power, generalized least squares"),
+    }
+    found = {(r["settings"]["noise"], r["models"][0], r["estimator"]): r for r in ratios("models")
+             if r["chain"] == "idbench" and r["models"][1] == "explicit"}  # fmt: skip
+    for k, ((model, estimator), (color, marker, label)) in enumerate(styles.items()):
+        rows = [found[noise, model, estimator] for noise in NOISES]
+        x = [i + 0.16 * (k - 1.5) for i in range(len(rows))]
+        middle = [r["ratio"] for r in rows]
+        spans = [[r["ratio"] - r["low"] for r in rows], [r["high"] - r["ratio"] for r in rows]]
+        face = color if estimator == "OLS" else "white"
+        axes.errorbar(x, middle, spans, fmt=marker, color=color, markerfacecolor=face, label=label, capsize=3, markersize=8)
+    axes.axhline(1, color="0.4", lw=1)
+    axes.set_yscale("log")
+    axes.set_yticks([0.25, 0.5, 1, 2, 5, 10, 20], ["1/4", "1/2", "1", "2", "5", "10", "20"])
+    axes.minorticks_off()
+    axes.set_xticks(range(len(NOISES)), list(NOISES.values()))
+    axes.set_ylabel("error, over the\nexplicit model's")
+    axes.set_title("As many rows for each model: below 1 is better than the explicit model", loc="left", fontsize=11)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(axis="y", color="0.9")
+    axes.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+    figure.savefig(place, dpi=120)
+
+
+def keep_conclusion(folder: Path) -> None:
+    """Keep what a folder of results has of the conclusion, and draw its picture anew."""
+    keep_ratios(folder)
+    picture(DOCS / "conclusion.png")

@@ -1,0 +1,20 @@
+"""The paper's conclusion, as the study `models` finds it: are the three models equal, and is power the one to take?"""
+
+import json
+from importlib.resources import files
+
+from idbench.experiments.study.ratios import RatioRow, conclusion
+
+
+def known_ratios() -> list[RatioRow]:
+    """Return the ratios of the study `models` over 200 motions, which ship with the package."""
+    text = files("idbench.experiments.paper").joinpath("conclusion.json").read_text(encoding="utf-8")
+    found: list[RatioRow] = json.loads(text)["ratios"]
+    return found
+
+
+def conclusion_lines() -> list[str]:
+    """Return what the paper's tables end with: the conclusion, and the command that computes it."""
+    found = known_ratios()
+    of = f"{min(row['runs'] for row in found)} motions or more; uv run idbench study models --seeds 200"
+    return [f"The paper's conclusion, with 95 % intervals ({of}): {conclusion(found)}"]
