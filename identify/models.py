@@ -111,8 +111,8 @@ class AbstractModel(ABC):
         )
 
 
-def rows_at_an_instant(model: AbstractModel, n: int) -> int:
-    """Return how many rows a model has at an instant of a robot of `n` joints: n, or 1 of power."""
+def rows_per_sample(model: AbstractModel, n: int) -> int:
+    """Return the number of equations per sample for a robot of `n` joints: n, or 1 for power."""
     still = np.zeros((n, 2))
     return 1 + max(row for row, _ in model.B(State(still, still, lambda x: x)))
 

@@ -97,7 +97,7 @@ def _windows() -> Iterator[str]:
         if c["model"] == "energy"
     }
     labels = list(dict.fromkeys(key[0] for key in found))
-    cases = (("noise", "OLS"), ("offset", "OLS"), ("noise", "OLS-chosen"), ("offset", "OLS-chosen"))
+    cases = (("noise", "OLS"), ("offset", "OLS"), ("noise", "OLS-selected"), ("offset", "OLS-selected"))
     rows = ([label.removeprefix("windows, "), *(typical(found[label, *case]) for case in cases)] for label in labels)
     yield from table(["windows [s]", "noise", "noise, offset", "chosen, noise", "chosen, noise, offset"], rows)
 

@@ -159,7 +159,7 @@ class Fit:
         stated, source = self.request.wdyn, "as stated"
         if stated is None and self.request.loops:
             stated, source = self.request.loops[0].wdyn, "of the scenario's controller"
-        source = "of the motion; --wdyn states the loop's" if stated is None else source
+        source = "from the motion; set that of the loop with --wdyn" if stated is None else source
         first = self.problem.parts[0].signals
         qd = first.state.qd[(0,) * (first.state.qd.ndim - 2)]
         rows = next(iter(self.estimates.values())).row_count

@@ -1,4 +1,4 @@
-"""Sampling and filter frequencies in multiples of the bandwidth of the position loop, as the paper's rules have them."""
+"""Sampling and filter frequencies as multiples of the bandwidth of the position loop, as in the paper's rules."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -16,9 +16,9 @@ class Rates:
     """The frequencies of a fit beside the rules of section 6: fs = 100 wdyn, wfp = 5 wdyn, wfq above 10 wdyn."""
 
     wdyn: float
-    """Bandwidth of the position loop, or what the motion has of it [Hz]."""
+    """Bandwidth of the position loop, or of the motion [Hz]."""
     source: str
-    """Where that is from."""
+    """Its source."""
     fs: float
     """Sampling frequency [Hz]."""
     wfp: float | None

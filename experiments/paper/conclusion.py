@@ -17,4 +17,4 @@ def conclusion_lines() -> list[str]:
     """Return what the paper's tables end with: the conclusion, and the command that computes it."""
     found = known_ratios()
     of = f"{min(row['runs'] for row in found)} motions or more; uv run idbench study models --seeds 200"
-    return [f"The paper's conclusion, with 95 % intervals ({of}): {conclusion(found)}"]
+    return [f"The paper's conclusion, with 95 % confidence intervals ({of}): {conclusion(found)}"]

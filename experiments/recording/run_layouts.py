@@ -105,7 +105,7 @@ def drive(shelf: Shelf) -> Part:
         None if shelf.of("torque/command") else plot(shelf, "position, commanded and true [rad]", "q/planned", "q/true"),
         plot(shelf, "rotor - link [rad], within the backlash", "gear/gap"),
         plot(shelf, "torque, true - commanded [N m]", "torque/disturbance"),
-        plot(shelf, "what the loop commands against it [N m]", "torque/rejection"),
+        plot(shelf, "torque commanded against it [N m]", "torque/rejection"),
         lanes(shelf, JOINT_STATES, "state/*"),
     )
     inside = column(

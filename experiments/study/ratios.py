@@ -96,7 +96,7 @@ def ratios_table(found: Sequence[Ratio]) -> Any:
     lines: dict[tuple[str, ...], dict[str, str]] = {}
     for each in found:
         lines.setdefault((combination(each.cell), *each.cell.names[:2]), {})[each.pair] = str(each)
-    grid = new_table("ratios of typical errors, with 95 % intervals", ["chain", "estimator", *pairs])
+    grid = new_table("ratios of typical errors, with 95 % confidence intervals", ["chain", "estimator", *pairs])
     for (settings, chain, estimator), row in lines.items():
         grid.add_row(settings, chain, estimator, *(row.get(pair, "") for pair in pairs))
     return grid
@@ -127,10 +127,11 @@ def conclusion(found: Sequence[RatioRow]) -> str:
     each = [f"{_interval(stated[noise])} {words}" for noise, words in NOISES.items() if noise in stated]
     best, worst = (pick(least, key=lambda row: row["ratio"]) for pick in (min, max))
     return (
-        f"The implicit model brings nothing: its errors are {min(row['ratio'] for row in implicit):.2g} to "
+        f"The implicit model has no advantage: its errors are {min(row['ratio'] for row in implicit):.2g} to "
         f"{max(row['ratio'] for row in implicit):.2g} times the explicit model's, over {len(implicit)} combinations of noise, "
-        f"chain and estimator. With as many rows, the power model's errors are, by least squares in chain {STATED[0]}, "
-        f"{', '.join(each)} times the explicit model's; by generalized least squares {_interval(best)} to {_interval(worst)}."
+        "chain and estimator. With equal numbers of rows, the power model's errors are, for least squares in chain "
+        f"{STATED[0]}, {', '.join(each)} times the explicit model's; for generalized least squares {_interval(best)} "
+        f"to {_interval(worst)}."
     )
 
 

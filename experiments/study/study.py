@@ -17,7 +17,7 @@ from idbench.experiments.requests.shared import CHAIN, ESTIMATOR, Parameters
 from idbench.experiments.study.axis import FRICTION, Axis, Method, Setting, combinations, methods_of, servo_methods, whole_first
 from idbench.experiments.study.servo_rows import SERVO, names_of
 from idbench.identify import MODELS, AbstractModel
-from idbench.identify.models import THREE, rows_at_an_instant
+from idbench.identify.models import THREE, rows_per_sample
 from idbench.sim.drives import ServoDrive
 from idbench.sim.scenario.scenario import Scenario
 from idbench.sim.scenario.scenario_file import from_dict
@@ -128,7 +128,7 @@ class Study:
         if self.of_servos or self.rows == "own":
             return self.realizations
         n = next(iter(self.subjects.values())).basis.n
-        return self.realizations * n // rows_at_an_instant(self.created_models[model], n)
+        return self.realizations * n // rows_per_sample(self.created_models[model], n)
 
     @cached_property
     def most_logs(self) -> int:

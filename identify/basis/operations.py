@@ -1,4 +1,4 @@
-"""What columns cost: the operations of an instant, counted by computing them once with symbols."""
+"""The cost of the columns: operations per sample, counted by evaluating them once on symbols."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -21,7 +21,7 @@ COLUMNS = {
 
 @dataclass(frozen=True)
 class Operations:
-    """The operations of the columns of one instant, each counted once however often its value is used."""
+    """Operations per sample of the columns of a model; a value that is used several times counts once."""
 
     multiplications: int
     """Of two values, or of a value and a constant that is not 0, 1 or -1."""
@@ -43,7 +43,7 @@ class Operations:
 
 
 def operations(basis: Basis, model: str) -> Operations:
-    """Return what the columns of a model cost at an instant: explicit, implicit or power.
+    """Return the operations per sample of the columns of a model: explicit, implicit or power.
 
     The basis computes its columns once with symbols in the place of numbers, so that zeros and ones of the robot vanish, as
     in customized symbolic models (W. Khalil and J.-F. Kleinfinger, IEEE Journal of Robotics and Automation 3 (1987) 517-526).
@@ -151,7 +151,7 @@ class _Tape:
         return self._known[key]
 
     def counts(self, wanted: list[_Symbol]) -> Counter[str]:
-        """Return how many operations of each kind some values take."""
+        """Return how many operations of each kind some values take: of each value v = f(a, b), one f beside those of a and b."""
         used, todo = set[int](), [symbol.number for symbol in wanted]
         while todo:
             if (number := todo.pop()) not in used:

@@ -2,7 +2,6 @@
 
 from idbench.identify.estimators.estimate import Estimate as Estimate
 from idbench.identify.estimators.estimator import AbstractEstimator as AbstractEstimator
-from idbench.identify.estimators.least_squares.chosen_rows import ChosenRows as ChosenRows
 from idbench.identify.estimators.least_squares.iteratively_reweighted import IterativelyReweighted as IterativelyReweighted
 from idbench.identify.estimators.least_squares.ordinary_weighted_generalized import (
     GeneralizedLeastSquares as GeneralizedLeastSquares,
@@ -14,6 +13,7 @@ from idbench.identify.estimators.least_squares.ordinary_weighted_generalized imp
     WeightedLeastSquares as WeightedLeastSquares,
 )
 from idbench.identify.estimators.least_squares.recursive_least_squares import RecursiveLeastSquares as RecursiveLeastSquares
+from idbench.identify.estimators.least_squares.selected_rows import SelectedRows as SelectedRows
 from idbench.identify.estimators.least_squares.total_least_squares import TotalLeastSquares as TotalLeastSquares
 from idbench.identify.estimators.likelihood.kalman_filter import UnscentedKalmanFilter as UnscentedKalmanFilter
 from idbench.identify.estimators.likelihood.maximum_likelihood import (
@@ -33,7 +33,7 @@ ESTIMATORS: PluginTable[AbstractEstimator] = PluginTable(
     AbstractEstimator,  # type: ignore[type-abstract]  # only asked whether an instance is one
     {
         "OLS": OrdinaryLeastSquares,
-        "OLS-chosen": ChosenRows,
+        "OLS-selected": SelectedRows,
         "WLS": WeightedLeastSquares,
         "GLS": GeneralizedLeastSquares,
         "ML": MaximumLikelihood,

@@ -29,11 +29,11 @@ class Rejection:
         """Return how much of each joint's logged torque is rejection, in a line."""
         rms, of = self.rejected.std(axis=0), self.ripple.std(axis=0)
         each = [
-            f"{name} {r:.2g} N m of {x:.2g} ({100 * r / y:.2g} % of the logged torque)"
+            f"{name} {r:.2g} of {x:.2g} N m, {100 * r / y:.2g} % of the logged torque"
             for name, r, x, y in zip(joints, rms, of, self.logged, strict=True)
         ]
         loop = "" if wdyn is None else f", wdyn {wdyn:.3g} Hz"
-        return f"rejection of ripple by the loop (rms{loop}): {', '.join(each)}"
+        return f"ripple rejected by the loop (rms{loop}): {', '.join(each)}"
 
 
 def rejection(run: Run, i: int = 0) -> Rejection | None:
@@ -54,7 +54,8 @@ def rejection(run: Run, i: int = 0) -> Rejection | None:
     at(q, still, still)
     inverse, damping = np.linalg.inv(at.mass_matrix), robot.model.dof_damping
     law, other = (scenario.controller.start(Task(scenario.nominal_robot, run.reference, 1)) for _ in range(2))
-    delta, rate, found = np.zeros(robot.n), np.zeros(robot.n), np.zeros_like(d)
+    delta, rate = np.zeros((2, robot.n))
+    found = np.zeros_like(d)
     for k in range(len(q)):
         found[k] = law.command(k, q[k : k + 1])[0] - other.command(k, q[k : k + 1] - delta)[0]
         acceleration = (inverse[k] * (found[k] + d[k] - damping * rate)).sum(axis=-1)

@@ -73,7 +73,7 @@ def test_the_summary_has_what_its_readers_expect(table1, truth):
     summary = table1.summary()
     assert summary["parameters"] == list(table1.truth)
     np.testing.assert_allclose(summary["truth"], truth, atol=1e-12)
-    assert set(summary["models"]) == set(summary["paper_chain"]) == {*FORMS, "energy"}
+    assert set(summary["models"]) == set(summary["paper_chain"]) == {*FORMS, "energy", "integral"}
     assert summary["scenario"]["fs"] == 100.0
     for form, entry in summary["models"].items():
         estimate = table1.estimates["idbench"][form]

@@ -86,7 +86,7 @@ def _print_parameters(page: Console, robot_model: RobotModel, truth: dict[str, f
     if base.without_effect:
         page.print(Text(f"no motion excites {', '.join(base.without_effect)}"), soft_wrap=True)
     counts = {model: operations(basis, model) for model in COLUMNS}
-    page.print(Text(f"columns of an instant: {'; '.join(f'{model} {x}' for model, x in counts.items())}"), soft_wrap=True)
+    page.print(Text(f"operations per sample: {'; '.join(f'{model} {x}' for model, x in counts.items())}"), soft_wrap=True)
     page.print()
 
 

@@ -91,8 +91,8 @@ class Windows(AbstractWeakForm):
     length: float = 0.1
     """Tb - ta [s]; the paper's n_d / fs."""
     spacing: float | None = None
-    """From ta of a window to that of the next [s]; by default the length. Of windows that overlap, estimator OLS-chosen takes
-    those that say most."""
+    """Time from one ta to the next [s]; by default the length. If windows overlap, estimator OLS-selected selects the most
+    informative ones."""
 
     def __post_init__(self) -> None:
         require_positive(length=self.length)

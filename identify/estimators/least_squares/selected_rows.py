@@ -1,4 +1,4 @@
-"""Least squares of the rows that say most."""
+"""Least squares of the most informative rows."""
 
 from dataclasses import dataclass
 from typing import ClassVar, final
@@ -15,54 +15,54 @@ from idbench.identify.estimators.simulating.row_products import with_weights
 from idbench.identify.estimators.solution import Given
 
 RIDGE = 1e-9
-"""Information of every parameter before the first row is chosen, over that of all rows: it only starts the choice."""
+"""Initial information about every parameter, as a share of that of all rows; it regularizes the first p selections."""
 
 
 @final
 @dataclass(frozen=True)
-class ChosenRows(AbstractEstimator):
-    """Ordinary least squares of chosen rows (OLS-chosen): those that together say most, and do not overlap.
+class SelectedRows(AbstractEstimator):
+    """Ordinary least squares of selected rows (OLS-selected): a D-optimal set of windows that do not overlap.
 
-    The energy model's sampling times ta and tb are free, and [15, 18] of the paper choose them for a well conditioned W. Here
-    rows are taken one by one, each the one that adds most to ln det(W' W) (D-optimal, greedy), and those that overlap it are
-    left out: w' M^-1 w is largest, with M the sum of w w' so far. It needs windows that overlap: `Windows(length, spacing)`.
+    The energy model's sampling times ta and tb are free; [15, 18] of the paper choose them for a well-conditioned W. Rows are
+    selected greedily: each adds most to ln det(W' W), which is the one with the largest w' M^-1 w, where M is the sum of w w'
+    so far. Rows that overlap it are excluded. It needs overlapping windows: `Windows(length, spacing)`.
     """
 
-    acronym: ClassVar[str] = "OLS-chosen"
+    acronym: ClassVar[str] = "OLS-selected"
     needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
 
     apart: float | None = None
-    """Least time between rows that are chosen [s]; by default the length of a window."""
+    """Minimum time between selected rows [s]; by default the length of a window."""
 
     def __post_init__(self) -> None:
         if self.apart is not None:
             require_positive(apart=self.apart)
 
     def solve(self, problem: Problem) -> Estimate:
-        """Return the estimate of every run, by the rows that are chosen of it."""
+        """Return the estimate of every run."""
         rows, operator = problem.rows, problem.own_chain.operator
         apart = getattr(operator, "length", 0.0) if self.apart is None else self.apart
         starts = np.concatenate([np.full(len(part.time) * rows.kinds, k) for k, part in enumerate(rows.maps)])
         weight = np.zeros(rows.Y.shape)
         for run in np.ndindex(rows.Y.shape[:-1]):
-            weight[run] = chosen(rows.W[run], rows.valid[run], rows.time, starts, apart)
+            weight[run] = selected(rows.W[run], rows.valid[run], rows.time, starts, apart)
         found = with_weights(rows.Y, rows.W, weight)
         return Estimate(problem, frozen(found.X), frozen(found.covariance), Given(found.G))
 
 
-def chosen(W: Array, valid: npt.NDArray[np.bool_], time: Array, log: Array, apart: float) -> npt.NDArray[np.bool_]:
-    """Return which rows are chosen, shape (r,).
+def selected(W: Array, valid: npt.NDArray[np.bool_], time: Array, log: Array, apart: float) -> npt.NDArray[np.bool_]:
+    """Return which rows are selected, shape (r,), by the greedy step k = argmax w_k' M^-1 w_k of `SelectedRows`.
 
     Parameters
     ----------
     W : Array, shape (r, p)
         Rows.
     valid : array, shape (r,)
-        Rows that may be chosen.
+        Rows that may be selected.
     time, log : Array, shape (r,)
         Instant [s], and number of the log, of every row.
     apart : float
-        Least time between chosen instants [s]; the rows of an instant are chosen one by one.
+        Minimum time between selected samples [s]; the rows of one sample are selected one by one.
     """
     size = np.sqrt(np.sum(W**2, axis=0))
     W = W / np.where(size > 0, size, 1.0)
