@@ -151,7 +151,7 @@ class _Tape:
         return self._known[key]
 
     def counts(self, wanted: list[_Symbol]) -> Counter[str]:
-        """Return how many operations of each kind some values take: of each value v = f(a, b), one f beside those of a and b."""
+        """Return the number of operations of each kind: a value v = f(a, b) takes one f beside those of a and b."""
         used, todo = set[int](), [symbol.number for symbol in wanted]
         while todo:
             if (number := todo.pop()) not in used:

@@ -45,7 +45,8 @@ def rejection(run: Run, i: int = 0) -> Rejection | None:
 
     about the motion as it was. Coulomb friction, whose sign stays, has no part in it; nor have delays of the drive.
     """
-    scenario, robot, h = run.scenario, run.robots[i], 1 / run.scenario.fs
+    scenario, robot = run.scenario, run.robots[i]
+    h = 1 / scenario.fs
     d, logged = run.tau[i] - run.command[i], run.log.tau[i].std(axis=0)
     if scenario.controller.commanded != "torque" or not (d.std(axis=0) > NOTHING * logged).any():
         return None
