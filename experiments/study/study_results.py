@@ -17,7 +17,18 @@ from idbench.experiments.reports.figures import rendered
 from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.folder import ResultsFolder
 from idbench.experiments.results.writing import write_summary
-from idbench.experiments.study.answer import answer, grouped, headline, method, percent, settings_of, short, value, where
+from idbench.experiments.study.answer import (
+    answer,
+    failures,
+    grouped,
+    headline,
+    method,
+    percent,
+    settings_of,
+    short,
+    value,
+    where,
+)
 from idbench.experiments.study.axis import FRICTION, Axis
 from idbench.experiments.study.cluster import versions
 from idbench.experiments.study.comparison import differences
@@ -28,6 +39,7 @@ from idbench.experiments.study.store import Store, arrays
 from idbench.experiments.study.study import Study
 from idbench.experiments.text import new_table, print_table
 from idbench.experiments.text import percent as signed
+from idbench.identify.models import THREE
 
 if TYPE_CHECKING:
     from idbench.experiments.recording.study_recording import StudyRecording
@@ -45,7 +57,7 @@ def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folde
         "report.html.j2",
         study=study,
         methods=len(study.methods),
-        headline=headline(solved, study.edges) if solved else "",
+        headline="" if _compares(study) or not solved else headline(solved, study.edges),
         answer=said_of(study, cells),
         typical=typical_figure(dict(families(study, solved)), main_axis(study), study.edges) if solved else "",
         axes=[short(name) for name in cells[0].settings],
@@ -53,7 +65,7 @@ def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folde
         families=[_family(title, group, main_axis(study)) for title, group in families(study, solved)],
         bars=[(title, bars_figure(group)) for title, group in _comparisons(study, solved)],
         ratios=[[where(r.cell, cells), r.pair, str(r), f"{r.runs}"] for r in ratios(solved)] if study.rows == "equal" else [],
-        differences=list(_differences(solved)),
+        differences=[] if _compares(study) else list(_differences(solved)),
         details=[row for cell in solved for row in _details(cell, where(cell, cells))],
         failed=[
             (where(c, cells), len(runs), f"{reason} (run {runs[0]})") for c in cells for reason, runs in c.failures.items()
@@ -68,11 +80,19 @@ def report(study: Study, cells: Sequence[Cell], seconds: dict[str, float], folde
 
 
 def said_of(study: Study, found: Sequence[Cell]) -> str:
-    """Return the answer of a study; of one that gives every model as many rows, with the ratios of their errors first."""
-    compares = study.rows == "equal" and {"explicit", "implicit", "power"} <= set(study.models) and "GLS" in study.estimators
+    """Return the answer of a study: the ratios of the models' errors, or which method errs least."""
+    if not (_compares(study) and any(cell.runs for cell in found)):
+        return answer(found, study.edges)
+    return " ".join(filter(None, [conclusion(ratios_summary(list(ratios(found)))), failures(found)]))
+
+
+def _compares(study: Study) -> bool:
+    """Return whether a study compares the models over kinds of noise, by equal numbers of rows.
+
+    It has too many methods for a test of every pair: the draws of a permutation test grow with the number of pairs.
+    """
     noises = any(axis.field == "noise" for axis in study.axes)
-    ratio = conclusion(ratios_summary(list(ratios(found)))) if compares and noises and any(c.runs for c in found) else ""
-    return " ".join(filter(None, [ratio, answer(found, study.edges)]))
+    return study.rows == "equal" and set(THREE) <= set(study.models) and "GLS" in study.estimators and noises
 
 
 def main_axis(study: Study) -> Axis:
