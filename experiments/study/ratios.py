@@ -76,7 +76,7 @@ def ratio(cell: Cell, base: Cell) -> Ratio:
 
 def _gap(share: Array, above: Array, below: Array) -> Array:
     """Return ln of the ratio of typical errors, shape (...), of squares (run, p) with shares of the runs, shape (..., run)."""
-    one, other = (np.log(np.maximum(share @ x, MIN_ERROR**2)) for x in (above, below))
+    one, other = (np.log(np.maximum(np.einsum("...r,rp->...p", share, x), MIN_ERROR**2)) for x in (above, below))
     return np.asarray(np.mean(one - other, axis=-1) / 2)
 
 

@@ -84,3 +84,14 @@ def test_the_summary_has_what_its_readers_expect(table1, truth):
         assert entry["condition_number"] == estimate.condition_number
         assert entry["rows"] == estimate.row_count
         assert entry["residual_rms"] == estimate.residual_rms
+
+
+def test_three_of_the_papers_errors_contradict_the_values_beside_them(table1):
+    """X is printed to 0.001 and %e, too: an Fv1 of 0.049 is 1 to 3 % off, not 0.207 % (docs/conclusion.md)."""
+    truth, found = list(table1.truth.items()), []
+    for form, column in PAPER.items():
+        for (name, true), X, error in zip(truth, column.estimate, column.error, strict=True):
+            off = [100 * max(0.0, abs(X - true) + sign * 5e-4) / true for sign in (-1, 1)]
+            if not off[0] - 5e-4 <= error <= off[1] + 5e-4:
+                found.append((form, name))
+    assert found == [("explicit", "Fv1"), ("implicit", "Fv1"), ("power", "Fs2")]
