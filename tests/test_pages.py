@@ -25,7 +25,8 @@ def tables(root):
 
 
 @pytest.mark.parametrize(
-    "page", ["answers.md", "any-arm.md", "estimators.md", "excitation.md", "noise.md", "appendix.md", "benchmark.md"]
+    "page",
+    ["answers.md", "any-arm.md", "conclusion.md", "estimators.md", "excitation.md", "noise.md", "appendix.md", "benchmark.md"],
 )
 def test_tables_are_made_of_the_results(root, tables, page):
     text = (root / "docs" / page).read_text()
