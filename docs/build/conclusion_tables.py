@@ -197,19 +197,22 @@ def _findings() -> Iterator[tuple[str, str, str]]:
     spaced = ", spacing 0.02"
     yield (
         "The sampling times can be optimized for a well-conditioned W.",
-        f"**Not here.** Windows of 1 s: consecutive {_window(1.0, 'noise')} %, selected {_window(1.0, 'noise', 'OLS-selected', spaced)} %; "
+        "**Not here.** "
+        f"Windows of 1 s: consecutive {_window(1.0, 'noise')} %, selected {_window(1.0, 'noise', 'OLS-selected', spaced)} %; "
         f"all overlapping windows together {_window(1.0, 'noise', 'OLS', spaced)} %.",
         "study windows",
     )
     yield (
         "Power is less sensitive to the exciting trajectory than its integral.",
-        f"**Hardly, without a prefilter**: from 40 moves to 5 the error of power grows {_grows('power')} times, of energy {_grows('energy')} times, of explicit "
+        "**Hardly, without a prefilter**: "
+        f"from 40 moves to 5 the error of power grows {_grows('power')} times, of energy {_grows('energy')} times, of explicit "
         f"{_grows('explicit')} times.",
         "study quality",
     )
     yield (
         "fs = 100 wdyn.",
-        f"**Half of it costs twice the error.** Explicit: {_rule(fs=50.0)} % at 50, {_rule()} % at 100, {_rule(fs=200.0)} % at 200 wdyn.",
+        "**Half of it costs twice the error.** "
+        f"Explicit: {_rule(fs=50.0)} % at 50, {_rule()} % at 100, {_rule(fs=200.0)} % at 200 wdyn.",
         "study rules",
     )
     cutoffs = [_rule(chain_prefilter_cutoff=x) for x in (5.0, 10.0, 20.0)]
@@ -221,7 +224,8 @@ def _findings() -> Iterator[tuple[str, str, str]]:
     )
     yield (
         "The order of fq must be above 2, that of fp above 1.",
-        f"**Holds for fp.** With a 12-bit encoder: fq of order 1, 2, 4: {_order(1.0, 8.0)}, {_order(2.0, 8.0)}, {_order(4.0, 8.0)} %; "
+        "**Holds for fp.** "
+        f"With a 12-bit encoder: fq of order 1, 2, 4: {_order(1.0, 8.0)}, {_order(2.0, 8.0)}, {_order(4.0, 8.0)} %; "
         f"fp of order 1, 8: {_order(4.0, 1.0)}, {_order(4.0, 8.0)} %.",
         "study orders",
     )
