@@ -1,6 +1,7 @@
 """What a study varies."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from dataclasses import field as field_of
 from functools import cached_property
@@ -28,9 +29,10 @@ class Axis:
     """A setting and the values that it takes, listed or evenly spaced."""
 
     field: str
-    """A setting of the scenario, such as encoder.lines, or of identification: chain.operator.cutoff, estimator.rounds."""
+    """A setting of the scenario, such as encoder.lines, or of identification: chain.operator.cutoff, estimator.rounds. Of
+    cases: any name."""
     values: tuple[Any, ...] = ()
-    """The values; for a stage of the chain, such as chain.operator, names of plug-ins."""
+    """The values; for a stage of the chain, such as chain.operator, names of plug-ins, or tables { kind = NAME, ... }."""
     lowest: Number | None = None
     """Instead of values: the first of evenly spaced ones."""
     highest: Number | None = None
@@ -42,7 +44,7 @@ class Axis:
     also: tuple[str, ...] = ()
     """Further fields that take the same value."""
     cases: dict[str, dict[str, Any]] = field_of(default_factory=dict)
-    """Instead of values: names of settings of the scenario that go together, each a table of them; `field` is what they are."""
+    """Instead of values: named tables of settings of the scenario that change together."""
 
     def __post_init__(self) -> None:
         spaced = self.lowest, self.highest, self.count
@@ -59,6 +61,8 @@ class Axis:
             raise ValueError(f"axis {self.field}: lowest = {self.lowest:g} must be above 0 for spacing log")
         if len({self.label(value) for value in self.points}) < len(self.points):
             raise ValueError(f"axis {self.field}: a value is given twice in {list(self.points)!r:.200}")
+        if not self.field:
+            raise ValueError("field is empty: name a setting, or what the cases are")
         kinds = {_of_identification(field) for field in self.all_fields}
         if len(kinds) > 1:
             raise ValueError(f"axis {self.field}: also = {list(self.also)} mixes settings of simulation and identification")
@@ -87,8 +91,8 @@ class Axis:
 
     @property
     def all_fields(self) -> tuple[str, ...]:
-        """Every field that takes the value."""
-        return (self.field, *self.also)
+        """Every field that takes the value, and every setting that a case changes."""
+        return (self.field, *self.also, *dict.fromkeys(path for case in self.cases.values() for path in paths_of(case)))
 
     @property
     def identification(self) -> bool:
@@ -111,7 +115,7 @@ class Setting:
     def into(self, content: dict[str, Any]) -> None:
         """Write the value into the tables of a scenario."""
         if self.axis.cases:
-            merged = merge(content, self.axis.cases[self.value])
+            merged = merge(content, deepcopy(self.axis.cases[self.value]))
             content.clear()
             content.update(merged)
             return
@@ -124,7 +128,7 @@ class Setting:
                     raise StudyError(f"axis {field}: {'.'.join(path[: i + 1])} is no table of settings")
             named = field == "trajectory" and isinstance(self.value, str)  # that of another scenario
             if named or isinstance(self.value, dict) or key not in table or not isinstance(table[key], dict):
-                table[key] = self.value
+                table[key] = deepcopy(self.value)
             else:
                 raise StudyError(f"axis {field} is a table of settings: give tables as values, or name one of its settings")
 
@@ -143,6 +147,12 @@ class Setting:
             if root == "estimator":
                 estimator = _set(estimator, path, self.value, field)
         return estimator
+
+
+def paths_of(table: Mapping[str, Any], above: str = "") -> Iterator[str]:
+    """Yield the dotted names of all settings of nested tables."""
+    for key, value in table.items():
+        yield from paths_of(value, f"{above}{key}.") if isinstance(value, dict) else (f"{above}{key}",)
 
 
 def merge(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

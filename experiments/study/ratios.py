@@ -122,23 +122,34 @@ def ratios_summary(found: Sequence[Ratio]) -> list[RatioRow]:
 
 
 def conclusion(found: Sequence[RatioRow]) -> str:
-    """Return the conclusion in two sentences, with 95 % intervals, from the ratios of a study with the axis `noise`."""
+    """Return how the errors of the implicit and the power model compare with the explicit model's, with 95 % intervals."""
     implicit, power = (_of(found, pair) for pair in (["implicit", "explicit"], ["power", "explicit"]))
-    stated = {row["settings"]["noise"]: row for row in power if (row["chain"], row["estimator"]) == STATED}
-    least = _of(power, ["power", "explicit"], estimator="GLS")
-    each = [f"{_interval(stated[noise])} {words}" for noise, words in NOISES.items() if noise in stated]
-    best, worst = (pick(least, key=lambda row: row["ratio"]) for pick in (min, max))
-    return (
-        f"The implicit model has no advantage: its errors are {min(row['ratio'] for row in implicit):.2g} to "
-        f"{max(row['ratio'] for row in implicit):.2g} times the explicit model's, over {len(implicit)} combinations of noise, "
-        "chain and estimator. With equal numbers of rows, the power model's errors are, for least squares in chain "
-        f"{STATED[0]}, {', '.join(each)} times the explicit model's; for generalized least squares {_interval(best)} "
-        f"to {_interval(worst)}."
-    )
+    words = []
+    if implicit:
+        words.append(f"The implicit model's errors are {_span(implicit)} times the explicit model's")
+    if stated := [row for row in power if (row["chain"], row["estimator"]) == STATED]:
+        of = {str(row["settings"].get("noise", "")): row for row in stated}
+        each = [f"{_interval(row)} {NOISES.get(noise, noise)}".rstrip() for noise, row in of.items()]
+        each = each if len(of) == len(stated) else [_span(stated)]
+        words.append(
+            f"With equal numbers of rows, the power model's are, for ordinary least squares in chain {STATED[0]}, "
+            f"{', '.join(each)} times as large"
+        )
+    elif power:
+        words.append(f"With equal numbers of rows, the power model's are {_span(power)} times as large")
+    if stated and (weighted := _of(power, ["power", "explicit"], estimator="GLS")):
+        best, worst = (pick(weighted, key=lambda row: row["ratio"]) for pick in (min, max))
+        words[-1] += f"; for generalized least squares {_interval(best)} to {_interval(worst)}"
+    return " ".join(f"{sentence}." for sentence in words)
 
 
 def _of(found: Sequence[RatioRow], pair: list[str], **given: str) -> list[RatioRow]:
     return [row for row in found if row["models"] == pair and all(row[key] == x for key, x in given.items())]
+
+
+def _span(rows: Sequence[RatioRow]) -> str:
+    low, high = (pick(row["ratio"] for row in rows) for pick in (min, max))
+    return f"{low:.2g} to {high:.2g}, over {len(rows)} combinations of noise, chain and estimator,"
 
 
 def _interval(row: RatioRow) -> str:

@@ -3,7 +3,7 @@
 import time
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,17 @@ from idbench.experiments.study.bound import bounds_of
 from idbench.experiments.study.servo_rows import SERVO, rows_of
 from idbench.experiments.study.statistics import BOUNDS
 from idbench.experiments.study.study import Study
-from idbench.identify import Array, Estimate, ExplicitModel, IdentificationError, Problem, Simulation, Status, attempt_each
+from idbench.identify import (
+    Array,
+    Chain,
+    Estimate,
+    ExplicitModel,
+    IdentificationError,
+    Problem,
+    Simulation,
+    Status,
+    attempt_each,
+)
 from idbench.identify.estimators.settle import settled
 from idbench.sim.engine.run import Run, ideal_run
 from idbench.sim.engine.simulation import Progress, simulate
@@ -144,11 +154,12 @@ def _identify(
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for every run and model."""
     found = dict[str, Estimate | IdentificationError]()
+    chain = _trimmed(study, method, simulated)
     for count in dict.fromkeys(map(study.logs_of, study.models)):
         models = {name: model for name, model in study.created_models.items() if study.logs_of(name) == count}
         logs = tuple(simulated.log.run((slice(k * len(runs), (k + 1) * len(runs)),)) for k in range(count))
         try:
-            problem = settled(Problem(logs, study.subjects[method.friction].basis, ExplicitModel(), method.chain, simulation))
+            problem = settled(Problem(logs, study.subjects[method.friction].basis, ExplicitModel(), chain, simulation))
             found |= attempt_each(problem, models, method.estimator, throw=False)
         except IdentificationError as error:
             found |= dict.fromkeys(models, error)
@@ -162,6 +173,14 @@ def _identify(
                 yield common | {"failure": reason}
             else:
                 yield common | {name: values[i] for name, values in columns.items()}
+
+
+def _trimmed(study: Study, method: Method, simulated: Run) -> Chain:
+    """Return the chain of a method; if models are to have equal numbers of rows, with the longest margin of all of them."""
+    if study.rows == "own" or method.chain.trim is not None:
+        return method.chain
+    fs, torque = simulated.log.fs, simulated.log.torque
+    return replace(method.chain, trim=max(method.chain.of_model(m).halo(fs, torque) for m in study.created_models.values()))
 
 
 def _simulation(

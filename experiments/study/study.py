@@ -33,6 +33,9 @@ MOST_METHODS = 1000
 PLAIN = ("name", "question", "seeds", "seed", "motion", "start", "bound", "data", "realizations", "rows")
 """Keys of a study whose values are no tables or lists."""
 
+RESULTS = ("run", "seed", "chain", "estimator", "model", "failure", "condition_number", "rows", "residual_rms", "simulations")
+"""Columns of the results beside those of axes and parameters."""
+
 Names = Annotated[tuple[str, ...], Field(min_length=1)]
 
 
@@ -91,6 +94,8 @@ class Study:
         every = [field for axis in self.every_axis for field in axis.all_fields]
         if twice := {field for field in every if every.count(field) > 1}:
             raise StudyError(f"two axes vary {', '.join(sorted(twice))}")
+        if taken := [axis.field for axis in self.every_axis if axis.cases and axis.field in RESULTS]:
+            raise StudyError(f"an axis of cases is called {taken[0]}, which is a column of the results: give it another name")
         if fixed := {"seed", "name", "trajectory.seed"} & set(every):
             raise StudyError(f"an axis varies {', '.join(sorted(fixed))}, which a study draws itself: use seeds")
         for group in (self.models, self.chains, self.estimators, self.friction):
@@ -107,21 +112,36 @@ class Study:
             raise StudyError(f'models = {list(self.models)}: a study of servos has models = ["{SERVO}"], any other has not')
         if not self.of_servos:
             _ = self.created_models, self.subjects
+        if taken := [axis.field for axis in self.axes if axis.cases and axis.field in self.parameters]:
+            raise StudyError(f"an axis of cases is called {taken[0]}, which is a parameter: give it another name")
         self._require_realizations()
         self._require(next(self._points()))  # the whole grid is looked at when it is known not to be endless
 
     def _require_realizations(self) -> None:
         """Raise StudyError if several logs of a run, or ideal ones, go with nothing else that is asked for."""
-        several, ideal = self.most_logs > 1, self.data == "ideal"
+        keys = {
+            f"realizations = {self.realizations}": self.realizations > 1,
+            "rows = 'equal'": self.rows == "equal",
+            "data = 'ideal'": self.data == "ideal",
+        }
+        given = [key for key, there in keys.items() if there]
+        if not given:
+            return
         loops = [method.estimator_name for method in self.methods if "loop" in method.estimator.needs]
         refused = {
-            "a study of servos": self.of_servos and (several or ideal),
-            "bound = true": self.bound and (several or ideal),
-            f"estimator {', '.join(loops)}, which simulates the loop of one log": bool(loops) and (several or ideal),
-            "motion = 'shared'": ideal and self.motion == "shared",
+            "a study of servos": self.of_servos,
+            "bound = true": self.bound,
+            f"estimator {', '.join(loops)}, which simulates the loop of one log: leave it out": bool(loops),
         }
+        if self.data == "ideal":
+            refused |= {
+                "motion = 'shared': use motion = 'drawn'": self.motion == "shared",
+                f"{' and '.join(given[:-1])}: ideal logs of a motion are all the same": len(given) > 1,
+            }
+            spoiled = [name for point in self._points() for name in imperfections_of(point.scenario)]
+            refused[f"a scenario with {spoiled[0] if spoiled else ''}, which ideal logs do not have"] = bool(spoiled)
         if found := [what for what, wrong in refused.items() if wrong]:
-            raise StudyError(f"realizations, rows = 'equal' and data = 'ideal' do not go with {found[0]}")
+            raise StudyError(f"{given[-1]} does not go with {found[0]}")
 
     def logs_of(self, model: str) -> int:
         """Return how many logs of a run a model has."""
@@ -270,6 +290,14 @@ class Study:
         plain = {key: getattr(self, key) for key in PLAIN}
         lists = {key: list(getattr(self, key)) for key in ("models", "chains", "estimators", "friction")}
         return {**plain, **lists, "axes": axes, "scenario": self.scenario}
+
+
+def imperfections_of(scenario: Scenario) -> Iterator[str]:
+    """Yield the parts of a scenario that are not ideal: of drives, encoders, torques, frictions, times."""
+    ideal = Scenario("ideal", scenario.trajectory, scenario.robot)
+    for part in ("drive", "ripple", "encoder", "torque", "friction", "timing", "payload"):
+        if getattr(scenario, part) != getattr(ideal, part):
+            yield part
 
 
 def _random(scenario: Scenario) -> RandomMoves | RandomPace | RandomSteps:

@@ -83,7 +83,7 @@ def said_of(study: Study, found: Sequence[Cell]) -> str:
     """Return the answer of a study: the ratios of the models' errors, or which method errs least."""
     if not (_compares(study) and any(cell.runs for cell in found)):
         return answer(found, study.edges)
-    return " ".join(filter(None, [conclusion(ratios_summary(list(ratios(found)))), failures(found)]))
+    return " ".join(filter(None, [conclusion(ratios_summary(list(ratios(found)))), failures(found)])) or answer(found)
 
 
 def _compares(study: Study) -> bool:

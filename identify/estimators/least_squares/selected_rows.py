@@ -28,7 +28,7 @@ class SelectedRows(AbstractEstimator):
     so far. Rows that overlap it are excluded. It needs overlapping windows: `Windows(length, spacing)`.
     """
 
-    acronym: ClassVar[str] = "OLS-selected"
+    acronym: ClassVar[str] = "OLS"
     needs: ClassVar[frozenset[Need]] = frozenset({"rows"})
 
     apart: float | None = None

@@ -196,8 +196,8 @@ def test_a_missing_scenario_is_said_to_be_missing(content):
 def test_the_example_of_the_docs_is_a_study(root):
     (example,) = re.findall(r"```toml\n(.*?)```", (root / "docs" / "studies.md").read_text(), re.DOTALL)
     study = study_from(tomllib.loads(example), "study")
-    assert study.size == 3 * 3 * 64
-    assert len(study.methods) == 2
+    assert study.size == 3 * 3 * 2 * 64
+    assert len(study.methods) == 2 * 2
 
 
 def test_a_study_may_be_of_any_arm_but_of_one(content):
