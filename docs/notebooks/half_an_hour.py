@@ -1,8 +1,8 @@
 """
 # The paper in half an hour
 
-Simulate a robot, see what filters distort, compare the models, break the encoder, find the reversals. Every cell runs in
-some seconds. You know what a torque, a velocity and least squares are; the rest is here.
+Simulate a robot, see what filters distort, compare the models, break the encoder, find the reversals. The cells take
+at most half a minute. You know what a torque, a velocity and least squares are; the rest is here.
 
 The robot is a SCARA of two joints with direct drives. Its motion follows from eight parameters X: two inertias (`ZZR1`,
 `ZZ2`), two first moments (`LMX2`, `LMY2`), viscous and Coulomb friction of each joint (`Fv`, `Fs`).
@@ -71,13 +71,13 @@ for noise in ("torque", "ripple"):
         print(f"{noise:7} {estimator}: power / explicit {errors['power'] / errors['explicit']:.2f}")
 
 """
-With ripple and ordinary least squares power is better; with white noise it is worse; with generalized least squares, which
-weighs what each row knows, it is never better. [The conclusion](../conclusion.md) has it with intervals over 200 motions.
+With ripple and ordinary least squares power is better; with white noise it is worse, and so it is with generalized least
+squares in chain `idbench`. [The conclusion](../conclusion.md) has it with intervals over 200 motions.
 
 ## 4. Break the encoder
 
-An encoder of 12 bits counts 4096 steps a turn. Counts are differentiated twice. Weighted least squares takes the noise of
-rows for independent; generalized least squares knows that it grows with the frequency.
+An encoder of 12 bits counts 4096 steps a turn. Counts are differentiated twice. Weighted least squares
+assumes independent noise; generalized least squares uses its covariance, which grows with the frequency.
 """
 
 broken = idbench.simulate("quantization", seed=2)
@@ -87,8 +87,8 @@ for estimator in ("OLS", "WLS", "GLS"):
     print(f"{estimator}: typical error {100 * np.exp(np.mean(np.log(off))):.3f} %")
 
 """
-The recording of such a run shows it: the residual is not white, its spectrum rises towards the end of the band. One with a
-delay that nobody told the identification, to see what a fault looks like:
+The recording of such a run shows it: the residual is not white, its spectrum rises towards the end of the band. This one has
+a delay that the identification ignores, to see what a fault looks like:
 
 <div class="recording" id="delay" data-recording="recordings/delay.rrd" markdown>
 

@@ -10,7 +10,7 @@ from idbench.experiments.identification.consistent_estimate import made_consiste
 from idbench.experiments.identification.friction_choice import chosen_in_turns, masked_laws, suited_mask
 from idbench.experiments.identification.lack import advice_on_lack
 from idbench.experiments.identification.logs import Logs
-from idbench.experiments.identification.rates import Rates
+from idbench.experiments.identification.rates import CONTROLLER, Rates
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.results.writing import finite, summarize
@@ -156,14 +156,13 @@ class Fit:
     @cached_property
     def rates(self) -> Rates:
         """Sampling and filter frequencies, in multiples of the bandwidth of the position loop."""
-        stated, source = self.request.wdyn, "as stated"
-        if stated is None and self.request.loops:
-            stated, source = self.request.loops[0].wdyn, "of the scenario's controller"
-        source = "from the motion; set that of the loop with --wdyn" if stated is None else source
+        stated, source = self.request.wdyn or (None, "from the motion; give the loop's bandwidth with --wdyn")
+        if stated is None and self.request.loops and (own := self.request.loops[0].wdyn):
+            stated, source = own, CONTROLLER
         first = self.problem.parts[0].signals
         qd = first.state.qd[(0,) * (first.state.qd.ndim - 2)]
-        rows = next(iter(self.estimates.values())).row_count
-        return Rates.of(self.processing, first.fs, int(np.max(rows)), stated, source, qd)
+        leading = self.estimates[self.leading]
+        return Rates.of(leading.problem.own_chain, first.fs, int(np.max(leading.row_count)), stated, source, qd)
 
     @cached_property
     def estimates(self) -> dict[str, Estimate]:

@@ -1,6 +1,7 @@
 """The job `identify`: a request becomes logs, a fit, and a judgement."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from idbench.experiments.identification.iterations import iterations
 from idbench.experiments.identification.load import Loaded, in_band, load, with_held_out
 from idbench.experiments.identification.log_warnings import warnings_of_log
 from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.rates import CONTROLLER
 from idbench.experiments.identification.reading import ReadOptions, file_of, stated_by
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import SCARA, RobotModel, absolute
@@ -60,13 +62,21 @@ def request_of(asked: IdentifyRequest, robot_model: RobotModel | None = None) ->
         start=asked.start,
         consistent=asked.consistent,
         mask_speed=asked.mask_speed,
-        wdyn=asked.wdyn,
+        wdyn=_wdyn(asked.wdyn, own),
     )
     if asked.loop and "loop" not in request.solver.needs:
         raise ExperimentError(
             f"--loop: {asked.estimator} simulates no loop; leave it out, or use --estimator IV, DIDIM, CLIE or CLOE"
         )
     return _with_chain(asked, request)
+
+
+def _wdyn(stated: float | None, scenarios: Sequence[Path]) -> tuple[float, str] | None:
+    """Return the bandwidth of the position loop that is stated, or that of the controller of a run, with its source."""
+    if stated is not None:
+        return stated, "as stated"
+    found = next((load_scenario(str(path)).wdyn for path in scenarios if path.is_file()), None)
+    return None if found is None else (found, CONTROLLER)
 
 
 def files_of(asked: IdentifyRequest) -> tuple[Path, ...]:

@@ -7,8 +7,11 @@ import numpy as np
 
 from idbench.identify import Array, Chain
 
+CONTROLLER = "of the scenario's controller"
+"""Source of a bandwidth that a run states."""
+
 MOST = 0.99
-"""Share of the velocities' power up to whose frequency a motion goes."""
+"""Share of the power of the velocities below the bandwidth of a motion."""
 
 
 @dataclass(frozen=True)
@@ -43,13 +46,15 @@ class Rates:
         return f"wdyn {self.wdyn:.3g} Hz ({self.source}); {', '.join(each)}, n_d {self.step}, rows {self.rows}"
 
     def summary(self) -> dict[str, Any]:
-        """Return what summary.json says of them."""
+        """Return the rates as summary.json has them."""
         return {"wdyn": self.wdyn, "source": self.source, "fs": self.fs, "wfp": self.wfp, "wfq": self.wfq, "n_d": self.step}
 
 
 def moved(qd: Array, fs: float) -> float:
-    """Return up to which frequency [Hz] velocities, shape (joint, time), have `MOST` of their power, of the fastest joint."""
-    power = np.cumsum(np.abs(np.fft.rfft(qd - qd.mean(axis=-1, keepdims=True))) ** 2, axis=-1)
-    share = power / np.maximum(power[..., -1:], np.finfo(float).tiny)
-    first = np.argmax(share >= MOST, axis=-1)
-    return max(float(np.fft.rfftfreq(qd.shape[-1], 1 / fs)[first].max()), fs / qd.shape[-1])
+    """Return the frequency [Hz] below which velocities, shape (joint, time), have `MOST` of their power, of all joints.
+
+    Joints that hardly move do not count: theirs is the power of the encoder's noise.
+    """
+    power = np.cumsum(np.sum(np.abs(np.fft.rfft(qd - qd.mean(axis=-1, keepdims=True))) ** 2, axis=0))
+    first = int(np.argmax(power >= MOST * power[-1]))
+    return max(float(np.fft.rfftfreq(qd.shape[-1], 1 / fs)[first]), fs / qd.shape[-1])

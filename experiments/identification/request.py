@@ -53,12 +53,12 @@ class Request:
     """Speeds up to which joints count as standing or turning, of all or of each [rad/s, m/s]; by default they follow the
     log."""
 
-    wdyn: float | None = None
-    """Bandwidth of the position loop [Hz]; by default that of the loops, if there are any."""
+    wdyn: tuple[float, str] | None = None
+    """Bandwidth of the position loop [Hz], and its source; by default that of the loops, if there are any."""
 
     def __post_init__(self) -> None:
-        if self.wdyn is not None and not 0 < self.wdyn < np.inf:
-            raise ExperimentError(f"--wdyn {self.wdyn:g} must be above 0 [Hz], and finite")
+        if self.wdyn is not None and not 0 < self.wdyn[0] < np.inf:
+            raise ExperimentError(f"--wdyn {self.wdyn[0]:g} must be above 0 [Hz], and finite")
         _ = self.robot_model.basis, self.processing, self.solver, [MODELS.create(name) for name in self.models]
         if self.mask_speed and not isinstance(self.processing.mask, ReversalMask):
             raise ExperimentError(

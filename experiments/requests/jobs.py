@@ -47,8 +47,8 @@ class IdentifyRequest(LogRequest):
     """explicit, implicit, power, energy (power over windows), integral (implicit over windows), all, or MODULE:CLASS of your
     own. Default: the first three; for robots of many joints the screen shows the best one."""
     wdyn: float | None = None
-    """Bandwidth of the position loop [Hz], in whose multiples sampling and filters are stated. Default: that of the run, else
-    the frequency up to which the motion goes."""
+    """Bandwidth of the position loop [Hz]; sampling and filter frequencies are printed as multiples of it. Default: that of
+    the controller of a run's folder, else the bandwidth of the motion."""
     loop: Scenarios = ()
     """Scenario of the control loop of each log, for IV, DIDIM, CLIE and CLOE: robot, motion, controller, timing, drive.
     Default: that of the run's folder."""
@@ -188,8 +188,8 @@ class RunRequest:
     chain: str = CHAIN
     """Chain of signal processing, or MODULE:NAME of your own."""
     estimator: str = ESTIMATOR
-    """GLS, ML, ML-delay, ML-reversals, OLS, WLS, IRLS, TLS, RLS, IV, DIDIM, CLIE, CLOE, OE, UKF, or a plug-in; see
-    docs/estimators.md."""
+    """GLS, ML, ML-delay, ML-reversals, OLS, OLS-selected, WLS, IRLS, TLS, RLS, IV, DIDIM, CLIE, CLOE, OE, UKF, or a plug-in;
+    see docs/estimators.md."""
     start: Start = "least-squares"
     """Where estimators that simulate or filter start: at the least-squares estimate, or at the robot's file."""
     consistent: Consistency = "no"

@@ -108,5 +108,5 @@ class LogRequest:
     cutoff: Hertz = None
     """Cut-off of the low-pass [Hz]. Default: 5, or what a short log needs."""
     estimator: str = ESTIMATOR
-    """GLS, ML, ML-delay, ML-reversals, OLS, WLS, IRLS, TLS, RLS, IV, DIDIM, CLIE, CLOE, OE, UKF, or a plug-in; see
-    docs/estimators.md."""
+    """GLS, ML, ML-delay, ML-reversals, OLS, OLS-selected, WLS, IRLS, TLS, RLS, IV, DIDIM, CLIE, CLOE, OE, UKF, or a plug-in;
+    see docs/estimators.md."""

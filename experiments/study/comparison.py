@@ -62,7 +62,7 @@ def _difference(a: Cell, b: Cell, draws: int) -> Difference:
         return Difference(a, b, 1.0, 1.0, 0)
     known = a.relative & b.relative
     one, other = a.error[mine][:, known] ** 2, b.error[theirs][:, known] ** 2
-    gap = float(_ln_typical(one.mean(axis=0)) - _ln_typical(other.mean(axis=0)))
+    gap = float(ln_typical(one.mean(axis=0)) - ln_typical(other.mean(axis=0)))
     better, worse = (a, b) if gap <= 0 else (b, a)
     return Difference(better, worse, float(np.exp(abs(gap))), _probability(one, other, abs(gap), draws), len(mine))
 
@@ -85,11 +85,11 @@ def _probability(one: Array, other: Array, gap: float, draws: int) -> float:
     middle, half = (one + other).mean(axis=0) / 2, (one - other) / (2 * len(one))
     while drawn < draws and count < ENOUGH:
         swapped = (1.0 - 2.0 * rng.integers(0, 2, (TOGETHER, len(one)), dtype=np.int8)) @ half
-        gaps = _ln_typical(middle + swapped) - _ln_typical(middle - swapped)
+        gaps = ln_typical(middle + swapped) - ln_typical(middle - swapped)
         count, drawn = count + int(np.count_nonzero(np.abs(gaps) >= gap * (1 - 1e-9))), drawn + TOGETHER
     return count / drawn
 
 
-def _ln_typical(squares: Array) -> Array:
+def ln_typical(squares: Array) -> Array:
     """Return the logarithm of the typical error of mean squares, shape (..., p)."""
     return np.asarray(np.mean(np.log(np.maximum(squares, MIN_ERROR**2)), axis=-1) / 2)

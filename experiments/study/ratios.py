@@ -8,9 +8,9 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from idbench.experiments.study.answer import combination
-from idbench.experiments.study.statistics import CONFIDENCE, MIN_ERROR, Cell
+from idbench.experiments.study.comparison import ln_typical
+from idbench.experiments.study.statistics import CONFIDENCE, Cell
 from idbench.experiments.text import new_table
-from idbench.identify import Array
 
 DRAWS = 2000
 """Of a bootstrap: the ends of an interval are then known to some 3 % of its width."""
@@ -69,15 +69,13 @@ def ratio(cell: Cell, base: Cell) -> Ratio:
     known = cell.relative & base.relative
     squares = [each.error[index][:, known] ** 2 for each, index in ((cell, mine), (base, theirs))]
     counts = np.random.default_rng(0).multinomial(len(mine), np.full(len(mine), 1 / len(mine)), size=DRAWS) / len(mine)
-    low, high = np.exp(np.quantile(_gap(counts, *squares), [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2]))
-    value = np.exp(_gap(np.full(len(mine), 1 / len(mine)), *squares))
-    return Ratio(cell, base, float(value), float(low), float(high), len(mine))
-
-
-def _gap(share: Array, above: Array, below: Array) -> Array:
-    """Return ln of the ratio of typical errors, shape (...), of squares (run, p) with shares of the runs, shape (..., run)."""
-    one, other = (np.log(np.maximum(np.einsum("...r,rp->...p", share, x), MIN_ERROR**2)) for x in (above, below))
-    return np.asarray(np.mean(one - other, axis=-1) / 2)
+    # A product by einsum: its bits do not depend on the number of threads.
+    drawn, whole = (
+        np.subtract(*(ln_typical(np.einsum("...r,rp->...p", share, x)) for x in squares))
+        for share in (counts, np.full(len(mine), 1 / len(mine)))
+    )
+    low, high = np.exp(np.quantile(drawn, [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2]))
+    return Ratio(cell, base, float(np.exp(whole)), float(low), float(high), len(mine))
 
 
 def ratios(cells: Sequence[Cell]) -> Iterator[Ratio]:
@@ -126,20 +124,23 @@ def conclusion(found: Sequence[RatioRow]) -> str:
     implicit, power = (_of(found, pair) for pair in (["implicit", "explicit"], ["power", "explicit"]))
     words = []
     if implicit:
-        words.append(f"The implicit model's errors are {_span(implicit)} times the explicit model's")
+        words.append(
+            f"The implicit model's errors are {_span(implicit)} times the explicit model's, over {len(implicit)} "
+            "combinations of noise, chain and estimator"
+        )
     if stated := [row for row in power if (row["chain"], row["estimator"]) == STATED]:
         of = {str(row["settings"].get("noise", "")): row for row in stated}
-        each = [f"{_interval(row)} {NOISES.get(noise, noise)}".rstrip() for noise, row in of.items()]
-        each = each if len(of) == len(stated) else [_span(stated)]
+        each = [f"{interval(row)} times {NOISES.get(noise, noise)}".rstrip() for noise, row in of.items()]
+        each = each if len(of) == len(stated) else [f"{_span(stated)} times"]
         words.append(
-            f"With equal numbers of rows, the power model's are, for ordinary least squares in chain {STATED[0]}, "
-            f"{', '.join(each)} times as large"
+            "With equal numbers of rows and ordinary least squares in chain "
+            f"{STATED[0]}, the power model's are {', '.join(each)}"
         )
     elif power:
         words.append(f"With equal numbers of rows, the power model's are {_span(power)} times as large")
     if stated and (weighted := _of(power, ["power", "explicit"], estimator="GLS")):
         best, worst = (pick(weighted, key=lambda row: row["ratio"]) for pick in (min, max))
-        words[-1] += f"; for generalized least squares {_interval(best)} to {_interval(worst)}"
+        words[-1] += f"; with generalized least squares {interval(best)} to {interval(worst)} times"
     return " ".join(f"{sentence}." for sentence in words)
 
 
@@ -149,8 +150,9 @@ def _of(found: Sequence[RatioRow], pair: list[str], **given: str) -> list[RatioR
 
 def _span(rows: Sequence[RatioRow]) -> str:
     low, high = (pick(row["ratio"] for row in rows) for pick in (min, max))
-    return f"{low:.2g} to {high:.2g}, over {len(rows)} combinations of noise, chain and estimator,"
+    return f"{low:.2g} to {high:.2g}"
 
 
-def _interval(row: RatioRow) -> str:
+def interval(row: RatioRow) -> str:
+    """Return a ratio with its interval, in words."""
     return f"{row['ratio']:.2g} ({row['low']:.2g} to {row['high']:.2g})"

@@ -83,10 +83,10 @@ class Study:
     data: Literal["simulated", "ideal"] = "simulated"
     """simulated: closed loops; ideal: robots that follow their motions exactly, with exact sensors."""
     realizations: Annotated[Whole, Field(ge=1)] = 1
-    """Logs of every run: its motion, realized so often with other noise, and identified in one fit."""
+    """Logs of every run: the same motion, repeated with independent noise, in one fit."""
     rows: Literal["own", "equal"] = "own"
-    """equal: models with one row per instant, power and energy, have as many more logs as the others have rows, so that all
-    have as many rows; own: all have the same logs."""
+    """equal: models with one row per instant, power and energy, get n times the logs of n joints, and all models leave out
+    the same time at the ends of a log; own: all models get the same logs."""
 
     def __post_init__(self) -> None:
         if not self.axes:

@@ -33,8 +33,13 @@ class Operations:
     """Columns that are still to be differentiated."""
 
     def __str__(self) -> str:
-        more = f", {self.differentiated} derivatives" if self.differentiated else ""
-        return f"{self.multiplications} multiplications, {self.additions} additions{more}"
+        counts = {
+            "multiplications": self.multiplications,
+            "additions": self.additions,
+            "functions": self.functions,
+            "derivatives": self.differentiated,
+        }
+        return ", ".join(f"{count} {name}" for name, count in counts.items() if count)
 
     @property
     def total(self) -> int:
@@ -47,7 +52,7 @@ def operations(basis: Basis, model: str) -> Operations:
 
     The basis computes its columns once with symbols in the place of numbers, so that zeros and ones of the robot vanish, as
     in customized symbolic models (W. Khalil and J.-F. Kleinfinger, IEEE Journal of Robotics and Automation 3 (1987) 517-526).
-    Signs, and sizes of velocities, cost nothing.
+    Signs and absolute values cost nothing, and neither does a law that is linearized about an estimate.
 
     Examples
     --------
@@ -58,7 +63,7 @@ def operations(basis: Basis, model: str) -> Operations:
     tape = _Tape()
     signals = (np.array([[tape.value("input", f"{name}{j}")] for j in range(basis.n)]) for name in ("q", "qd", "qdd"))
     q, qd, qdd = signals
-    state = State(q, qd, lambda _: qdd)
+    state = State(q, qd, lambda _: qdd, {"temperature": q, "payload": q[:1]})
     columns = {what: list(_columns(basis, state, what)) for what in COLUMNS[model]}
     counts = tape.counts([symbol for each in columns.values() for symbol in each])
     held = sum(len(columns.get(what, ())) for what in ("momentum", "energy"))
@@ -108,11 +113,16 @@ class _Symbol:
     def __neg__(self) -> "_Symbol":
         return self.tape.value("-", self.number)
 
-    def __truediv__(self, other: float) -> Any:
+    def __truediv__(self, other: Any) -> Any:
         return self * (1 / other)
 
-    def __pow__(self, power: int) -> Any:
-        return self if power == 1 else self * self ** (power - 1)
+    def __rtruediv__(self, other: float) -> Any:
+        return other * self.tape.value("function", "1 /", self.number)
+
+    def __pow__(self, power: float) -> Any:
+        if power in (1, 2, 3):
+            return self if power == 1 else self * self ** (power - 1)
+        return self.tape.value("function", f"** {power}", self.number)
 
     def __abs__(self) -> "_Symbol":
         return self
@@ -120,8 +130,12 @@ class _Symbol:
     def __gt__(self, other: Any) -> bool:
         return True
 
+    __ge__ = __gt__
+
     def __lt__(self, other: Any) -> bool:
         return False
+
+    __le__ = __lt__
 
     def __getattr__(self, name: str) -> Callable[[], "_Symbol"]:
         """Return what a function of NumPy, such as `numpy.cos`, calls of an object."""
@@ -130,8 +144,9 @@ class _Symbol:
         return lambda: self.tape.value("function", name, self.number)
 
 
-def _key(x: Any) -> int | float:
-    return x.number if isinstance(x, _Symbol) else float(x)
+def _key(x: Any) -> int | str:
+    """Return the number of a symbol, or a constant as text."""
+    return x.number if isinstance(x, _Symbol) else repr(float(x))
 
 
 @final

@@ -150,7 +150,8 @@ class _Slope:
         free = ~held & np.isfinite(self.found) & (self.expected > 0)
         both = free[..., :, None] & free[..., None, :]
         bend = np.where(both, self.bend * squares[..., :, None] * squares[..., None, :], 0.0)
-        own = np.where(free, np.diagonal(bend, axis1=-2, axis2=-1), 1.0)
+        diagonal = np.diagonal(bend, axis1=-2, axis2=-1)
+        own = np.where(free & (diagonal > 0), diagonal, 1.0)  # of levels that show nowhere nothing bends
         bend = bend + (~free + RIDGE * own)[..., :, None] * np.eye(bend.shape[-1])
         slope = np.where(free, (self.found - self.expected) * squares, 0.0)
         step = np.linalg.solve(bend, slope[..., None])[..., 0]

@@ -147,7 +147,7 @@ class RandomPace(AbstractTrajectory):
     smallest_move: Positive = 0.1
     """Least distance of every joint in every move [rad]."""
     velocity: Positive = 7.0
-    """Largest speed [rad/s]; a motion that would be faster is none of the class."""
+    """Largest speed [rad/s]; a seed whose motion would be faster is refused."""
     seed: Seed = 0
     """The same seed gives the same motion."""
 
@@ -170,7 +170,10 @@ class RandomPace(AbstractTrajectory):
         points = np.zeros((count + 1, robot.n))
         for k in range(count + 1):
             points[k] = draw_waypoint(rng, around, points[max(k - 1, 0) : k], 0.0, self.smallest_move)
-        return at_rest(points, self.shortest + np.diff(edges) * self.period, self.rest)
+        found = at_rest(points, self.shortest + np.diff(edges) * self.period, self.rest)
+        if (fastest := float(found.peak_velocity.max())) > self.velocity:
+            raise ScenarioError(f"seed {self.seed} draws a motion of {fastest:.3g} rad/s, above velocity = {self.velocity:g}")
+        return found
 
 
 def room(robot: Robot) -> Array:

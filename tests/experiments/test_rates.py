@@ -14,6 +14,12 @@ def test_a_sine_moves_up_to_its_frequency():
     assert moved(np.stack([np.sin(2 * np.pi * 0.5 * t), np.cos(2 * np.pi * 3.0 * t)]), 100.0) == pytest.approx(3.0, abs=0.05)
 
 
+def test_a_joint_at_rest_does_not_count():
+    """Its velocity is the noise of its encoder, which has power up to half the sampling frequency."""
+    t, rng = np.arange(0, 20, 0.01), np.random.default_rng(0)
+    assert moved(np.stack([np.sin(2 * np.pi * 0.5 * t), 1e-3 * rng.standard_normal(t.size)]), 100.0) < 1.0
+
+
 def test_a_scenario_states_the_bandwidth_of_its_controller():
     """15 rad/s are 2.39 Hz."""
     assert load_scenario("ideal").wdyn == pytest.approx(15 / (2 * np.pi))

@@ -22,7 +22,7 @@ from idbench.identify import (
 from idbench.identify.noise.band_matrix import BandMatrix, Cholesky
 from idbench.identify.noise.noisy_rows import NoisyRows
 from idbench.identify.noise.propagation import NoiseLevels
-from idbench.identify.noise.restricted_likelihood import likely_levels
+from idbench.identify.noise.restricted_likelihood import _Slope, likely_levels
 from idbench.identify.noise.row_weights import unbiased, with_more_noise
 from idbench.identify.rows import rows
 
@@ -221,3 +221,11 @@ def test_levels_that_begin_at_nothing_are_found(log):
     (part,) = problem.parts
     levels = likely_levels([part.unbiased], [part.noisy], nothing)
     np.testing.assert_allclose(levels.torque, problem.likely_noise.torque, rtol=0.03)
+
+
+def test_levels_that_show_nowhere_do_not_end_the_search():
+    """Average information of a level without effect is zero: no Newton step divides by it."""
+    slope = _Slope(np.array([2.0, 0.0]), np.array([1.0, 1e-300]), np.diag([4.0, 0.0]), np.zeros((1, 2)))
+    step = slope.newton(np.ones(2), np.zeros(2))
+    assert np.isfinite(step).all()
+    assert step[0] > 1

@@ -16,7 +16,9 @@ from idbench.experiments.judgement.warnings import FILE, warnings_of_robot
 from idbench.experiments.reports.budget import Budget
 from idbench.experiments.results.page import new_page
 from idbench.experiments.text import new_table, print_titled
-from idbench.identify.basis.operations import COLUMNS, operations
+from idbench.identify import Basis
+from idbench.identify.basis.operations import COLUMNS, Operations, operations
+from idbench.identify.blame import is_mistake
 from idbench.sim.errors import BenchError
 from idbench.sim.trajectories import RandomMoves
 
@@ -57,7 +59,7 @@ def _summary(robot_model: RobotModel, truth: dict[str, float]) -> dict[str, Any]
             {"name": p.name, "unit": p.unit, "kind": p.kind, "joint": p.joint, "value": truth[p.name]}
             for p in robot_model.basis.parameters
         ],
-        "operations": {model: asdict(operations(robot_model.basis, model)) for model in COLUMNS},
+        "operations": {model: asdict(counts) for model, counts in _operations(robot_model.basis).items()},
         "made_of": robot_model.grouping.groupings,
     }
 
@@ -85,9 +87,19 @@ def _print_parameters(page: Console, robot_model: RobotModel, truth: dict[str, f
     print_titled(page, f"{len(basis.names)} parameters that a motion can identify", grid)
     if base.without_effect:
         page.print(Text(f"no motion excites {', '.join(base.without_effect)}"), soft_wrap=True)
-    counts = {model: operations(basis, model) for model in COLUMNS}
-    page.print(Text(f"operations per sample: {'; '.join(f'{model} {x}' for model, x in counts.items())}"), soft_wrap=True)
+    if counts := _operations(basis):
+        page.print(Text(f"operations per sample: {'; '.join(f'{model} {x}' for model, x in counts.items())}"), soft_wrap=True)
     page.print()
+
+
+def _operations(basis: Basis) -> dict[str, Operations]:
+    """Return the operations of each model's columns; none where a law or block cannot be evaluated on symbols."""
+    try:
+        return {model: operations(basis, model) for model in COLUMNS}
+    except BaseException as error:  # whatever a plug-in does with what is no number
+        if not is_mistake(error):
+            raise
+        return {}
 
 
 def _print_budget(page: Console, budget: Budget) -> None:

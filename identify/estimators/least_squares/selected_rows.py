@@ -13,6 +13,7 @@ from idbench.identify.estimators.estimator import AbstractEstimator, Need
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.simulating.row_products import with_weights
 from idbench.identify.estimators.solution import Given
+from idbench.identify.rows.operators.windows import AbstractWeakForm
 
 RIDGE = 1e-9
 """Initial information about every parameter, as a share of that of all rows; it regularizes the first p selections."""
@@ -25,7 +26,8 @@ class SelectedRows(AbstractEstimator):
 
     The energy model's sampling times ta and tb are free; [15, 18] of the paper choose them for a well-conditioned W. Rows are
     selected greedily: each adds most to ln det(W' W), which is the one with the largest w' M^-1 w, where M is the sum of w w'
-    so far. Rows that overlap it are excluded. It needs overlapping windows: `Windows(length, spacing)`.
+    so far. Rows that overlap it are excluded. It needs overlapping windows, such as `Windows(length, spacing)`; where none
+    overlap, all are selected. The number of rows and Cond(W) of the estimate are those of all windows.
     """
 
     acronym: ClassVar[str] = "OLS"
@@ -40,14 +42,20 @@ class SelectedRows(AbstractEstimator):
 
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate of every run."""
-        rows, operator = problem.rows, problem.own_chain.operator
-        apart = getattr(operator, "length", 0.0) if self.apart is None else self.apart
+        rows = problem.rows
+        apart = _length(problem) if self.apart is None else self.apart
         starts = np.concatenate([np.full(len(part.time) * rows.kinds, k) for k, part in enumerate(rows.maps)])
         weight = np.zeros(rows.Y.shape)
         for run in np.ndindex(rows.Y.shape[:-1]):
             weight[run] = selected(rows.W[run], rows.valid[run], rows.time, starts, apart)
         found = with_weights(rows.Y, rows.W, weight)
         return Estimate(problem, frozen(found.X), frozen(found.covariance), Given(found.G))
+
+
+def _length(problem: Problem) -> float:
+    """Return the length of the windows [s]; 0 of rows that are no integrals, all of which are then selected."""
+    operator, fs = problem.own_chain.operator, problem.logs[0].fs
+    return (len(operator.kernels(fs).integral) - 1) / fs if isinstance(operator, AbstractWeakForm) else 0.0
 
 
 def selected(W: Array, valid: npt.NDArray[np.bool_], time: Array, log: Array, apart: float) -> npt.NDArray[np.bool_]:
@@ -64,6 +72,9 @@ def selected(W: Array, valid: npt.NDArray[np.bool_], time: Array, log: Array, ap
     apart : float
         Minimum time between selected samples [s]; the rows of one sample are selected one by one.
     """
+    gaps = np.diff(time)[(np.diff(log) == 0) & (np.diff(time) > 0)]
+    if not len(gaps) or gaps.min() >= apart * (1 - 1e-9):
+        return valid.copy()
     size = np.sqrt(np.sum(W**2, axis=0))
     W = W / np.where(size > 0, size, 1.0)
     inverse = np.eye(W.shape[1]) / RIDGE

@@ -1,4 +1,4 @@
-"""Integrals over consecutive windows."""
+"""Integrals over windows."""
 
 from abc import abstractmethod
 from dataclasses import dataclass
@@ -86,7 +86,7 @@ class AbstractWeakForm(AbstractOperator):
 @final
 @dataclass(frozen=True)
 class Windows(AbstractWeakForm):
-    """Integrals over consecutive windows [ta, tb]: power becomes the energy model (Eq. 11, 20), implicit its integral form."""
+    """Integrals over windows [ta, tb]: power becomes the energy model (Eq. 11, 20), implicit its integral form."""
 
     length: float = 0.1
     """Tb - ta [s]; the paper's n_d / fs."""

@@ -5,13 +5,14 @@ import pytest
 
 from idbench.experiments.errors import StudyError
 from idbench.experiments.study.axis import Axis
-from idbench.experiments.study.ratios import ratio
+from idbench.experiments.study.ratios import conclusion, ratio
 from idbench.experiments.study.shard import run_shard
 from idbench.experiments.study.statistics import Cell
 from idbench.experiments.study.study_file import study_from
 from idbench.identify import MODELS, ExplicitModel, PowerModel, idbench_chain, identify, identify_each, scara
 from idbench.identify.models import THREE, OverWindows
 from idbench.identify.rows.operators import Windows
+from idbench.sim.errors import ScenarioError
 
 EVERY = ["explicit", "implicit", "power", "energy", "integral"]
 
@@ -128,3 +129,50 @@ def test_a_ratio_of_known_errors_lies_in_its_interval():
         assert found.low < found.value < found.high
         inside += found.low <= 3.0 <= found.high
     assert inside >= 50  # of 60, 57 are expected, with a standard deviation of 1.7
+
+
+def test_models_of_equal_rows_leave_out_the_same_time(content):
+    """The filter of the paper's chain remembers longer than a window: the energy model does not get more of the log."""
+    study = study_from(
+        {**content, "seeds": 2, "models": EVERY, "rows": "equal", "chains": ["paper"], "axes": content["axes"][:1]}
+        | {"settings": content["settings"] | {"trajectory": content["settings"]["trajectory"] | {"moves": 8}}},
+        "study",
+    )
+    found = {row["model"]: row["rows"] for row in run_shard(study, range(1)).rows}
+    assert len(set(found.values())) == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"data": "ideal"}, "a scenario with encoder"),
+        ({"data": "ideal", "realizations": 2}, "ideal logs of a motion are all the same"),
+        ({"axes": [{"field": "model", "cases": {"a": {}, "b": {"fs": 50.0}}}]}, "column of the results"),
+        ({"axes": [{"field": "ZZR1", "cases": {"a": {}, "b": {"fs": 50.0}}}]}, "which is a parameter"),
+        ({"axes": [{"field": "", "values": [1]}]}, "field is empty"),
+        ({"axes": [{"field": "x", "cases": {"a": {"fs": 50.0}}}, {"field": "fs", "values": [50.0]}]}, "two axes vary fs"),
+        ({"axes": [{"field": "x", "cases": {"a": {"trajectory": {"seed": 5}}}}]}, "which a study draws itself"),
+    ],
+)
+def test_cases_and_ideal_data_are_checked(content, change, message):
+    with pytest.raises((StudyError, ScenarioError), match=message):
+        study_from({**content, **change}, "study")
+
+
+def test_a_case_is_not_changed_by_another_axis(content):
+    """A study that is read again is the same, whatever its points were changed to."""
+    cases = {"a": {"controller": {"kind": "computed_torque"}}, "b": {}}
+    axes = [{"field": "law", "cases": cases}, {"field": "controller.bandwidth", "values": [[9.0], [20.0]]}]
+    study = study_from({**content, "axes": axes}, "study")
+    before = study.text
+    assert len(study.points) == 4
+    assert study_from(study.content, "study").text == before
+    assert cases == {"a": {"controller": {"kind": "computed_torque"}}, "b": {}}
+
+
+def test_the_sentences_need_no_chain_or_estimator_of_their_own():
+    """Whatever a study has of the ratios is said, and nothing else."""
+    row = {"settings": {"noise": "quiet"}, "chain": "paper", "estimator": "GLS", "ratio": 2.0, "low": 1.5, "high": 3.0}
+    assert conclusion([]) == ""
+    assert "2 to 2 times" in conclusion([row | {"models": ["power", "explicit"]}])
+    assert "no advantage" not in conclusion([row | {"models": ["implicit", "explicit"], "ratio": 0.3}])
