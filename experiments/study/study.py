@@ -138,7 +138,7 @@ class Study:
                 "motion = 'shared': use motion = 'drawn'": self.motion == "shared",
                 f"{' and '.join(given[:-1])}: ideal logs of a motion are all the same": len(given) > 1,
             }
-            spoiled = [name for point in self._points() for name in imperfections_of(point.scenario)]
+            spoiled = [name for point in self._points() for name in point.scenario.imperfections]
             refused[f"a scenario with {spoiled[0] if spoiled else ''}, which ideal logs do not have"] = bool(spoiled)
         if found := [what for what, wrong in refused.items() if wrong]:
             raise StudyError(f"{given[-1]} does not go with {found[0]}")
@@ -290,14 +290,6 @@ class Study:
         plain = {key: getattr(self, key) for key in PLAIN}
         lists = {key: list(getattr(self, key)) for key in ("models", "chains", "estimators", "friction")}
         return {**plain, **lists, "axes": axes, "scenario": self.scenario}
-
-
-def imperfections_of(scenario: Scenario) -> Iterator[str]:
-    """Yield the parts of a scenario that are not ideal: of drives, encoders, torques, frictions, times."""
-    ideal = Scenario("ideal", scenario.trajectory, scenario.robot)
-    for part in ("drive", "ripple", "encoder", "torque", "friction", "timing", "payload"):
-        if getattr(scenario, part) != getattr(ideal, part):
-            yield part
 
 
 def _random(scenario: Scenario) -> RandomMoves | RandomPace | RandomSteps:

@@ -109,6 +109,13 @@ class Scenario:
         return Robot.load(self.robot)
 
     @property
+    def imperfections(self) -> list[str]:
+        """The parts of the scenario that are not ideal."""
+        ideal = Scenario("ideal", self.trajectory, self.robot)
+        parts = ("drive", "ripple", "encoder", "torque", "friction", "timing", "payload")
+        return [part for part in parts if getattr(self, part) != getattr(ideal, part)]
+
+    @property
     def wdyn(self) -> float | None:
         """The bandwidth of the position loop, that of its fastest joint [Hz]; None where the controller closes none."""
         w = self.controller.wdyn(self.real_robot.n)
