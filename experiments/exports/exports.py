@@ -97,7 +97,7 @@ def standard_of(fit: Fit, model: str) -> dict[str, float]:
     values: Array = np.zeros(len(grouping.standard.names))
     for parameter, x in zip(estimate.problem.basis.parameters, estimate.X, strict=True):
         values[grouping.standard.places[parameter]] = x / parameter.scale
-    return dict(zip(grouping.standard.names, map(float, values), strict=True))
+    return robot_model.equal(dict(zip(grouping.standard.names, map(float, values), strict=True)))
 
 
 def require_known(robot_model: RobotModel, target: object) -> None:

@@ -45,7 +45,7 @@ class WrittenRobot:
         without = {named("Ia", j): 0.0 for j in range(robot_model.basis.n)} if robot_model.asked.armature == "none" else {}
         for letters, law in (("Fv", "viscous"), ("Fs", "coulomb")):
             without |= {named(letters, j): 0.0 for j, own in enumerate(robot_model.laws.names) if law not in own}
-        return without | dict(zip(found.names, map(float, found.standard), strict=True))
+        return without | robot_model.equal(dict(zip(found.names, map(float, found.standard), strict=True)))
 
     def text(self, folder: Path | None = None) -> str:
         """Return the file, to stand in a folder; in that of the robot's own file by default."""

@@ -273,6 +273,8 @@ class Fit:
             "hidden": list(self.hidden),
             "mask_speed": list(self.request.mask_speed),
             "rates": self.rates.summary(),
+            **({"held": self.robot_model.held} if self.robot_model.asked.hold else {}),
+            **({"tied": list(self.robot_model.asked.tie)} if self.robot_model.asked.tie else {}),
             "cutoff": cutoff,
             "logs": [self._of_log(k) for k in range(len(self.logs.fitted))],
         }

@@ -1,19 +1,22 @@
 """The robot that is identified: its basis, its joints, and what is true of it where it is simulated."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Self, final
 
+import numpy as np
+
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.friction_laws import FrictionLaws, balancers, law_of
+from idbench.experiments.identification.known import Known
 from idbench.experiments.requests.shared import Parameters
-from idbench.identify import BLOCKS, AbstractJointLaw, BaseParameters, Basis, KinematicTree, tree_basis
+from idbench.identify import BLOCKS, AbstractJointLaw, BaseParameters, Basis, KinematicTree, SettingError, tree_basis
 from idbench.identify.parameters.base_parameters import in_letters_of_the_paper
 from idbench.identify.tables import html_table, text_table
 from idbench.sim.frictions import AbstractFrictionLaw
-from idbench.sim.robot.mounting import PLAIN, Mounting
+from idbench.sim.robot.mounting import PLAIN, Mounting, with_values
 from idbench.sim.robot.robot import FILES, Robot
 from idbench.sim.robot.tree import kinematic_tree, standard_parameters
 
@@ -48,7 +51,20 @@ class RobotModel:
     @cached_property
     def robot(self) -> Robot:
         """The robot as its file describes it, mounted as it is."""
-        return Robot.load(self.name) if self.mounting.plain else Robot.load(self.name, self.mounting.edit)
+        if self.mounting.plain and not self.asked.hold:
+            return Robot.load(self.name)
+        return Robot.load(self.name, self.mounting.edit, with_values(self.known.values))
+
+    @cached_property
+    def known(self) -> Known:
+        """Parameters that are known; ExperimentError if what is held makes no sense."""
+        return Known.of(self.asked.hold)
+
+    @cached_property
+    def held(self) -> dict[str, float]:
+        """Standard parameters that are held, by name."""
+        basis = self.grouping.standard
+        return {parameter.name: float(np.asarray(value)) for parameter, value in basis.held.items()}
 
     @cached_property
     def tree(self) -> KinematicTree:
@@ -63,8 +79,13 @@ class RobotModel:
     @cached_property
     def grouping(self) -> BaseParameters:
         """How its standard parameters are grouped; those of the SCARA in the letters of the paper."""
-        standard = self._with_laws(tree_basis(self.tree, self.laws.blocks()))
-        return BaseParameters.of(self.tree, standard, in_letters_of_the_paper(self.tree) if self.name == SCARA else None)
+        standard = self._tied(self._with_laws(tree_basis(self.tree, self.laws.blocks())))
+        written = in_letters_of_the_paper(self.tree) if self.name == SCARA else None
+        if not self.asked.hold:
+            return BaseParameters.of(self.tree, standard, written)
+        grouping = BaseParameters.of(self.tree, self.known.holding(standard, standard_parameters(self.robot)), written)
+        self.known.require(standard, grouping.basis)
+        return grouping
 
     @property
     def plain(self) -> Self:
@@ -102,6 +123,8 @@ class RobotModel:
     def basis(self) -> Basis:
         """What is identified."""
         whole = self.grouping.basis
+        if self.asked.hold:  # base parameters may be held, too
+            whole = Known((), self.known.values).holding(whole, self.grouping.values(standard_parameters(self.robot)))
         if missing := [name for name in self.asked.without if name not in whole.names]:
             laws = "" if self.laws.standard else f" with --friction {' '.join(self.asked.friction)}"
             raise ExperimentError(
@@ -117,6 +140,24 @@ class RobotModel:
         standard = standard_parameters(robot) | (friction.truth(robot) if friction else {})
         known = self.grouping.values(standard)
         return {name: known.get(name, 0.0) for name in self.basis.names}
+
+    def _tied(self, basis: Basis) -> Basis:
+        """Return a basis with the parameters tied that are said to be equal; ExperimentError if that makes no sense."""
+        ties = dict[str, str]()
+        for word in self.asked.tie:
+            name, equals, other = word.partition("=")
+            if not (name and equals and other) or name in ties:
+                raise ExperimentError(f"--tie {word}: write NAME=NAME, each name on the left once, as in Ia1=Ia4")
+            ties[name] = other
+        try:
+            return basis.tying(**ties) if ties else basis
+        except SettingError as error:
+            raise ExperimentError(f"--tie: {error}") from error
+
+    def equal(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return standard values with what is held, and what is tied to others, beside those that are given."""
+        tied = {p.name: values[other.name] for p, other in self.grouping.standard.tied.items() if other.name in values}
+        return {**self.held, **values, **tied}
 
     def _with_laws(self, basis: Basis) -> Basis:
         for name in self.asked.add:

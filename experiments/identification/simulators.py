@@ -66,7 +66,8 @@ class Fields:
         # Robot by robot: a product of all of them at once would have other bits for other numbers of robots.
         standard = given + np.matmul(self._back, (base - grouping.base(given))[..., None])[..., 0]
         try:
-            values = dict(zip(grouping.standard.names, standard.T, strict=True))
+            values: dict[str, Array] = dict(zip(grouping.standard.names, standard.T, strict=True))
+            values |= {p.name: values[other.name] for p, other in grouping.standard.tied.items() if other.name in values}
             return model_fields(self.robot, {name: x for name, x in values.items() if name in self._given})
         except BenchError as error:
             raise IdentificationError(f"a robot with these parameters cannot be simulated: {error}") from error

@@ -80,6 +80,10 @@ def _told(fit: Fit) -> Iterator[str]:
     ignored = f", which chain {fit.request.chain} ignores: it takes it as logged"
     logged = isinstance(fit.processing.alignment, AsLogged)
     yield str(fit.rates)
+    asked = fit.robot_model.asked
+    if asked.hold or asked.tie:
+        known = (("held", asked.hold), ("tied", asked.tie))
+        yield "; ".join(f"{what}: {', '.join(words)}" for what, words in known if words)
     yield f"torque: {channel.meaning}, delay {1e3 * channel.delay:.4g} ms{ignored if logged else ''}"
     if fit.delay is not None:
         delay, sigma = (1e3 * x for x in fit.delay)

@@ -24,6 +24,11 @@ class Parameters:
     """Friction laws in addition to viscous and Coulomb friction, such as offset, a constant torque of each joint."""
     without: Names = ()
     """Parameters to leave out, as if they were zero."""
+    hold: Annotated[tuple[str, ...], Word("NAME=VALUE")] = ()
+    """Known parameters, which are not identified: Ia3=0.1 Fs2=file, and links=file, armatures=file, friction=file for all of
+    a kind. Others are grouped without them: with known links each armature is a parameter of its own."""
+    tie: Annotated[tuple[str, ...], Word("NAME=NAME")] = ()
+    """Parameters that are equal, such as those of the same motor in two joints: Ia1=Ia4 Fv1=Fv4."""
     friction: Laws = ("standard",)
     """Friction laws: standard (viscous and Coulomb), none (torques measured at the links), asymmetric, or a sum such as
     standard+load+stribeck; for one joint: 2=standard+load. auto chooses those that predict held-out stretches best. `idbench

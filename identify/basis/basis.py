@@ -36,6 +36,8 @@ class Basis:
     """Joints that slide, from 0: their frictions and rotors have units of translation."""
     held: Mapping[Parameter, Array | float] = field(default_factory=dict)
     """Parameters that are known, shape (...): their torques are no part of W X, but stand in `HELD`."""
+    tied: Mapping[Parameter, Parameter] = field(default_factory=dict)
+    """Parameters that equal others, such as those of the same motor: their columns are added to those of the others."""
 
     def __post_init__(self) -> None:
         every = [parameter for block in self.blocks for parameter in block.parameters(self.n)]
@@ -68,7 +70,8 @@ class Basis:
     @cached_property
     def places(self) -> dict[Parameter, int]:
         """Where the parameters stand in X."""
-        return {parameter: k for k, parameter in enumerate(self.parameters)}
+        own = {parameter: k for k, parameter in enumerate(self.parameters)}
+        return own | {parameter: own[other] for parameter, other in self.tied.items() if other in own}
 
     def __add__(self, block: AbstractBlock) -> Self:
         kept = None if self.kept is None else (*self.kept, *block.parameters(self.n))
@@ -76,7 +79,7 @@ class Basis:
 
     def of(self, parameters: Sequence[Parameter]) -> Self:
         """Return the basis with these parameters alone, in this order; blocks are spared the work for others."""
-        asked = {*parameters, *self.held}
+        asked = {*parameters, *self.held, *(p for p, other in self.tied.items() if other in parameters)}
         blocks = (block.narrowed(asked) if isinstance(block, Narrowing) else block for block in self.blocks)
         there = tuple(block for block in blocks if asked.intersection(block.parameters(self.n)))
         return replace(self, blocks=there, kept=tuple(parameters))
@@ -103,6 +106,23 @@ class Basis:
         """Return the basis with parameters that are known to have these values, and are not identified."""
         held = {p: value / p.scale for p, value in zip(self.named(*values), values.values(), strict=True)}
         return replace(self, held={**self.held, **held}).without(*values)
+
+    def tying(self, **names: str) -> Self:
+        """Return the basis with parameters, by name, that equal others.
+
+        Raises
+        ------
+        SettingError
+            If there is no such parameter, one is tied to itself or to one that is tied, or the units of two differ.
+        """
+        ties = dict(zip(self.named(*names), self.named(*names.values()), strict=True))
+        for parameter, other in ties.items():
+            if parameter.unit != other.unit or parameter.kind != other.kind:
+                raise SettingError(f"{parameter.name} [{parameter.unit}] and {other.name} [{other.unit}] cannot be equal")
+            if other in ties:
+                raise SettingError(f"{parameter.name} is tied to {other.name}, which is tied itself: tie both to a third one")
+        kept = [parameter for parameter in self.parameters if parameter not in ties]
+        return replace(self, tied={**self.tied, **ties}).of(kept)
 
     def linearized_at(self, X: Array) -> Self:
         """Return the basis, linear about an estimate X, shape (..., p)."""
@@ -170,7 +190,8 @@ class Basis:
                     if np.shape(signal) != shape:
                         expect(block, f"{function} for {parameter.name}", signal, shape)
                     scale = self.parameters[place].scale
-                    total[row, place] = signal if scale == 1 else signal / scale
+                    column = signal if scale == 1 else signal / scale
+                    total[row, place] = total[row, place] + column if (row, place) in total else column
                 if parameter in held:
                     total[row, HELD] = total.get((row, HELD), 0.0) + np.asarray(held[parameter])[..., None] * signal
         return total

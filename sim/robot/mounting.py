@@ -1,13 +1,14 @@
 """How a robot is mounted and which of its joints a log has: a file describes more than a log shows."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import final
 
 import mujoco
 import numpy as np
 
+from idbench.identify.basis.block import named
 from idbench.identify.plugins import did_you_mean
 from idbench.sim.errors import RobotError
 from idbench.sim.robot.motors import Array
@@ -60,6 +61,24 @@ class Mounting:
             _hold(spec, joint, held[joint.name])
         for name, weights in self.couplings:
             _couple(spec, name, weights)
+
+
+FIELDS = {"Ia": "armature", "Fv": "damping", "Fs": "frictionloss"}
+"""Letters of parameters of a joint, and MuJoCo's attributes of joints that hold their values."""
+
+
+def with_values(values: Mapping[str, float | None]) -> Callable[[mujoco.MjSpec], None]:
+    """Return what gives the joints of a robot these armatures and frictions, by the parameter's name; None changes nothing."""
+
+    def edit(spec: mujoco.MjSpec) -> None:
+        for j, joint in enumerate(spec.joints):
+            for letters, field in FIELDS.items():
+                if (value := values.get(named(letters, j))) is not None:
+                    stated = np.array(getattr(joint, field), dtype=np.float64)
+                    stated.flat[0] = value  # damping is a polynomial of the velocity, the first coefficient of which is Fv
+                    setattr(joint, field, stated if stated.ndim else value)
+
+    return edit
 
 
 MIN_FACTOR, MAX_FACTOR = 1e-6, 1e6
