@@ -40,7 +40,11 @@ def test_what_is_known_makes_the_others_surer(run):
     assert held.parameters["Ia1"].value == pytest.approx(truth["Ia1"], abs=4 * held.parameters["Ia1"].sigma)
 
 
-@pytest.mark.parametrize("model", ["explicit", "implicit", "power", "energy", "integral"])
+SLOW = pytest.mark.thorough
+MODELS = [*("explicit", "power"), *(pytest.param(name, marks=SLOW) for name in ("implicit", "energy", "integral"))]
+
+
+@pytest.mark.parametrize("model", MODELS)
 def test_all_models_give_the_truth_with_a_known_parameter(model):
     """Noise-free: the torque of what is held is taken away, in every model."""
     ideal = idbench.simulate("ideal", seed=1)
@@ -112,7 +116,7 @@ def same_motors():
     return ideal_log(robot, moves.sample(robot, 100.0))
 
 
-@pytest.mark.parametrize("model", ["explicit", "implicit", "power", "energy"])
+@pytest.mark.parametrize("model", [MODELS[0], *MODELS[2:]])
 def test_what_is_tied_is_one_parameter(same_motors, model, tmp_path):
     fit = idbench.fit(same_motors, "scara", model=model, tie=("Fv2=Fv1", "Fs2=Fs1"))
     assert not {"Fv2", "Fs2"} & set(fit.parameters)

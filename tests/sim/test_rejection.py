@@ -7,7 +7,7 @@ import pytest
 
 from idbench.sim import load_scenario
 from idbench.sim.controllers import PID, ComputedTorque, PDFeedforward
-from idbench.sim.drives import AveragedDrive
+from idbench.sim.drives import AveragedDrive, IdealDrive
 from idbench.sim.engine.rejection import rejection
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.scenario.measurement import Ripple
@@ -20,7 +20,18 @@ def scenario():
     return replace(load_scenario("ripple"), drive=AveragedDrive(), trajectory=moves)
 
 
-@pytest.mark.parametrize("controller", [PDFeedforward(), PDFeedforward(bandwidth=(6.0, 30.0)), PID(), ComputedTorque()])
+SLOW = pytest.mark.thorough
+
+
+@pytest.mark.parametrize(
+    "controller",
+    [
+        PDFeedforward(),
+        pytest.param(PDFeedforward(bandwidth=(6.0, 30.0)), marks=SLOW),
+        pytest.param(PID(), marks=SLOW),
+        pytest.param(ComputedTorque(), marks=SLOW),
+    ],
+)
 def test_it_is_what_a_twin_without_ripple_does_not_command(scenario, controller):
     """While joints move: at rest friction holds what ripple would move, and the loop is linear about its motion otherwise."""
     with_it = replace(scenario, controller=controller)
@@ -34,10 +45,11 @@ def test_it_is_what_a_twin_without_ripple_does_not_command(scenario, controller)
     assert "joint1" in found.words(run.robots[0].joints, with_it.wdyn)
 
 
+@pytest.mark.thorough
 def test_a_fast_loop_rejects_more(scenario):
     slow, fast = (rejection(simulate(replace(scenario, controller=PDFeedforward(bandwidth=(w,))))) for w in (4.0, 40.0))
     assert (fast.rejected.std(axis=0) > 1.5 * slow.rejected.std(axis=0)).all()
 
 
 def test_without_ripple_there_is_nothing_to_reject(scenario):
-    assert rejection(simulate(load_scenario("ideal"))) is None
+    assert rejection(simulate(replace(scenario, ripple=Ripple(), drive=IdealDrive()))) is None
