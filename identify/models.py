@@ -37,11 +37,7 @@ class Equations:
     @cached_property
     def y(self) -> Array:
         """B tau, shape (..., row, time): torques [N m] or power [W]."""
-        q = self.signals.state.q
-        total = np.zeros((*q.shape[:-2], self.kinds, q.shape[-1]))
-        for (row, joint), B in self.B.items():
-            total[..., row, :] += self.signals.torque.times(B, joint)
-        return total
+        return torque_rows(self.B, self.signals)
 
     @cached_property
     def weight(self) -> Array:
@@ -76,6 +72,15 @@ class Equations:
     def predicted(self, X: Array) -> Array:
         """Return (c + s e) X at every sample, shape (..., row, time), for parameters of shape (..., p)."""
         return combined(self.rates, X, combined(self.c, X, np.zeros(self.y.shape)))
+
+
+def torque_rows(B: Multipliers, signals: Signals) -> Array:
+    """Return B tau of signals, shape (..., row, time)."""
+    q = signals.state.q
+    total = np.zeros((*q.shape[:-2], 1 + max(row for row, _ in B), q.shape[-1]))
+    for (row, joint), factor in B.items():
+        total[..., row, :] += signals.torque.times(factor, joint)
+    return total
 
 
 class AbstractModel(ABC):

@@ -181,4 +181,4 @@ def _moved(log: MotionLog, found: DelayEstimate) -> bool:
 
 def with_delay(log: MotionLog, found: DelayEstimate) -> MotionLog:
     """Return a log whose torques have a delay."""
-    return replace(log, torque=replace(log.torque, delay=found.delay))
+    return replace(log, torque=replace(log.torque, delay=found.delay, delay_sigma=found.sigma))

@@ -195,8 +195,8 @@ def with_delays(every: Sequence[ReadLog], request: Request) -> list[ReadLog]:
 
 def _delayed(read: ReadLog, found: DelayEstimate) -> ReadLog:
     logs = tuple(with_delay(log, found) for log in read.logs)
-    sure = f"{1e3 * found.delay:.4g} ms, sigma {1e3 * found.sigma:.2g} ms (not in the sigmas above)"
-    channel = replace(read.channel, delay=found.delay)
+    sure = f"{1e3 * found.delay:.4g} ms, sigma {1e3 * found.sigma:.2g} ms"
+    channel = replace(read.channel, delay=found.delay, delay_sigma=found.sigma)
     return replace(read, logs=logs, channel=channel, notes=(*read.notes, f"torque delay estimated from the log: {sure}"))
 
 

@@ -85,6 +85,10 @@ def _told(fit: Fit) -> Iterator[str]:
         known = (("held", asked.hold), ("tied", asked.tie))
         yield "; ".join(f"{what}: {', '.join(words)}" for what, words in known if words)
     yield f"torque: {channel.meaning}, delay {1e3 * channel.delay:.4g} ms{ignored if logged else ''}"
+    if channel.delay_sigma:
+        without = [name for name, estimate in fit.estimates.items() if not estimate.knows_delay]
+        but = f", but for {', '.join(without)}" if without else ""
+        yield f"the standard errors contain that of the delay, {1e3 * channel.delay_sigma:.2g} ms{but}"
     if fit.delay is not None:
         delay, sigma = (1e3 * x for x in fit.delay)
         words = f"delay found with the parameters: {delay:.4g} ms, sigma {sigma:.2g} ms"

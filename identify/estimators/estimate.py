@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,9 @@ from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.rows.factors import Factor, LeastSquaresFit, Status
 from idbench.identify.rows.rows import Rows
 from idbench.identify.tables import html_table, significant, text_table
+
+if TYPE_CHECKING:
+    from idbench.identify.data.motion_log import TorqueChannel
 
 
 def noise_covariance(problem: Problem, influence: Sequence[Array]) -> Array:
@@ -197,7 +200,31 @@ class Estimate:
     def covariance(self) -> Array:
         """Covariance of the error of X, calibrated where the noise of the logs is known, shape (..., p, p)."""
         known = np.isfinite(self.calibrated_covariance).all(axis=(-2, -1), keepdims=True)
-        return np.where(known, self.calibrated_covariance, self.own_covariance)
+        return np.where(known, self.calibrated_covariance, self.own_covariance) + self.delay_covariance
+
+    @property
+    def knows_delay(self) -> bool:
+        """Whether standard errors contain that of the delay: it is known how X follows from the rows, and these are kept."""
+        return self.solution is not None and not self.problem.long
+
+    @cached_property
+    def delay_covariance(self) -> Array:
+        """Covariance of the error of X due to that of the delays, shape (..., p, p); 0 where it is not known.
+
+        With X = G' Y and a delay that is off by d, X is off by G' (dY/d delay) d: logs with the same channel together.
+        """
+        total = np.zeros(self.own_covariance.shape)
+        if not (self.knows_delay and any(log.torque.delay_sigma for log in self.problem.logs)):
+            return total
+        assert self.solution is not None
+        slopes: dict[TorqueChannel, Array] = {}
+        for part, G in zip(self.problem.parts, self.solution.influence(self.problem.parts), strict=True):
+            channel = part.signals.log.torque
+            slope = np.sum(G * part.delay_slope[..., None], axis=-2) * channel.delay_sigma
+            slopes[channel] = slopes.get(channel, 0.0) + slope
+        for slope in slopes.values():
+            total = total + slope[..., :, None] * slope[..., None, :]
+        return total
 
     @property
     def standard_errors(self) -> Array:

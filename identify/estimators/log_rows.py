@@ -9,6 +9,7 @@ import numpy as np
 
 from idbench.identify.arrays import Array
 from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.models import torque_rows
 from idbench.identify.noise.covariance import BandedCovariance, Whitening
 from idbench.identify.noise.linearization import Linearization
 from idbench.identify.noise.noisy_rows import NoisyRows
@@ -22,6 +23,10 @@ if TYPE_CHECKING:
     from weakref import ref
 
     from idbench.identify.estimators.problem import Problem
+
+
+DELAY_STEP = 1e-4
+"""Half the difference of delays [s]: small beside a sample, large beside the rounding of an interpolation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +101,17 @@ class LogRows:
     def noisier(self) -> Signals:
         """The signals with more noise, which all models share."""
         return with_more_noise(self.signals, self.problem.position_noise) if self.explicit is None else self.explicit.noisier
+
+    @cached_property
+    def delay_slope(self) -> Array:
+        """The derivative of Y by the delay of the torques, by a central difference, shape (..., r) [1/s]."""
+        to_rows, log = self.rows.maps[0], self.signals.log
+
+        def measured(change: float) -> Array:
+            torque = replace(log.torque, delay=log.torque.delay + change)
+            return to_rows.measurement(torque_rows(to_rows.B, replace(self.signals, log=replace(log, torque=torque))))
+
+        return (measured(DELAY_STEP) - measured(-DELAY_STEP)) / (2 * DELAY_STEP)
 
     @cached_property
     def bias(self) -> Array:

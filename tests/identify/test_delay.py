@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from idbench.identify import (
+    ESTIMATORS,
+    MODELS,
     ExcitationError,
     LogError,
     MotionLog,
     SettingError,
     TorqueChannel,
     idbench_chain,
+    identify,
     paper_chain,
     scara,
 )
@@ -80,3 +83,39 @@ def test_what_cannot_be_estimated_is_told(log):
     still = MotionLog(log.fs, np.full_like(log.q, 0.5), log.tau, log.torque)
     with pytest.raises((ExcitationError, ValueError)):
         estimate_delay(still, scara())
+
+
+@pytest.mark.parametrize("model", ["explicit", "power", "integral"])
+def test_standard_errors_contain_that_of_the_delay(log, rng, model):
+    """The part of the covariance is d d' sigma^2, d being how the estimate moves with the delay, by fits at two of them.
+
+    Of least squares, whose weights do not depend on the delay.
+    """
+    noisy = MotionLog(log.fs, log.q, log.tau + [0.05, 0.0025] * rng.standard_normal(log.tau.shape), TorqueChannel("held"))
+
+    def fit(delay, sigma=0.0):
+        torque = TorqueChannel("held", delay, delay_sigma=sigma)
+        chosen = MODELS.create(model), ESTIMATORS.create("OLS")
+        return identify(replace(noisy, torque=torque), scara(), chosen[0], idbench_chain(), chosen[1])
+
+    plain, known = fit(0.001), fit(0.001, 5e-4)
+    moved = (fit(0.0011).X - fit(0.0009).X) / 2e-4
+    np.testing.assert_array_equal(plain.X, known.X)
+    added = np.sqrt(np.diag(known.covariance - plain.covariance))
+    np.testing.assert_allclose(added, 5e-4 * np.abs(moved), rtol=0.1, atol=0.02 * plain.standard_errors.min())
+    assert not plain.delay_covariance.any()
+
+
+def test_a_delay_of_several_logs_is_one_error(log):
+    """Two logs of the same channel are off together: their parts add before they are squared."""
+    torque = TorqueChannel("instantaneous", 0.001, delay_sigma=1e-3)
+    one, other = (replace(log, torque=torque), replace(log, torque=replace(torque, delay=0.001 + 1e-9)))
+    ols = ESTIMATORS.create("OLS")
+    same = identify([one, one], scara(), MODELS.create("explicit"), estimator=ols).delay_covariance
+    apart = identify([one, other], scara(), MODELS.create("explicit"), estimator=ols).delay_covariance
+    np.testing.assert_allclose(np.diag(same), 2 * np.diag(apart), rtol=1e-3)
+
+
+def test_a_delay_without_a_size_of_its_error_is_refused():
+    with pytest.raises(SettingError, match="delay_sigma"):
+        TorqueChannel("held", delay_sigma=-1e-3)
