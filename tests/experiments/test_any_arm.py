@@ -11,7 +11,7 @@ from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.judgement.held_out import on_log
-from idbench.identify import MODELS
+from idbench.identify.models import THREE
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import standard_parameters
@@ -36,7 +36,7 @@ def arm(request):
     return on_log(fit(Request(robot_model), Logs((log,), truth=robot_model.truth(robot_model.robot))), "second", unseen)
 
 
-@pytest.mark.parametrize("model", MODELS.builtin)
+@pytest.mark.parametrize("model", THREE)
 def test_well_excited_base_parameters_are_true_within_2_percent(arm, model):
     """Well excited: sigma is below 1 % of the value. Of the PUMA's 52, 16 are zero and have no relative error, which leaves six
     in ten; the power model, with a single row per instant, fewer.
@@ -52,7 +52,7 @@ def test_well_excited_base_parameters_are_true_within_2_percent(arm, model):
     assert 0.5 < np.sqrt(np.mean(errors**2)) < 1.5  # of 52, whose errors go together: 0.6 to 1.4 over rates and motions
 
 
-@pytest.mark.parametrize("model", MODELS.builtin)
+@pytest.mark.parametrize("model", THREE)
 def test_torques_of_an_unseen_motion_are_foretold_within_1_percent(arm, model):
     found = arm.torques[model]
     assert found.percent.max() < 1
@@ -65,7 +65,7 @@ def test_torques_of_an_unseen_motion_are_foretold_within_1_percent(arm, model):
 
 def test_the_identified_robot_repeats_the_unseen_motion(arm):
     """Held by a loop of 5 rad/s to a log of encoders with 4.8e-5 rad: it stays within a few counts."""
-    for model in MODELS.builtin:
+    for model in THREE:
         assert arm.position_error(model).max() < 3e-4, model
 
 
@@ -95,7 +95,7 @@ def test_the_scara_as_a_tree_says_what_its_closed_form_says(log):
     """From the same log, by file and by name: the parameters that mean the same are the same."""
     by_file = fit(Request(RobotModel(str(Robot.path("scara")))), Logs((log,)))
     by_name = fit(Request(RobotModel("scara")), Logs((log,)))
-    for model in MODELS.builtin:
+    for model in THREE:
         tree = dict(zip(by_file.basis.names, by_file.estimates[model].X, strict=True))
         form = dict(zip(by_name.basis.names, by_name.estimates[model].X, strict=True))
         for name in ("ZZR1", "Fv1", "Fs1", "ZZ2", "Fv2", "Fs2"):

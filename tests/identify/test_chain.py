@@ -31,6 +31,7 @@ from idbench.identify import (
     paper_chain,
     scara,
 )
+from idbench.identify.models import THREE
 from idbench.sim.engine.run import ideal_log
 
 CHANNELS = [
@@ -202,7 +203,7 @@ def test_the_halo_counts_every_stage():
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("model", MODELS.builtin)
+@pytest.mark.parametrize("model", THREE)
 def test_logging_faster_does_not_make_a_coarse_encoder_worse(model, table1, truth):
     """16 bits at 5 kHz: differences over samples would be 50 times noisier than at 100 Hz, and errors above 100 %."""
     fast = ideal_log(table1.robot, table1.scenario.trajectory.points.sample(5000.0))
