@@ -6,6 +6,7 @@ from idbench.experiments.contracts.contract import Example
 from idbench.experiments.contracts.contracts import CONTRACTS, kept
 from idbench.experiments.plugin_tables import TABLES
 from idbench.identify import BLOCKS, CHAINS, MODELS, Basis, identify, scara
+from idbench.identify.models import THREE
 
 EVERY = [f"{table.point}/{name}" for table in TABLES for name in table.builtin]
 
