@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -11,15 +11,13 @@ import numpy.typing as npt
 from idbench.identify.arrays import Array, frozen
 from idbench.identify.errors import PluginError
 from idbench.identify.estimators.likelihood.joint_fit import JointFit
+from idbench.identify.estimators.log_rows import delay_covariance
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.solution import AbstractSolution, Given, OfWeightedRows
 from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.rows.factors import Factor, LeastSquaresFit, Status
 from idbench.identify.rows.rows import Rows
 from idbench.identify.tables import html_table, significant, text_table
-
-if TYPE_CHECKING:
-    from idbench.identify.data.motion_log import TorqueChannel
 
 
 def noise_covariance(problem: Problem, influence: Sequence[Array]) -> Array:
@@ -209,22 +207,10 @@ class Estimate:
 
     @cached_property
     def delay_covariance(self) -> Array:
-        """Covariance of the error of X due to that of the delays, shape (..., p, p); 0 where it is not known.
-
-        With X = G' Y and a delay that is off by d, X is off by G' (dY/d delay) d: logs with the same channel together.
-        """
-        total = np.zeros(self.own_covariance.shape)
-        if not (self.knows_delay and any(log.torque.delay_sigma for log in self.problem.logs)):
-            return total
-        assert self.solution is not None
-        slopes: dict[TorqueChannel, Array] = {}
-        for part, G in zip(self.problem.parts, self.solution.influence(self.problem.parts), strict=True):
-            channel = part.signals.log.torque
-            slope = np.sum(G * part.delay_slope[..., None], axis=-2) * channel.delay_sigma
-            slopes[channel] = slopes.get(channel, 0.0) + slope
-        for slope in slopes.values():
-            total = total + slope[..., :, None] * slope[..., None, :]
-        return total
+        """Covariance of the error of X due to that of the delays, shape (..., p, p); 0 where it is not known."""
+        if self.solution is None or self.problem.long or not any(log.torque.delay_sigma for log in self.problem.logs):
+            return np.zeros(self.own_covariance.shape)
+        return delay_covariance(self.problem.parts, self.solution.influence(self.problem.parts))
 
     @property
     def standard_errors(self) -> Array:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from idbench.identify.arrays import Array
-from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.data.motion_log import MotionLog, TorqueChannel
 from idbench.identify.models import torque_rows
 from idbench.identify.noise.covariance import BandedCovariance, Whitening
 from idbench.identify.noise.linearization import Linearization
@@ -141,6 +141,19 @@ class LogRows:
 
     def _bias_of(self, noisy: NoisyRows) -> Array:
         return friction_bias(noisy.to_rows, self.linear, self.problem.model, self.problem.noise.position)
+
+
+def delay_covariance(parts: Sequence[LogRows], influence: Sequence[Array]) -> Array:
+    """Return the covariance of the error of X due to that of the delays, shape (..., p, p).
+
+    With X = G' Y and a delay that is off by d, X is off by G' (dY/d delay) d: logs with the same channel together.
+    """
+    slopes: dict[TorqueChannel, Array] = {}
+    for part, G in zip(parts, influence, strict=True):
+        channel = part.signals.log.torque
+        slope = np.sum(G * part.delay_slope[..., None], axis=-2) * channel.delay_sigma
+        slopes[channel] = slopes.get(channel, 0.0) + slope
+    return np.asarray(sum(slope[..., :, None] * slope[..., None, :] for slope in slopes.values()))
 
 
 MOVED = 0.02
