@@ -80,10 +80,10 @@ class AbstractController(ABC):
     def start(self, task: Task) -> AbstractLaw:
         """Return the law at the start of a motion."""
 
-    def wdyn(self, n: int) -> Array | None:
-        """Return the bandwidth of the position loop, w_dyn [rad/s], shape (joint,); None where the controller closes none."""
-        w = getattr(self, "bandwidth", None)
-        return None if w is None else np.broadcast_to(per_joint(w, n, "controller.bandwidth"), n)
+    @property
+    def wdyn(self) -> float | None:
+        """Bandwidth of the position loop of the fastest joint, w_dyn [rad/s]; None if the controller closes no such loop."""
+        return None
 
 
 class Error:
@@ -128,6 +128,11 @@ class PDFeedforward(AbstractController):
     cutoff: Positive = 100.0
     """First-order low-pass on de/dt [Hz]."""
 
+    @property
+    def wdyn(self) -> float | None:
+        """Natural frequency of the fastest joint [rad/s]."""
+        return max(self.bandwidth)
+
     def start(self, task: Task) -> AbstractLaw:
         """Return the law, its gains for the inertia at the start of the motion."""
         return _PDLaw(self, task)
@@ -154,6 +159,11 @@ class PID(AbstractController):
     """Triple pole w of the loop [rad/s], of all joints or of each."""
     cutoff: Positive = 100.0
     """First-order low-pass on de/dt [Hz]."""
+
+    @property
+    def wdyn(self) -> float | None:
+        """Natural frequency of the fastest joint [rad/s]."""
+        return max(self.bandwidth)
 
     def start(self, task: Task) -> AbstractLaw:
         """Return the law, its gains for the inertia at the start of the motion."""
@@ -190,6 +200,11 @@ class ComputedTorque(AbstractController):
     """Share by which all inertias and viscous frictions of the nominal model are wrong."""
     cutoff: Positive = 100.0
     """First-order low-pass on de/dt [Hz]."""
+
+    @property
+    def wdyn(self) -> float | None:
+        """Natural frequency of the fastest joint [rad/s]."""
+        return max(self.bandwidth)
 
     def start(self, task: Task) -> AbstractLaw:
         """Return the law."""

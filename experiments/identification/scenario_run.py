@@ -12,6 +12,7 @@ from idbench.experiments.identification.fit import Fit, fit
 from idbench.experiments.identification.iterations import iterations
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.request import Request
+from idbench.identify.blame import is_mistake
 from idbench.sim.engine.rejection import Rejection, rejection
 from idbench.sim.engine.run import Run
 from idbench.sim.engine.simulation import Progress, simulate
@@ -67,8 +68,13 @@ class ScenarioRun:
 
     @cached_property
     def rejection(self) -> Rejection | None:
-        """What the loop commands against the ripple of the drives, if these have any."""
-        return rejection(self.run) if self.scenario.ripple != Ripple() else None
+        """What the loop commands against the ripple of the drives; none without ripple, or if a plug-in's controller fails."""
+        try:
+            return rejection(self.run) if self.scenario.ripple != Ripple() else None
+        except BaseException as error:  # whatever a plug-in raises: the fit is not lost by it
+            if not is_mistake(error):
+                raise
+            return None
 
     @property
     def _why_nothing(self) -> str:

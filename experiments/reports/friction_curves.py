@@ -45,8 +45,8 @@ def left_over(fit: Fit) -> dict[str, Instants]:
 
 
 def of_joints(fit: Fit, left: Mapping[str, Instants]) -> dict[str, Instants]:
-    """Return the residuals of models that have a row for each joint."""
-    return {form: one for form, one in left.items() if form not in ("power", "energy") and len(one.residual) == fit.basis.n}
+    """Return the residuals of models whose rows are the torques of joints."""
+    return {form: one for form, one in left.items() if fit.estimates[form].problem.alike}
 
 
 def spectra(fit: Fit, left: Mapping[str, Instants]) -> Iterator[Spectrum]:

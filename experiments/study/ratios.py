@@ -57,7 +57,7 @@ class Ratio:
         return f"{self.cell.names[2]} / {self.base.names[2]}"
 
     def __str__(self) -> str:
-        return f"{self.value:.2g} ({self.low:.2g} to {self.high:.2g})"
+        return interval({"ratio": self.value, "low": self.low, "high": self.high})
 
 
 @lru_cache(maxsize=4096)

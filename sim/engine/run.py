@@ -79,8 +79,7 @@ def ideal_log(robot: Robot, reference: Reference) -> MotionLog:
 def ideal_run(scenario: Scenario, seeds: Sequence[int], motions: Sequence[Reference]) -> Run:
     """Return the logs of robots that follow their motions exactly, as `simulate` returns those of closed loops.
 
-    A motion whose torques are beyond what the robot's actuators have, or its speeds beyond the `velocity` of its trajectory,
-    is one that failed.
+    A motion whose torques are beyond what the robot's actuators have is one that failed.
     """
     robot = scenario.real_robot
     logs = [ideal_log(robot, motion) for motion in motions]
@@ -88,10 +87,8 @@ def ideal_run(scenario: Scenario, seeds: Sequence[int], motions: Sequence[Refere
     qd = np.stack([motion.qd for motion in motions])
     tau = np.stack([log.tau for log in logs])
     failures = dict[int, str]()
-    limits = {"speed": getattr(scenario.trajectory, "velocity", np.inf), "torque": robot.torque_limits}
-    for what, x in (("speed", qd), ("torque", tau)):
-        over = np.abs(x).max(axis=1) > np.asarray(limits[what])
-        for i, j in np.argwhere(over).tolist():
-            failures.setdefault(i, f"the {what} of {robot.joints[j]} would be {np.abs(x[i, :, j]).max():.3g}, beyond its limit")
+    for i, j in np.argwhere(np.abs(tau).max(axis=1) > robot.torque_limits).tolist():
+        most = np.abs(tau[i, :, j]).max()
+        failures.setdefault(i, f"the torque of {robot.joints[j]} would be {most:.3g} N m, beyond its limit")
     log = MotionLog(scenario.fs, q, tau, TorqueChannel("instantaneous"))
     return Run(scenario, tuple(seeds), [robot] * len(logs), motions[0], log, q, qd, tau, tau, failures)

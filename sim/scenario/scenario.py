@@ -118,8 +118,8 @@ class Scenario:
     @property
     def wdyn(self) -> float | None:
         """The bandwidth of the position loop, that of its fastest joint [Hz]; None where the controller closes none."""
-        w = self.controller.wdyn(self.real_robot.n)
-        return None if w is None else float(w.max()) / (2 * np.pi)
+        w = self.controller.wdyn
+        return None if w is None else w / (2 * np.pi)
 
     @property
     def channel(self) -> TorqueChannel:
