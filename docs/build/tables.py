@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmark_tables import BENCHMARK_TABLES
+from conclusion_sentences import sentences
 from conclusion_tables import CONCLUSION_TABLES, keep_conclusion
 from estimator_tables import compared, compared_in_birdys_shape
 from excitation_tables import coarse, criteria, foretold, motions, ranks
@@ -178,6 +179,7 @@ TABLES: dict[str, Callable[[], Iterator[str]]] = {
     "estimators-unfiltered": compared("unfiltered"),
     "estimators-puma560": compared_in_birdys_shape,
     **BENCHMARK_TABLES,
+    "sentences": sentences,
     **CONCLUSION_TABLES,
     **SIMULATED_TABLES,
 }
