@@ -150,9 +150,7 @@ def difference(first: MotionLog, other: MotionLog, shift: float) -> tuple[Array,
 
 def _of(run: Compared, model: str) -> dict[str, tuple[float, float]]:
     found = run.summary["models"][model]
-    both = zip(found["sigma"], found.get("corrected_sigma") or found["sigma"], strict=True)
-    sigma = [plain if corrected is None else corrected for plain, corrected in both]
-    return dict(zip(run.summary["parameters"], zip(found["estimate"], sigma, strict=True), strict=True))
+    return dict(zip(run.summary["parameters"], zip(found["estimate"], found["sigma"], strict=True), strict=True))
 
 
 def _truth(run: Compared) -> dict[str, float]:

@@ -15,6 +15,8 @@ from pathlib import Path
 from shutil import rmtree
 from typing import Any, Self, final
 
+import numpy as np
+
 from idbench.experiments.errors import ResultsError, shortened
 from idbench.identify import Estimate
 
@@ -30,8 +32,10 @@ def summarize(estimate: Estimate, truth: list[float] | None) -> dict[str, Any]:
     return {
         "estimate": estimate.X.tolist(),
         "relative_error_percent": None if truth is None else [finite(x) for x in estimate.relative_error_percent(truth)],
-        "sigma": estimate.own_sigma.tolist(),
-        "corrected_sigma": [finite(x) for x in estimate.calibrated_sigma],
+        "sigma": [finite(x) for x in estimate.standard_errors],
+        "sigma_noise": [finite(x) for x in estimate.noise_sigma],
+        "paper_sigma": [finite(x) for x in estimate.own_sigma],
+        **({} if (between := estimate.between_logs) is None else {"between_logs": np.sqrt(between.variance).tolist()}),
         "relative_sigma_percent": [finite(x) for x in estimate.paper_sigma_percent],
         "condition_number": float(estimate.condition_number),
         "rows": int(estimate.row_count),

@@ -10,10 +10,12 @@ import numpy.typing as npt
 
 from idbench.identify.arrays import Array, frozen
 from idbench.identify.errors import PluginError
+from idbench.identify.estimators.between_logs import BetweenLogs, between_logs
 from idbench.identify.estimators.likelihood.joint_fit import JointFit
 from idbench.identify.estimators.log_rows import delay_covariance
+from idbench.identify.estimators.model_error import ModelError
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.estimators.solution import AbstractSolution, Given, OfWeightedRows
+from idbench.identify.estimators.solution import AbstractSolution, Given, OfWeightedRows, OfWhitenedRows
 from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.rows.factors import Factor, LeastSquaresFit, Status
 from idbench.identify.rows.rows import Rows
@@ -41,23 +43,6 @@ def bias_covariance(problem: Problem, influence: Sequence[Array]) -> Array:
     each = zip(problem.parts, influence, strict=True)
     bias = sum((np.matmul(np.swapaxes(G, -1, -2), part.bias[..., None]) for part, G in each), start=np.zeros(()))
     return np.matmul(bias, np.swapaxes(bias, -1, -2)) / problem.share**2
-
-
-def excess(problem: Problem, X: Array, weights: Sequence[Array]) -> Array:
-    """Return how many times the squares of weighted residuals are what noise makes of them, at least 1, shape (...).
-
-    1 where rows of a kind are alike, since noise levels are theirs; elsewhere what the model does not explain counts, too.
-    """
-    if problem.alike:
-        return np.ones(X.shape[:-1])
-    squares, expected = np.zeros(()), np.zeros(())
-    for part, weight in zip(problem.parts, weights, strict=True):
-        counted = weight**2 * part.rows.valid
-        squares = squares + np.sum(counted * (part.rows.Y - part.rows.predicted(X)) ** 2, axis=-1)
-        expected = expected + np.sum(counted * part.variance, axis=-1)
-    p = len(problem.names)
-    free = 1 - p / np.maximum(problem.factors.together.rows * problem.share, p + 1)
-    return np.maximum(np.divide(squares, expected * free, out=np.ones_like(squares), where=expected > 0), 1.0)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -167,12 +152,8 @@ class Estimate:
             return self.calibrated
         if self.solution is None:
             return np.full(self.own_covariance.shape, np.nan)
-        parts = self.problem.parts
-        influence, weights = self.solution.influence(parts), self.solution.weights(parts)
-        found = noise_covariance(self.problem, influence)
-        if weights is not None:
-            found = found * excess(self.problem, self.X, weights)[..., None, None]
-        found = found + bias_covariance(self.problem, influence)
+        influence = self.solution.influence(self.problem.parts)
+        found = noise_covariance(self.problem, influence) + bias_covariance(self.problem, influence)
         return np.where((self.status == Status.OK)[..., None, None], found, np.nan)
 
     def influence(self) -> Array | None:
@@ -194,11 +175,38 @@ class Estimate:
         """Standard error of every parameter, from `calibrated_covariance`, shape (..., p)."""
         return _roots(self.calibrated_covariance)
 
-    @property
+    @cached_property
     def covariance(self) -> Array:
-        """Covariance of the error of X, calibrated where the noise of the logs is known, shape (..., p, p)."""
+        """Covariance of the error of X due to noise, delay and the model, shape (..., p, p)."""
+        return self.noise_covariance + (0.0 if self.model_error is None else self.model_error.covariance)
+
+    @property
+    def noise_covariance(self) -> Array:
+        """Covariance of the error of X due to noise and delay, by the estimator where noise is not known, shape (..., p, p)."""
         known = np.isfinite(self.calibrated_covariance).all(axis=(-2, -1), keepdims=True)
         return np.where(known, self.calibrated_covariance, self.own_covariance) + self.delay_covariance
+
+    @cached_property
+    def model_error(self) -> ModelError | None:
+        """The error of X due to the model, from residuals beyond noise; None where it is not known how X follows from rows."""
+        if self.solution is None:
+            return None
+        parts = self.problem.parts
+        found = ModelError.of(parts, self.X, self.solution.influence(parts), self.problem.share)
+        changes = found.changes(self.problem.basis.parameters, self.X)
+        if (between := self.between_logs) is None:
+            return found.with_scatter(changes)
+        # The scatter that is usual for friction counts as one more log.
+        seen = between.logs - (changes > 0)
+        return found.with_scatter((seen * between.variance + changes) / between.logs**2)
+
+    @cached_property
+    def between_logs(self) -> BetweenLogs | None:
+        """How much parameters move from log to log; None where there is one log, or many runs, or rows are not kept."""
+        several = len(self.problem.logs) > 1 and self.X.ndim == 1 and not self.problem.long
+        if not (several and isinstance(self.solution, OfWeightedRows | OfWhitenedRows)):
+            return None
+        return between_logs(self.problem.parts, self.solution)
 
     @property
     def knows_delay(self) -> bool:
@@ -216,6 +224,11 @@ class Estimate:
     def standard_errors(self) -> Array:
         """Standard error (sigma) of every parameter, from `covariance`, shape (..., p)."""
         return _roots(self.covariance)
+
+    @property
+    def noise_sigma(self) -> Array:
+        """The part of every standard error due to noise and delay, shape (..., p)."""
+        return _roots(self.noise_covariance)
 
     @property
     def paper_sigma_percent(self) -> Array:

@@ -57,7 +57,7 @@ class AbstractEstimator(ABC):
             raise PluginError(f"plug-in {type(self).__name__}.solve returned {estimate!r:.60}, expected an Estimate")
         p = len(problem.names)
         expect(self, "solve", estimate.X, (*status.shape, p))
-        expect(self, "solve", estimate.covariance, (*status.shape, p, p))
+        expect(self, "solve", estimate.own_covariance, (*status.shape, p, p))
         if throw and estimate.failures:
             raise IdentificationError(next(iter(estimate.failures.values())))
         lost = ~np.isfinite(estimate.X) & (status == Status.OK)[..., None]

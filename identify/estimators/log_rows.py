@@ -70,6 +70,11 @@ class LogRows:
         """The covariance of the rows by `Problem.noise`."""
         return self._twin.covariance if self._twin else self.noisy.covariance(self.problem.noise)
 
+    @property
+    def likely_covariance(self) -> BandedCovariance:
+        """The covariance of the rows by `Problem.likely_noise`."""
+        return self._twin.likely_covariance if self._twin else self.noisy.covariance(self.problem.likely_noise)
+
     @cached_property
     def whitening(self) -> Whitening:
         """What makes the rows independent, by `Problem.likely_noise` and, of a model such as power, its `errors`."""
@@ -86,7 +91,7 @@ class LogRows:
     @cached_property
     def errors(self) -> list[BandedCovariance]:
         """Where B varies, what noise makes of the rows, and errors of that mean variance: white, and of friction near zero."""
-        C = self.noisy.covariance(self.problem.likely_noise)
+        C = self.likely_covariance
         mean, (count, kinds) = np.mean(C.variance, axis=-1, keepdims=True), C.bands.shape[-3:-1]
         of_rest = np.mean(rest := self.bias**2, axis=-1, keepdims=True)
         share = np.divide(rest, of_rest, out=np.ones_like(rest), where=of_rest > 0)

@@ -10,6 +10,7 @@ import numpy as np
 
 from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
+from idbench.identify.data.jumps import encoder_steps
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import IdentificationError, LogError
 from idbench.identify.estimators.given_logs import require_logs, same_form
@@ -19,7 +20,7 @@ from idbench.identify.models import AbstractModel, ExplicitModel
 from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.noise.restricted_likelihood import likely, likely_levels
 from idbench.identify.noise.row_weights import floor_of, reciprocal_root
-from idbench.identify.noise.spectral_levels import position_noise, repeats, spectral_levels
+from idbench.identify.noise.white_noise import repeats, residual_level, torque_noise, white_noise
 from idbench.identify.rows.chain import Chain
 from idbench.identify.rows.factors import Factors, LeastSquaresFit, triangular
 from idbench.identify.rows.rows import Rows, is_long
@@ -30,6 +31,9 @@ Reduced = TypeVar("Reduced")
 
 SAMPLED = 8
 """Pieces of long logs from which noise is estimated and propagated."""
+
+COUNT = 1 / np.sqrt(12)
+"""Standard deviation of an error that is anything within a step, over the step."""
 
 BEGIN, LEAST = (1.0, 0.1, 0.1), 1e-4
 """Shares of the errors of rows of which one kind is not alike, to begin with, and at least."""
@@ -124,8 +128,14 @@ class Problem:
 
     @cached_property
     def position_noise(self) -> Array:
-        """Standard deviation of the noise of the positions, from their differences [rad], shape (..., joint)."""
-        return self.explicit.position_noise if self.explicit is not self else position_noise(self.signals)
+        """Standard deviation of the noise of the positions [rad], shape (..., joint).
+
+        From their differences, and at least that of a count of the encoder, which slow motion hides.
+        """
+        if self.explicit is not self:
+            return self.explicit.position_noise
+        steps = np.nan_to_num(encoder_steps(np.concatenate([log.q for log in self.logs], axis=-2)))
+        return np.maximum(white_noise(self.signals, "q"), steps * COUNT)
 
     @cached_property
     def repeats(self) -> Array:
@@ -181,21 +191,22 @@ class Problem:
 
     @cached_property
     def noise(self) -> NoiseLevels:
-        """The noise of torques and positions, from the spectrum of the residuals of the explicit model."""
+        """The white noise of torques and positions, from their differences; it is what `Estimate.noise_sigma` contains."""
         if self.explicit is not self:
             return self.explicit.noise
-        rows, noisy = zip(*((part.rows, part.noisy) for part in self.parts), strict=True)
-        found = spectral_levels(rows, noisy, self.some_rows.factors, self.start, self.position_noise)
-        return replace(found, repeats=self.repeats) if found.position.any() else found
+        return replace(self.likely_noise, torque=torque_noise(self.signals, self.likely_noise.torque))
 
     @cached_property
     def likely_noise(self) -> NoiseLevels:
-        """The noise whose levels make the explicit model's rows most likely, from their covariance."""
+        """The noise by which rows are weighted: of the torques, what makes the explicit model's rows most likely (REML).
+
+        It contains the error of the model, as far as that is white.
+        """
         if self.explicit is not self:
             return self.explicit.likely_noise
-        start = NoiseLevels(self.noise.torque, self.position_noise, self.repeats)
         rows, noisy = zip(*((part.unbiased, part.noisy) for part in self.parts), strict=True)
-        return likely_levels(rows, noisy, start)
+        begin = residual_level(rows, noisy, self.some_rows.factors, self.start.X)
+        return likely_levels(rows, noisy, NoiseLevels(begin, self.position_noise, self.repeats))
 
     @cached_property
     def alike(self) -> bool:

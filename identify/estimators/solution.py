@@ -19,10 +19,6 @@ class AbstractSolution(ABC):
         """Return G of the rows of each part of the problem, shape (..., r, p)."""
 
     @abstractmethod
-    def weights(self, parts: Sequence[LogRows]) -> list[Array] | None:
-        """Return what rows were multiplied by, shape (..., r), if X is a least-squares solution whose residuals are noise."""
-
-    @abstractmethod
     def independent(self, parts: Sequence[LogRows]) -> list[Array] | None:
         """Return [W Y] made independent, shape (..., r, p + 1), each row by those before it, if X is their solution."""
 
@@ -44,15 +40,15 @@ class OfWeightedRows(AbstractSolution):
         each = zip(parts, self.weights(parts), strict=True)
         return [np.matmul(part.rows.W * (weight**2)[..., None], self.inverse) for part, weight in each]
 
-    def weights(self, parts: Sequence[LogRows]) -> list[Array]:
-        """Return what rows were multiplied by."""
-        of_kinds = [np.tile(self.weight, part.rows.maps[0].grid.count) for part in parts]
-        scaled = self.scaled and not parts[0].problem.alike
-        return [weight * part.weights if scaled else weight for part, weight in zip(parts, of_kinds, strict=True)]
-
     def independent(self, parts: Sequence[LogRows]) -> list[Array]:
         """Return the weighted rows."""
         return [part.rows.joined * weight[..., None] for part, weight in zip(parts, self.weights(parts), strict=True)]
+
+    def weights(self, parts: Sequence[LogRows]) -> list[Array]:
+        """Return what rows were multiplied by, shape (..., r)."""
+        of_kinds = [np.tile(self.weight, part.rows.maps[0].grid.count) for part in parts]
+        scaled = self.scaled and not parts[0].problem.alike
+        return [weight * part.weights if scaled else weight for part, weight in zip(parts, of_kinds, strict=True)]
 
 
 @final
@@ -66,9 +62,6 @@ class OfWhitenedRows(AbstractSolution):
     def influence(self, parts: Sequence[LogRows]) -> list[Array]:
         """Return C^-1 W (W' C^-1 W)^-1."""
         return [np.matmul(part.whitening.solve(part.unbiased.W), self.inverse) for part in parts]
-
-    def weights(self, parts: Sequence[LogRows]) -> None:  # rows count together
-        """Return None: the levels of the noise are those of these rows."""
 
     def independent(self, parts: Sequence[LogRows]) -> list[Array]:
         """Return L^-1 [W Y], L L' being the covariance."""
@@ -88,9 +81,6 @@ class Given(AbstractSolution):
     def influence(self, parts: Sequence[LogRows]) -> list[Array]:
         """Return G as it was given."""
         return np.split(self.G, _ends(parts), axis=-2)
-
-    def weights(self, parts: Sequence[LogRows]) -> None:  # G says all
-        """Return None: how the rows were weighted is in G."""
 
     def independent(self, parts: Sequence[LogRows]) -> list[Array] | None:
         """Return the weighted rows."""

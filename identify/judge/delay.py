@@ -17,7 +17,16 @@ from idbench.identify.rows.chain import Chain, idbench_chain
 from idbench.identify.rows.rows import Rows, manageable
 
 RANGE = (-0.02, 0.05)
-"""Delays [s] that are looked at: a filtered measurement is late by some milliseconds, a slow controller by some tens."""
+"""Delays [s] of a first look: a filtered measurement is late by some milliseconds, a slow controller by some tens."""
+
+WIDER, FARTHEST = 3.0, 0.6
+"""How many times farther each further look goes, and how far at most [s]: two clocks of a recorder may be that far apart."""
+
+SHARE = 0.05
+"""Share of a log that a delay may be: its rows must lie inside the log at all delays."""
+
+STEPS = 2
+"""Steps of the generalized least squares in which the delay is a parameter."""
 
 BLOCKS = 16
 """Stretches of the log of which each is left out once, to see how much the delay depends on it."""
@@ -40,12 +49,14 @@ def estimate_delay(
     log: MotionLog | Sequence[MotionLog],
     basis: Basis,
     chain: Chain | None = None,
-    within: tuple[float, float] = RANGE,
+    within: tuple[float, float] | None = None,
 ) -> DelayEstimate:
     """Return the delay with which the explicit model explains the torques best.
 
-    The misfit is the likelihood of Gaussian noise with a level of its own for each joint, its parameters those that fit best
-    at each delay.
+    A search over delays, by the likelihood of Gaussian noise with a level of its own for each joint, brackets the best one; it
+    goes farther as long as that lies at an end. The delay is then a parameter beside the others in generalized least squares:
+
+        [X; delta] = argmin (Y - W X - d delta)' C^-1 (Y - W X - d delta),   d = dY/d(delay)
 
     Parameters
     ----------
@@ -55,8 +66,8 @@ def estimate_delay(
         The robot.
     chain : Chain, optional
         Signal processing that reads torques by their channel; chain `idbench` by default.
-    within : tuple of float
-        Smallest and largest delay to look at [s].
+    within : tuple of float, optional
+        Smallest and largest delay to look at [s]; by default -20 to 50 ms, and farther if the best is at an end.
 
     Raises
     ------
@@ -70,15 +81,29 @@ def estimate_delay(
     logs = manageable([log] if isinstance(log, MotionLog) else list(log))
     if any(one.q.ndim != 2 for one in logs):
         raise LogError("the delay is estimated from one run, or a sequence of them: give the runs one by one")
-    if not within[0] < within[1]:
+    if within is not None and not within[0] < within[1]:
         raise SettingError(f"the range of delays, {within[0]:g} to {within[1]:g} s, is empty")
-    search = _Search(logs, basis, chain or idbench_chain(), within)
-    return search.run()
+    chain = chain or idbench_chain()
+    low, high = within or RANGE
+    farthest = min(FARTHEST, SHARE * min(one.samples / one.fs for one in logs))
+    while True:
+        try:
+            return _Search(logs, basis, chain, (low, high)).run()
+        except RangeError:
+            if within or high >= farthest or not _is_read(logs, chain):
+                raise
+            low, high = max(WIDER * low, -farthest), min(WIDER * high, farthest)
+
+
+def _is_read(logs: Sequence[MotionLog], chain: Chain) -> bool:
+    """Return whether the chain reads the delay of a log at all."""
+    late = replace(logs[0], torque=replace(logs[0].torque, delay=1 / logs[0].fs))
+    return not np.array_equal(chain.signals(late).torque.mean, chain.signals(logs[0]).torque.mean)
 
 
 class _Search:
     def __init__(self, logs: list[MotionLog], basis: Basis, chain: Chain, within: tuple[float, float]) -> None:
-        self._logs, self._within = logs, within
+        self._logs, self._basis, self._within = logs, basis, within
         halos = [chain.halo(log.fs, replace(log.torque, delay=delay)) for log in logs for delay in within]
         # The same rows at all delays, or their misfits could not be compared.
         self._chain = replace(chain, trim=max(*halos, chain.trim or 0.0))
@@ -97,7 +122,34 @@ class _Search:
         found = scipy.optimize.minimize_scalar(
             self._misfit, bounds=(grid[best - 1], grid[best + 1]), method="bounded", options={"xatol": 1e-7}
         )
-        return DelayEstimate(float(found.x), self._sigma(float(found.x)))
+        return self._refined(float(found.x), (float(grid[best - 1]), float(grid[best + 1])))
+
+    def _refined(self, delay: float, within: tuple[float, float]) -> DelayEstimate:
+        """Return the delay as a parameter of generalized least squares, and its jackknife's standard deviation.
+
+        If its steps leave the bracket of the search, which they do where the model is far off, it is the search's.
+        """
+        found = delay
+        for _ in range(STEPS):
+            A, y = self._rows_with_delay(found)
+            steps, whole = _left_out(A, y, np.arange(len(A)) * BLOCKS // len(A))
+            if not within[0] <= found + whole <= within[1]:
+                A, y = self._rows_with_delay(delay)
+                return DelayEstimate(delay, _jackknife(_left_out(A, y, np.arange(len(A)) * BLOCKS // len(A))[0]))
+            found += whole
+        return DelayEstimate(found, _jackknife(steps))
+
+    def _rows_with_delay(self, delay: float) -> tuple[Array, Array]:
+        """Return [W -d] and Y, made independent: Y(delay + delta) = Y + d delta = W X."""
+        logs = [replace(log, torque=replace(log.torque, delay=delay)) for log in self._logs]
+        problem = Problem(tuple(logs), self._basis, ExplicitModel(), self._chain)
+        parts = problem.parts
+        whole = [
+            part.whitening.whiten(np.concatenate([part.unbiased.W, -part.delay_slope[:, None], part.rows.Y[:, None]], axis=1))
+            for part in parts
+        ]
+        rows = np.concatenate([white[part.rows.valid] for white, part in zip(whole, parts, strict=True)])
+        return rows[:, :-1], rows[:, -1]
 
     def _at(self, delay: float) -> Rows:
         """Return the rows at a delay, of which Y alone depends on it."""
@@ -112,23 +164,22 @@ class _Search:
         factors = self._at(delay).factors
         return float(np.sum(factors.rows * np.log(np.maximum(factors.squares(factors.fit(2).X), TINY))))
 
-    def _sigma(self, delay: float) -> float:
-        """Return the jackknife's standard deviation of a Gauss-Newton step from the optimum, blocks of time left out."""
-        step, rows = 1e-4, self._at(delay)
-        slope = (self._at(delay + step).Y - self._at(delay - step).Y) / (2 * step)
-        fit = rows.factors.fit(2)
-        weight = np.tile(fit.weight, len(rows.time) // rows.kinds)
-        A = np.concatenate([rows.W, -slope[:, None]], axis=1) * weight[:, None]
-        counted = np.cumsum(rows.valid) - 1
-        steps = _left_out(A, weight * (rows.Y - rows.predicted(fit.X)), counted * BLOCKS // (counted[-1] + 1))
-        return float(np.sqrt((BLOCKS - 1) / BLOCKS * np.sum((steps - steps.mean()) ** 2)))
+
+def _jackknife(steps: Array) -> float:
+    """Return the standard deviation of what is estimated with each block left out."""
+    return float(np.sqrt((BLOCKS - 1) / BLOCKS * np.sum((steps - steps.mean()) ** 2)))
 
 
-def _left_out(A: Array, y: Array, block: npt.NDArray[np.signedinteger]) -> Array:
-    """Return the last unknown of A x = y, by least squares, with each block of rows left out."""
+def _left_out(A: Array, y: Array, block: npt.NDArray[np.signedinteger]) -> tuple[Array, float]:
+    """Return the last unknown of A x = y, by least squares, with each block of rows left out, and of all rows."""
     scale = np.linalg.norm(A, axis=0)
     A = A / scale
     squares = np.array([A[block == b].T @ A[block == b] for b in range(BLOCKS)])
     products = np.array([A[block == b].T @ y[block == b] for b in range(BLOCKS)])
-    x = np.linalg.pinv(squares.sum(axis=0) - squares, hermitian=True) @ (products.sum(axis=0) - products)[..., None]
-    return x[:, -1, 0] / scale[-1]
+    left = np.concatenate([squares.sum(axis=0) - squares, squares.sum(axis=0, keepdims=True)])
+    x = (
+        np.linalg.pinv(left, hermitian=True)
+        @ np.concatenate([products.sum(axis=0) - products, products.sum(axis=0, keepdims=True)])[..., None]
+    )
+    last = x[:, -1, 0] / scale[-1]
+    return last[:-1], float(last[-1])

@@ -117,12 +117,17 @@ class BandedCovariance:
         return own.reshape(*own.shape[:-2], -1)
 
     @property
+    def autocovariance(self) -> Array:
+        """Sum over instants of the covariance of rows of a kind with those some instants later, shape (..., kind, lag)."""
+        return np.swapaxes(np.diagonal(np.sum(self.bands, axis=-3), axis1=-2, axis2=-1), -1, -2)
+
+    @property
     def spectrum(self) -> Array:
         """Expected |DFT|^2 of the rows of every kind, at twice as many frequencies, shape (..., kind, frequency)."""
         lags, count = self.bands.shape[-4:-2]
-        sums = np.diagonal(np.sum(self.bands, axis=-3), axis1=-2, axis2=-1)
-        correlations = np.zeros((*sums.shape[:-2], sums.shape[-1], 2 * count))
-        correlations[..., :lags] = np.swapaxes(sums, -1, -2)
+        sums = self.autocovariance
+        correlations = np.zeros((*sums.shape[:-1], 2 * count))
+        correlations[..., :lags] = sums
         return np.maximum(2 * np.fft.rfft(correlations).real - correlations[..., :1], 0.0)
 
     def of_sums(self, G: Array) -> Array:

@@ -15,6 +15,7 @@ from idbench.identify.arrays import Array
 from idbench.identify.noise.band_matrix import BandMatrix, Cholesky
 from idbench.identify.noise.noisy_rows import NoisyRows
 from idbench.identify.noise.propagation import NoiseLevels
+from idbench.identify.noise.white_noise import EXACT
 from idbench.identify.rows.factors import Factor, triangular
 from idbench.identify.rows.rows import Rows
 
@@ -36,17 +37,15 @@ RIDGE = 1e-6
 LOWEST = 1e-3
 """Share of the torque's rms at which its noise begins at least: what begins at nothing hardly grows."""
 
-EXACT = 1e-5
-"""Share of the torque's rms that counts as noise at least: no model of a robot is better."""
-
 SMALLEST = 1e-9
 """Noise of positions [rad] at least: rounding, of a log in single precision."""
 
 
 def likely_levels(parts: Sequence[Rows], noisy: Sequence[NoisyRows], start: NoiseLevels) -> NoiseLevels:
-    """Return the levels of the noise of logs by restricted maximum likelihood (REML), from the rows of their explicit model.
+    """Return the noise of logs, the torques' by restricted maximum likelihood (REML) of the rows of the explicit model.
 
-    The covariance of rows is C = sum of sigma_i^2 C_i over the torques and positions of all joints. The likelihood of what
+    The covariance of rows is C = sum of sigma_i^2 C_i over the torques and positions of all joints. The noise of positions is
+    held: their differences show it, while rows would also take errors of the model for it. The likelihood of what
     the parameters do not explain is stationary where r' C^-1 C_i C^-1 r = trace of P C_i, with P = C^-1 - C^-1 W (W' C^-1
     W)^-1 W' C^-1 and r the residual (H. D. Patterson and R. Thompson, "Recovery of inter-block information when block sizes
     are unequal", Biometrika 58 (1971) 545-554). In the first round every sigma_i^2 is multiplied by a power of the ratio of
@@ -60,21 +59,22 @@ def likely_levels(parts: Sequence[Rows], noisy: Sequence[NoisyRows], start: Nois
     noisy : sequence of NoisyRows
         How noise reaches them.
     start : NoiseLevels
-        Where to begin; NaN in runs that cannot be solved.
+        Where the torques begin, NaN in runs that cannot be solved; the positions.
     """
     units = [each.units for each in noisy]
     joined = [rows.joined * each.kept[..., None] for rows, each in zip(parts, noisy, strict=True)]
     tau = [each.to_rows.signals.torque.mean for each in noisy]
     rms = np.sqrt(sum(np.mean(one**2, axis=-1) for one in tau) / len(parts))
-    least = np.concatenate([np.maximum(EXACT * rms, 1e-12), np.full(rms.shape, SMALLEST)], axis=-1) ** 2
-    begin = np.where(np.isfinite(start.torque), np.maximum(start.torque, LOWEST * rms), start.torque)
-    levels = np.concatenate([begin, np.broadcast_to(start.position, start.torque.shape)], axis=-1)
-    squares = likely(units, joined, np.nan_to_num(levels**2), least)
-    torque, position = np.split(np.where(np.isfinite(levels), np.sqrt(squares), np.nan), 2, axis=-1)
-    return NoiseLevels(torque, position, start.repeats)
+    least = np.maximum(EXACT * rms, 1e-12) ** 2
+    torque = np.where(np.isfinite(start.torque), np.maximum(start.torque, LOWEST * rms), start.torque)
+    position = np.broadcast_to(np.maximum(start.position, SMALLEST), torque.shape)
+    squares = likely(units, joined, np.nan_to_num(torque**2), least, position**2)
+    return NoiseLevels(np.where(np.isfinite(torque), np.sqrt(squares), np.nan), start.position, start.repeats)
 
 
-def likely(units: Sequence[Sequence[BandMatrix]], joined: Sequence[Array], start: Array, least: Array) -> Array:
+def likely(
+    units: Sequence[Sequence[BandMatrix]], joined: Sequence[Array], start: Array, least: Array, held: Array | None = None
+) -> Array:
     """Return the numbers, not below `least`, shape (..., i), with which C = sum of number_i C_i makes rows most likely.
 
     Parameters
@@ -85,11 +85,14 @@ def likely(units: Sequence[Sequence[BandMatrix]], joined: Sequence[Array], start
         [W Y], log by log.
     start, least : Array, shape (..., i)
         Where to begin, and where to end.
+    held : Array, shape (..., k), optional
+        Numbers of the C_i after those, which stay.
     """
+    held = np.zeros((*start.shape[:-1], 0)) if held is None else held
     squares = np.maximum(start, least)
     settled = np.zeros(squares.shape[:-1], dtype=bool)
     for k in range(ROUNDS):
-        slope = _Slope.at(units, joined, squares)
+        slope = _Slope.at(units, joined, squares, held)
         moved = np.maximum(squares * (slope.ratio**HASTE if k < HASTY else slope.newton(squares, least)), least)
         moved = np.where(settled[..., None], squares, moved)
         settled |= slope.small(squares, moved)  # each run by itself, as if it were alone
@@ -113,9 +116,10 @@ class _Slope:
     """What X moves by, in its sigma, for a change of each square, shape (..., p, i)."""
 
     @classmethod
-    def at(cls, units: Sequence[Sequence[BandMatrix]], joined: Sequence[Array], squares: Array) -> Self:
-        """Return the slopes at squares of levels."""
-        roots = [Cholesky.of(BandMatrix.weighted(parts, squares)) for parts in units]
+    def at(cls, units: Sequence[Sequence[BandMatrix]], joined: Sequence[Array], squares: Array, held: Array) -> Self:
+        """Return the slopes at squares of levels, those that are `held` after the others."""
+        every, free = np.concatenate([squares, held], axis=-1), squares.shape[-1]
+        roots = [Cholesky.of(BandMatrix.weighted(parts, every)) for parts in units]
         white = [root.whiten(x) for root, x in zip(roots, joined, strict=True)]
         names = ("",) * (joined[0].shape[-1] - 1)
         factor = Factor(triangular(np.concatenate(white, axis=-2)), np.array(0), names)
@@ -127,8 +131,8 @@ class _Slope:
             solved = root.unwhiten(z)
             W, left = solved[..., :-1], solved[..., -1:] - np.matmul(solved[..., :-1], X[..., None])
             P = root.inverse() - BandMatrix.product(np.matmul(W, inverse), W, root.lower.shape[-1])
-            products = [part @ left for part in parts]
-            for i, (part, product) in enumerate(zip(parts, products, strict=True)):
+            products = [part @ left for part in parts[:free]]
+            for i, (part, product) in enumerate(zip(parts[:free], products, strict=True)):
                 found[..., i] += np.sum(left * product, axis=(-2, -1))
                 expected[..., i] += P.trace_with(part)
             w = root.whiten(np.concatenate(products, axis=-1))

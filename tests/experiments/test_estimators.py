@@ -79,7 +79,7 @@ def test_a_log_whose_loop_is_known_only_roughly_is_identified_by_instruments(idb
     assert code == 0, err
     found = json.loads((tmp_path / "found" / "summary.json").read_text())
     X = dict(zip(found["parameters"], found["models"]["explicit"]["estimate"], strict=True))
-    sigma = dict(zip(found["parameters"], found["models"]["explicit"]["corrected_sigma"], strict=True))
+    sigma = dict(zip(found["parameters"], found["models"]["explicit"]["sigma"], strict=True))
     assert "off1" in X
     assert all(abs(X[name] - true) < 4 * sigma[name] for name, true in zip(own["parameters"], own["truth"], strict=True))
     code, _, err = idbench(*words, "--estimator", "DIDIM")

@@ -79,7 +79,7 @@ def test_the_log_says_which_law(tmp_path, monkeypatch, capsys):
     explicit = found["models"]["explicit"]
     for name in ("Fst1", "vs1"):
         k = found["parameters"].index(name)
-        x, sigma, true = explicit["estimate"][k], explicit["corrected_sigma"][k], found["truth"][k]
+        x, sigma, true = explicit["estimate"][k], explicit["sigma"][k], found["truth"][k]
         assert abs(x - true) < 4 * sigma < 0.3 * true
     capsys.readouterr()
     assert (

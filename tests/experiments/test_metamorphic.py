@@ -79,8 +79,8 @@ def test_names_and_order_change_no_number(both, way, tmp_path, capsys):
     at = [order.index(joint) for joint in joints]
     for model, mine in one["models"].items():
         its = two["models"][model]
-        sigma = np.array(mine["corrected_sigma"])
+        sigma = np.array(mine["sigma"])
         assert np.abs((np.array(its["estimate"])[places] - mine["estimate"]) / sigma).max() < near, model
-        np.testing.assert_allclose(np.array(its["corrected_sigma"])[places], sigma, rtol=near)
+        np.testing.assert_allclose(np.array(its["sigma"])[places], sigma, rtol=near)
     mine, its = (each["validation"]["models"]["explicit"]["torque_error_rms"] for each in (one, two))
     np.testing.assert_allclose(np.array(its)[at], mine, rtol=near)

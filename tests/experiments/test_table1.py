@@ -78,7 +78,7 @@ def test_the_summary_has_what_its_readers_expect(table1, truth):
     for form, entry in summary["models"].items():
         estimate = table1.estimates["idbench"][form]
         np.testing.assert_array_equal(entry["estimate"], estimate.X)
-        np.testing.assert_array_equal(entry["sigma"], estimate.own_sigma)
+        np.testing.assert_array_equal(entry["paper_sigma"], estimate.own_sigma)
         np.testing.assert_array_equal(entry["relative_sigma_percent"], estimate.paper_sigma_percent)
         np.testing.assert_array_equal(entry["relative_error_percent"], estimate.relative_error_percent(truth))
         assert entry["condition_number"] == estimate.condition_number

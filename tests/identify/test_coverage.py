@@ -26,19 +26,24 @@ def logs(robot):
     [((0.5, 0.025), "OLS"), ((0.5, 0.025), "WLS"), ((0.025, 0.5), "WLS"), ((0.5, 0.025), "GLS")],
 )
 def test_two_corrected_sigma_hold_the_truth_in_93_to_97_percent(estimator, sigma, logs, truth):
-    """For every parameter and model; 95.4 % is right, and 1500 runs tell it to 0.5 %. The paper's sigma does not do that."""
+    """For every parameter and model; 95.4 % is right, and 1500 runs tell it to 0.5 %. The paper's sigma does not do that.
+
+    With the error of the model, of which there is none, it holds little more.
+    """
     q, tau = logs
     noisy = tau + sigma * np.random.default_rng(11).standard_normal(tau.shape)
     models = {name: MODELS.create(name) for name in MODELS.builtin}
-    inside, papers = ({name: [] for name in models} for _ in range(2))
+    inside, papers, whole = ({name: [] for name in models} for _ in range(3))
     for start in range(0, RUNS, BATCH):
         log = MotionLog(FS, q[start : start + BATCH], noisy[start : start + BATCH], TorqueChannel("instantaneous"))
         for name, found in identify_each(log, scara(), models, estimator=ESTIMATORS.create(estimator)).items():
             inside[name].append(np.abs(found.X - truth) < 2 * found.calibrated_sigma)
             papers[name].append(np.abs(found.X - truth) < 2 * found.own_sigma)
+            whole[name].append(np.abs(found.X - truth) < 2 * found.standard_errors)
     for name in models:
         share = np.concatenate(inside[name]).mean(axis=0)
         assert share.min() >= 0.93, (name, share)
         assert share.max() <= 0.97, (name, share)
+        assert 0.93 <= np.concatenate(whole[name]).mean() <= 0.98, name
     if estimator != "GLS":  # whose own sigma is that
         assert min(np.concatenate(found).mean(axis=0).min() for found in papers.values()) < 0.9

@@ -217,11 +217,11 @@ def test_the_corrected_sigma_is_the_scatter(sigma, estimator, log):
 @pytest.mark.thorough
 @pytest.mark.parametrize("mask", MASKS.builtin)
 def test_the_level_of_each_joint_is_found(log, mask):
-    """From some 280 rows a level is known to 4 %; the mean of 300 to 0.3 %, 1 % is left to the leverage of correlated rows."""
+    """From 4600 samples differences show a level to 2 %, from some 280 rows residuals to 5 %; the less is 2 % low."""
     chain = replace(idbench_chain(), mask=MASKS.create(mask))
     levels = Problem((noisy(log, (0.5, 0.025)),), scara(), EVERY["power"], chain).noise.torque
-    np.testing.assert_allclose(np.sqrt(np.mean(levels**2, axis=0)), (0.5, 0.025), rtol=0.013)
-    assert levels.std(axis=0) / levels.mean(axis=0) == pytest.approx(0.045, abs=0.015)
+    np.testing.assert_allclose(np.sqrt(np.mean(levels**2, axis=0)), (0.5, 0.025), rtol=0.035)
+    assert (levels.std(axis=0) / levels.mean(axis=0) < 0.06).all()
 
 
 @pytest.mark.thorough

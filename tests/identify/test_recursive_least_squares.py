@@ -33,7 +33,7 @@ def test_it_is_least_squares_of_the_rows_so_far(noisy, model, estimator):
     for k, now in enumerate(t):
         X, sigma = least_squares(W, Y, (given.time + halo <= now) & given.valid)
         np.testing.assert_allclose(running.X[k], X, rtol=1e-9)
-        np.testing.assert_allclose(running.sigma[k], sigma / whole * estimate.calibrated_sigma, rtol=1e-8)
+        np.testing.assert_allclose(running.sigma[k], sigma / whole * estimate.standard_errors, rtol=1e-8)
 
 
 def least_squares(W, Y, rows):
@@ -45,7 +45,7 @@ def test_it_ends_at_the_estimate(noisy):
     estimate = identify(noisy, scara(), MODELS.create("implicit"), CHAINS.create("paper"))
     running = recursive_least_squares(estimate, np.array([1e9]))
     np.testing.assert_allclose(running.X[-1], estimate.X, rtol=1e-9)
-    np.testing.assert_allclose(running.sigma[-1], estimate.calibrated_sigma, rtol=1e-7)
+    np.testing.assert_allclose(running.sigma[-1], estimate.standard_errors, rtol=1e-7)
 
 
 def test_it_is_silent_until_every_parameter_is_told(noisy):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from idbench.identify import MODELS, MotionLog, TorqueChannel, identify, scara
-from idbench.identify.noise.spectral_levels import repeats
+from idbench.identify.noise.white_noise import repeats
 
 FS, SECONDS = 100.0, 40.0
 T = np.arange(0, SECONDS, 1 / FS)
@@ -115,6 +115,7 @@ def test_sigma_of_counts_alone_holds_the_truth(motion, bits, truth):
     q = np.array([rounded(one[0], bits, rng)[0] for one in every])
     log = logged(q, np.array([torque(truth, *one) for one in every]))
     found = identify(log, scara(), MODELS.create("explicit"))
-    z = (found.X - truth) / found.standard_errors
+    z = (found.X - truth) / found.noise_sigma
     assert np.sqrt(np.mean(z**2)) == pytest.approx(1.0, abs=0.1)
     assert 0.93 < np.mean(np.abs(z) < 2) < 0.98
+    assert np.mean(np.abs(found.X - truth) < 2 * found.standard_errors) > 0.93

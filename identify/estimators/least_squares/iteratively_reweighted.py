@@ -15,7 +15,7 @@ from idbench.identify.estimators.estimator import AbstractEstimator, Need
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.simulating.row_products import Kinds, Solved, solve_with, with_weights
 from idbench.identify.estimators.solution import Given
-from idbench.identify.noise.restricted_likelihood import EXACT
+from idbench.identify.noise.white_noise import EXACT
 from idbench.identify.signals.wild_samples import without_wild_samples
 
 SIGMA = 1.4826

@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
-import numpy as np
-
 from idbench.identify.arrays import frozen
 from idbench.identify.errors import require_whole
-from idbench.identify.estimators.estimate import Estimate, bias_covariance
+from idbench.identify.estimators.estimate import Estimate
 from idbench.identify.estimators.estimator import AbstractEstimator, Need
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.solution import OfWhitenedRows
@@ -73,7 +71,5 @@ class GeneralizedLeastSquares(AbstractEstimator):
         R = problem.independent_factor
         factor = Factor(R, problem.factors.together.rows, problem.names)
         solvable = (problem.factors.together.status == Status.OK) & factor.determined
-        solution = OfWhitenedRows(inverse := factor.inverse(solvable))
-        off = np.zeros(()) if problem.alike else bias_covariance(problem, solution.influence(problem.parts))
-        X, covariance = frozen(factor.solution(solvable)), frozen(inverse + off)
-        return Estimate(problem, X, covariance, solution, calibrated=covariance, levels=problem.likely_noise)
+        inverse = factor.inverse(solvable)
+        return Estimate(problem, frozen(factor.solution(solvable)), frozen(inverse), OfWhitenedRows(inverse))

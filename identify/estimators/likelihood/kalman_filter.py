@@ -81,7 +81,7 @@ class UnscentedKalmanFilter(AbstractEstimator):
         covariance = np.full((*runs, p, p), np.nan)
         failures = dict[tuple[int, ...], str]()
         torque = np.zeros((*runs, problem.basis.n))
-        levels = problem.noise
+        levels = problem.likely_noise
         for run in np.ndindex(runs):
             if problem.factors.together.status[run] != Status.OK or not np.isfinite(start[run]).all():
                 continue

@@ -19,7 +19,8 @@ from idbench.identify.estimators.problem import Problem
 from idbench.identify.models import ExplicitModel
 from idbench.identify.noise.band_matrix import BandMatrix, Cholesky
 from idbench.identify.noise.propagation import NoiseLevels
-from idbench.identify.noise.restricted_likelihood import EXACT, SMALLEST
+from idbench.identify.noise.restricted_likelihood import SMALLEST
+from idbench.identify.noise.white_noise import EXACT
 from idbench.identify.rows.factors import Status
 
 
