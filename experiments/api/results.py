@@ -24,6 +24,7 @@ from idbench.experiments.results.attempts import Attempts
 from idbench.experiments.results.writing import require_free, write_text
 from idbench.identify import Array, MotionLog, Problem, State, Validation, validate
 from idbench.identify.arrays import combined
+from idbench.identify.judge.torque_interval import torque_interval
 from idbench.identify.rows.rows import manageable
 from idbench.identify.tables import html_table, significant, text_table
 from idbench.sim.engine.run import Run
@@ -134,8 +135,10 @@ class Identification:
         """The verdict on held-out data in one sentence, and what to check first."""
         return conclusion(self.judgement, self.doubts)
 
-    def predict(self, q: Array, qd: Array, qdd: Array, model: str | None = None) -> Array:
-        """Return the torques of motions [N m, N], of the shape of q.
+    def predict(
+        self, q: Array, qd: Array, qdd: Array, model: str | None = None, *, interval: float | None = None
+    ) -> Array | tuple[Array, Array]:
+        """Return the torques of motions [N m, N], of the shape of q; with `interval`, also the half widths of their intervals.
 
         Parameters
         ----------
@@ -143,11 +146,14 @@ class Identification:
             Positions, velocities and accelerations [rad, rad/s, rad/s^2], joints in the order of the robot.
         model : str, optional
             The model whose parameters are used; by default the one that is shown.
+        interval : float, optional
+            Share of torques that intervals shall contain, such as 0.95. They are from held-out blocks, or logs, of the fit
+            (`torque_interval`), and hold for torques in the band of the fit and motions like the fitted ones.
 
         Raises
         ------
         ExperimentError
-            If a shape is another, or the model has no estimate.
+            If a shape is another, the model has no estimate, or intervals are not known.
         """
         given = [np.asarray(x, dtype=np.float64) for x in (q, qd, qdd)]
         n = self.fit.basis.n
@@ -157,7 +163,15 @@ class Identification:
         flat = [x.reshape(-1, n).T for x in given]
         state = State(flat[0], flat[1], lambda _: flat[2])
         tau = combined(self.fit.basis.explicit(state), self._of(model).X, np.zeros(flat[0].shape))
-        return tau.T.reshape(given[0].shape)
+        torques = tau.T.reshape(given[0].shape)
+        return torques if interval is None else (torques, np.broadcast_to(self._half(interval, model), torques.shape).copy())
+
+    def _half(self, level: float, model: str | None) -> Array:
+        if not 0 < level < 1:
+            raise ExperimentError(f"predict: interval = {level:g} must be a share between 0 and 1, such as 0.95")
+        if (found := torque_interval(self._of(model), level)) is None:
+            raise ExperimentError("predict: the rows of this fit are not kept, its log is too long: intervals are not known")
+        return found.half
 
     def score(self, log: MotionLog, model: str | None = None) -> Score:
         """Return the errors of the torques predicted for a held-out log.
@@ -175,7 +189,7 @@ class Identification:
         if any(within(held_out, other) for other in self.fit.logs.fitted):
             raise ExperimentError("score: the log holds the motion that is identified: give another motion")
         problem = Problem((manageable([held_out])[0],), self.fit.basis, self.fit.problem.model, self.fit.processing)
-        found = validate(problem, estimate.X, estimate.covariance)
+        found = validate(problem, estimate.X, estimate.within_covariance)
         units = tuple(robot.units(j)[0] for j in range(self.fit.basis.n))
         return Score(robot.robot.joints, units, found, Verdict.of(self.fit, found))
 

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from importlib.metadata import version
 from importlib.resources import files
+from math import isfinite, nan
 from pathlib import Path
 from pprint import pformat
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.consistent_robot import WrittenRobot
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.results.writing import finite
 from idbench.identify import AbstractBlock, AbstractFriction, Parameter, SettingError, ShapedFriction
 from idbench.identify.basis import LoadFriction
 from idbench.identify.basis.block import BODY, named
@@ -118,7 +120,8 @@ def require_known(robot_model: RobotModel, target: object) -> None:
 ABOUT = (
     "tau = D(q, qd, qdd) X: X are `parameters`, each the sum of standard parameters in `made_of`. D has the columns of the "
     "standard parameters `column`, over `scale`: those of links from the tree (inertia about the origin of the link's frame "
-    "and in its axes, first moments, mass), Ia: qdd of its joint, Fv: qd, Fs: sign(qd), off: 1."
+    "and in its axes, first moments, mass), Ia: qdd of its joint, Fv: qd, Fs: sign(qd), off: 1. `torque_interval` has half "
+    "widths of 95 % intervals of tau, and the speeds and torques that 99 % of the fit stayed below."
 )
 
 
@@ -150,6 +153,7 @@ def json_text(fit: Fit, model: str) -> str:
         "logs": list(fit.logs.names),
         "parameters": parameters,
         "covariance": np.asarray(estimate.covariance).tolist(),
+        "torque_interval": {name: [finite(x) for x in of] for name, of in _interval(fit, model).items()},
         "letters_of_links": list(INERTIAL),
         "gravity": [float(x) for x in robot_model.tree.gravity],
         "tree": [
@@ -202,10 +206,23 @@ def python_text(fit: Fit, model: str, target: Path) -> str:
         "{tree}": pformat([_joint(joint) for joint in tree.joints], width=110),
         "{links}": pformat([[values.get(named(x, j), 0.0) for x in INERTIAL] for j in range(n)], width=110),
         **{f"{{{x}}}": repr(of) for x, of in each.items()},
+        **{f"{{{x}}}": _numbers(of) for x, of in _interval(fit, model).items()},
     }
     for mark, word in words.items():
         text = text.replace(mark, word)
     return text
+
+
+def _interval(fit: Fit, model: str) -> dict[str, list[float]]:
+    """Return the half widths of the torques' intervals, and the fitted speeds and torques; NaN where they are not known."""
+    interval, nothing = fit.torque_intervals[model], [nan] * fit.basis.n
+    if interval is None:
+        return dict.fromkeys(("half", "speed", "torque"), nothing)
+    return {name: getattr(interval, name).tolist() for name in ("half", "speed", "torque")}
+
+
+def _numbers(values: list[float]) -> str:
+    return f"[{', '.join(f'{x:.6g}' if isfinite(x) else 'np.nan' for x in values)}]"
 
 
 def _joint(joint: Joint) -> tuple[object, ...]:

@@ -30,6 +30,7 @@ from idbench.identify import (
 )
 from idbench.identify.judge.friction_choice import FrictionChoice
 from idbench.identify.judge.lack_of_fit import Lack, lack_of_fit
+from idbench.identify.judge.torque_interval import TorqueInterval, torque_interval
 from idbench.identify.rows.rows import Rows
 
 NOTHING = 1e-12
@@ -218,9 +219,14 @@ class Fit:
     def left_open(self) -> dict[str, Array]:
         """Standard error of the torque that every estimate predicts on its own log, over that torque's rms, shape (joint,)."""
         W = self.problem.factors.R[..., :-1]
-        spread = {name: np.sum(W @ e.covariance * W, axis=(-2, -1)) for name, e in self.estimates.items()}
+        spread = {name: np.sum(W @ e.within_covariance * W, axis=(-2, -1)) for name, e in self.estimates.items()}
         squares = np.maximum(self._torque_squares, 1e-300)
         return {name: np.sqrt(np.maximum(found, 0.0) / squares) for name, found in spread.items()}
+
+    @cached_property
+    def torque_intervals(self) -> dict[str, TorqueInterval | None]:
+        """Intervals of the torques that every estimate predicts; None where rows are not kept."""
+        return {name: torque_interval(e) for name, e in self.estimates.items()}
 
     @property
     def _torque_squares(self) -> Array:
@@ -253,6 +259,8 @@ class Fit:
         models = {name: summarize(e, truth) for name, e in self.estimates.items()}
         for name, share in self.explained.items():
             models[name]["explained_share"] = [finite(x) for x in share]
+        for name, interval in self.torque_intervals.items():
+            models[name]["torque_interval"] = None if interval is None else [finite(x) for x in interval.half]
         delay, cutoff = self.delay, getattr(self.processing.operator, "cutoff", None)
         return {
             "parameters": list(self.basis.names),

@@ -36,7 +36,7 @@ def words_of_lack(found: Sequence[Lack], robot_model: RobotModel) -> str:
         f"{joints[x.joint]} over its {x.over} ({x.size:.2g} {robot_model.units(x.joint)[0]} rms, p {probability(x.p)})"
         for x in wrong
     )
-    return f"lack of fit: {'; '.join(each)}: sigma is too small"
+    return f"lack of fit: {'; '.join(each)}"
 
 
 def advice_on_lack(found: Sequence[Lack], joints: Sequence[str]) -> Iterator[str]:
@@ -46,6 +46,6 @@ def advice_on_lack(found: Sequence[Lack], joints: Sequence[str]) -> Iterator[str
         names = ", ".join(joints[lack.joint] for lack in wrong if lack.over == over)
         first = next(lack.joint for lack in wrong if lack.over == over)
         yield (
-            f"the residual torque of {names} depends on {over}, which no parameter explains: errors are larger than "
-            f"sigma; try {TRY[over].format(joint=said(first, joints))}"
+            f"the residual torque of {names} depends on {over}, which no parameter explains; "
+            f"try {TRY[over].format(joint=said(first, joints))}"
         )

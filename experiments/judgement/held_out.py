@@ -155,7 +155,12 @@ class HeldOut:
     @cached_property
     def torques(self) -> dict[str, Validation]:
         """How well each model predicts the torques."""
-        return {model: validate(self.problem, e.X, e.covariance) for model, e in self.fit.estimates.items()}
+        return {model: validate(self.problem, e.X, e.within_covariance) for model, e in self.fit.estimates.items()}
+
+    def within_interval(self, model: str) -> tuple[Array, float] | None:
+        """Return the share of each joint's torques within the fit's intervals, and that of the log outside the fit."""
+        interval = self.fit.torque_intervals[model]
+        return None if interval is None else (interval.contained(self.problem, self.fit.estimates[model].X))
 
     @cached_property
     def replays(self) -> dict[str, Replay | str]:
@@ -236,6 +241,9 @@ class HeldOut:
             "residual_correlation_bound": validation.bound,
         }
         found: dict[str, Any] = {name: [finite(x) for x in values] for name, values in numbers.items()}
+        if (within := self.within_interval(model)) is not None:
+            found["within_interval"] = [finite(x) for x in within[0]]
+            found["outside_fitted"] = within[1]
         return {**found, "position_error_rms": None if off is None else off.tolist()}
 
 

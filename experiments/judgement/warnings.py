@@ -74,7 +74,7 @@ def _link_side(fit: Fit) -> Iterator[str]:
     estimate = next(iter(fit.estimates.values()))
     rotors = [
         name
-        for p, name, x, sigma in zip(fit.basis.parameters, estimate.names, estimate.X, estimate.standard_errors, strict=True)
+        for p, name, x, sigma in zip(fit.basis.parameters, estimate.names, estimate.X, estimate.own_sigma, strict=True)
         if p.kind == "rotor inertia" and x < -LINK_SIDE * sigma
     ]
     if rotors:
@@ -114,7 +114,7 @@ def used(marks: Mapping[str, Sequence[Sequence[str]]]) -> list[str]:
 def _negative(fit: Fit, model: str) -> list[str]:
     """Return parameters that must be positive and are significantly negative."""
     estimate = fit.estimates[model]
-    friction = zip(fit.basis.parameters, estimate.X, estimate.standard_errors, strict=True)
+    friction = zip(fit.basis.parameters, estimate.X, estimate.own_sigma, strict=True)
     return [p.name for p, x, sigma in friction if p.kind in NOT_NEGATIVE and _surely_negative(x, sigma)]
 
 
@@ -181,7 +181,7 @@ def warnings_of_robot(robot: Robot) -> list[str]:
 def wrong_sign(fit: Fit) -> list[str]:
     """Return which torques have the wrong sign: those that drive their joint by friction."""
     model, estimate = next(iter(fit.estimates.items()))
-    values = zip(fit.basis.parameters, estimate.X, estimate.standard_errors, strict=True)
+    values = zip(fit.basis.parameters, estimate.X, estimate.own_sigma, strict=True)
     known = {(p.kind, p.joint): (x, sigma) for p, x, sigma in values}
     nothing = (0.0, 0.0)
     wrong = [
@@ -200,6 +200,7 @@ def wrong_sign(fit: Fit) -> list[str]:
 
 
 def _surely_negative(x: float, sigma: float) -> bool:
+    """Return whether a value is negative by the estimator's own sigma: an impossible value is a mistake, not an error."""
     return x < -2 * sigma
 
 

@@ -8,7 +8,6 @@ from math import isfinite, log10
 import numpy as np
 
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.identification.lack import lacking
 from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.judgement.judgement import Judgement
 from idbench.experiments.judgement.warnings import FLAGS, doubtful, used
@@ -18,9 +17,6 @@ from idbench.identify.arrays import TINY, Array
 
 LEAST_PERCENT = 0.01
 """%sigma without a bar: such a parameter is known better than anybody needs."""
-
-ABOUT = "~"
-"""Mark of a standard error that does not hold what the model is wrong by."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +37,7 @@ class EstimatesTable:
     def heads(self) -> list[tuple[str, str]]:
         """The two lines above each column but the first."""
         known = self.fit.truth is not None
-        about = ABOUT if lacking(self.fit.lack) else ""
-        what = "X", "%e" if known else f"{about}sigma", f"{about}%sigma"
+        what = ("X", "%e", "%sigma") if known else ("X", "sigma", "of noise", "%sigma")
         return [("true", "X")] * known + [(model, each) for model in self.estimates for each in what]
 
     def rows(self) -> Iterator[list[str]]:
@@ -71,15 +66,18 @@ class EstimatesTable:
         for j in range(self.fit.basis.n):
             every[f"tau{j + 1} explained"] = [_explained(self.fit.explained[model][j]) for model in self.estimates]
         for name, cells in every.items():
-            yield [name, *before, *(cell for first in cells for cell in (first, "", ""))]
+            yield [name, *before, *(cell for first in cells for cell in (first, *[""] * (self._width - 1)))]
+
+    @property
+    def _width(self) -> int:
+        """Columns of a model."""
+        return 3 if self.fit.truth is not None else 4
 
     @cached_property
     def legend(self) -> str:
         """What the marks mean that are used."""
         marks = [f"{flag} {FLAGS[flag]}" for flag in used(self._marks)]
-        return "; ".join(
-            marks + [f"{ABOUT} of noise alone: the fit lacks something, errors are larger"] * bool(lacking(self.fit.lack))
-        )
+        return "; ".join(marks)
 
     @cached_property
     def _marks(self) -> dict[str, list[tuple[str, str, str]]]:
@@ -90,13 +88,14 @@ class EstimatesTable:
 
     def _cells(self, model: str, estimate: Estimate, i: int) -> Iterator[str]:
         if self.fit.truth is None:
-            second = f"{estimate.standard_errors[i]:.2g}"
+            own = [f"{estimate.standard_errors[i]:.2g}", f"{estimate.noise_sigma[i]:.2g}"]
         else:
             error = float(estimate.error_percent(list(self.fit.truth.values()))[i])
-            second = percent(error) if isfinite(error) else ""
+            own = [percent(error) if isfinite(error) else ""]
         share = 100 * estimate.standard_errors[i] / abs(estimate.X[i]) if estimate.X[i] else float("inf")
-        cells = number(estimate.X[i]), second, percentage(share) or f">{WORTHLESS:g}"
-        marks = self._marks[model][i] if self.legend else ("", "", "")
+        cells = number(estimate.X[i]), *own, percentage(share) or f">{WORTHLESS:g}"
+        first, *others, last = self._marks[model][i] if self.legend else ("", "", "")
+        marks = first, *others, *[""] * (len(own) - 1), last
         return (f"{cell}{mark}" for cell, mark in zip(cells, marks, strict=True))
 
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import zip_longest
 from math import isfinite, log2, pi
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -17,10 +18,11 @@ from idbench.experiments.judgement.judgement import Unjudged
 from idbench.experiments.judgement.remedies import SURE
 from idbench.experiments.reports.estimates import EstimatesTable, in_lines, leading
 from idbench.experiments.text import WORTHLESS, new_table, percentage, print_titled
-from idbench.identify import AsLogged, Estimate
+from idbench.identify import Array, AsLogged, Estimate
+from idbench.identify.judge.torque_interval import LEVEL
 
-HIDDEN = 0.5
-"""Share of an encoder's rounding below which noise of the positions was not found."""
+FEW_OUTSIDE = 0.02
+"""Share of a motion outside of the fit that is expected: twice that of the fit."""
 
 BARS, BAR_HEAD = 8, "0.01..100"
 """Cells of the bar of a standard error, and what is written above: a full bar is 100 % of the value, an empty one 0.01 %."""
@@ -135,24 +137,16 @@ def _rotors(fit: Fit) -> Iterator[str]:
 def _noise(fit: Fit) -> str:
     """Return the noise of a log in words, joint by joint."""
     torque = " ".join("?" if x is None else f"{x:.2g}" for x in fit.noise["torque"])
-    position = " ".join(_position_noise(*each) for each in zip(fit.noise["position"], fit.noise["encoder_step"], strict=True))
+    position = " ".join("?" if x is None else f"{x:.2g}" for x in fit.noise["position"])
     slides = [joint.kind == "slide" for joint in fit.robot_model.tree.joints]
     force, length = ("N m, N", "rad, m") if any(slides) else ("N m", "rad")
-    words = f"noise found in the log: torque {torque} {force}, position {position} {length}"
+    words = f"white noise of the log: torque {torque} {force}, position {position} {length}"
     steps = fit.noise["encoder_step"]
     if not any(steps):
         return words
     each = zip(steps, slides, strict=True)
     bits = " ".join("-" if slide else f"{log2(2 * pi / step):.1f}" if step else "?" for step, slide in each)
     return f"{words}; encoder steps {' '.join(f'{x:.3g}' if x else '?' for x in steps)} {length} ({bits} bits)"
-
-
-def _position_noise(level: float | None, step: float | None) -> str:
-    """Return a level as text; one below the rounding of the encoder was hidden by the noise of the torque."""
-    if level is None:
-        return "?"
-    rounding = (step or 0.0) / 12**0.5
-    return f"<{rounding:.2g}" if level < HIDDEN * rounding else f"{level:.2g}"
 
 
 def print_held_out(console: Console, one: HeldOut | Unjudged, whole: Sequence[str]) -> None:
@@ -175,6 +169,8 @@ def print_held_out(console: Console, one: HeldOut | Unjudged, whole: Sequence[st
         grid.add_row(joint, noise, *cells)
     what = "torque error while moving [N m, N]" + (", position error of the simulated robot [rad, m]" if simulated else "")
     print_titled(console, f"{one.title}: {what}", grid, 2)
+    if (within := one.within_interval(best)) is not None and one.fit.torque_intervals[best] is not None:
+        console.print(Text(_interval_words(one, best, *within)), soft_wrap=True)
     apart = [f"{joint} {rms:.2g}" for joint, rms in zip(joints, first.standing, strict=True) if isfinite(rms)]
     if apart:
         console.print(Text(f"at rest and reversing, where friction is not determined: {', '.join(apart)} N m"), soft_wrap=True)
@@ -188,6 +184,21 @@ def print_held_out(console: Console, one: HeldOut | Unjudged, whole: Sequence[st
     for model, why in one.fit.failures.items():
         console.print(Text(f"{model}: not judged: {why}"), soft_wrap=True)
     console.print()
+
+
+def _interval_words(one: HeldOut, model: str, inside: Array, outside: float) -> str:
+    """Return how many of a held-out log's torques lie in the fit's intervals, and how much of its motion outside of the fit."""
+    interval, joints = one.fit.torque_intervals[model], one.fit.robot_model.robot.joints
+    assert interval is not None
+    half = " ".join(f"{x:.2g}" for x in interval.half)
+    share = np.nan_to_num(inside, nan=1.0)
+    worst = f", of {joints[int(share.argmin())]} {100 * share.min():.0f} %" if len(joints) > 1 else ""
+    words = f"{100 * LEVEL:.0f} % intervals of the torque, +- {half} N m: they contain {100 * np.nanmean(inside):.0f} %{worst}"
+    return (
+        f"{words}; {100 * outside:.0f} % of the motion is outside the fitted speeds and torques"
+        if outside > FEW_OUTSIDE
+        else words
+    )
 
 
 def _alike(verdicts: Mapping[str, tuple[str, ...]]) -> dict[tuple[str, ...], list[str]]:

@@ -21,6 +21,10 @@ class BetweenLogs(NamedTuple):
     logs: int
     """Number of logs that determine all parameters by themselves."""
 
+    def of_all(self, usual: Array) -> Array:
+        """Return the variance of what all logs give together, shape (p,); that `usual` of friction counts as one more log."""
+        return ((self.logs - (usual > 0)) * self.variance + usual) / self.logs**2
+
 
 def between_logs(parts: Sequence[LogRows], solution: OfWeightedRows | OfWhitenedRows) -> BetweenLogs | None:
     """Return the scatter of parameters between the logs of a fit; None unless two of them determine all parameters.

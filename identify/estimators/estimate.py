@@ -1,7 +1,7 @@
 """What comes out of an identification, and how good it is."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self
 
@@ -178,6 +178,12 @@ class Estimate:
     @cached_property
     def covariance(self) -> Array:
         """Covariance of the error of X due to noise, delay and the model, shape (..., p, p)."""
+        scatter = 0.0 if self.model_error is None else self.model_error.scatter[..., None] * np.eye(len(self.names))
+        return self.within_covariance + scatter
+
+    @property
+    def within_covariance(self) -> Array:
+        """The same without the scatter from log to log, which is not known of combinations, shape (..., p, p)."""
         return self.noise_covariance + (0.0 if self.model_error is None else self.model_error.covariance)
 
     @property
@@ -193,12 +199,8 @@ class Estimate:
             return None
         parts = self.problem.parts
         found = ModelError.of(parts, self.X, self.solution.influence(parts), self.problem.share)
-        changes = found.changes(self.problem.basis.parameters, self.X)
-        if (between := self.between_logs) is None:
-            return found.with_scatter(changes)
-        # The scatter that is usual for friction counts as one more log.
-        seen = between.logs - (changes > 0)
-        return found.with_scatter((seen * between.variance + changes) / between.logs**2)
+        usual = found.changes(self.problem.basis.parameters, self.X)
+        return replace(found, scatter=usual if self.between_logs is None else self.between_logs.of_all(usual))
 
     @cached_property
     def between_logs(self) -> BetweenLogs | None:

@@ -1,7 +1,7 @@
 """The part of an estimate's error that comes from the model: from residuals beyond those of noise."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self, final
 
 import numpy as np
@@ -39,7 +39,9 @@ class ModelError:
     """The error that a wrong model gives an estimate X = G' Y. Leading axes are runs."""
 
     covariance: Array
-    """Of the error of X, shape (..., p, p)."""
+    """Of the error of X within a log, shape (..., p, p)."""
+    scatter: Array
+    """Variance of X from log to log beyond that, shape (..., p)."""
     share: Array
     """Share of residuals beyond `MARGIN` times noise, at the frequencies of the torque, shape (..., kind)."""
     independent: Array
@@ -76,7 +78,8 @@ class ModelError:
         rows, time = (np.sum([getattr(part, x) for part in each], axis=0) for x in ("rows", "time"))
         ratio = np.sum([part.ratios(lags) * part.rows[..., None] for part in each], axis=0) / np.maximum(rows, TINY)[..., None]
         surely = 1 + 2 * np.sqrt(0.75 * MEMORY / np.maximum(time, MEMORY))[..., None]
-        share, meat, worst = np.zeros(ratio.shape[:-1]), np.zeros((*X.shape, X.shape[-1])), np.zeros(X.shape)
+        share, worst = np.zeros(ratio.shape[:-1]), np.zeros(X.shape)
+        meat = np.zeros((*X.shape, X.shape[-1]))
         for part in each:
             S, S0 = part.spectra(taper * ratio, surely)
             share = np.maximum(share, part.share(S, S0))
@@ -88,11 +91,7 @@ class ModelError:
         absorbed = np.minimum(X.shape[-1] / np.maximum(independent, 1.0), MOST)
         diagonal = np.maximum(np.diagonal(meat, axis1=-2, axis2=-1), TINY)
         scale = np.sqrt((1 + IN_PHASE**2 * worst / diagonal) / (1 - absorbed)[..., None])
-        return cls(meat * scale[..., :, None] * scale[..., None, :], share, independent)
-
-    def with_scatter(self, variance: Array) -> Self:
-        """Return it with a scatter of the parameters from log to log, shape (..., p)."""
-        return replace(self, covariance=self.covariance + variance[..., None] * np.eye(variance.shape[-1]))
+        return cls(meat * scale[..., :, None] * scale[..., None, :], np.zeros(X.shape), share, independent)
 
     def changes(self, parameters: Sequence[Parameter], X: Array) -> Array:
         """Return the variance of friction from log to log (`CHANGES`), as far as noise does not explain the residuals.

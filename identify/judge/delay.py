@@ -125,7 +125,7 @@ class _Search:
         return self._refined(float(found.x), (float(grid[best - 1]), float(grid[best + 1])))
 
     def _refined(self, delay: float, within: tuple[float, float]) -> DelayEstimate:
-        """Return the delay as a parameter of generalized least squares, and its jackknife's standard deviation.
+        """Return the delay as a parameter, delta(k+1) = delta(k) + its GLS step, and its jackknife's standard deviation.
 
         If its steps leave the bracket of the search, which they do where the model is far off, it is the search's.
         """

@@ -123,7 +123,7 @@ def test_running_estimates_end_at_the_estimate_with_its_sigma(recorded):
             _, variance = layer(recorded, f"{form}/estimate/{name}", "Measurements:variances")
             # The factor takes in rows in another order than the estimate did: rounding, times the condition of W squared.
             np.testing.assert_allclose(X[-1], estimate.X[p], rtol=1e-8)
-            np.testing.assert_allclose(variance[-1] ** 0.5, estimate.calibrated_sigma[p], rtol=1e-6)
+            np.testing.assert_allclose(variance[-1] ** 0.5, estimate.standard_errors[p], rtol=1e-6)
 
 
 def test_velocities_are_shown_as_measured_and_as_the_rows_see_them(recorded):
