@@ -16,7 +16,7 @@ T = TypeVar("T")
 OURS = ("idbench",)
 """Packages whose mistakes are not those of a plug-in."""
 
-LIBRARIES = frozenset({"numpy", "scipy", "mujoco", "pyarrow", "ruckig", "pydantic", "clarabel"}) | sys.stdlib_module_names
+LIBRARIES = frozenset({"numpy", "scipy", "mujoco", "pyarrow", "ruckig", "pydantic"}) | sys.stdlib_module_names
 """Packages that this project calls itself."""
 
 

@@ -10,7 +10,7 @@ import sys
 import sysconfig
 from pathlib import Path
 
-NEEDED = ("pinocchio", "covertable", "distributed", "dask_jobqueue", "clarabel", "rosbags")
+NEEDED = ("pinocchio", "covertable", "distributed", "dask_jobqueue", "rosbags")
 """Modules of the dependency group `test`, which `uv run idbench` does not install: 200 MB, robots of other people above all."""
 
 if any(importlib.util.find_spec(name) is None for name in NEEDED):

@@ -34,7 +34,6 @@ ALLOWED_IN = {
     "identify/files/ros_bag.py": {"rosbags"},
     "identify/telling.py": {"threadpoolctl"},
     "identify/servo/servo_step.py": {"numba"},
-    "identify/parameters/consistent.py": {"clarabel"},
     "sim/scenario/scenario_file.py": {"tomli_w"},
     "sim/trajectories/recorded.py": {"scipy"},
     "experiments/recording/columns.py": {"pyarrow"},

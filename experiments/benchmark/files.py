@@ -5,7 +5,6 @@ import os
 from functools import cache
 from hashlib import file_digest, sha256
 from importlib.metadata import version
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -41,8 +40,7 @@ def made_of_files(folder: Path, definition: Definition, out: Path) -> dict[str, 
     """Return digests of all that a row follows from, by its path."""
     found = {os.path.relpath(path, folder): _digest(path) for path in files_of(folder, definition)}
     found |= {path.name: _digest(path) for path in sorted(out.glob(PREDICTED))}
-    solver = "with Clarabel" if find_spec("clarabel") else "without Clarabel"
-    return {"idbench": version("idbench"), "code": _code(), "consistent bodies": solver, **found}
+    return {"idbench": version("idbench"), "code": _code(), **found}
 
 
 @cache

@@ -6,16 +6,18 @@ from functools import cached_property
 from pathlib import Path
 from typing import final
 
+import numpy as np
+
 from idbench.experiments.identification.consistent_estimate import consistent_of
 from idbench.experiments.identification.fit import Fit
-from idbench.identify import Consistent
+from idbench.identify import Array, Consistent
 from idbench.identify.basis.block import FRICTION, named
 from idbench.sim.robot.rewrite import compiled, rewritten
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import standard_parameters
 
-SIGMAS = 3.0
-"""Departures from the estimate beyond this many sigma are messages."""
+LITTLE = 0.1
+"""Differences of torques of less than so many per cent are not named."""
 
 
 @final
@@ -62,17 +64,29 @@ class WrittenRobot:
     @property
     def warnings(self) -> list[str]:
         """What is wrong about it."""
-        found, names = self.consistent, self.fit.robot_model.grouping.names
         messages = []
-        if not found.agrees:
-            far = [f"{n} by {abs(d):.1f}" for n, d in zip(names, found.departure, strict=True) if abs(d) > SIGMAS]
+        if not self.consistent.agrees:
+            joints, off = self.fit.robot_model.robot.joints, 100 * self.torque_off
+            far = ", ".join(f"{joint} {x:.2g} %" for joint, x in zip(joints, off, strict=True) if x > LITTLE)
+            torques = (
+                f"its torques differ by {far} of those of the log" if far else f"its torques differ by less than {LITTLE:g} %"
+            )
             messages.append(
-                f"the estimate of the {self.model} model is not physically consistent: the nearest consistent parameters are "
-                f"{found.distance:.1f} sigma off{', ' + ', '.join(far) + ' sigma' if far else ''}"
+                f"the estimate of the {self.model} model is not physically consistent: the nearest consistent robot is written; "
+                + torques
             )
         if self.lost:
             messages.append(f"{', '.join(self.lost)} have no place in an MJCF file and are left out")
         return messages
+
+    @property
+    def torque_off(self) -> Array:
+        """Rms of the torque by which the robot differs from the estimate, over that of the log, shape (joint,)."""
+        problem, estimate = self.fit.problem, self.fit.estimates[self.model]
+        X = np.array([self.consistent.base[self.fit.robot_model.grouping.basis.places[p]] for p in problem.basis.parameters])
+        R = problem.factors.R
+        squares = [np.sum(x**2, axis=-1) for x in (R[..., :-1] @ (X - estimate.X), R[..., -1])]
+        return np.sqrt(np.divide(squares[0], squares[1], out=np.zeros_like(squares[0]), where=squares[1] > 0))
 
     @property
     def lost(self) -> dict[str, float]:

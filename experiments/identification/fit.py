@@ -6,10 +6,10 @@ from typing import Any, Self, final
 
 import numpy as np
 
-from idbench.experiments.identification.consistent_estimate import made_consistent
 from idbench.experiments.identification.friction_choice import chosen_in_turns, masked_laws, suited_mask
 from idbench.experiments.identification.lack import advice_on_lack
 from idbench.experiments.identification.logs import Logs
+from idbench.experiments.identification.prior_share import chosen_share
 from idbench.experiments.identification.rates import CONTROLLER, Rates
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
@@ -51,6 +51,9 @@ def fit(request: Request, logs: Logs) -> "Fit":
     choice = None
     if request.robot_model.laws.auto:
         request, logs, choice = chosen_in_turns(request, logs)
+    known = request.robot_model.asked.prior
+    if known and request.robot_model.roughly_known.links and not request.robot_model.roughly_known.share:
+        request = replace(request, share=chosen_share(request, logs.fitted))
     problem = request.problem(logs.fitted)
     (speeds, raised), hidden = suited_mask(problem), list[str]()
     if raised:
@@ -84,18 +87,8 @@ def _with_its_cause(found: "Fit", error: IdentificationError) -> IdentificationE
 
 
 def _fit(request: Request, logs: Logs, problem: Problem) -> "Fit":
-    plain = attempt_each(problem, {name: MODELS.create(name) for name in request.models}, request.solver)
-    return Fit(request, logs, problem, plain, {name: _moved(request, outcome) for name, outcome in plain.items()})
-
-
-def _moved(request: Request, outcome: Estimate | IdentificationError) -> Estimate | IdentificationError:
-    """Return an estimate, moved to physically consistent parameters if that is asked for; or why that cannot be done."""
-    if request.consistent == "no" or isinstance(outcome, IdentificationError):
-        return outcome
-    try:
-        return made_consistent(request.robot_model, outcome, request.consistent)
-    except IdentificationError as error:
-        return error
+    found = attempt_each(problem, {name: MODELS.create(name) for name in request.models}, request.solver)
+    return Fit(request, logs, problem, found)
 
 
 @final
@@ -109,10 +102,8 @@ class Fit:
     """The logs."""
     problem: Problem
     """Logs, robot and chain, by the explicit model."""
-    unconstrained: Outcomes
-    """What each model gives, whether it is physically consistent or not."""
     outcomes: Outcomes
-    """The same, made consistent where that is asked for."""
+    """What each model gives."""
     choice: FrictionChoice | None = None
     """What was compared, where laws of friction were chosen."""
     hidden: tuple[str, ...] = ()
@@ -191,7 +182,7 @@ class Fit:
             name: replace(e, problem=problem.with_model(e.problem.model), solution=None, calibrated=e.covariance, fits={})
             for name, e in self.estimates.items()
         }
-        return replace(self, logs=alone, problem=problem, unconstrained=seen, outcomes=seen)
+        return replace(self, logs=alone, problem=problem, outcomes=seen)
 
     @cached_property
     def torque_errors(self) -> dict[str, Array]:
@@ -270,7 +261,6 @@ class Fit:
             "robot": self.robot_model.name,
             "chain": self.request.chain,
             "estimator": self.request.estimator,
-            "consistent": self.request.consistent,
             "torque": self._channel(0),
             "reversals_left_out": self.left_out,
             "found_delay": None if delay is None else {"delay": delay[0], "sigma": delay[1]},
@@ -282,6 +272,11 @@ class Fit:
             "mask_speed": list(self.request.mask_speed),
             "rates": self.rates.summary(),
             **({"held": self.robot_model.held} if self.robot_model.asked.hold else {}),
+            **(
+                {"prior": list(self.robot_model.asked.prior), "share": self.request.share}
+                if self.robot_model.asked.prior
+                else {}
+            ),
             **({"tied": list(self.robot_model.asked.tie)} if self.robot_model.asked.tie else {}),
             "cutoff": cutoff,
             "logs": [self._of_log(k) for k in range(len(self.logs.fitted))],

@@ -62,7 +62,7 @@ def iterations(fit: Fit) -> dict[str, Any]:
 
 def _unmoved(fit: Fit) -> dict[str, Estimate]:
     """Return the estimates as they came, before they were made physically consistent."""
-    return {model: outcome for model, outcome in fit.unconstrained.items() if isinstance(outcome, Estimate)}
+    return {model: outcome for model, outcome in fit.outcomes.items() if isinstance(outcome, Estimate)}
 
 
 def _test(fit: Fit, model: str) -> dict[str, Any]:

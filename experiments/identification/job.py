@@ -60,7 +60,6 @@ def request_of(asked: IdentifyRequest, robot_model: RobotModel | None = None) ->
         name=asked.label,
         loops=tuple(map(load_scenario, loops)),
         start=asked.start,
-        consistent=asked.consistent,
         mask_speed=asked.mask_speed,
         wdyn=_wdyn(asked.wdyn, own),
     )

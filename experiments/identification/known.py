@@ -1,14 +1,18 @@
-"""Parameters that are known, and therefore not identified."""
+"""Parameters that are known, and not identified, or roughly known."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isfinite
+from math import inf, isfinite
 from typing import Self, final
 
+import numpy as np
+
 from idbench.experiments.errors import ExperimentError
-from idbench.identify import Basis
+from idbench.identify import BaseParameters, Basis
 from idbench.identify.basis.block import BODY, FRICTION, Kind
+from idbench.identify.parameters.prior import FilePrior, NormalPrior, PriorSum
 from idbench.identify.plugins import did_you_mean
+from idbench.identify.rows.factors import AbstractPrior
 
 KINDS: Mapping[str, frozenset[Kind]] = {"links": BODY, "armatures": frozenset({"rotor inertia"}), "friction": FRICTION}
 """Groups of parameters that can be held together, at the values of the robot's file."""
@@ -68,6 +72,114 @@ class Known:
             if name not in names:
                 hint = did_you_mean(name, list(names))
                 raise ExperimentError(f"--hold: there is no parameter {name!r}{hint}; there are {', '.join(names)}")
+
+
+SHARE = 1.0
+"""Relative change of the links of a file that is expected where nobody says it and no log has been asked."""
+
+
+@final
+@dataclass(frozen=True)
+class Trust:
+    """A value that is roughly known."""
+
+    value: float | None
+    """The value; None stands for that of the robot's file."""
+    sigma: float
+    """Its standard deviation, as a share of the value where that is `relative`."""
+    relative: bool
+    """Whether it is a share."""
+
+    def of(self, filed: float) -> tuple[float, float]:
+        """Return value and standard deviation, with the value of the file."""
+        value = filed if self.value is None else self.value
+        return value, self.sigma * abs(value) if self.relative else self.sigma
+
+
+@final
+@dataclass(frozen=True)
+class RoughlyKnown:
+    """What is roughly known: links near the file, and values of parameters with their standard deviations."""
+
+    links: bool
+    """Whether links are near those of the file."""
+    share: float | None
+    """Relative change of them that is expected; None if the log shall decide."""
+    values: Mapping[str, Trust]
+    """Parameters, letters that stand for those of all joints, or groups of `KINDS` but for links."""
+
+    @classmethod
+    def of(cls, words: tuple[str, ...]) -> Self:
+        """Return what words such as file, file:25%, Ia=0.1:30% or Fs2=file:0.02 state.
+
+        Raises
+        ------
+        ExperimentError
+            If a word is none of these, or names something twice.
+        """
+        links, share, values = False, None, dict[str, Trust]()
+        for word in words:
+            name, equals, stated = word.partition("=")
+            first, _, trust = (stated if equals else word).partition(":")
+            sigma, relative = _number(trust.removesuffix("%")), trust.endswith("%")
+            sigma = sigma / 100 if sigma is not None and relative else sigma
+            wrong = bool(trust) and not (sigma is not None and sigma > 0)
+            if not equals and first == FILE and not wrong and not links:
+                links, share = True, sigma
+                continue
+            value = _number(first)
+            if not equals or not name or wrong or sigma is None or (value is None and first != FILE) or name in values:
+                raise ExperimentError(
+                    f"--prior {word}: write file, file:25% (links near the robot's file), NAME=VALUE:30%, NAME=VALUE:SIGMA or "
+                    "NAME=file:30%, each name once"
+                )
+            if name == "links" or (name in KINDS and value is not None):
+                raise ExperimentError(f"--prior {word}: write file:25% for links, {name}=file:25% for the others of a kind")
+            values[name] = Trust(value, sigma, relative)
+        return cls(links, share, values)
+
+    def prior(self, grouping: BaseParameters, basis: Basis, filed: Mapping[str, float], share: float | None) -> AbstractPrior:
+        """Return what that says of the parameters of a basis.
+
+        Raises
+        ------
+        ExperimentError
+            If a name is none of the robot's, or all that is made of it has parts that are not known.
+        """
+        K = grouping.K[[grouping.basis.places[parameter] for parameter in basis.parameters]]
+        standard = grouping.standard.parameters
+        values = np.array([filed.get(p.name, 0.0) for p in standard])
+        parts, known = list[AbstractPrior](), np.full(len(standard), inf)
+        stated = values.copy()
+        for name, trust in self.values.items():
+            if name in basis.names and name not in grouping.standard.names:
+                place = basis.names.index(name)
+                one = np.eye(len(basis.names))[place : place + 1]
+                value, sigma = trust.of(float(one @ K @ values))
+                parts.append(NormalPrior.of(one.T, np.array([value]), np.array([sigma])))
+                continue
+            places = [i for i, p in enumerate(standard) if name in (p.name, p.symbol) or p.kind in KINDS.get(name, ())]
+            if not places:
+                hint = did_you_mean(name, [*grouping.standard.names, *basis.names])
+                raise ExperimentError(f"--prior: there is no parameter {name!r}{hint}")
+            for i in places:
+                stated[i], known[i] = trust.of(values[i])
+        if (zero := [standard[i].name for i in np.flatnonzero(known == 0)]) != []:
+            raise ExperimentError(f"--prior: {', '.join(zero)} is 0 in the file, of which no share is known: give a sigma")
+        if np.isfinite(known).any():
+            normal = NormalPrior.of(K, stated, known)
+            if not len(normal.known):
+                raise ExperimentError(f"--prior: {_grouped(grouping, self.values)}: say of all parts, or hold them (--hold)")
+            parts.append(normal)
+        if self.links:
+            parts.append(FilePrior(K, standard, values, share or self.share or SHARE))
+        return parts[0] if len(parts) == 1 else PriorSum(tuple(parts))
+
+
+def _grouped(grouping: BaseParameters, names: Mapping[str, Trust]) -> str:
+    """Return what parameters are grouped with others in."""
+    made = [f"{base} = {text}" for base, text in grouping.groupings.items() if any(name in text for name in names)]
+    return f"no base parameter is made of {', '.join(names)} alone ({'; '.join(made[:3])})"
 
 
 def _number(text: str) -> float | None:

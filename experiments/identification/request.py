@@ -9,7 +9,7 @@ from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.identification.simulators import RobotPlant, ScenarioLoop
 from idbench.experiments.requests.shared import CHAIN, ESTIMATOR
-from idbench.experiments.requests.words import Consistency, Start
+from idbench.experiments.requests.words import Start
 from idbench.identify import CHAINS, ESTIMATORS, MODELS, AbstractEstimator, Chain, ExplicitModel, MotionLog, Problem, Simulation
 from idbench.identify.blame import blamed
 from idbench.identify.estimators.settle import settled
@@ -47,8 +47,8 @@ class Request:
     start: Start = "least-squares"
     """Where estimators begin that simulate or filter: at the least-squares estimate, or at the parameters of the robot's
     file."""
-    consistent: Consistency = "no"
-    """Whether estimates are moved to the nearest physically consistent parameters."""
+    share: float | None = None
+    """Relative change of the links of the file that is expected, where they are roughly known; by default the log decides."""
     mask_speed: tuple[float, ...] = ()
     """Speeds up to which joints count as standing or turning, of all or of each [rad/s, m/s]; by default they follow the
     log."""
@@ -68,6 +68,12 @@ class Request:
         n, given = self.robot_model.robot.n, " ".join(f"{x:g}" for x in self.mask_speed)
         if len(self.mask_speed) not in (0, 1, n) or not all(0 < x < np.inf for x in self.mask_speed):
             raise ExperimentError(f"--mask-speed {given} must be one speed above 0 for all {n} joints, or one for each")
+        if self.robot_model.asked.prior and not self.solver.takes_prior:
+            raise ExperimentError(
+                f"--prior: {self.estimator} takes nothing that is known before; use --estimator GLS, WLS or OLS, or --hold"
+            )
+        if self.robot_model.asked.prior:
+            _ = self.robot_model.prior()
         if self.start != "least-squares" and not self.solver.begins:
             raise ExperimentError(
                 f"--start {self.start}: {self.estimator} needs no start; leave it out, or use --estimator IV or DIDIM"
@@ -102,7 +108,8 @@ class Request:
         """Return logs, robot and chain, by the explicit model; nonlinear parameters at their operating point."""
         basis, simulation = self.robot_model.basis, self._simulation(tuple(logs))
         with blamed():
-            return settled(Problem(tuple(logs), basis, ExplicitModel(), self.processing, simulation))
+            prior = self.robot_model.prior(self.share)
+            return settled(Problem(tuple(logs), basis, ExplicitModel(), self.processing, simulation, prior))
 
     def _simulation(self, logs: tuple[MotionLog, ...]) -> Simulation:
         """Return how the robot is simulated, for estimators that need it."""

@@ -10,10 +10,11 @@ import numpy as np
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.friction_laws import FrictionLaws, balancers, law_of
-from idbench.experiments.identification.known import Known
+from idbench.experiments.identification.known import Known, RoughlyKnown
 from idbench.experiments.requests.shared import Parameters
 from idbench.identify import BLOCKS, AbstractJointLaw, BaseParameters, Basis, KinematicTree, SettingError, tree_basis
 from idbench.identify.parameters.base_parameters import in_letters_of_the_paper
+from idbench.identify.rows.factors import AbstractPrior
 from idbench.identify.tables import html_table, text_table
 from idbench.sim.frictions import AbstractFrictionLaw
 from idbench.sim.robot.mounting import PLAIN, Mounting, with_values
@@ -61,6 +62,17 @@ class RobotModel:
         return Known.of(self.asked.hold)
 
     @cached_property
+    def roughly_known(self) -> RoughlyKnown:
+        """What is roughly known; ExperimentError if that makes no sense."""
+        return RoughlyKnown.of(self.asked.prior)
+
+    def prior(self, share: float | None = None) -> AbstractPrior | None:
+        """Return what is roughly known of the parameters, links to a `share` of the file's; None if nothing is."""
+        if not self.asked.prior:
+            return None
+        return self.roughly_known.prior(self.grouping, self.basis, standard_parameters(self.robot), share)
+
+    @cached_property
     def held(self) -> dict[str, float]:
         """Standard parameters that are held, by name."""
         basis = self.grouping.standard
@@ -70,11 +82,17 @@ class RobotModel:
     def tree(self) -> KinematicTree:
         """Its description."""
         tree = kinematic_tree(self.robot, [name for name, _ in self.mounting.couplings])
-        if self.asked.armature == "file":
+        if self.asked.armature == "file" or (self.asked.armature == "auto" and not self.rotors_assumed):
             return tree
-        rotors = self.asked.armature == "all"
+        rotors = self.asked.armature != "none"
         joints = tuple(replace(joint, armature=rotors) for joint in tree.joints)
         return replace(tree, joints=joints, couplings=tuple(replace(c, armature=rotors) for c in tree.couplings))
+
+    @cached_property
+    def rotors_assumed(self) -> bool:
+        """Whether all joints have rotors because the robot's file cannot say which do."""
+        silent = Path(self.name).suffix.lower() in FILES and Path(self.name).suffix.lower() != ".xml"
+        return self.asked.armature == "auto" and silent and not self.robot.model.dof_armature.any()
 
     @cached_property
     def grouping(self) -> BaseParameters:

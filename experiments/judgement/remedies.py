@@ -101,6 +101,8 @@ class Remedies:
         asked = robot_model.asked
         mounting = robot_model.mounting
         joints = robot_model.robot.joints
+        if not (asked.prior or "links=file" in asked.hold) and request.solver.takes_prior:
+            found["--prior file"] = lambda: replace(robot_model, asked=replace(asked, prior=("file",)))
         if not all(joint.armature for joint in robot_model.tree.joints):
             found["--armature all"] = lambda: replace(robot_model, asked=replace(asked, armature="all"))
         if "offset" not in asked.add:

@@ -3,13 +3,13 @@
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import zip_longest
 from math import isfinite, log2, pi
+from pathlib import Path
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from idbench.experiments.identification.consistent_estimate import words_of_consistency
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.iterations import words_of_iterations
 from idbench.experiments.identification.lack import words_of_lack
@@ -18,7 +18,7 @@ from idbench.experiments.judgement.judgement import Unjudged
 from idbench.experiments.judgement.remedies import SURE
 from idbench.experiments.reports.estimates import EstimatesTable, in_lines, leading
 from idbench.experiments.text import WORTHLESS, new_table, percentage, print_titled
-from idbench.identify import Array, AsLogged, Estimate
+from idbench.identify import Array, AsLogged
 from idbench.identify.judge.torque_interval import LEVEL
 
 FEW_OUTSIDE = 0.02
@@ -107,9 +107,10 @@ def _told(fit: Fit) -> Iterator[str]:
     yield from words_of_iterations(fit)
     for model, why in fit.left_out.items():
         yield f"{model}: reversals are left out, as ML does: {why}"
-    if fit.request.consistent != "no":
-        before = {name: e for name, e in fit.unconstrained.items() if isinstance(e, Estimate)}
-        yield from words_of_consistency(before, fit.estimates)
+    if fit.robot_model.asked.prior:
+        share = fit.request.share or fit.robot_model.roughly_known.share
+        near = f"; links near the file's, to {100 * share:.0f} % as the log decides" if fit.request.share and share else ""
+        yield f"roughly known: {', '.join(fit.robot_model.asked.prior)}{near}"
 
 
 def _print_logs(console: Console, fit: Fit) -> None:
@@ -127,7 +128,12 @@ def _rotors(fit: Fit) -> Iterator[str]:
     if asked == "none":
         words = "no armature is identified and reversals are not masked, as where torques are measured at the links"
         yield f"{words} (--armature none)" + ("" if filed else "; the robot's file has none either")
-    elif asked == "file" and not filed:
+    elif fit.robot_model.rotors_assumed:
+        yield (
+            f"rotor inertias are identified, because a {Path(fit.robot_model.name).suffix[1:]} file cannot state any (torques "
+            "measured at the links: --armature none)"
+        )
+    elif asked in ("auto", "file") and not filed:
         yield (
             "no armature is identified, because the file has none; behind gears rotors often have more inertia than links: "
             "--armature all"

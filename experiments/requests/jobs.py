@@ -6,7 +6,6 @@ from typing import Annotated
 
 from idbench.experiments.requests.shared import CHAIN, ESTIMATOR, LogRequest, MountingOptions, Parameters
 from idbench.experiments.requests.words import (
-    Consistency,
     Count,
     Each,
     File,
@@ -54,9 +53,6 @@ class IdentifyRequest(LogRequest):
     Default: that of the run's folder."""
     start: Start = "least-squares"
     """Where estimators that simulate or filter start: at the least-squares estimate, or at the robot's file."""
-    consistent: Consistency = "no"
-    """Move estimates to the nearest physically consistent parameters, in the metric of their covariance (extra `consistent`).
-    Unidentifiable parameters are held near the file by the constant pull-back or the entropic distance."""
     validate: Files = ()
     """Held-out logs on which the result is validated. Default: the last quarter of the log, predicted by a fit of the rest."""
     label: str = ""
@@ -192,9 +188,6 @@ class RunRequest:
     see docs/estimators.md."""
     start: Start = "least-squares"
     """Where estimators that simulate or filter start: at the least-squares estimate, or at the robot's file."""
-    consistent: Consistency = "no"
-    """Move estimates to the nearest physically consistent parameters, in the metric of their covariance (extra `consistent`).
-    Unidentifiable parameters are held near the file by the constant pull-back or the entropic distance."""
     study: Annotated[Path | None, Word("DIR", Path, option="from")] = None
     """Repeat one run of a study, given by its folder, instead of a scenario."""
     index: Count = None

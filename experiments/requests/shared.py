@@ -17,9 +17,9 @@ CHAIN, ESTIMATOR = "idbench", "GLS"
 class Parameters:
     """Which parameters are identified."""
 
-    armature: Literal["file", "all", "none"] = "file"
+    armature: Literal["auto", "file", "all", "none"] = "auto"
     """Joints with a rotor inertia: those that have one in the robot's file, all, or none (torques measured at the links;
-    reversals are then not masked)."""
+    reversals are then not masked). auto: as the file has it, and all where a file cannot state any (URDF, DH tables)."""
     add: Names = ()
     """Friction laws in addition to viscous and Coulomb friction, such as offset, a constant torque of each joint."""
     without: Names = ()
@@ -27,6 +27,9 @@ class Parameters:
     hold: Annotated[tuple[str, ...], Word("NAME=VALUE")] = ()
     """Known parameters, which are not identified: Ia3=0.1 Fs2=file, and links=file, armatures=file, friction=file for all of
     a kind. Others are grouped without them: with known links each armature is a parameter of its own."""
+    prior: Annotated[tuple[str, ...], Word("NAME=VALUE:TRUST")] = ()
+    """Roughly known parameters: file, links near those of the robot's file and physically consistent (file:25%: as near as
+    that; by default the log decides); Ia3=0.1:30%, Fs=file:20% (of all joints), armatures=file:30%, ZZR1=3:0.2 with a sigma."""
     tie: Annotated[tuple[str, ...], Word("NAME=NAME")] = ()
     """Parameters that are equal, such as those of the same motor in two joints: Ia1=Ia4 Fv1=Fv4."""
     friction: Laws = ("standard",)

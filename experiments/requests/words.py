@@ -44,8 +44,6 @@ Meaning = Literal["held", "instantaneous", "averaged"]
 Torque = Annotated[Meaning | None, Word("held|instantaneous|averaged", str, ("held", "instantaneous", "averaged"))]
 Start = Literal["least-squares", "file"]
 """Where estimators begin that simulate or filter: at the least-squares estimate, or at the parameters of the robot's file."""
-Consistency = Literal["no", "pullback", "entropic"]
-"""Whether estimates are made physically consistent, and by which distance unidentifiable parameters are held."""
 Way = Literal["all", "together", "fixed", "apart", "difference"]
 Logs = Annotated[tuple[Path, ...], Word(positional=True, file=True)]
 Log = Annotated[Path, Word(positional=True, file=True)]

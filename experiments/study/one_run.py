@@ -50,7 +50,6 @@ def run_of(asked: RunRequest, tell: Callable[[str], None]) -> ScenarioRun:
         method=chosen,
         name=name,
         start=asked.start,
-        consistent=asked.consistent,
     )
     return ScenarioRun(scenario, request)
 

@@ -109,7 +109,7 @@ class Estimate:
         """Return the estimate of a least-squares solution; `scaled` if its rows were divided by their noise."""
         inverse = fit.factor.inverse(problem.factors.together.status == Status.OK)
         covariance = _paper_covariance(fit.factor, fit.X, inverse)
-        return cls(problem, frozen(fit.X), frozen(covariance), OfWeightedRows(fit.weight, inverse, scaled))
+        return cls(problem, frozen(fit.X), frozen(covariance), OfWeightedRows(fit.weight, inverse, scaled, fit.factor.prior))
 
     def __repr__(self) -> str:
         return text_table(*self._table())
@@ -153,7 +153,7 @@ class Estimate:
         if self.solution is None:
             return np.full(self.own_covariance.shape, np.nan)
         influence = self.solution.influence(self.problem.parts)
-        found = noise_covariance(self.problem, influence) + bias_covariance(self.problem, influence)
+        found = noise_covariance(self.problem, influence) + bias_covariance(self.problem, influence) + self.solution.of_prior
         return np.where((self.status == Status.OK)[..., None, None], found, np.nan)
 
     def influence(self) -> Array | None:

@@ -25,6 +25,9 @@ class AbstractEstimator(ABC):
     too long; its `logs`; the `loop` in which they were recorded, or the robot by itself, its `plant`, which the caller may
     give."""
 
+    takes_prior: ClassVar[bool] = False
+    """Whether what is known before, `Problem.prior`, is among its rows."""
+
     full_rank: ClassVar[bool] = True
     """Whether it needs a motion that shows every parameter; one with a prior or a penalty does not."""
 
@@ -75,6 +78,8 @@ class AbstractEstimator(ABC):
 
     def _require(self, problem: Problem) -> None:
         self.require_needs()
+        if problem.prior is not None and not self.takes_prior:
+            raise IdentificationError(f"{self.called} takes nothing that is known before: use GLS, WLS or OLS")
         if "loop" in self.needs and problem.simulation.loop is None:
             raise IdentificationError(
                 f"{self.called} simulates the closed loop in which a log was recorded, which is not known: name the "

@@ -22,7 +22,7 @@ from idbench.identify.noise.restricted_likelihood import likely, likely_levels
 from idbench.identify.noise.row_weights import floor_of, reciprocal_root
 from idbench.identify.noise.white_noise import repeats, residual_level, torque_noise, white_noise
 from idbench.identify.rows.chain import Chain
-from idbench.identify.rows.factors import Factors, LeastSquaresFit, triangular
+from idbench.identify.rows.factors import AbstractPrior, Factors, LeastSquaresFit, triangular
 from idbench.identify.rows.rows import Rows, is_long
 from idbench.identify.signals.signals import Signals
 
@@ -53,6 +53,8 @@ class Problem:
     """Signal processing, of all models; `own_chain` makes the rows of this one."""
     simulation: Simulation = Simulation()  # noqa: RUF009  # frozen
     """How the robot is simulated, for estimators that need it."""
+    prior: AbstractPrior | None = None
+    """What is known of the parameters before."""
     _signals: tuple[Signals, ...] = field(default=(), repr=False)
     _explicit: "Problem | None" = field(default=None, repr=False)
 
@@ -145,7 +147,8 @@ class Problem:
     @cached_property
     def factors(self) -> Factors:
         """Triangular factors of the rows as they are, one for each kind."""
-        return Factors.merged([part.rows.factors for part in self.every_part()]) if self.long else self.rows.factors
+        found = Factors.merged([part.rows.factors for part in self.every_part()]) if self.long else self.rows.factors
+        return found if self.prior is None else replace(found, prior=self.prior, _fits=[])
 
     @cached_property
     def scaled_factors(self) -> Factors:
@@ -153,8 +156,8 @@ class Problem:
         if self.alike:
             return self.factors
         if not self.long:
-            return self.rows.factors_of(self.weights)
-        return Factors.merged(self._of_pieces(lambda part: part.rows.factors_of(part.weights)))
+            return replace(self.rows.factors_of(self.weights), prior=self.prior)
+        return replace(Factors.merged(self._of_pieces(lambda part: part.rows.factors_of(part.weights))), prior=self.prior)
 
     @cached_property
     def independent_factor(self) -> Array:
@@ -187,7 +190,9 @@ class Problem:
     @cached_property
     def start(self) -> LeastSquaresFit:
         """The estimate by weighted least squares, from all parts."""
-        return self.some_rows.factors.fit(2)
+        return (
+            replace(self.some_rows.factors, prior=self.prior, _fits=[]).fit(2) if self.prior else self.some_rows.factors.fit(2)
+        )
 
     @cached_property
     def noise(self) -> NoiseLevels:

@@ -14,6 +14,16 @@ from idbench.identify.estimators.log_rows import LogRows
 class AbstractSolution(ABC):
     """X = G' Y, to first order."""
 
+    @property
+    def known(self) -> Array | None:
+        """Rows of what is known before, in units of one sigma, shape (..., m, p + 1); None if nothing is."""
+        return None
+
+    @property
+    def of_prior(self) -> Array:
+        """Covariance of the error of X due to that of what is known before, shape (..., p, p)."""
+        return np.zeros(())
+
     @abstractmethod
     def influence(self, parts: Sequence[LogRows]) -> list[Array]:
         """Return G of the rows of each part of the problem, shape (..., r, p)."""
@@ -31,9 +41,21 @@ class OfWeightedRows(AbstractSolution):
     weight: Array
     """Of every kind, shape (..., kind)."""
     inverse: Array
-    """Of W' W of the weighted rows, shape (..., p, p)."""
+    """Of W' W of the weighted rows and what is known before, shape (..., p, p)."""
     scaled: bool
     """Whether rows that differ from those of their kind had a weight of their own, too."""
+    prior: Array | None = None
+    """Rows of what is known before, in the unit of the weighted rows, shape (..., m, p + 1)."""
+
+    @property
+    def known(self) -> Array | None:
+        """Rows of what is known before."""
+        return self.prior
+
+    @property
+    def of_prior(self) -> Array:
+        """M P' P M with M = `inverse`."""
+        return _of_prior(self.prior, self.inverse)
 
     def influence(self, parts: Sequence[LogRows]) -> list[Array]:
         """Return w^2 W (W' w^2 W)^-1."""
@@ -57,7 +79,19 @@ class OfWhitenedRows(AbstractSolution):
     """The solution of rows made independent by their covariance, W without what noise adds to it."""
 
     inverse: Array
-    """Of W' C^-1 W, shape (..., p, p)."""
+    """Of W' C^-1 W and what is known before, shape (..., p, p)."""
+    prior: Array | None = None
+    """Rows of what is known before, shape (..., m, p + 1)."""
+
+    @property
+    def known(self) -> Array | None:
+        """Rows of what is known before."""
+        return self.prior
+
+    @property
+    def of_prior(self) -> Array:
+        """M P' P M with M = `inverse`."""
+        return _of_prior(self.prior, self.inverse)
 
     def influence(self, parts: Sequence[LogRows]) -> list[Array]:
         """Return C^-1 W (W' C^-1 W)^-1."""
@@ -93,3 +127,10 @@ class Given(AbstractSolution):
 def _ends(parts: Sequence[LogRows]) -> Array:
     """Return where the rows of each part but the last end among those of all."""
     return np.cumsum([len(part.rows.time) for part in parts])[:-1]
+
+
+def _of_prior(prior: Array | None, inverse: Array) -> Array:
+    if prior is None:
+        return np.zeros(())
+    P = np.matmul(prior[..., :-1], inverse)
+    return np.matmul(np.swapaxes(P, -1, -2), P)

@@ -122,6 +122,8 @@ def _left_out(estimate: Estimate, parts: Sequence[LogRows], several: bool) -> li
         starts = np.searchsorted(block, np.arange(int(block[-1]) + 1))
         grams.append(np.stack([x.T @ x for x in np.split(rows, starts[1:])]))
     every = np.sum([gram.sum(axis=0) for gram in grams], axis=0)
+    if (known := estimate.solution.known) is not None:
+        every = every + known.T @ known
     size = np.sqrt(np.maximum(np.diagonal(every)[:-1], TINY))
     found = list[Array]()
     for gram in grams:

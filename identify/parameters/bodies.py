@@ -1,9 +1,7 @@
-"""The bodies of a robot as a cone: scales of their parameters, a metric of their changes, and what bodies can exist."""
+"""Bodies that exist: positive pseudo-inertias of links, positive armatures and frictions, and a distance between them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from types import ModuleType
-from typing import Any, Literal, final
+from typing import NamedTuple, final
 
 import numpy as np
 
@@ -34,151 +32,184 @@ def inertial(S: Array) -> Array:
 PSEUDO = np.array([pseudo_inertia(e) for e in np.eye(len(INERTIAL))])
 """What each inertial parameter adds to a pseudo-inertia, shape (10, 4, 4)."""
 
-
-Prior = Literal["pullback", "entropic"]
-"""Distance to the given model: constant pull-back, tr((S0^-1 dS)^2), or entropic, 2 (tr(S0^-1 S) - ln det(S0^-1 S) - 4), of
-each link's pseudo-inertia S. Both are the same near the given model; the entropic one keeps bodies from becoming thin."""
-
-_ROOT2 = np.sqrt(2.0)  # weight of what a symmetric matrix has on both sides
-_PLACES = [(i, j) for j in range(4) for i in range(j, 4)]
-"""Of the entries of a lower triangular matrix."""
-
-
-@dataclass(frozen=True, eq=False)
-class Terms:
-    """What a prior adds to a convex programme over x and variables of its own."""
-
-    own: int
-    """Number of variables of its own, which stand behind x."""
-    linear: Array
-    """Of the objective, shape (p + own,)."""
-    G: Array
-    """Matrix of the cones: H - G (x, own) lies in them, shape (rows, p + own)."""
-    h: Array
-    """Their right side, shape (rows,)."""
-    cones: list[Any]
-    """Of the solver."""
-
-
-def entropic_terms(links: list[list[int]], inertias: list[Array], p: int, weight: float, clarabel: ModuleType) -> Terms:
-    """Return the entropic distance of links to their given pseudo-inertias, as cones.
-
-    ln det P is the largest sum of ln Z_ii with [[P, Z], [Z', diag(Z)]] not negative and Z lower triangular (A. Ben-Tal and
-    A. Nemirovski, "Lectures on Modern Convex Optimization", SIAM 2001, section 4.2), P being S in the axes of the given one.
-
-    Parameters
-    ----------
-    links : list of list of int
-        Where the ten inertial parameters of each link stand among the p of x.
-    inertias : list of Array, shape (4, 4)
-        Pseudo-inertias of the given model.
-    p : int
-        Number of parameters x.
-    weight : float
-        What a distance of 1 costs.
-    clarabel : module
-        The solver.
-    """
-    each = len(_PLACES) + 4
-    own = each * len(links)
-    linear = np.zeros(p + own)
-    rows = list[Array]()
-    limits = list[Array]()
-    cones = list[Any]()
-    for number, (link, S) in enumerate(zip(links, inertias, strict=True)):
-        inverse = np.linalg.inv(np.linalg.cholesky(S))
-        units = [inverse @ unit @ inverse.T for unit in PSEUDO]
-        first = p + each * number
-        linear[link] = [2 * weight * np.trace(unit) for unit in units]
-        linear[first + len(_PLACES) : first + each] = -2 * weight
-        matrix = np.zeros((8, 8, p + own))
-        for place, unit in zip(link, units, strict=True):
-            matrix[:4, :4, place] = unit
-        for k, (i, j) in enumerate(_PLACES):
-            matrix[i, 4 + j, first + k] = matrix[4 + j, i, first + k] = 1.0
-            if i == j:
-                matrix[4 + i, 4 + i, first + k] = 1.0
-        upper = [(i, j) for j in range(8) for i in range(j + 1)]
-        rows.append(-np.stack([matrix[i, j] * (1.0 if i == j else _ROOT2) for i, j in upper]))
-        limits.append(np.zeros(len(upper)))
-        cones.append(clarabel.PSDTriangleConeT(8))
-        for i in range(4):
-            cone = np.zeros((3, p + own))
-            cone[0, first + len(_PLACES) + i], cone[2, first + _PLACES.index((i, i))] = -1.0, -1.0
-            rows.append(cone)
-            limits.append(np.array([0.0, 1.0, 0.0]))
-            cones.append(clarabel.ExponentialConeT())
-    return Terms(own, linear, np.concatenate(rows), np.concatenate(limits), cones)
-
-
-MARGIN = 1e-6
-"""Smallest eigenvalue of a link's pseudo-inertia, as a share of the given one: a body with some extent in every direction."""
-
-SOLVED = 1e-7
-"""Accuracy of the solver's matrices, as a share of their trace: no eigenvalue is asked to be, or left, below it."""
-
 FLAT = 1e-6
 """Share of the largest eigenvalue below which the least says that a body is flat."""
 
-SMALL, DUST = 1e-3, 1e-6
-"""Shares of the robot's mean body below which a given body says nothing of the size of a change, and nothing of the body: a
-file may have a flange of a milligram where a tool of a kilogram is; in units of milligrams no estimate could put it there."""
+SMALL = 0.01
+"""Share of the robot's mean mass below which a given body says nothing of the real one, and one of that share of the mean body
+takes its place: a file may have a flange of a milligram where a tool of a kilogram is."""
+
+LEAST = 1e-8
+"""Share of the trace of a link's pseudo-inertia that its least eigenvalue is raised to."""
+
+
+class Divergence(NamedTuple):
+    """A distance and its derivatives."""
+
+    value: float
+    """Sum over bodies."""
+    gradient: Array
+    """Shape (p,)."""
+    root: Array
+    """L^-T with L L' the Hessian, shape (p, p)."""
 
 
 @final
 class Bodies:
-    """Scales, metric and cones of standard parameters."""
+    """Standard parameters, and how far others are from them.
 
-    def __init__(self, parameters: Sequence[Parameter], given: Array) -> None:
-        self._p, self.given = len(parameters), given
+    For the pseudo-inertias P of links, and P0 of the given ones, the log-determinant divergence
+
+        d = tr(P0^-1 P) - ln det(P0^-1 P) - 4
+
+    (T. Lee, P. M. Wensing and F. C. Park, "Geometric robot dynamic identification: a convex programming approach", IEEE T-RO 36
+    (2020) 348-365): it depends on no frame, is half the square of relative changes where they are small, and infinite where no
+    body is. Armatures and frictions, which are not negative, count as matrices of one row. For others it is
+    1/2 ((x - x0) / size)^2.
+
+    Parameters
+    ----------
+    parameters : sequence of Parameter
+        The standard parameters.
+    given : Array, shape (p,)
+        Theirs.
+    size : Array, shape (p,)
+        What counts as a large change of those that are no inertia of a link.
+    """
+
+    def __init__(self, parameters: Sequence[Parameter], given: Array, size: Array) -> None:
         links = sorted({p.joint for p in parameters if p.kind == "mass" and p.joint is not None})
         place = {(p.symbol, p.joint): i for i, p in enumerate(parameters)}
         self.links = [[place[x, joint] for x in INERTIAL] for joint in links]
-        self._signed = [i for i, parameter in enumerate(parameters) if parameter.kind in NOT_NEGATIVE]
+        in_links = {i for link in self.links for i in link}
+        alone = [i for i in range(len(parameters)) if i not in in_links]
+        self._signed = np.array([i for i in alone if parameters[i].kind in NOT_NEGATIVE], dtype=np.intp)
+        self._free = np.array([i for i in alone if parameters[i].kind not in NOT_NEGATIVE], dtype=np.intp)
         thick = [_thick(pseudo_inertia(given[link]), j + 1) for j, link in zip(links, self.links, strict=True)]
         mean = _mean(thick)
-        self.inertias = [_at_least(S, DUST * mean) for S in thick]
-        self._sizes = [_at_least(S, SMALL * mean) for S in thick]
-        self.scale, self.metric = np.where(given == 0, 1.0, np.abs(given)), np.eye(self._p)
-        for S, link in zip(self._sizes, self.links, strict=True):
-            self.scale[link] = _spread(S)
-            steps = [np.linalg.solve(S, PSEUDO[k] * self.scale[i]) for k, i in enumerate(link)]
-            self.metric[np.ix_(link, link)] = [[np.trace(a @ b) for b in steps] for a in steps]
+        inertias = [_at_least(S, SMALL * mean) if S[3, 3] < SMALL * mean[3, 3] else S for S in thick]
+        self._inverses = [np.linalg.inv(S) for S in inertias]
+        self.given, self._size = given.copy(), size
+        for link, S in zip(self.links, inertias, strict=True):
+            self.given[link] = inertial(S)
+        self.given[self._signed] = np.maximum(given[self._signed], size[self._signed])
 
-    @property
-    def metric_of_drives(self) -> Array:
-        """The metric of what is no inertia of a link."""
-        metric = self.metric.copy()
+    def with_extent(self, x: Array) -> Array:
+        """Return parameters of links with some extent in every direction, as simulators ask: `LEAST` of the trace."""
+        thick = x.copy()
         for link in self.links:
-            metric[np.ix_(link, link)] = 0.0
-        return metric
+            values, axes = np.linalg.eigh(S := pseudo_inertia(x[link]))
+            if values[0] < (least := LEAST * np.trace(S)):
+                thick[link] = inertial((axes * np.maximum(values, least)) @ axes.T)
+        return thick
 
-    def cones(self) -> tuple[Array, Array, tuple[int, int]]:
-        """Return G, h of h - G x in the cones, and the numbers of signs and of matrices among them."""
-        rows = [-np.eye(self._p)[self._signed]]
-        limits = [np.zeros(len(self._signed))]
-        lower = [(i, j) for j in range(4) for i in range(j + 1)]  # of the upper triangle, column by column
-        for S_given, S_size, link in zip(self.inertias, self._sizes, self.links, strict=True):
-            weights = np.array([[S[i, j] * (1.0 if i == j else _ROOT2) for S in PSEUDO] for i, j in lower])
-            block = np.zeros((len(lower), self._p))
-            size = np.trace(S_size)  # a gram of a wrist and a ton of a base are solved to the same share
-            block[:, link] = -weights / size
-            rows.append(block)
-            smallest = max(MARGIN * np.linalg.eigvalsh(S_given)[0] / size, SOLVED)
-            limits.append(np.array([-smallest if i == j else 0.0 for i, j in lower]))
-        return np.concatenate(rows), np.concatenate(limits), (len(self._signed), len(self.links))
-
-    def projected(self, standard: Array) -> Array:
-        """Return parameters whose cones are kept exactly: what the solver leaves outside is moved to their edge."""
-        inside = standard.copy()
-        inside[self._signed] = np.maximum(inside[self._signed], 0.0)
+    def room(self, x: Array, step: Array) -> float:
+        """Return how many times a step can be made from x before it reaches bodies that do not exist."""
+        least = [float(np.min(step[self._signed] / x[self._signed], initial=0.0))]
         for link in self.links:
-            S = pseudo_inertia(inside[link])
-            values, axes = np.linalg.eigh(S)
-            least = SOLVED / 2 * np.trace(S)
-            if values[0] < least:
-                inside[link] = inertial((axes * np.maximum(values, least)) @ axes.T)
-        return inside
+            inner = np.linalg.inv(np.linalg.cholesky(pseudo_inertia(x[link])))
+            least.append(float(np.linalg.eigvalsh(inner @ pseudo_inertia(step[link]) @ inner.T)[0]))
+        return -1 / min(least) if min(least) < 0 else np.inf
+
+    def divergence(self, x: Array) -> Divergence | None:
+        """Return the distance of x from the given parameters; None where no bodies have them."""
+        gradient, root, value = np.zeros(len(x)), np.zeros((len(x), len(x))), 0.0
+        for link, inverse in zip(self.links, self._inverses, strict=True):
+            P = pseudo_inertia(x[link])
+            try:
+                inner = np.linalg.inv(np.linalg.cholesky(P))
+            except np.linalg.LinAlgError:
+                return None
+            ratio = inverse @ P
+            value += float(np.trace(ratio)) - float(np.linalg.slogdet(ratio)[1]) - len(P)
+            units = np.matmul(np.matmul(inner, PSEUDO), inner.T).reshape(len(link), -1)
+            gradient[link] = np.sum(inverse * PSEUDO, axis=(1, 2)) - units @ np.eye(len(P)).ravel()
+            root[np.ix_(link, link)] = np.linalg.inv(np.linalg.qr(units.T, mode="r"))
+        ratio, free = x[self._signed] / self.given[self._signed], (x - self.given)[self._free] / self._size[self._free]
+        if (ratio <= 0).any():
+            return None
+        value += float(np.sum(ratio - np.log(ratio) - 1) + np.sum(free**2) / 2)
+        gradient[self._signed] = (1 - 1 / ratio) / self.given[self._signed]
+        root[self._signed, self._signed] = x[self._signed]
+        gradient[self._free] = free / self._size[self._free]
+        root[self._free, self._free] = self._size[self._free]
+        return Divergence(value, gradient, root)
+
+
+FASTER = 10.0
+"""What the weight is divided by from stage to stage: each begins near its end."""
+
+STEPS = 100
+"""Newton steps of a stage at most; some five are usual."""
+
+CENTRED, CLOSE = 0.1, 1e-8
+"""Newton decrement, over the weight, at which a stage and the last one are done: d is self-concordant."""
+
+SHARE = 0.9
+"""Share of the way to the border of what bodies can have that a step goes at most: far too thin ones are slow to grow again."""
+
+LEAST_STEP = 1e-10
+"""Share of a step below which nothing is gained: what is left is rounding."""
+
+ROUNDING = 1e-13
+"""Share of the objective by which it may rise: rounding."""
+
+
+def nearest(A: Array, b: Array, bodies: Bodies, weight: float) -> Array:
+    """Return x = argmin 1/2 |A x - b|^2 + weight d(x), shape (p,), by damped Newton steps that stay inside.
+
+    With H = L L' the Hessian of d, g its gradient, and A L^-T = U S V', the step is
+
+        L^-T V (S U'(b - A x) - weight V' L^-1 g) / (S^2 + weight)
+
+    so that however well A knows some directions, and badly others, none is lost by rounding. The weight comes down in stages.
+
+    Parameters
+    ----------
+    A : Array, shape (r, p)
+        Rows, in units of their standard deviation.
+    b : Array, shape (r,)
+        What they measure.
+    bodies : Bodies
+        The given parameters.
+    weight : float
+        Of the distance to them; 1/s^2 where relative changes of s are expected.
+    """
+    begin, x = bodies.divergence(bodies.given), bodies.given
+    assert begin is not None
+    stage = max(weight, float(np.linalg.norm(A @ begin.root, 2)) ** 2)
+    while True:
+        x = _centred(A, b, bodies, stage, x, CLOSE if stage <= weight else CENTRED)
+        if stage <= weight:
+            return x
+        stage = max(weight, stage / FASTER)
+
+
+def _centred(A: Array, b: Array, bodies: Bodies, weight: float, x: Array, close: float) -> Array:
+    """Return x(k+1) = x(k) + t step, until a step makes the objective less by less than `close` times the weight."""
+
+    def at(x: Array) -> tuple[float, Divergence] | None:
+        found = bodies.divergence(x)
+        return None if found is None else (float(np.sum((A @ x - b) ** 2)) / 2 + weight * found.value, found)
+
+    now = at(x)
+    for _ in range(STEPS):
+        assert now is not None
+        value, d = now
+        U, S, V = np.linalg.svd(A @ d.root)
+        S = np.pad(S, (0, len(V) - len(S)))
+        slope = S * np.pad(U.T @ (b - A @ x), (0, max(0, len(V) - len(U))))[: len(V)] - weight * (V @ (d.root.T @ d.gradient))
+        step = d.root @ (V.T @ (slope / (S**2 + weight)))
+        decrement = float(np.sum(slope**2 / (S**2 + weight)))
+        if decrement <= close * weight:
+            break
+        t = min(1.0, SHARE * bodies.room(x, step))
+        while (new := at(x + t * step)) is None or new[0] > value - 1e-4 * t * decrement + ROUNDING * value:
+            t /= 2
+            if t < LEAST_STEP:
+                return x
+        x, now = x + t * step, new
+    return x
 
 
 def _thick(S: Array, number: int) -> Array:
@@ -206,9 +237,3 @@ def _at_least(S: Array, least: Array) -> Array:
     root = np.sqrt(np.diagonal(least))
     values, axes = np.linalg.eigh(S / np.outer(root, root))
     return S if values[0] >= 1 else (axes * np.maximum(values, 1.0)) @ axes.T * np.outer(root, root)
-
-
-def _spread(S: Array) -> Array:
-    """Return what counts as a large change of each of a link's parameters: geometric means of the diagonal of S."""
-    root = np.sqrt(np.diagonal(S))
-    return np.array([np.max(np.abs(P) * np.outer(root, root)) for P in PSEUDO])

@@ -1,8 +1,7 @@
 """Physically consistent standard parameters that agree with an estimate of the base parameters."""
 
 from dataclasses import dataclass
-from types import ModuleType
-from typing import Any, final
+from typing import final
 
 import numpy as np
 import numpy.typing as npt
@@ -13,9 +12,9 @@ from idbench.identify.basis.block import NOT_NEGATIVE
 from idbench.identify.data.kinematics import INERTIAL
 from idbench.identify.errors import IdentificationError
 from idbench.identify.parameters.base_parameters import BaseParameters
-from idbench.identify.parameters.bodies import Bodies, Prior, entropic_terms
+from idbench.identify.parameters.bodies import Bodies, nearest
 
-NEAR = 1e-4
+NEAR = 1e-6
 """What a step to twice the given model costs, beside one sigma of the estimate: nothing, where the estimate knows anything."""
 
 CONFIDENCE = 0.999
@@ -23,9 +22,6 @@ CONFIDENCE = 0.999
 
 LARGER = 30.0
 """Times the size of the given bodies from which on an estimate says that these stand for bodies of an unknown size."""
-
-REACHED = 0.1
-"""Sigma of the estimate by which what the solver left outside the cones may be off: nothing that anybody would see."""
 
 
 @final
@@ -54,27 +50,20 @@ class Consistent:
 
 
 def consistent_parameters(
-    grouping: BaseParameters,
-    X: Array,
-    covariance: Array,
-    given: Array,
-    *,
-    prior: Prior = "pullback",
-    weight: float = NEAR,
+    grouping: BaseParameters, X: Array, covariance: Array, given: Array, *, weight: float = NEAR
 ) -> Consistent:
     """Return the standard parameters with positive pseudo-inertias that agree best with an estimate.
 
-    They minimise (K x - X)' C^-1 (K x - X) + weight d(x, given) over all x for which every link's pseudo-inertia
+    They minimise 1/2 (K x - X)' C^-1 (K x - X) + weight d(x, given), d being the log-determinant divergence of `Bodies`: every
+    link's pseudo-inertia
 
         [ tr(I)/2 1 - I    MS ]
         [ MS'              M  ]
 
     is positive definite (P. M. Wensing, S. Kim and J.-J. Slotine, "Linear matrix inequalities for physically consistent
-    inertial parameter identification", IEEE RA-L 3 (2018) 60-67), and armatures and frictions are not negative. d, the
-    distance to the given model, depends on no frame (`Prior`: T. Lee, P. M. Wensing and F. C. Park, "Geometric robot dynamic
-    identification: a convex programming approach", IEEE T-RO 36 (2020) 348-365). So base values are the estimate's where
-    bodies can have them, and unidentifiable parameters stay as given. What constraints do not touch is not moved; C is then
-    that of the others.
+    inertial parameter identification", IEEE RA-L 3 (2018) 60-67), and armatures and frictions are not negative. So base values
+    are the estimate's where bodies can have them, and unidentifiable parameters stay as given. What constraints do not touch is
+    not moved; C is then that of the others.
 
     Parameters
     ----------
@@ -86,34 +75,35 @@ def consistent_parameters(
         C.
     given : Array, shape (p,)
         Standard parameters of the given model, consistent themselves.
-    prior : {"pullback", "entropic"}
-        d of the links; of armatures and frictions it is the square of their relative change.
     weight : float
         What a step to twice the given model costs [squared sigma of the estimate].
 
     Raises
     ------
     IdentificationError
-        If Clarabel is not installed, the covariance is not positive definite, the given model has a link that cannot exist, or
-        the solver does not reach bodies that can.
+        If the covariance is not positive definite, or the given model has a link that cannot exist.
     """
-    clarabel = _solver()
     root, given = _root(covariance), _sized(grouping, X, covariance, np.array(given, dtype=np.float64))
     rows, columns = _touched(grouping, X)
     standard = _as_estimated(grouping, X, given, columns)
     if not rows.any():
         return _found(grouping, X, root, standard, rows)
-    bodies = Bodies([p for p, there in zip(grouping.standard.parameters, columns, strict=True) if there], given[columns])
-    # x = start + J u + N z: u counts sigma away from the estimate, z are the unidentifiable directions.
-    own = _root(covariance[np.ix_(rows, rows)])
-    scaled = grouping.K[np.ix_(rows, columns)] * bodies.scale
-    to_estimate = bodies.scale[:, None] * np.linalg.pinv(scaled)
-    start = bodies.given + to_estimate @ (X - grouping.base(given))[rows]
-    T = np.concatenate([to_estimate @ own, bodies.scale[:, None] * scipy.linalg.null_space(scaled)], axis=1)
-    reached = start + T @ _solved(clarabel, bodies, (start, T, len(own)), prior, weight)
-    standard[columns] = bodies.projected(reached)
-    _require_reached(scaled @ ((standard[columns] - reached) / bodies.scale), own)
+    K = grouping.K[np.ix_(rows, columns)]
+    own, sigma = _root(covariance[np.ix_(rows, rows)]), np.sqrt(np.diagonal(covariance))[rows]
+    parameters = [p for p, there in zip(grouping.standard.parameters, columns, strict=True) if there]
+    bodies = Bodies(parameters, given[columns], np.maximum(np.abs(given[columns]), least_change(K, sigma)))
+    rest = (X - grouping.base(np.where(columns, 0.0, standard)))[rows]
+    A = np.asarray(np.linalg.solve(own, np.column_stack([K, rest])), dtype=np.float64)
+    found = nearest(A[:, :-1], A[:, -1], bodies, weight)
+    standard[columns] = bodies.with_extent(found)
     return _found(grouping, X, root, standard, rows)
+
+
+def least_change(K: Array, sigma: Array) -> Array:
+    """Return the change of each standard parameter that moves a base value by its sigma, shape (p,); 1 where none does."""
+    size = np.abs(K) / sigma[:, None]
+    most = size.max(axis=0, initial=0.0)
+    return np.where(most > 0, 1 / np.where(most > 0, most, 1.0), 1.0)
 
 
 def _sized(grouping: BaseParameters, X: Array, covariance: Array, given: Array) -> Array:
@@ -168,46 +158,6 @@ def _found(grouping: BaseParameters, X: Array, root: Array, standard: Array, row
     return Consistent(grouping.standard.names, standard, base, departure, distance, int(rows.sum()))
 
 
-def _require_reached(off: Array, root: Array) -> None:
-    """Raise IdentificationError if bodies had to be moved far to be ones that can exist: base values `off` by sigma."""
-    if (distance := float(np.linalg.norm(np.linalg.solve(root, off)))) > REACHED:
-        raise IdentificationError(
-            f"the solver left inconsistent bodies, {distance:.2g} sigma from consistent ones: physically consistent "
-            "parameters are not known; give a model whose bodies have about the size of the real ones"
-        )
-
-
-def _solved(clarabel: ModuleType, bodies: Bodies, way: tuple[Array, Array, int], prior: Prior, weight: float) -> Array:
-    """Return v of x = start + T v with the least sum of the squares of its first b and of weight d(x, given).
-
-    `way` is start, T and b.
-    """
-    start, T, b = way
-    steps, away = T / bodies.scale[:, None], (start - bodies.given) / bodies.scale
-    metric = bodies.metric if prior == "pullback" else bodies.metric_of_drives
-    quadratic = weight * steps.T @ metric @ steps + np.diag(np.r_[np.ones(b), np.zeros(T.shape[1] - b)])
-    linear = 2 * weight * steps.T @ metric @ away
-    G, h, (signs, links) = bodies.cones()
-    cones = [clarabel.NonnegativeConeT(signs), *(clarabel.PSDTriangleConeT(4) for _ in range(links))]
-    G, h = G @ T, h - G @ start
-    if prior == "entropic":
-        terms = entropic_terms(bodies.links, bodies.inertias, len(start), weight, clarabel)
-        x_of = scipy.linalg.block_diag(T, np.eye(terms.own))
-        linear = np.r_[linear, np.zeros(terms.own)] + terms.linear @ x_of
-        G = np.concatenate([np.pad(G, ((0, 0), (0, terms.own))), terms.G @ x_of])
-        h, cones = np.r_[h, terms.h - terms.G[:, : len(start)] @ start], [*cones, *terms.cones]
-        quadratic = np.pad(quadratic, (0, terms.own))
-    found = clarabel.DefaultSolver(
-        scipy.sparse.csc_matrix(np.triu(2 * quadratic)), linear, scipy.sparse.csc_matrix(G), h, cones, _quiet(clarabel)
-    ).solve()
-    if str(found.status) not in ("Solved", "AlmostSolved"):
-        raise IdentificationError(
-            f"no physically consistent bodies are near these parameters (the solver ends with {found.status}): is the torque's "
-            "sign, unit and delay right?"
-        )
-    return np.array(found.x)[: T.shape[1]]
-
-
 def _root(covariance: Array) -> Array:
     """Return the triangular L with L L' = C."""
     try:
@@ -219,19 +169,3 @@ def _root(covariance: Array) -> Array:
             "the covariance of the estimate is not positive definite: it does not say what is known"
         ) from error
     return root
-
-
-def _quiet(clarabel: ModuleType) -> Any:
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    return settings
-
-
-def _solver() -> ModuleType:
-    try:
-        import clarabel
-    except ImportError as error:
-        raise IdentificationError(
-            "physically consistent parameters need the solver Clarabel: uv run --extra consistent ..., or pip install clarabel"
-        ) from error
-    return clarabel

@@ -1,20 +1,31 @@
 """Triangular factors: all that least squares needs to know of rows, however many there are."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import cached_property
-from typing import NamedTuple, Self
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 import numpy.typing as npt
 
-from idbench.identify.arrays import Array
+from idbench.identify.arrays import TINY, Array
 from idbench.identify.errors import ExcitationError, IdentificationError
 
 NOT_SHOWN = 1e-6
 """A direction of the parameters, in columns scaled to unit length, is not shown when its singular value is below this share of
 the largest: it would take columns known to seven digits to identify it to 10 %, and no log gives those."""
+
+
+NOISE = 1e-3
+"""Share of the measurements that counts as noise at least beside what is known before: rows as few as parameters show none."""
+
+
+class AbstractPrior(Protocol):
+    """Something that is known of parameters before any log."""
+
+    def rows(self, R: Array) -> Array:
+        """Return [P, P x0] with P (x - x0) of variance 1, shape (m, p + 1), for R of rows in units of their noise."""
 
 
 class Status(IntEnum):
@@ -35,6 +46,8 @@ class Factor:
     """Number of rows that are not void, r, shape (...)."""
     names: tuple[str, ...]
     """Names of X."""
+    prior: Array | None = None
+    """What is known before: rows in the unit of those of R, shape (..., m, p + 1), optional."""
 
     @property
     def p(self) -> int:
@@ -45,6 +58,11 @@ class Factor:
     def R_W(self) -> Array:
         """Triangular factor of W, shape (..., p, p)."""
         return self.R[..., : self.p, : self.p]
+
+    @cached_property
+    def whole(self) -> Array:
+        """The factor of the rows and of what is known before, shape (..., p + 1, p + 1)."""
+        return self.R if self.prior is None else triangular(np.concatenate([self.R, self.prior], axis=-2))
 
     @cached_property
     def condition_number(self) -> Array:
@@ -62,23 +80,24 @@ class Factor:
     def determined(self) -> npt.NDArray[np.bool_]:
         """Whether W has full rank, and nothing in it is lost, shape (...)."""
         finite = np.asarray(np.isfinite(self.R).all(axis=(-2, -1)))
-        return finite & (Factor(np.where(finite[..., None, None], self.R, 0.0), self.rows, self.names).rank == self.p)
+        return finite & (Factor(np.where(finite[..., None, None], self.whole, 0.0), self.rows, self.names).rank == self.p)
 
     @cached_property
     def status(self) -> npt.NDArray[np.intp]:
         """Status of every run, shape (...)."""
         deficient = np.where(self.rank < self.p, Status.RANK_DEFICIENT, Status.OK)
-        return np.where(self.rows <= self.p, Status.TOO_FEW_ROWS, deficient)
+        known = 0 if self.prior is None else self.prior.shape[-2]
+        return np.where(self.rows + known <= self.p, Status.TOO_FEW_ROWS, deficient)
 
     def solution(self, solvable: npt.NDArray[np.bool_]) -> Array:
         """Return the least-squares solution X, shape (..., p); NaN in runs that are not `solvable`, shape (...)."""
-        R = np.where(solvable[..., None, None], self.R_W, np.eye(self.p))
-        X = np.linalg.solve(R, self.R[..., : self.p, self.p :])[..., 0]
+        R = np.where(solvable[..., None, None], self.whole[..., : self.p, : self.p], np.eye(self.p))
+        X = np.linalg.solve(R, self.whole[..., : self.p, self.p :])[..., 0]
         return np.where(solvable[..., None], X, np.nan)
 
     def inverse(self, solvable: npt.NDArray[np.bool_]) -> Array:
-        """Return (W' W)^-1, shape (..., p, p); NaN in runs that are not `solvable`, shape (...)."""
-        root = np.linalg.inv(np.where(solvable[..., None, None], self.R_W, np.eye(self.p)))
+        """Return (W' W + P' P)^-1, shape (..., p, p); NaN in runs that are not `solvable`, shape (...)."""
+        root = np.linalg.inv(np.where(solvable[..., None, None], self.whole[..., : self.p, : self.p], np.eye(self.p)))
         return np.where(solvable[..., None, None], np.matmul(root, np.swapaxes(root, -1, -2)), np.nan)
 
     def squares(self, X: Array) -> Array:
@@ -145,9 +164,10 @@ class Factor:
 
     @property
     def _scaled(self) -> Array:
-        """Triangular factor of W with its columns scaled to unit length, shape (..., p, p)."""
-        length = np.linalg.norm(self.R_W, axis=-2, keepdims=True)
-        return self.R_W / np.where(length > 0, length, 1.0)
+        """Triangular factor of W, and of what is known, with its columns scaled to unit length, shape (..., p, p)."""
+        R = self.whole[..., : self.p, : self.p]
+        length = np.linalg.norm(R, axis=-2, keepdims=True)
+        return R / np.where(length > 0, length, 1.0)
 
 
 class LeastSquaresFit(NamedTuple):
@@ -173,6 +193,8 @@ class Factors:
     """Numbers of rows that are not void, shape (..., kind)."""
     names: tuple[str, ...]
     """Names of X."""
+    prior: AbstractPrior | None = None
+    """What is known before."""
     _fits: list[LeastSquaresFit] = field(default_factory=list, repr=False)
 
     def __post_init__(self) -> None:
@@ -202,7 +224,10 @@ class Factors:
     @cached_property
     def together(self) -> Factor:
         """The factor of all rows as they are."""
-        return self.weighted(np.ones(self.rows.shape))
+        plain = self.weighted(np.ones(self.rows.shape))
+        measured = np.sqrt(np.sum(plain.R[..., -1] ** 2, axis=-1) / np.maximum(plain.rows, 1))
+        left = np.abs(plain.R[..., -1, -1]) / np.sqrt(np.maximum(plain.rows - plain.p, 1))
+        return self._with_prior(plain, np.maximum(left, NOISE * measured))
 
     def weighted(self, weight: Array) -> Factor:
         """Return the factor of all rows, those of each kind multiplied by its weight, shape (..., kind)."""
@@ -230,9 +255,13 @@ class Factors:
             self._fits.append(LeastSquaresFit(self.together.solution(self.together.status == Status.OK), one, self.together))
         while len(self._fits) <= rounds:
             weight = 1 / self._rms(self._fits[-1].X)
-            factor = self.weighted(weight)
+            factor = self._with_prior(self.weighted(weight), np.ones(self.rows.shape[:-1]))
             self._fits.append(LeastSquaresFit(factor.solution(self.together.status == Status.OK), weight, factor))
         return self._fits[rounds]
+
+    def _with_prior(self, factor: Factor, sigma: Array) -> Factor:
+        """Return the factor of rows whose noise has the standard deviation `sigma`, shape (...), with what is known before."""
+        return factor if self.prior is None else replace(factor, prior=prior_rows(self.prior, factor.R, sigma))
 
     def _rms(self, X: Array) -> Array:
         """Return the rms of every kind's residuals, shape (..., kind); 1 where there are none."""
@@ -241,6 +270,12 @@ class Factors:
         mean = np.sum(self.R[..., -1] ** 2, axis=(-2, -1)) / np.maximum(np.sum(self.rows, axis=-1), 1)
         floor = np.where(mean > 0, 1e-12 * np.sqrt(mean), 1.0)[..., None]
         return np.where(np.isfinite(level), np.maximum(level, floor), 1.0)
+
+
+def prior_rows(prior: AbstractPrior, R: Array, sigma: Array) -> Array:
+    """Return the rows of a prior beside those of R whose noise is `sigma`, run by run, shape (..., m, p + 1)."""
+    found = [s * prior.rows(r / s) for r, s in zip(R.reshape(-1, *R.shape[-2:]), np.maximum(sigma.ravel(), TINY), strict=True)]
+    return np.reshape(found, (*R.shape[:-2], *found[0].shape))
 
 
 def triangular(joined: Array) -> Array:

@@ -113,22 +113,47 @@ def test_one_model_that_cannot_takes_nothing_from_the_others(idbench, ran):
     assert "ZZR1" in out
 
 
-@pytest.mark.parametrize("prior", ["pullback", "entropic"])
-def test_any_estimate_can_be_followed_by_what_bodies_allow(idbench, ran, tmp_path, prior):
-    """Torques of two joints exchanged in size: friction comes out below zero, and is moved to zero."""
+def test_links_may_be_near_those_of_the_file(idbench, ran, tmp_path):
+    """The run's first 4 s: with the file's links the inertias are 3 times better known, and their sigma says it."""
     log = read_log(ran / "log.parquet")
-    qd = np.gradient(log.q, 1 / log.fs, axis=0)
-    wrong = replace(log, tau=log.tau - [0.3, 0.05] * qd)
-    write_log(wrong, tmp_path / "wrong.parquet")
-    words = ("identify", "wrong.parquet", "--estimator", "WLS", "--model", "explicit", "--no-rerun")
+    rng = np.random.default_rng(3)
+    noisy = replace(log, tau=log.tau + [2.0, 0.1] * rng.standard_normal(log.tau.shape))
+    write_log(noisy.part(0, 700), tmp_path / "short.parquet")
+    words = ("identify", "short.parquet", "--model", "explicit", "--no-rerun")
     assert idbench(*words, "--out", "free")[0] == 0
-    code, out, err = idbench(*words, "--consistent", prior, "--out", "held")
+    code, out, err = idbench(*words, "--prior", "file:5%", "Fs2=0.1:10%", "--out", "near")
     assert code == 0, err
-    assert "explicit: moved to where bodies can exist: Fv" in out
-    free, held = (json.loads((tmp_path / name / "summary.json").read_text()) for name in ("free", "held"))
-    before, after = (np.array(x["models"]["explicit"]["estimate"]) for x in (free, held))
+    assert "roughly known: file:5%, Fs2=0.1:10%" in out
+    free, near = (json.loads((tmp_path / name / "summary.json").read_text()) for name in ("free", "near"))
     names = free["parameters"]
-    assert before[names.index("Fv1")] < -0.1
-    assert abs(after[names.index("Fv1")]) < 1e-4
-    assert after[names.index("ZZR1")] == pytest.approx(before[names.index("ZZR1")], rel=0.05)
-    assert held["consistent"] == prior
+    sigma = [np.array(x["models"]["explicit"]["sigma_noise"]) for x in (free, near)]
+    k = names.index("ZZ2")
+    assert sigma[1][k] < sigma[0][k]
+    assert sigma[1][names.index("Fs2")] <= 0.0101
+    assert near["prior"] == ["file:5%", "Fs2=0.1:10%"]
+    code, out, err = idbench(*words, "--prior", "file", "--out", "asked")
+    assert code == 0, err
+    assert "as the log decides" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (("file:-3%",), "--prior file:-3%: write file, file:25%"),
+        (("Fs2=0.1",), "--prior Fs2=0.1: write file"),
+        (("Fs9=0.1:10%",), "there is no parameter 'Fs9', did you mean"),
+        (("Ia1=0.3:10%",), "no base parameter is made of Ia1 alone (ZZR1 = ZZ1 + Ia1"),
+        (("Fs2=0.1:10%", "Fs2=0.2:10%"), "each name once"),
+        (("links=file:10%",), "write file:25% for links"),
+    ],
+)
+def test_priors_that_make_no_sense_are_refused(idbench, ran, words, why):
+    code, _, err = idbench("identify", ran, "--prior", *words, "--no-rerun")
+    assert code == 2
+    assert why in err
+
+
+def test_estimators_without_a_place_for_priors_are_named(idbench, ran):
+    code, _, err = idbench("identify", ran, "--prior", "file", "--estimator", "IV", "--no-rerun")
+    assert code == 2
+    assert "IV takes nothing that is known before; use --estimator GLS, WLS or OLS, or --hold" in err

@@ -25,7 +25,7 @@ OPTIONS = {
     "estimator": ["--estimator WLS", "--estimator OLS", NONE, "--estimator IV"],
     "start": [NONE, "--start file"],
     "loop": [NONE, "--loop loop.toml"],
-    "consistent": [NONE, "--consistent pullback", "--consistent entropic"],
+    "prior": [NONE, "--prior file", "--prior file:20% Fs2=0.1:10%"],
     "armature": [NONE, "--armature all", "--armature none"],
     "add": [NONE, "--add offset"],
     "without": [NONE, "--without Fs2"],

@@ -245,7 +245,7 @@ WAYS = {
     "rotors": ["--armature", "all", "--estimator", "WLS", "--write", "c.py", "--write-mjcf", "d.xml"],
     "stribeck": ["--friction", "standard+stribeck", "--model", "explicit", "--estimator", "WLS", "--write", "b.json", "c.py"],
     "auto": ["--friction", "auto", "--model", "explicit", "--estimator", "WLS", "--write", "b.json", "c.py"],
-    "consistent": ["--consistent", "entropic", "--model", "explicit", "--estimator", "WLS", "--write", "a.urdf"],
+    "prior": ["--prior", "file", "--model", "explicit", "--estimator", "WLS", "--write", "a.urdf"],
 }
 
 

@@ -1,9 +1,8 @@
 """Physically consistent parameters that agree with the estimate and are otherwise those given."""
 
-import sys
-
 import numpy as np
 import pytest
+import scipy
 
 from idbench.identify import BaseParameters, IdentificationError, consistent_parameters, tree_basis
 from idbench.identify.data.kinematics import INERTIAL
@@ -73,9 +72,8 @@ def test_impossible_estimates_get_the_nearest_possible_bodies_and_are_told(arm):
     np.testing.assert_allclose(found.departure[others], 0, atol=1e-3)
 
 
-@pytest.mark.parametrize("prior", ["pullback", "entropic"])
 @pytest.mark.parametrize("mass", [1e-3, 1e-6, 1e-9, 1e-12])
-def test_a_last_body_of_next_to_nothing_does_not_keep_the_estimate_away(arm, mass, prior):
+def test_a_last_body_of_next_to_nothing_does_not_keep_the_estimate_away(arm, mass):
     """The file has a dot where the tool is; friction, which no body is coupled to, does not move at all, though correlated."""
     grouping, X = arm
     rng, base, given = np.random.default_rng(0), grouping.base(X), X.copy()
@@ -85,18 +83,10 @@ def test_a_last_body_of_next_to_nothing_does_not_keep_the_estimate_away(arm, mas
     correlated = np.eye(len(base)) + 0.1 * rng.normal(size=(len(base), len(base)))
     C = correlated @ correlated.T * np.outer(sigma, sigma)
     estimate = base + np.linalg.cholesky(C) @ rng.normal(size=len(base))
-    found = consistent_parameters(grouping, estimate, C, given, prior=prior)
+    found = consistent_parameters(grouping, estimate, C, given)
     assert np.abs(found.departure).max() < 0.25  # as with the file's own body
     friction = [i for i, name in enumerate(grouping.names) if name.startswith(("Fv", "Fs"))]
     np.testing.assert_array_equal(found.base[friction], estimate[friction])
-
-
-def test_what_the_solver_leaves_far_outside_is_no_result(monkeypatch, arm):
-    grouping, X = arm
-    moved = lambda self, standard: 1.1 * standard  # noqa: E731
-    monkeypatch.setattr("idbench.identify.parameters.bodies.Bodies.projected", moved)
-    with pytest.raises(IdentificationError, match="the solver left inconsistent bodies"):
-        consistent_parameters(grouping, grouping.base(X), 1e-6 * np.eye(len(grouping.names)), X)
 
 
 def test_a_link_too_slender_for_its_inertia_is_moved_as_little_as_its_sigma_asks():
@@ -118,7 +108,7 @@ def test_a_link_too_slender_for_its_inertia_is_moved_as_little_as_its_sigma_asks
     assert not consistent_parameters(grouping, impossible, np.diag(sigma**2), X).agrees
 
 
-def test_what_cannot_be_used_is_refused(arm, monkeypatch):
+def test_what_cannot_be_used_is_refused(arm):
     grouping, X = arm
     base, C = grouping.base(X), np.eye(len(grouping.names))
     with pytest.raises(IdentificationError, match="covariance of the estimate is not positive definite"):
@@ -127,9 +117,6 @@ def test_what_cannot_be_used_is_refused(arm, monkeypatch):
     wrong[grouping.standard.names.index("XX1")] = -1.0
     with pytest.raises(IdentificationError, match="link 1 of the given model is not physically consistent"):
         consistent_parameters(grouping, base, C, wrong)
-    monkeypatch.setitem(sys.modules, "clarabel", None)
-    with pytest.raises(IdentificationError, match="pip install clarabel"):
-        consistent_parameters(grouping, base, C, X)
 
 
 def test_a_link_of_a_needle_is_left_with_room_for_the_solver(rng):
@@ -165,17 +152,40 @@ def test_a_plate_is_given_some_thickness():
     assert min(np.linalg.eigvalsh(S)[0] for S in links(grouping, found.standard)) > -1e-9
 
 
-def test_both_priors_agree_near_the_given_model(arm):
-    """A step of 1 %: the same base values to a few per cent of the step."""
+def distance(S0, S):
+    """tr(S0^-1 S) - ln det(S0^-1 S) - 4, by the eigenvalues of the ratio."""
+    values = scipy.linalg.eigh(S, S0, eigvals_only=True)
+    return float(np.sum(values - np.log(values) - 1))
+
+
+@pytest.mark.parametrize("weight", [1e-4, 1.0, 100.0])
+def test_no_other_bodies_agree_better(arm, rng, weight):
+    """The objective, typed here by eigenvalues, does not fall along 40 directions to either side."""
     grouping, X = arm
     base = grouping.base(X)
-    C, near = np.diag((0.1 * np.maximum(np.abs(base), 0.01)) ** 2), X * 1.01
-    ways = [consistent_parameters(grouping, base, C, near, prior=prior, weight=1.0) for prior in ("pullback", "entropic")]
-    assert np.abs(ways[0].base - ways[1].base).max() < 0.05 * np.abs(ways[0].base - base).max() + 1e-6 * np.abs(base).max()
+    sigma = 0.02 * np.maximum(np.abs(base), 0.01)
+    estimate = base + 3 * sigma * rng.standard_normal(len(base))
+    found = consistent_parameters(grouping, estimate, np.diag(sigma**2), X, weight=weight)
+    bodies = [i for i, p in enumerate(grouping.standard.parameters) if p.symbol in INERTIAL]
+    given = list(links(grouping, X))
+
+    def objective(x):
+        off = (grouping.base(x) - estimate) / sigma
+        away = sum(distance(S0, S) for S0, S in zip(given, links(grouping, x), strict=True))
+        return np.sum(off**2) / 2 + weight * away
+
+    least = objective(found.standard)
+    for _ in range(40):
+        step = np.zeros(len(X))
+        step[bodies] = rng.standard_normal(len(bodies)) * np.abs(X[bodies]).max() * 1e-4
+        for side in (step, -step):
+            moved = found.standard + side
+            if min(np.linalg.eigvalsh(S)[0] for S in links(grouping, moved)) > 0:
+                assert objective(moved) > least - 1e-6 * max(1.0, least)
 
 
-def test_the_entropic_prior_keeps_a_link_from_becoming_thin():
-    """An estimate of ZZ2 that takes a slender link: which of all such links it is, the prior says."""
+def test_a_link_does_not_become_thinner_than_the_estimate_asks():
+    """An estimate of ZZ2 that takes a slender link; of all such links the one whose shape is nearest to the file's."""
     robot = Robot.load("scara")
     tree = kinematic_tree(robot)
     grouping = BaseParameters.of(tree, tree_basis(tree))
@@ -183,11 +193,9 @@ def test_the_entropic_prior_keeps_a_link_from_becoming_thin():
     X = np.array([truth[name] for name in grouping.standard.names])
     base = grouping.base(X)
     base[grouping.names.index("ZZ2")] = 0.005
-    C = np.diag(np.full(8, 1e-3) ** 2)
-    thin, thick = (consistent_parameters(grouping, base, C, X, prior=prior) for prior in ("pullback", "entropic"))
-    least = [min(np.linalg.eigvalsh(S)[0] for S in links(grouping, found.standard)) for found in (thin, thick)]
-    assert least[1] > 3 * least[0] > 0
-    assert max(thin.distance, thick.distance) < 1
+    found = consistent_parameters(grouping, base, np.diag(np.full(8, 1e-3) ** 2), X)
+    assert found.distance < 1
+    assert min(np.linalg.eigvalsh(S)[0] for S in links(grouping, found.standard)) > 1e-5
 
 
 def test_a_given_model_of_unknown_size_takes_that_of_the_estimate(arm):

@@ -75,7 +75,14 @@ def _print_joints(page: Console, robot_model: RobotModel) -> None:
         grid.add_row(f"{j + 1} {joint.name}", joint.kind, parent, *ends, *(f"{x:g}" if x else "" for x in values))
     print_titled(page, f"robot {tree.name}: {tree.n} joints on a base that is fixed to the ground", grid)
     if not any(joint.armature for joint in tree.joints):
-        page.print(Text("the file has no armatures; behind gears rotors have more inertia than links: --armature all"))
+        filed = bool(model.dof_armature.any())
+        why = (
+            "no armature is identified (--armature none)"
+            if robot_model.asked.armature == "none"
+            else "the file has no armatures"
+        )
+        more = "" if filed else "; behind gears rotors have more inertia than links: --armature all"
+        page.print(Text(why + more))
 
 
 def _print_parameters(page: Console, robot_model: RobotModel, truth: dict[str, float]) -> None:

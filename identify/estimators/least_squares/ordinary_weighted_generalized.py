@@ -3,13 +3,15 @@
 from dataclasses import dataclass
 from typing import ClassVar, final
 
+import numpy as np
+
 from idbench.identify.arrays import frozen
 from idbench.identify.errors import require_whole
 from idbench.identify.estimators.estimate import Estimate
 from idbench.identify.estimators.estimator import AbstractEstimator, Need
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.solution import OfWhitenedRows
-from idbench.identify.rows.factors import Factor, Status
+from idbench.identify.rows.factors import Factor, Status, prior_rows
 
 
 @final
@@ -19,6 +21,7 @@ class OrdinaryLeastSquares(AbstractEstimator):
 
     acronym: ClassVar[str] = "OLS"
     needs: ClassVar[frozenset[Need]] = frozenset({"factors"})
+    takes_prior: ClassVar[bool] = True
 
     def solve(self, problem: Problem) -> Estimate:
         """Return R^-1 Q' Y, NaN where W has not full rank."""
@@ -38,6 +41,7 @@ class WeightedLeastSquares(AbstractEstimator):
 
     acronym: ClassVar[str] = "WLS"
     needs: ClassVar[frozenset[Need]] = frozenset({"factors"})
+    takes_prior: ClassVar[bool] = True
 
     rounds: int = 2
     """How often weights are taken from the residuals of the estimate before, at least 1."""
@@ -65,11 +69,13 @@ class GeneralizedLeastSquares(AbstractEstimator):
 
     acronym: ClassVar[str] = "GLS"
     needs: ClassVar[frozenset[Need]] = frozenset({"factors"})
+    takes_prior: ClassVar[bool] = True
 
     def solve(self, problem: Problem) -> Estimate:
         """Return the estimate; of logs too long for their rows to be kept, pieces count as independent."""
         R = problem.independent_factor
-        factor = Factor(R, problem.factors.together.rows, problem.names)
+        known = None if problem.prior is None else prior_rows(problem.prior, R, np.ones(R.shape[:-2]))
+        factor = Factor(R, problem.factors.together.rows, problem.names, known)
         solvable = (problem.factors.together.status == Status.OK) & factor.determined
         inverse = factor.inverse(solvable)
-        return Estimate(problem, frozen(factor.solution(solvable)), frozen(inverse), OfWhitenedRows(inverse))
+        return Estimate(problem, frozen(factor.solution(solvable)), frozen(inverse), OfWhitenedRows(inverse, known))

@@ -1,0 +1,118 @@
+"""What is roughly known of parameters, as rows of the normal equations."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from idbench.identify.arrays import TINY, Array
+from idbench.identify.basis.block import BODY, Parameter
+from idbench.identify.parameters.bodies import Bodies, nearest
+from idbench.identify.rows.factors import AbstractPrior, triangular
+
+PLAIN = 1e-9
+"""Share of the largest singular value below which one is zero."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class NormalPrior:
+    """Values with standard deviations."""
+
+    known: Array
+    """[P, P x0], shape (m, p + 1)."""
+
+    @classmethod
+    def of(cls, K: Array, values: Array, sigma: Array) -> "NormalPrior":
+        """Return what standard values with standard deviations, infinite where nothing is known, say of base parameters K x.
+
+        A base parameter of which a part is not known is not known at all.
+
+        Parameters
+        ----------
+        K : Array, shape (b, p)
+            What base parameters are made of.
+        values, sigma : Array, shape (p,)
+            Standard values, and their standard deviations.
+        """
+        known = np.isfinite(sigma)
+        rows = (K[:, known] != 0).any(axis=1) & ~(K[:, ~known] != 0).any(axis=1)
+        own = K[np.ix_(rows, known)]
+        return cls(_rows(own @ values[known], (own * sigma[known] ** 2) @ own.T, rows))
+
+    def rows(self, R: Array) -> Array:
+        """Return them."""
+        del R
+        return self.known
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class FilePrior:
+    """Links near those of a file: weight times the log-determinant divergence of `Bodies`, linearized at its minimum.
+
+    The others are weakly known: none makes more than the whole torque alone, so that a short log, too, has an estimate.
+
+    With x the standard parameters of links, X = K x base parameters that are made of links alone, and x* the minimum of
+    1/2 |R (K x, X_free)|^2 + weight d(x), the rows are those of x* - H^-1 g, with covariance H^-1, g and H the gradient and
+    Hessian of weight d at x*: their solution with R is K x*, which bodies can have.
+    """
+
+    K: Array
+    """What base parameters are made of, shape (b, p)."""
+    parameters: Sequence[Parameter]
+    """The standard parameters."""
+    given: Array
+    """Theirs in the file, shape (p,)."""
+    share: float
+    """Relative change of a link that is expected; the weight is its inverse square."""
+
+    def rows(self, R: Array) -> Array:
+        """Return what is known, at the best links for R."""
+        links = np.array([p.kind in BODY for p in self.parameters])
+        own = (self.K[:, links] != 0).any(axis=1) & ~(self.K[:, ~links] != 0).any(axis=1)
+        K = self.K[np.ix_(own, links)]
+        bodies = Bodies([p for p in self.parameters if p.kind in BODY], self.given[links], np.ones(int(links.sum())))
+        order = np.r_[np.flatnonzero(~own), np.flatnonzero(own)]
+        free = int((~own).sum())
+        weak = np.zeros((free, R.shape[-1]))
+        size = np.linalg.norm(R[:, :-1][:, ~own], axis=0) / max(float(np.linalg.norm(R[:, -1])), TINY)
+        weak[np.arange(free), np.flatnonzero(~own)] = size
+        R = np.concatenate([R, weak])
+        part = triangular(R[:, [*order, -1]])[free:, free:]
+        x = nearest(part[:, :-1] @ K, part[:, -1], bodies, weight := self.share**-2)
+        d = bodies.divergence(x)
+        assert d is not None
+        root = K @ d.root / np.sqrt(weight)
+        of_links = _rows(K @ x - root @ (d.root.T @ d.gradient) * np.sqrt(weight), root @ root.T, own)
+        return np.concatenate([weak, of_links])
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class PriorSum:
+    """Several."""
+
+    parts: tuple[AbstractPrior, ...]
+    """Each."""
+
+    def rows(self, R: Array) -> Array:
+        """Return the rows of all; each is linearized as if it were the only one."""
+        found = R
+        every = list[Array]()
+        for part in self.parts:
+            every.append(part.rows(found))
+            found = triangular(np.concatenate([found, every[-1]]))
+        return np.concatenate(every)
+
+
+def _rows(mean: Array, covariance: Array, places: Array) -> Array:
+    """Return [P, P x0] of some base parameters with a mean and a covariance, which may be singular, shape (m, b + 1)."""
+    size = np.sqrt(np.diagonal(covariance))
+    values, axes = np.linalg.eigh(covariance / np.outer(size, size))
+    kept = values > PLAIN * values.max(initial=0.0)
+    P = np.zeros((int(kept.sum()), len(places) + 1))
+    root = (axes[:, kept] / np.sqrt(values[kept])).T / size
+    P[:, np.flatnonzero(places)], P[:, -1] = root, root @ mean
+    return P

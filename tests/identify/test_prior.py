@@ -1,0 +1,155 @@
+"""What is roughly known: rows of the normal equations, of every linear estimator."""
+
+import numpy as np
+import pytest
+
+from idbench.identify import (
+    ESTIMATORS,
+    MODELS,
+    BaseParameters,
+    IdentificationError,
+    MotionLog,
+    Problem,
+    estimate,
+    idbench_chain,
+)
+from idbench.identify.basis import tree_basis
+from idbench.identify.parameters.bodies import pseudo_inertia
+from idbench.identify.parameters.prior import FilePrior, NormalPrior, PriorSum
+from idbench.identify.rows.factors import prior_rows
+from idbench.sim.robot.robot import Robot
+from idbench.sim.robot.tree import kinematic_tree, standard_parameters
+
+LINEAR = ["OLS", "WLS", "GLS"]
+
+
+@pytest.fixture(scope="module")
+def grouping():
+    tree = kinematic_tree(Robot.load("scara"))
+    return BaseParameters.of(tree, tree_basis(tree))
+
+
+@pytest.fixture(scope="module")
+def values(grouping):
+    true = standard_parameters(Robot.load("scara"))
+    return np.array([true[name] for name in grouping.standard.names])
+
+
+def problem_of(log, grouping, prior=None):
+    return Problem((log,), grouping.basis, MODELS.create("explicit"), idbench_chain(), prior=prior)
+
+
+@pytest.fixture(scope="module")
+def noisy(log):
+    rng = np.random.default_rng(4)
+    return MotionLog(log.fs, log.q, log.tau + [0.5, 0.025] * rng.standard_normal(log.tau.shape), log.torque)
+
+
+@pytest.mark.parametrize("acronym", LINEAR)
+def test_a_value_and_its_sigma_are_one_more_measurement(noisy, grouping, acronym):
+    """Fs2 0.12 +- 0.002 beside what the log says, as the mean of two numbers by their variances: closed form.
+
+    Of OLS, whose rows count alike, the prior's size is that of the residual, and the mean is that of its own weights.
+    """
+    k = grouping.names.index("Fs2")
+    plain = estimate(problem_of(noisy, grouping), ESTIMATORS.create(acronym))
+    prior = NormalPrior.of(np.eye(8)[:, k : k + 1], np.array([0.12]), np.array([0.002]))
+    found = estimate(problem_of(noisy, grouping, prior), ESTIMATORS.create(acronym))
+    rows = found.solution.known
+    unit = rows[0, k] * 0.002  # 1 where rows are divided by their noise
+    inverse = plain.solution.inverse * unit**2
+    mean = (plain.X[k] / inverse[k, k] + 0.12 / 0.002**2) / (1 / inverse[k, k] + 1 / 0.002**2)
+    near = 5e-2 if acronym == "WLS" else 1e-5  # its weights are those of other residuals
+    assert found.X[k] == pytest.approx(mean, rel=near)
+    gain = inverse[:, k] / (inverse[k, k] + 0.002**2)
+    np.testing.assert_allclose(found.X, plain.X + gain * (0.12 - plain.X[k]), rtol=near)
+    if acronym == "GLS":
+        np.testing.assert_allclose(np.diag(found.own_covariance)[k], 1 / (1 / inverse[k, k] + 1 / 0.002**2), rtol=1e-4)
+
+
+def test_sigma_is_right_where_the_prior_is(log, grouping, values):
+    """200 values drawn from the prior, and 200 noises: the errors of a log of 10 s over sigma are 1 within a seventh."""
+    rng, short, z = np.random.default_rng(2), log.part(0, 1000), []
+    places = [grouping.names.index(name) for name in ("Fv1", "Fs1", "Fv2", "Fs2")]
+    true = grouping.base(values)
+    sigma = 0.3 * np.abs(true[places])
+    for _ in range(200):
+        believed = true[places] + sigma * rng.standard_normal(len(places))
+        prior = NormalPrior.of(np.eye(8)[:, places], believed, sigma)
+        tau = short.tau + [5.0, 0.25] * rng.standard_normal(short.tau.shape)
+        one = MotionLog(log.fs, short.q, tau, log.torque)
+        found = estimate(problem_of(one, grouping, prior), ESTIMATORS.create("GLS"))
+        z.append((found.X - true) / found.noise_sigma)
+    assert np.sqrt(np.mean(np.square(z))) == pytest.approx(1.0, abs=0.15)
+
+
+def test_what_is_grouped_with_something_unknown_is_not_known(grouping, values):
+    """ZZR1 = ZZ1 + Ia1 + 0.25 M2: known when all three are."""
+    K, names = grouping.K, grouping.standard.names
+    sigma = np.full(len(names), np.inf)
+    sigma[names.index("Ia1")] = 0.1
+    assert not len(NormalPrior.of(K, values, sigma).known)
+    sigma[[names.index("ZZ1"), names.index("M2")]] = 0.2, 0.4
+    (row,) = NormalPrior.of(K, values, sigma).known
+    variance = 0.1**2 + 0.2**2 + (0.25 * 0.4) ** 2
+    assert row[grouping.names.index("ZZR1")] == pytest.approx(1 / np.sqrt(variance))
+    assert row[-1] * np.sqrt(variance) == pytest.approx(3.5)
+
+
+@pytest.mark.parametrize("acronym", LINEAR)
+def test_links_near_the_file_are_consistent_and_the_log_wins_where_it_knows(noisy, grouping, values, acronym):
+    wrong = values.copy()
+    for i, p in enumerate(grouping.standard.parameters):
+        wrong[i] *= 1.3 if p.symbol not in ("Fv", "Fs", "Ia") else 1.0
+    plain = estimate(problem_of(noisy, grouping), ESTIMATORS.create(acronym))
+    loose, tight = (
+        estimate(
+            problem_of(noisy, grouping, FilePrior(grouping.K, grouping.standard.parameters, wrong, share)),
+            ESTIMATORS.create(acronym),
+        )
+        for share in (10.0, 1e-4)
+    )
+    np.testing.assert_allclose(loose.X, plain.X, atol=0.02 * plain.own_sigma.max())
+    k = grouping.names.index("ZZ2")
+    assert tight.X[k] == pytest.approx(grouping.base(wrong)[k], rel=3e-2)
+
+
+def test_the_rows_of_a_file_solve_to_bodies_that_exist(noisy, grouping, values):
+    """The solution of R and the rows is K x with positive pseudo-inertias, and does not change when it is linearized again."""
+    prior = FilePrior(grouping.K, grouping.standard.parameters, values, 0.2)
+    found = estimate(problem_of(noisy, grouping, prior), ESTIMATORS.create("GLS"))
+    R = found.problem.independent_factor
+    again = np.linalg.lstsq(np.concatenate([R[:, :-1], (rows := prior_rows(prior, R, np.ones(())))[:, :-1]]),
+                            np.concatenate([R[:, -1], rows[:, -1]]))[0]  # fmt: skip
+    np.testing.assert_allclose(found.X, again, rtol=1e-8)
+    body = dict(zip(grouping.names, found.X, strict=True))
+    S = pseudo_inertia(np.array([0.03, 0, 0, 0.03, 0, body["ZZ2"], body["MX2"], body["MY2"], 0, 2.0]))
+    assert np.linalg.eigvalsh(S[np.ix_([0, 1, 3], [0, 1, 3])])[0] > 0
+
+
+def test_a_log_that_determines_nothing_has_an_estimate_with_a_prior(log, grouping, values):
+    """Three seconds in which joint 2 moves alone: nothing of joint 1 but what couples them."""
+    piece = log.part(100, 420)
+    q = piece.q.copy()
+    q[:, 0] = 0.3
+    short = MotionLog(log.fs, q, piece.tau, log.torque)
+    with pytest.raises(IdentificationError):
+        estimate(problem_of(short, grouping), ESTIMATORS.create("WLS"))
+    prior = FilePrior(grouping.K, grouping.standard.parameters, values, 0.1)
+    found = estimate(problem_of(short, grouping, prior), ESTIMATORS.create("WLS"))
+    assert found.X[grouping.names.index("ZZ2")] == pytest.approx(0.06, rel=0.3)
+
+
+def test_several_priors_add(grouping, values):
+    friction = NormalPrior.of(np.eye(8)[:, [1]], np.array([0.05]), np.array([0.01]))
+    links = FilePrior(grouping.K, grouping.standard.parameters, values, 0.2)
+    R = np.diag([1e2] * 9)
+    both = PriorSum((friction, links)).rows(R)
+    assert len(both) == len(friction.rows(R)) + len(links.rows(R))
+
+
+@pytest.mark.parametrize("acronym", ["TLS", "IRLS", "ML"])
+def test_estimators_that_take_no_prior_say_so(noisy, grouping, acronym):
+    prior = NormalPrior.of(np.eye(8)[:, [1]], np.array([0.05]), np.array([0.01]))
+    with pytest.raises(IdentificationError, match="takes nothing that is known before: use GLS, WLS or OLS"):
+        estimate(problem_of(noisy, grouping, prior), ESTIMATORS.create(acronym))
