@@ -68,12 +68,9 @@ class WrittenRobot:
         if not self.consistent.agrees:
             joints, off = self.fit.robot_model.robot.joints, 100 * self.torque_off
             far = ", ".join(f"{joint} {x:.2g} %" for joint, x in zip(joints, off, strict=True) if x > LITTLE)
-            torques = (
-                f"its torques differ by {far} of those of the log" if far else f"its torques differ by less than {LITTLE:g} %"
-            )
             messages.append(
-                f"the estimate of the {self.model} model is not physically consistent: the nearest consistent robot is written; "
-                + torques
+                f"the estimate of the {self.model} model is not physically consistent; torques of the nearest robot that is "
+                f"differ by {far or f'less than {LITTLE:g} %'} of the log's"
             )
         if self.lost:
             messages.append(f"{', '.join(self.lost)} have no place in an MJCF file and are left out")

@@ -51,8 +51,7 @@ def fit(request: Request, logs: Logs) -> "Fit":
     choice = None
     if request.robot_model.laws.auto:
         request, logs, choice = chosen_in_turns(request, logs)
-    known = request.robot_model.asked.prior
-    if known and request.robot_model.roughly_known.links and not request.robot_model.roughly_known.share:
+    if request.robot_model.share_sought:
         request = replace(request, share=chosen_share(request, logs.fitted))
     problem = request.problem(logs.fitted)
     (speeds, raised), hidden = suited_mask(problem), list[str]()
@@ -271,13 +270,8 @@ class Fit:
             "hidden": list(self.hidden),
             "mask_speed": list(self.request.mask_speed),
             "rates": self.rates.summary(),
-            **({"held": self.robot_model.held} if self.robot_model.asked.hold else {}),
-            **(
-                {"prior": list(self.robot_model.asked.prior), "share": self.request.share}
-                if self.robot_model.asked.prior
-                else {}
-            ),
-            **({"tied": list(self.robot_model.asked.tie)} if self.robot_model.asked.tie else {}),
+            **self.robot_model.stated,
+            **({"share": self.request.share} if self.request.share else {}),
             "cutoff": cutoff,
             "logs": [self._of_log(k) for k in range(len(self.logs.fitted))],
         }

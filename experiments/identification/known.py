@@ -117,7 +117,8 @@ class RoughlyKnown:
         ExperimentError
             If a word is none of these, or names something twice.
         """
-        links, share, values = False, None, dict[str, Trust]()
+        links, values = False, dict[str, Trust]()
+        share: float | None = None
         for word in words:
             name, equals, stated = word.partition("=")
             first, _, trust = (stated if equals else word).partition(":")

@@ -34,8 +34,9 @@ def chosen_share(request: Request, logs: Sequence[MotionLog]) -> float | None:
 
 def _error(request: Request, blocks: Sequence[Array], share: float) -> float:
     """Return the sum of squared errors of the blocks, with a share."""
-    prior, p, total = request.robot_model.prior(share), blocks[0].shape[-1] - 1, 0.0
+    prior, p = request.robot_model.prior(share), blocks[0].shape[-1] - 1
     assert prior is not None
+    total = 0.0
     for k, block in enumerate(blocks):
         R = triangular(np.concatenate([*blocks[:k], *blocks[k + 1 :]]))
         factor = Factor(R, np.array(len(R)), ("",) * p, prior_rows(prior, R, np.ones(())))

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Self, final
+from typing import Any, Self, final
 
 import numpy as np
 
@@ -65,6 +65,18 @@ class RobotModel:
     def roughly_known(self) -> RoughlyKnown:
         """What is roughly known; ExperimentError if that makes no sense."""
         return RoughlyKnown.of(self.asked.prior)
+
+    @property
+    def stated(self) -> dict[str, Any]:
+        """What a summary.json says of what is known: held, tied, and roughly known."""
+        asked = self.asked
+        found = {"held": self.held if asked.hold else {}, "tied": list(asked.tie), "prior": list(asked.prior)}
+        return {name: of for name, of in found.items() if of}
+
+    @property
+    def share_sought(self) -> bool:
+        """Whether the log decides how near links are to those of the file."""
+        return bool(self.asked.prior) and self.roughly_known.links and self.roughly_known.share is None
 
     def prior(self, share: float | None = None) -> AbstractPrior | None:
         """Return what is roughly known of the parameters, links to a `share` of the file's; None if nothing is."""

@@ -1,6 +1,6 @@
 """What comes out of an identification, and how good it is."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self
@@ -12,7 +12,7 @@ from idbench.identify.arrays import Array, frozen
 from idbench.identify.errors import PluginError
 from idbench.identify.estimators.between_logs import BetweenLogs, between_logs
 from idbench.identify.estimators.likelihood.joint_fit import JointFit
-from idbench.identify.estimators.log_rows import delay_covariance
+from idbench.identify.estimators.log_rows import bias_covariance, delay_covariance, noise_covariance
 from idbench.identify.estimators.model_error import ModelError
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.estimators.solution import AbstractSolution, Given, OfWeightedRows, OfWhitenedRows
@@ -20,29 +20,6 @@ from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.rows.factors import Factor, LeastSquaresFit, Status
 from idbench.identify.rows.rows import Rows
 from idbench.identify.tables import html_table, significant, text_table
-
-
-def noise_covariance(problem: Problem, influence: Sequence[Array]) -> Array:
-    """Return the covariance that the noise of a problem's logs gives an estimate X = G' Y, shape (..., p, p).
-
-    Parameters
-    ----------
-    problem : Problem
-        Logs and rows.
-    influence : sequence of Array, shape (..., r, p)
-        G of each of its parts.
-    """
-    each = zip(problem.parts, influence, strict=True)
-    return sum((part.covariance.of_sums(G) for part, G in each), start=np.zeros(())) / problem.share
-
-
-def bias_covariance(problem: Problem, influence: Sequence[Array]) -> Array:
-    """Return the square of the bias that noise of velocities near zero gives an estimate X = G' Y, shape (..., p, p)."""
-    if problem.alike:
-        return np.zeros(())
-    each = zip(problem.parts, influence, strict=True)
-    bias = sum((np.matmul(np.swapaxes(G, -1, -2), part.bias[..., None]) for part, G in each), start=np.zeros(()))
-    return np.matmul(bias, np.swapaxes(bias, -1, -2)) / problem.share**2
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -148,6 +148,29 @@ class LogRows:
         return friction_bias(noisy.to_rows, self.linear, self.problem.model, self.problem.noise.position)
 
 
+def noise_covariance(problem: "Problem", influence: Sequence[Array]) -> Array:
+    """Return the covariance that the noise of a problem's logs gives an estimate X = G' Y, shape (..., p, p).
+
+    Parameters
+    ----------
+    problem : Problem
+        Logs and rows.
+    influence : sequence of Array, shape (..., r, p)
+        G of each of its parts.
+    """
+    each = zip(problem.parts, influence, strict=True)
+    return sum((part.covariance.of_sums(G) for part, G in each), start=np.zeros(())) / problem.share
+
+
+def bias_covariance(problem: "Problem", influence: Sequence[Array]) -> Array:
+    """Return the square of the bias that noise of velocities near zero gives an estimate X = G' Y, shape (..., p, p)."""
+    if problem.alike:
+        return np.zeros(())
+    each = zip(problem.parts, influence, strict=True)
+    bias = sum((np.matmul(np.swapaxes(G, -1, -2), part.bias[..., None]) for part, G in each), start=np.zeros(()))
+    return np.matmul(bias, np.swapaxes(bias, -1, -2)) / problem.share**2
+
+
 def delay_covariance(parts: Sequence[LogRows], influence: Sequence[Array]) -> Array:
     """Return the covariance of the error of X due to that of the delays, shape (..., p, p).
 

@@ -77,11 +77,11 @@ class ModelError:
         taper = 0.5 + 0.5 * np.cos(np.pi * np.arange(lags) / lags)
         rows, time = (np.sum([getattr(part, x) for part in each], axis=0) for x in ("rows", "time"))
         ratio = np.sum([part.ratios(lags) * part.rows[..., None] for part in each], axis=0) / np.maximum(rows, TINY)[..., None]
-        surely = 1 + 2 * np.sqrt(0.75 * MEMORY / np.maximum(time, MEMORY))[..., None]
+        beyond_chance = 1 + 2 * np.sqrt(0.75 * MEMORY / np.maximum(time, MEMORY))[..., None]
         share, worst = np.zeros(ratio.shape[:-1]), np.zeros(X.shape)
         meat = np.zeros((*X.shape, X.shape[-1]))
         for part in each:
-            S, S0 = part.spectra(taper * ratio, surely)
+            S, S0 = part.spectra(taper * ratio, beyond_chance)
             share = np.maximum(share, part.share(S, S0))
             sandwich, most = part.sandwich(S, S0)
             meat, worst = meat + sandwich / whole, worst + most / whole
@@ -163,13 +163,13 @@ class _Residuals:
         squares = np.abs(np.fft.rfft(self.rho, self.size)) ** 2
         return _lags(np.divide(squares, reference, out=np.zeros_like(squares), where=reference > 0), lags)
 
-    def spectra(self, ratio: Array, surely: Array) -> tuple[Array, Array]:
-        """Return S, and S0 as far as it may surely be exceeded, shape (..., kind, frequency).
+    def spectra(self, ratio: Array, beyond_chance: Array) -> tuple[Array, Array]:
+        """Return S, and S0 with its margin, shape (..., kind, frequency).
 
         Residuals are divided by the reference before they are averaged over frequencies: noise of positions grows with f^4.
         """
         rows = np.maximum(self.rows, TINY)[..., None]
-        return self._spectrum(self.reference) * self._spectrum(ratio) / rows, surely * self._spectrum(self.noise) / rows
+        return self._spectrum(self.reference) * self._spectrum(ratio) / rows, beyond_chance * self._spectrum(self.noise) / rows
 
     def share(self, S: Array, S0: Array) -> Array:
         """Return the share of S beyond `MARGIN`, as the mean over the torque's spectrum, shape (..., kind)."""

@@ -130,10 +130,7 @@ class Problem:
 
     @cached_property
     def position_noise(self) -> Array:
-        """Standard deviation of the noise of the positions [rad], shape (..., joint).
-
-        From their differences, and at least that of a count of the encoder, which slow motion hides.
-        """
+        """Noise of the positions [rad], shape (..., joint): from their differences, at least that of an encoder's count."""
         if self.explicit is not self:
             return self.explicit.position_noise
         steps = np.nan_to_num(encoder_steps(np.concatenate([log.q for log in self.logs], axis=-2)))
@@ -148,7 +145,7 @@ class Problem:
     def factors(self) -> Factors:
         """Triangular factors of the rows as they are, one for each kind."""
         found = Factors.merged([part.rows.factors for part in self.every_part()]) if self.long else self.rows.factors
-        return found if self.prior is None else replace(found, prior=self.prior, _fits=[])
+        return found.known(self.prior)
 
     @cached_property
     def scaled_factors(self) -> Factors:
@@ -156,8 +153,8 @@ class Problem:
         if self.alike:
             return self.factors
         if not self.long:
-            return replace(self.rows.factors_of(self.weights), prior=self.prior)
-        return replace(Factors.merged(self._of_pieces(lambda part: part.rows.factors_of(part.weights))), prior=self.prior)
+            return self.rows.factors_of(self.weights).known(self.prior)
+        return Factors.merged(self._of_pieces(lambda part: part.rows.factors_of(part.weights))).known(self.prior)
 
     @cached_property
     def independent_factor(self) -> Array:
@@ -190,9 +187,7 @@ class Problem:
     @cached_property
     def start(self) -> LeastSquaresFit:
         """The estimate by weighted least squares, from all parts."""
-        return (
-            replace(self.some_rows.factors, prior=self.prior, _fits=[]).fit(2) if self.prior else self.some_rows.factors.fit(2)
-        )
+        return self.some_rows.factors.known(self.prior).fit(2)
 
     @cached_property
     def noise(self) -> NoiseLevels:
@@ -203,10 +198,7 @@ class Problem:
 
     @cached_property
     def likely_noise(self) -> NoiseLevels:
-        """The noise by which rows are weighted: of the torques, what makes the explicit model's rows most likely (REML).
-
-        It contains the error of the model, as far as that is white.
-        """
+        """The noise by which rows are weighted: of torques what makes the explicit rows most likely (REML), model error too."""
         if self.explicit is not self:
             return self.explicit.likely_noise
         rows, noisy = zip(*((part.unbiased, part.noisy) for part in self.parts), strict=True)

@@ -103,7 +103,8 @@ def _is_read(logs: Sequence[MotionLog], chain: Chain) -> bool:
 
 class _Search:
     def __init__(self, logs: list[MotionLog], basis: Basis, chain: Chain, within: tuple[float, float]) -> None:
-        self._logs, self._basis, self._within = logs, basis, within
+        self._logs, self._within = logs, within
+        self._basis = basis
         halos = [chain.halo(log.fs, replace(log.torque, delay=delay)) for log in logs for delay in within]
         # The same rows at all delays, or their misfits could not be compared.
         self._chain = replace(chain, trim=max(*halos, chain.trim or 0.0))

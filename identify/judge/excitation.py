@@ -14,7 +14,8 @@ from idbench.identify.basis.basis import Basis
 from idbench.identify.data.kinematics import KinematicTree
 from idbench.identify.data.log_columns import LogColumns
 from idbench.identify.data.motion_log import MotionLog
-from idbench.identify.estimators.estimate import Estimate, noise_covariance
+from idbench.identify.estimators.estimate import Estimate
+from idbench.identify.estimators.log_rows import noise_covariance
 from idbench.identify.estimators.simulating.row_products import Kinds, with_weights
 from idbench.identify.estimators.solution import Given
 from idbench.identify.parameters.base_parameters import BaseParameters, columns_at, random_states

@@ -80,7 +80,8 @@ def torque_interval(estimate: Estimate, level: float = LEVEL) -> TorqueInterval 
     problem = estimate.problem
     if problem.long or estimate.X.ndim > 1:
         return None
-    parts, explicit, factors = problem.parts, problem.explicit.parts, problem.explicit.factors
+    parts, explicit = problem.parts, problem.explicit.parts
+    factors = problem.explicit.factors
     several = len(parts) >= MIN_LOGS
     left = _left_out(estimate, parts, several)
     errors = [_errors(part, estimate.X if left is None else left[k][_blocks(part, several)]) for k, part in enumerate(explicit)]

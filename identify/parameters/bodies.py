@@ -113,7 +113,8 @@ class Bodies:
 
     def divergence(self, x: Array) -> Divergence | None:
         """Return the distance of x from the given parameters; None where no bodies have them."""
-        gradient, root, value = np.zeros(len(x)), np.zeros((len(x), len(x))), 0.0
+        gradient, root = np.zeros(len(x)), np.zeros((len(x), len(x)))
+        value = 0.0
         for link, inverse in zip(self.links, self._inverses, strict=True):
             P = pseudo_inertia(x[link])
             try:
@@ -149,7 +150,7 @@ SHARE = 0.9
 """Share of the way to the border of what bodies can have that a step goes at most: far too thin ones are slow to grow again."""
 
 LEAST_STEP = 1e-10
-"""Share of a step below which nothing is gained: what is left is rounding."""
+"""Share of a step below which nothing is gained but rounding."""
 
 ROUNDING = 1e-13
 """Share of the objective by which it may rise: rounding."""

@@ -214,6 +214,10 @@ class Factors:
         R = triangular(np.concatenate([part.R for part in parts], axis=-2))
         return cls(R, np.sum([part.rows for part in parts], axis=0), parts[0].names)
 
+    def known(self, prior: AbstractPrior | None) -> Self:
+        """Return the factors with something that is known before."""
+        return self if prior is None else replace(self, prior=prior, _fits=[])
+
     def only(self, places: Sequence[int], known: Mapping[int, Array | float] | None = None) -> Self:
         """Return the factors of rows with the parameters at some places; of others those `known`, shape (...), count in Y."""
         R = self.R.copy()

@@ -243,7 +243,7 @@ def test_the_function_of_true_parameters_is_mujocos_inverse_dynamics(robot, tmp_
     request = Request(robot_model, models=("explicit",))
     X = np.array(list(robot_model.truth(arm).values()))
     estimate = Estimate(Problem((log,), robot_model.basis, ExplicitModel(), request.processing), X, np.eye(len(X)))
-    known = Fit(request, Logs((log,)), estimate.problem, {}, {"explicit": estimate})
+    known = Fit(request, Logs((log,)), estimate.problem, {"explicit": estimate})
     text = python_text(known, "explicit", tmp_path)
     (tmp_path / "arm.py").write_text(text)
     function = runpy.run_path(str(tmp_path / "arm.py"))

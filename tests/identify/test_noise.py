@@ -25,7 +25,7 @@ from idbench.identify import (
     paper_chain,
     scara,
 )
-from idbench.identify.estimators.estimate import noise_covariance
+from idbench.identify.estimators.log_rows import noise_covariance
 from idbench.identify.noise.linearization import Linearization
 from idbench.identify.noise.propagation import position_paths, torque_paths
 

@@ -5,7 +5,6 @@ import numpy as np
 from idbench.experiments.recording.columns import seconds
 from idbench.experiments.recording.stream import Stream
 from idbench.experiments.recording.views import Shelf
-from idbench.experiments.reports.printed import _position_noise
 from idbench.experiments.text import of_each
 
 
@@ -25,10 +24,3 @@ def test_titles_have_the_rms_of_what_was_sent_in_pieces():
 
 def test_what_is_said_of_several_logs_is_one_line():
     assert of_each([("a", "x"), ("b", "y"), ("c", "x")]) == ["a, c: x", "b: y"]
-
-
-def test_noise_below_the_rounding_of_an_encoder_is_named_as_hidden():
-    """Rounding to a step has the standard deviation step / sqrt(12)."""
-    assert _position_noise(1e-9, np.sqrt(12) * 1e-5) == "<1e-05"
-    assert _position_noise(0.9e-5, np.sqrt(12) * 1e-5) == "9e-06"
-    assert _position_noise(None, None) == "?"
