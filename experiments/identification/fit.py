@@ -207,9 +207,9 @@ class Fit:
 
     @cached_property
     def left_open(self) -> dict[str, Array]:
-        """Standard error of the torque that every estimate predicts on its own log, over that torque's rms, shape (joint,)."""
+        """Error due to noise of the torque predicted on the own log, over that torque's rms, shape (joint,), by model."""
         W = self.problem.factors.R[..., :-1]
-        spread = {name: np.sum(W @ e.within_covariance * W, axis=(-2, -1)) for name, e in self.estimates.items()}
+        spread = {name: np.sum(W @ e.noise_covariance * W, axis=(-2, -1)) for name, e in self.estimates.items()}
         squares = np.maximum(self._torque_squares, 1e-300)
         return {name: np.sqrt(np.maximum(found, 0.0) / squares) for name, found in spread.items()}
 

@@ -21,7 +21,7 @@ from idbench.identify.judge.band import slow_motion
 from idbench.identify.judge.friction_choice import FrictionChoice, choose_friction
 from idbench.identify.models import ExplicitModel
 from idbench.identify.rows.rows import Rows
-from idbench.identify.signals.masks import NoMask
+from idbench.identify.signals.masks import NoMask, most_masked
 from idbench.identify.telling import stage
 
 SHOWN = 0.02
@@ -41,8 +41,10 @@ def suited_mask(problem: Problem) -> tuple[tuple[float, ...], tuple[int, ...]]:
         speed, factor = slow_motion(explicit, ESTIMATORS.create("WLS").fit(explicit).X)
     except IdentificationError:
         return (), ()
-    raised = tuple(int(j) for j in np.flatnonzero(factor > 1))
-    return (tuple((speed * factor).tolist()), raised) if raised else ((), ())
+    most = np.max([most_masked(signals.state.qd) for signals in explicit.signals], axis=0)
+    reach = np.maximum(np.minimum(speed * factor, most), speed)
+    raised = tuple(int(j) for j in np.flatnonzero(reach > speed))
+    return (tuple(reach.tolist()), raised) if raised else ((), ())
 
 
 def masked_laws(before: Problem, after: Problem) -> tuple[str, ...]:

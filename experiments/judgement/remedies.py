@@ -1,5 +1,6 @@
 """What is most likely to mend an identification that is not good, tried out: the likely cause first."""
 
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import final
@@ -41,6 +42,9 @@ SURE = 4.0
 WORTH, TOLERABLE = 0.7, 20.0
 """Options are recommended if they bring the error below this share of what it was, and below so many per cent."""
 
+MOST_TIME, AUTO_FITS = 60.0, 100
+"""Time [s] that trials may take; fits whose time a choice of friction laws takes, about: 60 s where a fit takes 0.6 s."""
+
 AUTO = "--friction auto"
 
 DRASTIC = 1 / 3
@@ -79,9 +83,14 @@ class Remedies:
         """Yield options with which the error falls, and how far."""
         request = self.held_out.fit.request
         before = least = self._worst(request)
+        begin, tried = time.perf_counter(), 0
         for option, make in self._others().items():
+            spent = time.perf_counter() - begin
+            if spent > MOST_TIME or (option == AUTO and spent * AUTO_FITS > MOST_TIME * max(tried, 1)):
+                continue
             if option == AUTO and least < TOLERABLE:  # what is well enough is not worth the time
                 continue
+            tried += 1
             try:
                 with stage(f"trying {option}"):
                     after = self._worst(replace(request, robot_model=make()))
@@ -124,7 +133,7 @@ class Remedies:
         return float(np.nanmax(validate(unseen, X).percent))
 
 
-def checks(judgement: Judgement, *, delay: bool) -> dict[str, list[str]]:
+def checks(judgement: Judgement, *, delay: bool, trials: bool = True) -> dict[str, list[str]]:
     """Return warnings by what they are about.
 
     Parameters
@@ -133,6 +142,8 @@ def checks(judgement: Judgement, *, delay: bool) -> dict[str, list[str]]:
         The judged fit.
     delay : bool
         Whether the delay of the torques was given, so that it is compared with that which the log shows.
+    trials : bool
+        Whether other options are tried on the held-out data where no model is good.
     """
     result = judgement.fit
     of_logs = list(warnings_of_logs(judgement))
@@ -147,7 +158,7 @@ def checks(judgement: Judgement, *, delay: bool) -> dict[str, list[str]]:
     if hardest is not None and not result.logs.long:
         # Friction absorbs a wrong delay, and the verdict may be good: the log itself is asked.
         found[DELAY] += delay_advice(result) if delay else ()
-        found[MODEL] += () if judgement.good else Remedies(hardest).options()
+        found[MODEL] += Remedies(hardest).options() if trials and not judgement.good else ()
     found[MODEL] += advice_on_lack(result.lack, result.robot_model.robot.joints)
     return found
 

@@ -211,9 +211,12 @@ def _work(log: MotionLog) -> float:
 
 
 def _left_open(fit: Fit) -> list[str]:
-    """Return which base parameters the log leaves open so far that a brisk motion shows it, and the moves to make."""
+    """Return which base parameters the log leaves open so far that a brisk motion shows it, and the moves to make.
+
+    By the part of sigma due to noise: another motion does not mend the model.
+    """
     robot_model, (model, estimate) = fit.robot_model, next(iter(fit.estimates.items()))
-    shares = brisk_shares(robot_model.tree, fit.basis, estimate.X, estimate.standard_errors)
+    shares = brisk_shares(robot_model.tree, fit.basis, estimate.X, estimate.noise_sigma)
     names = [name for name, share in zip(fit.basis.names, shares, strict=True) if share > OPEN]
     if not names:
         return []

@@ -57,6 +57,8 @@ class IdentifyRequest(LogRequest):
     """Held-out logs on which the result is validated. Default: the last quarter of the log, predicted by a fit of the rest."""
     label: str = ""
     """Name of this identification in a recording. Default: chain and estimator."""
+    no_trials: bool = False
+    """Try no other options on held-out data where the result is not good."""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from idbench.identify.arrays import Array, frozen
-from idbench.identify.errors import LogError, SettingError, TimeError, require_finite, require_not_negative, require_positive
+from idbench.identify.errors import (
+    LogError,
+    SettingError,
+    TimeError,
+    require_finite,
+    require_not_negative,
+    require_positive,
+)
 from idbench.identify.tables import html_table
 
 Meaning = Literal["instantaneous", "held", "averaged"]
@@ -43,6 +50,9 @@ class TorqueChannel:
     gain: float | tuple[float, ...] = 1.0
     """Torque over logged value, of all joints or of each; 1 for a log in N m. G_T of the paper's Eq. 13 for a log of current
     references."""
+    period: float | None = field(default=None, repr=False)
+    """Time [s] over which a torque is held or averaged, of a controller that is faster or slower than the log; by default the
+    sampling period."""
     delay_sigma: float = field(default=0.0, repr=False)
     """Standard deviation of the error of the delay [s]; all logs with the same channel have the same error."""
 
@@ -51,6 +61,8 @@ class TorqueChannel:
             raise SettingError(f"torque meaning {self.meaning!r} is unknown; known: {', '.join(get_args(Meaning))}")
         require_finite(delay=self.delay)
         require_not_negative(delay_sigma=self.delay_sigma)
+        if self.period is not None:
+            require_positive(period=self.period)
         try:
             gains = np.atleast_1d(np.asarray(self.gain, dtype=np.float64))
         except (TypeError, ValueError) as error:

@@ -110,7 +110,7 @@ class LogLayout:
         motors = dict(stated.get("motors", {}))
         _require_known("motors", motors, ("matrix",))
         torque = dict(stated.get("torque", {}))
-        _require_known("torque", torque, ("meaning", "delay", "gain"))
+        _require_known("torque", torque, ("meaning", "delay", "gain", "period"))
         gain = torque.pop("gain", [])
         gains = tuple(map(float, gain if isinstance(gain, list) else [gain]))
         channel = TorqueChannel(**torque) if "meaning" in torque else None

@@ -203,7 +203,9 @@ class _Files:
             return None
         try:
             known = json.loads(stated)
-            return TorqueChannel(known["meaning"], known["delay"], known["gain"], known.get("delay_sigma", 0.0))
+            return TorqueChannel(
+                known["meaning"], known["delay"], known["gain"], known.get("period"), known.get("delay_sigma", 0.0)
+            )
         except (ValueError, KeyError, TypeError) as error:
             words = stated.decode(errors="replace")
             raise LogError(f"{path} states {words!r} of its torque, which makes no torque channel") from error

@@ -113,7 +113,8 @@ def validate(held_out: Problem, X: Array, covariance: Array | None = None) -> Va
     Raises
     ------
     LogError
-        If the log holds several runs, does not fit the basis, is too short for the chain, or a joint of it never moves.
+        If the log holds several runs, does not fit the basis, is too short for the chain, or nothing moves. Of a joint that
+        never moves figures are NaN.
     IdentificationError
         If the log is too long for its rows to be kept.
     """
@@ -132,12 +133,11 @@ def validate(held_out: Problem, X: Array, covariance: Array | None = None) -> Va
     standing = chain.operator.map(left.equations, left.equations.weighted_as(1.0 - signals.weight), chain.grid(signals.log))
     still = rows.by_kind(standing.measurement(left.everywhere)), shares(standing), standing.outside > 0
     rms, level, R2, correlation, count = zip(*(joint.judged() for joint in moving), strict=True)
-    if 0 in count:
+    if not any(count):
         raise LogError(
-            f"joint {count.index(0) + 1} never moves in this log, as far as the mask of the chain sees: use a motion in which "
-            "all joints do, or a lower --mask-speed"
+            "no joint moves in this log, as far as the mask of the chain sees: use another motion, or a lower --mask-speed"
         )
-    bound = _bound(chain.operator, signals.fs) / np.sqrt(count)
+    bound = _bound(chain.operator, signals.fs) / np.sqrt(np.maximum(count, 1))
     noise = row_noise(left, signals, chain) * [joint.unmasked for joint in moving]
     left_open = [joint.open(covariance) for joint in moving]
     still_rms = [_rms_of(*(x[j] for x in still)) for j in range(basis.n)]
@@ -207,7 +207,8 @@ class _Joint:
     @property
     def unmasked(self) -> float:
         """The rms of rows of white noise over that of rows of which the mask takes nothing."""
-        return self._rms(self.spread[self.valid]) / float(self.spread.max())
+        most = float(self.spread.max())
+        return self._rms(self.spread[self.valid]) / most if most > 0 else np.nan
 
     def open(self, covariance: Array | None) -> float:
         """Return the rms over the rows of the sigma of W X."""

@@ -70,7 +70,17 @@ def slow_speed(qd: Array) -> Array:
     kinks = np.abs(np.diff(qd, THIRD, axis=-1))
     size = scipy.special.ndtri((1 + QUIET) / 2) * np.sqrt(scipy.special.comb(2 * THIRD, THIRD))
     noise = np.quantile(kinks, QUIET, axis=-1) / size
-    return np.maximum(np.maximum(SLOW * rms, NOISY * noise), MIN_SPEED)
+    return np.maximum(np.minimum(np.maximum(SLOW * rms, NOISY * noise), most_masked(qd)), MIN_SPEED)
+
+
+def most_masked(qd: Array) -> Array:
+    """Return the speed that half of a joint's moving time is below, of velocities (..., time): no mask takes more."""
+    speed = np.abs(qd)
+    moving = speed > np.maximum(SLOW * np.sqrt(np.mean(qd**2, axis=-1, keepdims=True)), MIN_SPEED)
+    ordered = np.sort(np.where(moving, speed, -1.0), axis=-1)
+    count = np.count_nonzero(moving, axis=-1)
+    place = np.clip(qd.shape[-1] - 1 - count // 2, 0, qd.shape[-1] - 1)
+    return np.asarray(np.take_along_axis(ordered, place[..., None], axis=-1)[..., 0])
 
 
 @final

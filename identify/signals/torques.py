@@ -36,7 +36,8 @@ READINGS: dict[Meaning, Reading] = {
 """A torque that was averaged is compared with columns averaged over the same period. What a sampled motion shows of a held one,
 a staircase, is its content below fs/2: the samples, T/2 later, smoothed by the hold, whose gain sin(w T/2) / (w T/2) is that of
 a mean over one period; the columns stay as they are. (To average staircase and columns over one period instead takes the
-accelerations for smooth within it, which they are not: an error of (w T)^2 times 1/24 - (1/2 - delay/T)^2 / 2.)"""
+accelerations for smooth within it, which they are not: an error of (w T)^2 times 1/24 - (1/2 - delay/T)^2 / 2.) T is the
+sampling period, or that of the controller: `TorqueChannel.period`."""
 
 
 @final
@@ -52,10 +53,13 @@ class Torque:
     """[s]; what sample k speaks for begins at t_k + delay."""
     fs: float
     """[Hz]."""
+    period: float | None = None
+    """Time [s] over which it is held or averaged; by default the sampling period."""
 
-    @property
+    @cached_property
     def _reading(self) -> Reading:
-        return READINGS[self.meaning]
+        plain, ratio = READINGS[self.meaning], 1.0 if self.period is None else self.period * self.fs
+        return Reading(plain.middle * ratio, plain.torque * ratio**2, plain.columns * ratio**2)
 
     @property
     def _late(self) -> float:
@@ -103,7 +107,7 @@ class ByChannel(AbstractAlignment):
 
     def align(self, tau: Array, channel: TorqueChannel, fs: float) -> Torque:
         """Return the torque with its meaning and delay."""
-        return Torque(tau, channel.meaning, channel.delay, fs)
+        return Torque(tau, channel.meaning, channel.delay, fs, channel.period)
 
 
 @final

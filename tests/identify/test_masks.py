@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from idbench.identify import NoMask, ReversalMask, SettingError
+from idbench.identify.signals.masks import slow_speed
 
 
 @pytest.mark.parametrize("fs", [100.0, 1000.0])
@@ -53,3 +54,13 @@ def test_a_gradual_mask_keeps_high_frequencies_out_of_low_ones():
         return np.abs(np.fft.rfft(weight * noise))[:200].std()
 
     assert leaked(0.1) < leaked(0.0) / 10
+
+
+def test_half_of_a_slow_joints_moving_time_stays(rng):
+    """Velocities of 0.02 rad/s below noise of 0.05 rad/s: four times the noise would leave nothing."""
+    t = np.arange(4000) / 100
+    qd = 0.02 * np.sin(t) + 0.05 * rng.standard_normal(len(t))
+    moving = np.abs(qd) > 0.05 * np.sqrt(np.mean(qd**2))
+    assert np.mean(np.abs(qd[moving]) > slow_speed(qd)) == pytest.approx(0.5, abs=0.01)
+    fast = 2.0 * np.sin(t)
+    assert slow_speed(fast) == pytest.approx(0.05 * np.sqrt(2), rel=0.01)

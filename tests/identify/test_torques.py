@@ -70,6 +70,17 @@ def test_an_averaged_torque_has_its_mean_and_power(delay):
         assert power_of(torque, qd(K * PERIOD))[k] == pytest.approx(power, abs=2e-6)  # fourth order: (5/100)^4 / 12
 
 
+@pytest.mark.parametrize("period", [0.001, 0.004, 0.02])
+@pytest.mark.parametrize("delay", [0.0, 0.003])
+def test_a_torque_held_by_a_controller_of_another_period_has_its_gain_and_lag(period, delay):
+    """A sine that is held for P is, below its images, sin(w P/2) / (w P/2) times itself, P/2 later."""
+    w, t = 5.0, K * PERIOD
+    channel = TorqueChannel("held", delay, period=period)
+    torque = ByChannel().align(np.sin(w * t)[None], channel, FS)
+    expected = np.sinc(w * period / 2 / np.pi) * np.sin(w * (t - delay - period / 2))
+    np.testing.assert_allclose(torque.mean[0, INNER], expected[INNER], atol=1e-5)
+
+
 @pytest.mark.parametrize("delay", DELAYS)
 def test_an_instantaneous_torque_is_moved_by_its_delay(delay):
     torque = align(smooth(K * PERIOD + delay), "instantaneous", delay)

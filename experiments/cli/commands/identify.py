@@ -61,7 +61,9 @@ def identify(options: Identify) -> None:
                 attempts.failed(log.title, log.why, log.traceback)
             with stages_of("checking"):
                 delay = options.torque_delay != "estimate"
-                warnings = attempts.attempt("the checks", lambda: checks(judgement, delay=delay)) or {}
+                warnings = (
+                    attempts.attempt("the checks", lambda: checks(judgement, delay=delay, trials=not options.no_trials)) or {}
+                )
             page.warn(warnings)
             page.print(Text(conclusion(judgement, warnings), style="bold"), soft_wrap=True)
             attempts.attempt("summary.json", lambda: _save(folder, page))
