@@ -17,12 +17,10 @@ from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.judgement.judgement import Unjudged
 from idbench.experiments.judgement.remedies import SURE
 from idbench.experiments.reports.estimates import EstimatesTable, in_lines, leading
+from idbench.experiments.reports.uncertainty import words_of_uncertainty
 from idbench.experiments.text import WORTHLESS, new_table, percentage, print_titled
 from idbench.identify import Array, AsLogged
-from idbench.identify.judge.torque_interval import LEVEL
-
-FEW_OUTSIDE = 0.02
-"""Share of a motion outside of the fit that is expected: twice that of the fit."""
+from idbench.identify.judge.torque_interval import LEVEL, MOST
 
 BARS, BAR_HEAD = 8, "0.01..100"
 """Cells of the bar of a standard error, and what is written above: a full bar is 100 % of the value, an empty one 0.01 %."""
@@ -103,6 +101,7 @@ def _told(fit: Fit) -> Iterator[str]:
         each = ", ".join(f"{joints[j]} up to {speeds[j]:.2g} {fit.robot_model.units(j)[1]}/s" for j in fit.raised)
         yield f"slow motion is masked, because its friction differs from that of faster motion: {each} (--mask-speed)"
     yield _noise(fit)
+    yield from words_of_uncertainty(fit)
     yield words_of_lack(fit.lack, fit.robot_model)
     yield from words_of_iterations(fit)
     for model, why in fit.left_out.items():
@@ -199,6 +198,7 @@ def _interval_words(one: HeldOut, model: str, inside: Array, outside: float) -> 
     half = " ".join(f"{x:.2g}" for x in interval.half)
     share = np.nan_to_num(inside, nan=1.0)
     worst = f", of {joints[int(share.argmin())]} {100 * share.min():.0f} %" if len(joints) > 1 else ""
+    expected = 2 * (1 - MOST) * len(joints)  # of speeds and torques
     words = f"{100 * LEVEL:.0f} % intervals of the torque, +- {half} N m: they contain {100 * np.nanmean(inside):.0f} %{worst}"
     return (
         f"{words}; {100 * outside:.0f} % of the motion is outside the fitted speeds and torques"

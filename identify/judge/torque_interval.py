@@ -10,6 +10,7 @@ from idbench.identify.arrays import TINY, Array
 from idbench.identify.estimators.estimate import Estimate
 from idbench.identify.estimators.log_rows import LogRows
 from idbench.identify.estimators.problem import Problem
+from idbench.identify.signals.signals import Signals
 
 LEVEL = 0.95
 """Share of torques that intervals shall contain."""
@@ -41,18 +42,21 @@ class TorqueInterval:
     torque: Array
     """Quantile of |tau| in the fit [N m]."""
 
+    def outside(self, signals: Signals) -> float:
+        """Return the share of instants at which a joint is faster, or has a larger torque, than in 99 % of the fit."""
+        fast = np.abs(signals.state.qd) > self.speed[:, None]
+        return float((fast | (np.abs(signals.torque.mean) > self.torque[:, None])).any(axis=0).mean())
+
     def contained(self, held_out: Problem, X: Array) -> tuple[Array, float]:
         """Return the share of a log's torques within the intervals of predictions by X, and that of the log outside the fit.
 
-        The first has the shape (joint,); it is NaN where a joint has no rows. Outside the fit are instants at which a joint is
-        faster, or has a larger torque, than in 99 % of the fit.
+        The first has the shape (joint,); it is NaN where a joint has no rows. The second is `outside`, of the fit itself some
+        1 % for each joint's speeds and torques.
         """
         part = held_out.explicit.parts[0]
         each = zip(_errors(part, X), self.half, strict=True)
         inside = np.array([np.mean(error <= half) if len(error) else np.nan for error, half in each])
-        qd, tau = part.signals.state.qd, part.signals.torque.mean
-        outside = (np.abs(qd) > self.speed[:, None]) | (np.abs(tau) > self.torque[:, None])
-        return inside, float(outside.any(axis=0).mean())
+        return inside, self.outside(part.signals)
 
 
 def torque_interval(estimate: Estimate, level: float = LEVEL) -> TorqueInterval | None:
