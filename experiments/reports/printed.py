@@ -202,7 +202,7 @@ def _interval_words(one: HeldOut, model: str, inside: Array, outside: float) -> 
     words = f"{100 * LEVEL:.0f} % intervals of the torque, +- {half} N m: they contain {100 * np.nanmean(inside):.0f} %{worst}"
     return (
         f"{words}; {100 * outside:.0f} % of the motion is outside the fitted speeds and torques"
-        if outside > FEW_OUTSIDE
+        if outside > 2 * expected
         else words
     )
 
