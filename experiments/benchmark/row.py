@@ -145,8 +145,11 @@ def _log(one: HeldOut | Unjudged, fit: Fit) -> dict[str, Any]:
     if isinstance(one, Unjudged):
         return {"title": one.title, "failure": one.why}
     own, verdict = one.torques[fit.leading], one.verdicts[fit.leading]
+    inside, outside = one.within_interval(fit.leading) or (np.full(len(own.rms), np.nan), np.nan)
     return {
         "title": one.title,
+        "within_interval": [finite(x) for x in inside],
+        "outside_fitted": finite(outside),
         "torque_error_rms": [finite(x) for x in own.rms],
         "torque_error_percent": [finite(x) for x in own.percent],
         "torque_rms": [finite(x) for x in own.level],

@@ -69,6 +69,7 @@ HEADS = (
     "R2\nmedian",
     "R2\nworst",
     "intervals\nagree",
+    "torques in\n95 %",
     "free run\nNRMSE",
     "fit\nseconds",
     "verdict",
@@ -88,10 +89,17 @@ def overview(rows: Sequence[Row]) -> Iterator[list[str]]:
             *(percentage(x) if np.isfinite(x) else "" for x in (_median(percent), _largest(percent))),
             *(f"{x:.3f}" if np.isfinite(x) else "" for x in (_median(R2), -_largest(-R2))),
             _agree(row["repeats"]),
+            _contained(row["logs"]),
             f"{free:.3f}" if np.isfinite(free) else "",
             f"{row['seconds']:.2g}",
             row["verdict"] or "",
         ]
+
+
+def _contained(logs: Sequence[Row]) -> str:
+    """Return how many of the held-out torques lie in their intervals [%]; empty where that is not known."""
+    inside = of_logs(logs, "within_interval")
+    return f"{100 * np.nanmean(inside):.0f} %" if np.isfinite(inside).any() else ""
 
 
 def of_tools(row: Row) -> Iterator[list[str]]:

@@ -23,7 +23,7 @@ def begin(options: New) -> None:
         new_study(options.name, out)
         how = f"uv run idbench study {out}"
     elif options.what == "set":
-        then = f"uv run --extra consistent idbench benchmark {out}"
+        then = f"uv run idbench benchmark {out}"
         how = f"get the data, in {out}:\n{new_set(options.name, out).strip()}\nthen: {then}"
     elif options.what == "example":
         with stages_of("simulating an arm"):
