@@ -1,7 +1,7 @@
 """The files that an identification can be written to, and their table."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from importlib.metadata import version
 from importlib.resources import files
@@ -18,8 +18,9 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.results.writing import finite
 from idbench.identify import AbstractBlock, AbstractFriction, Parameter, SettingError, ShapedFriction
-from idbench.identify.basis import LoadFriction
+from idbench.identify.basis import LoadFriction, OfJoints, SmoothFriction
 from idbench.identify.basis.block import BODY, named
+from idbench.identify.basis.friction.smooth import CENTRES, WIDTH
 from idbench.identify.basis.of_joints import inner_of
 from idbench.identify.data.kinematics import INERTIAL, Joint
 from idbench.sim.robot.rewrite import rewritten
@@ -39,6 +40,9 @@ def lines_of(fit: Fit, values: Mapping[str, float]) -> list[str]:
     n, lines = fit.basis.n, list[str]()
     for block in fit.basis.blocks:
         inner, law = inner_of(block), _law(block)
+        if isinstance(law, SmoothFriction):
+            lines += _smooth_lines(block, law, values, n)
+            continue
         letters = getattr(law, "symbol", "Fl" if isinstance(law, LoadFriction) else "")
         if not letters or letters in APART or not any(named(letters, j) in values for j in range(n)):
             continue
@@ -52,6 +56,14 @@ def lines_of(fit: Fit, values: Mapping[str, float]) -> list[str]:
         torque = text.format(**each)
         lines.append(f"tau = tau + {_array([values.get(named(letters, j), 0.0) for j in range(n)])} * ({torque})")
     return lines
+
+
+def _smooth_lines(block: AbstractBlock, law: SmoothFriction, values: Mapping[str, float], n: int) -> Iterator[str]:
+    """Yield the line of each joint that adds its smooth function."""
+    for j in block.joints if isinstance(block, OfJoints) else range(n):
+        u = _array([values.get(named(f"u{k + 1}_", j), 0.0) for k in range(len(CENTRES))])
+        x = f"np.arcsinh(qd[..., {j}, None] / {law.v!r}) - np.linspace({CENTRES[0]!r}, {CENTRES[-1]!r}, {len(CENTRES)})"
+        yield f"tau[..., {j}] = tau[..., {j}] + np.exp(-(({x}) ** 2) / {2 * WIDTH**2!r}) @ {u}"
 
 
 def _law(block: AbstractBlock) -> Any:
@@ -83,7 +95,7 @@ def _known(robot_model: RobotModel) -> set[str]:
         inner, law = inner_of(block), _law(block)
         if isinstance(law, AbstractFriction) and law.symbol not in APART:
             _ = law.source()
-        if isinstance(law, AbstractFriction | LoadFriction):
+        if isinstance(law, AbstractFriction | LoadFriction | SmoothFriction):
             found |= set(inner.letters())  # type: ignore[attr-defined]  # both kinds of laws have letters
     return found
 

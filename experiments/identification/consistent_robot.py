@@ -73,7 +73,10 @@ class WrittenRobot:
                 f"differ by {far or f'less than {LITTLE:g} %'} of the log's"
             )
         if self.lost:
-            messages.append(f"{', '.join(self.lost)} have no place in an MJCF file and are left out")
+            smooth = {p.name for p in self.fit.basis.parameters if p.kind == "smooth friction"}
+            others = [name for name in self.lost if name not in smooth]
+            names = ", ".join([*others, *(["smooth functions of friction"] if smooth & self.lost.keys() else [])])
+            messages.append(f"{names} have no place in an MJCF file and are left out")
         return messages
 
     @property

@@ -13,6 +13,7 @@ from idbench.experiments.identification.prior_share import chosen_share
 from idbench.experiments.identification.rates import CONTROLLER, Rates
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.identification.smooth_friction import smoothed
 from idbench.experiments.results.writing import finite, summarize
 from idbench.identify import (
     ESTIMATORS,
@@ -51,6 +52,8 @@ def fit(request: Request, logs: Logs) -> "Fit":
     choice = None
     if request.robot_model.laws.auto:
         request, logs, choice = chosen_in_turns(request, logs)
+    if request.robot_model.laws.smooth:
+        request = smoothed(request, logs.fitted)
     if request.robot_model.share_sought:
         request = replace(request, share=chosen_share(request, logs.fitted))
     problem = request.problem(logs.fitted)

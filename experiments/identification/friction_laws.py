@@ -22,6 +22,9 @@ from idbench.identify.plugins import did_you_mean
 AUTO = "auto"
 """The laws are those that predict motion best that was not fitted."""
 
+SMOOTH = "smooth"
+"""The friction of every joint is a smooth function of its velocity, beside standard laws and load."""
+
 STANDARD = ("viscous", "coulomb")
 
 GROUPS: Mapping[str, tuple[str, ...]] = {
@@ -51,6 +54,8 @@ class FrictionLaws:
     """Names of `BLOCKS`, joint by joint; a number after a colon is a law's first setting."""
     auto: bool = False
     """Whether what suits the logs is to be added."""
+    smooth: bool = False
+    """Whether smooth functions, whose sizes the logs decide, are to be added."""
 
     @classmethod
     def of(cls, texts: Sequence[str], joints: Sequence[str]) -> "FrictionLaws":
@@ -61,6 +66,12 @@ class FrictionLaws:
         ExperimentError
             If a law or a joint is unknown.
         """
+        if SMOOTH in texts:
+            if len(texts) > 1:
+                raise ExperimentError(
+                    f"--friction {' '.join(texts)}: smooth stands alone: it has standard laws and load of all joints"
+                )
+            return cls((STANDARD,) * len(joints), smooth=True)
         given = dict[int | str | None, tuple[str, tuple[str, ...]]]()  # by joint; None: of all
         for text in texts:
             where, mark, laws = text.rpartition("=")

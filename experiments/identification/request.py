@@ -8,12 +8,26 @@ import numpy as np
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.identification.simulators import RobotPlant, ScenarioLoop
+from idbench.experiments.identification.smooth_friction import places_of, prior_of, sizes_of
 from idbench.experiments.requests.shared import CHAIN, ESTIMATOR
 from idbench.experiments.requests.words import Start
-from idbench.identify import CHAINS, ESTIMATORS, MODELS, AbstractEstimator, Chain, ExplicitModel, MotionLog, Problem, Simulation
+from idbench.identify import (
+    CHAINS,
+    ESTIMATORS,
+    MODELS,
+    AbstractEstimator,
+    Basis,
+    Chain,
+    ExplicitModel,
+    MotionLog,
+    Problem,
+    Simulation,
+)
 from idbench.identify.blame import blamed
 from idbench.identify.estimators.settle import settled
 from idbench.identify.models import THREE
+from idbench.identify.parameters.prior import PriorSum
+from idbench.identify.rows.factors import AbstractPrior
 from idbench.identify.signals.masks import ReversalMask
 from idbench.sim.scenario.scenario import Scenario
 
@@ -53,6 +67,8 @@ class Request:
     """Speeds up to which joints count as standing or turning, of all or of each [rad/s, m/s]; by default they follow the
     log."""
 
+    smooth: tuple[float, ...] = ()
+    """Standard deviations of the smooth functions of friction, joint by joint [N m]; by default a tenth of the rms torques."""
     wdyn: tuple[float, str] | None = None
     """Bandwidth of the position loop [Hz], and its source; by default that of the loops, if there are any."""
 
@@ -68,9 +84,11 @@ class Request:
         n, given = self.robot_model.robot.n, " ".join(f"{x:g}" for x in self.mask_speed)
         if len(self.mask_speed) not in (0, 1, n) or not all(0 < x < np.inf for x in self.mask_speed):
             raise ExperimentError(f"--mask-speed {given} must be one speed above 0 for all {n} joints, or one for each")
-        if self.robot_model.asked.prior and not self.solver.takes_prior:
+        laws = self.robot_model.laws
+        rough = "--prior" if self.robot_model.asked.prior else "--friction smooth" if laws.smooth else ""
+        if rough and not self.solver.takes_prior:
             raise ExperimentError(
-                f"--prior: {self.estimator} takes nothing that is known before; use --estimator GLS, WLS or OLS, or --hold"
+                f"{rough}: {self.estimator} takes nothing that is known before; use --estimator GLS, WLS or OLS, or --hold"
             )
         if self.robot_model.asked.prior:
             _ = self.robot_model.prior()
@@ -108,8 +126,16 @@ class Request:
         """Return logs, robot and chain, by the explicit model; nonlinear parameters at their operating point."""
         basis, simulation = self.robot_model.basis, self._simulation(tuple(logs))
         with blamed():
-            prior = self.robot_model.prior(self.share)
+            prior = self._prior(basis, tuple(logs))
             return settled(Problem(tuple(logs), basis, ExplicitModel(), self.processing, simulation, prior))
+
+    def _prior(self, basis: Basis, logs: tuple[MotionLog, ...]) -> AbstractPrior | None:
+        """Return what is known before: of smooth functions their sizes, of others what is said."""
+        known = self.robot_model.prior(self.share)
+        if not places_of(basis)[0]:
+            return known
+        functions = prior_of(basis, self.smooth or sizes_of(logs))
+        return functions if known is None else PriorSum((functions, known))
 
     def _simulation(self, logs: tuple[MotionLog, ...]) -> Simulation:
         """Return how the robot is simulated, for estimators that need it."""

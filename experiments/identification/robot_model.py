@@ -128,6 +128,8 @@ class RobotModel:
 
     def require_laws(self) -> None:
         """Raise ExperimentError if its laws of friction are those that suit a log, where there is none."""
+        if self.laws.smooth:
+            raise ExperimentError("--friction smooth looks at a log, and there is none here: name the laws")
         if self.laws.auto:
             raise ExperimentError("--friction auto looks at a log, and there is none here: name the laws")
 

@@ -217,7 +217,8 @@ def _left_open(fit: Fit) -> list[str]:
     """
     robot_model, (model, estimate) = fit.robot_model, next(iter(fit.estimates.items()))
     shares = brisk_shares(robot_model.tree, fit.basis, estimate.X, estimate.noise_sigma)
-    names = [name for name, share in zip(fit.basis.names, shares, strict=True) if share > OPEN]
+    of_laws = [p.kind != "smooth friction" for p in fit.basis.parameters]
+    names = [name for name, share, law in zip(fit.basis.names, shares, of_laws, strict=True) if share > OPEN and law]
     if not names:
         return []
     return [f"one sigma of these parameters is above {100 * OPEN:g} % of a brisk motion's torque ({model} model): "

@@ -165,7 +165,7 @@ def _loaded(asked: LoadRequest) -> tuple[LoadJudgement, tuple[str, ...]]:
     notes = list(loaded.notes)
     first = len(asked.unloaded)
     without, with_it = loaded.logs(slice(first)), loaded.logs(slice(first, None))
-    if robot_model.laws.auto:
+    if robot_model.laws.auto or robot_model.laws.smooth:
         request, choice = chosen_friction(request, without or with_it)
         notes += words(choice, request.robot_model.laws.names, robot_model.robot.joints)
     robot_model = request.robot_model

@@ -42,20 +42,21 @@ class EstimatesTable:
 
     def rows(self) -> Iterator[list[str]]:
         """Yield the cells of every parameter, its name first; marks stand behind what is doubtful."""
-        for i, name in enumerate(self.fit.basis.names):
+        for i, name in self._shown:
             each = (self._cells(model, estimate, i) for model, estimate in self.estimates.items())
             yield [name, *self._true(i), *(cell for cells in each for cell in cells)]
 
     def bars(self, cells: int) -> Iterator[str]:
         """Yield a bar of the last model's %sigma for every parameter, on a logarithmic scale from 0.01 % to 100 %."""
         estimate = list(self.estimates.values())[-1]
-        for x, sigma in zip(estimate.X, estimate.standard_errors, strict=True):
+        for i, _ in self._shown:
+            x, sigma = estimate.X[i], estimate.standard_errors[i]
             share = log10(max(100 * sigma / max(abs(x), TINY), TINY) / LEAST_PERCENT) / log10(100 / LEAST_PERCENT)
             yield ("#" * round(cells * min(max(share, 0.0), 1.0))).ljust(cells)
 
     def short(self) -> Iterator[list[str]]:
         """Yield the truth and the estimates alone, with all marks."""
-        for i, name in enumerate(self.fit.basis.names):
+        for i, name in self._shown:
             values = (f"{e.X[i]:.4g}{''.join(self._marks[m][i]).strip()}" for m, e in self.estimates.items())
             yield [name, *self._true(i), *values]
 
@@ -67,6 +68,12 @@ class EstimatesTable:
             every[f"tau{j + 1} explained"] = [_explained(self.fit.explained[model][j]) for model in self.estimates]
         for name, cells in every.items():
             yield [name, *before, *(cell for first in cells for cell in (first, *[""] * (self._width - 1)))]
+
+    @property
+    def _shown(self) -> list[tuple[int, str]]:
+        """Places and names of the parameters but for smooth functions, which are no physical ones."""
+        parameters = enumerate(self.fit.basis.parameters)
+        return [(i, p.name) for i, p in parameters if p.kind != "smooth friction"]
 
     @property
     def _width(self) -> int:

@@ -106,6 +106,9 @@ def _told(fit: Fit) -> Iterator[str]:
     yield from words_of_iterations(fit)
     for model, why in fit.left_out.items():
         yield f"{model}: reversals are left out, as ML does: {why}"
+    if fit.request.smooth:
+        sizes = " ".join(f"{x:.2g}" for x in fit.request.smooth)
+        yield f"smooth functions of velocity beside these laws, of a size that the log decides: {sizes} N m"
     if fit.robot_model.asked.prior:
         share = fit.request.share or fit.robot_model.roughly_known.share
         near = f"; links near the file's, to {100 * share:.0f} % as the log decides" if fit.request.share and share else ""

@@ -52,6 +52,8 @@ def correlated(estimate: Estimate) -> list[tuple[str, str, float]]:
     C = estimate.within_covariance
     sigma = np.sqrt(np.maximum(np.diagonal(C), 1e-300))
     R = C / np.outer(sigma, sigma)
+    of_functions = [p.kind == "smooth friction" for p in estimate.problem.basis.parameters]
+    R[of_functions], R[:, of_functions] = 0.0, 0.0
     found = [(estimate.names[i], estimate.names[j], float(R[i, j])) for i, j in _pairs(R)]
     if estimate.delay_covariance.any():
         of_delay = np.sqrt(np.maximum(np.diagonal(estimate.delay_covariance), 0.0)) / sigma

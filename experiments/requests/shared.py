@@ -34,7 +34,8 @@ class Parameters:
     """Parameters that are equal, such as those of the same motor in two joints: Ia1=Ia4 Fv1=Fv4."""
     friction: Laws = ("standard",)
     """Friction laws: standard (viscous and Coulomb), none (torques measured at the links), asymmetric, or a sum such as
-    standard+load+stribeck; for one joint: 2=standard+load. auto chooses those that predict held-out stretches best. `idbench
+    standard+load+stribeck; for one joint: 2=standard+load. auto chooses those that predict held-out stretches best; smooth adds
+    smooth functions of velocity, of a size that the log decides, to standard+load, in seconds. `idbench
     list` lists them."""
     balancer: Annotated[tuple[str, ...], Word("JOINT=a:M,b:M,...")] = ()
     """Springs and gas springs between two points, by their geometry from a drawing, such as 2=a:0.2,b:0.8,zero:-1.66 with

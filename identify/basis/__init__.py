@@ -22,6 +22,7 @@ from idbench.identify.basis.friction.shape import Shape as Shape
 from idbench.identify.basis.friction.shape import ShapedFriction as ShapedFriction
 from idbench.identify.basis.friction.shape import StribeckFriction as StribeckFriction
 from idbench.identify.basis.friction.shape import free_stribeck, power, stribeck
+from idbench.identify.basis.friction.smooth import SmoothFriction as SmoothFriction
 from idbench.identify.basis.joint_law import AbstractFriction as AbstractFriction
 from idbench.identify.basis.joint_law import AbstractJointLaw as AbstractJointLaw
 from idbench.identify.basis.joint_law import Armature as Armature
@@ -49,6 +50,7 @@ BLOCKS: PluginTable[AbstractBlock] = PluginTable(
         "load": LoadFriction,
         "temperature": TemperatureFriction,
         "cogging": Cogging,
+        "smooth": SmoothFriction,
         "armature": Armature,
         "spring": Spring,
         "balancer": Balancer,

@@ -20,6 +20,7 @@ Kind = Literal[
     "Coulomb friction",
     "friction",
     "shape of friction",
+    "smooth friction",
     "offset",
     "stiffness",
     "other",
@@ -31,7 +32,9 @@ BODY: frozenset[Kind] = frozenset({"inertia", "first moment", "mass"})
 RIGID: frozenset[Kind] = BODY | {"rotor inertia"}
 """Kinds of parameters of what has inertia."""
 
-FRICTION: frozenset[Kind] = frozenset({"viscous friction", "Coulomb friction", "friction", "shape of friction"})
+FRICTION: frozenset[Kind] = frozenset(
+    {"viscous friction", "Coulomb friction", "friction", "shape of friction", "smooth friction"}
+)
 """Kinds of parameters of what resists motion: their torques turn with the velocity, which those of bodies do not."""
 
 NOT_NEGATIVE: frozenset[Kind] = frozenset({"rotor inertia", "viscous friction", "Coulomb friction"})

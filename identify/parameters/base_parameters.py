@@ -74,10 +74,12 @@ class BaseParameters:
         'ZZ1 + Ia1 + 0.25 M2'
         """
         W = _explicit_columns(tree, standard)
-        large, count = _large(tree, standard, np.linalg.norm(W, axis=0)), len(standard.names)
+        large = _large(tree, standard, np.linalg.norm(W, axis=0))
         resists = np.array([parameter.kind in FRICTION for parameter in standard.parameters])
-        K, kept = np.zeros((count, count)), list[int]()
-        for group in (~resists, resists):
+        # Random effects are not parameters to be told apart: slow random states hardly show those of slow motion.
+        random = np.array([parameter.kind == "smooth friction" for parameter in standard.parameters])
+        K, kept = np.diag(random.astype(np.float64)), [int(k) for k in np.flatnonzero(random)]
+        for group in (~resists, resists & ~random):
             own = np.flatnonzero(group)
             first, part = _grouped(W[:, own] / large[own])
             stay = own[first]
