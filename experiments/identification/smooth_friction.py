@@ -23,8 +23,11 @@ FINE = 0.1
 BEGIN = 0.1
 """Standard deviation of the functions, over the rms torque, where the evidence begins, and where no log has been asked."""
 
-ROUNDS, CLOSE, LEAST = 60, 0.01, 1e-4
-"""Iterations at most; relative change of a size at which they end; and the least size, over the rms torque."""
+ROUNDS, CLOSE = 60, 0.01
+"""Iterations at most, and the relative change of a size at which they end."""
+
+LEAST = 1e-4
+"""Least size, over the rms torque."""
 
 FREE = 0.1
 """Functions of a joint that the log decides at least."""
