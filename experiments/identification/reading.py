@@ -2,7 +2,7 @@
 
 import json
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -181,7 +181,7 @@ def with_delays(every: Sequence[ReadLog], request: Request) -> list[ReadLog]:
             f"--torque-delay estimate: --chain {request.chain} takes torques as they were logged and reads no delay: "
             "leave one of the two out"
         )
-    found = {}
+    found, unknown = dict[str, DelayEstimate](), dict[str, str]()
     for meaning in {log.logs[0].torque.meaning for log in every}:
         alike = [log for read in every for log in read.logs if log.torque.meaning == meaning]
         try:
@@ -189,11 +189,16 @@ def with_delays(every: Sequence[ReadLog], request: Request) -> list[ReadLog]:
         except RangeError as error:
             laws = " ".join(request.robot_model.asked.friction)
             without = "" if request.robot_model.laws.standard else f", with --friction {laws}: does that fit the robot?"
-            raise ExperimentError(f"--torque-delay estimate: {error}{without}") from error
-    return [_delayed(log, found[log.logs[0].torque.meaning]) for log in every]
+            unknown[meaning] = f"torque delay not found: {error}{without}"
+    return [_delayed(log, found, unknown) for log in every]
 
 
-def _delayed(read: ReadLog, found: DelayEstimate) -> ReadLog:
+def _delayed(read: ReadLog, every: Mapping[str, DelayEstimate], unknown: Mapping[str, str]) -> ReadLog:
+    """Return a log with the delay of its meaning; where none was found, with the stated one, and a note."""
+    meaning = read.logs[0].torque.meaning
+    if meaning in unknown:
+        return replace(read, notes=(*read.notes, f"{unknown[meaning]}; {read.channel.delay:g} s is assumed"))
+    found = every[meaning]
     logs = tuple(with_delay(log, found) for log in read.logs)
     sure = f"{1e3 * found.delay:.4g} ms, sigma {1e3 * found.sigma:.2g} ms"
     channel = replace(read.channel, delay=found.delay, delay_sigma=found.sigma)

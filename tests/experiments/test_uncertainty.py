@@ -68,3 +68,16 @@ def test_both_parts_of_sigma_are_in_the_summary(fit):
     found = fit.summary()["models"]["explicit"]
     assert (np.array(found["sigma"]) >= np.array(found["sigma_noise"]) * (1 - 1e-12)).all()
     assert len(found["paper_sigma"]) == len(found["sigma"])
+
+
+def test_a_delay_that_no_range_holds_does_not_end_the_fit(log, monkeypatch):
+    """A log whose best delay lies at the end of all that is looked at is fitted without, and that is said."""
+    from idbench.identify import RangeError
+
+    def lost(*given, **settings):
+        raise RangeError("the torque fits best at an end of the range, 0.6 s")
+
+    monkeypatch.setattr("idbench.identify.judge.delay.estimate_delay", lost)
+    found = idbench.fit(replace(log, torque=TorqueChannel("held")), "scara", model="explicit", torque_delay="estimate")
+    assert any("torque delay not found: the torque fits best at an end" in note for note in found.fit.logs.notes)
+    assert np.isfinite(found.parameters["ZZR1"].value)
