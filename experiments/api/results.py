@@ -167,8 +167,8 @@ class Identification:
         return torques if interval is None else (torques, np.broadcast_to(self._half(interval, model), torques.shape).copy())
 
     def _half(self, level: float, model: str | None) -> Array:
-        if not 0 < level < 1:
-            raise ExperimentError(f"predict: interval = {level:g} must be a share between 0 and 1, such as 0.95")
+        if not isinstance(level, int | float) or not 0 < level < 1:
+            raise ExperimentError(f"predict: interval = {level!r:.40} must be a share between 0 and 1, such as 0.95")
         if (found := torque_interval(self._of(model), level)) is None:
             raise ExperimentError("predict: the rows of this fit are not kept, its log is too long: intervals are not known")
         return found.half
@@ -200,7 +200,7 @@ class Identification:
         ------
         ExperimentError, ResultsError, IdentificationError, BenchError
             If a name ends with something else, a file is there that idbench did not write, or cannot be written; if the robot
-            has no consistent bodies, or what finds them is missing (extra `consistent`).
+            has no consistent bodies.
 
         Warns
         -----

@@ -16,7 +16,7 @@ FAR = 5.0
 
 def words_of_iterations(fit: Fit) -> Iterator[str]:
     """Yield what is said of the estimates, model by model."""
-    for model, estimate in _unmoved(fit).items():
+    for model, estimate in fit.estimates.items():
         if estimate.simulations is None:
             continue
         yield f"{model}: converged after {int(estimate.simulations)} simulations"
@@ -49,7 +49,7 @@ def _far_from_least_squares(fit: Fit, model: str, estimate: Estimate) -> Iterato
 
 def iterations(fit: Fit) -> dict[str, Any]:
     """Return what a summary.json says of it."""
-    every = {model: e for model, e in _unmoved(fit).items() if e.path}
+    every = {model: e for model, e in fit.estimates.items() if e.path}
     return {
         model: {
             "simulations": None if e.simulations is None else int(e.simulations),
@@ -60,13 +60,8 @@ def iterations(fit: Fit) -> dict[str, Any]:
     }
 
 
-def _unmoved(fit: Fit) -> dict[str, Estimate]:
-    """Return the estimates as they came, before they were made physically consistent."""
-    return {model: outcome for model, outcome in fit.outcomes.items() if isinstance(outcome, Estimate)}
-
-
 def _test(fit: Fit, model: str) -> dict[str, Any]:
-    test = noise_in_rows(_unmoved(fit)[model])
+    test = noise_in_rows(fit.estimates[model])
     return {
         "noise_in_W": {
             "matters": bool(test.matters),

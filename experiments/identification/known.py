@@ -1,6 +1,6 @@
 """Parameters that are known, and not identified, or roughly known."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
 from typing import Self, final
@@ -155,9 +155,9 @@ class RoughlyKnown:
         for name, trust in self.values.items():
             if name in basis.names and name not in grouping.standard.names:
                 place = basis.names.index(name)
-                one = np.eye(len(basis.names))[place : place + 1]
-                value, sigma = trust.of(float(one @ K @ values))
-                parts.append(NormalPrior.of(one.T, np.array([value]), np.array([sigma])))
+                value, sigma = trust.of(float(K[place] @ values))
+                _require_sigma(name, sigma)
+                parts.append(NormalPrior.of(np.eye(len(basis.names))[:, [place]], np.array([value]), np.array([sigma])))
                 continue
             places = [i for i, p in enumerate(standard) if name in (p.name, p.symbol) or p.kind in KINDS.get(name, ())]
             if not places:
@@ -165,22 +165,35 @@ class RoughlyKnown:
                 raise ExperimentError(f"--prior: there is no parameter {name!r}{hint}")
             for i in places:
                 stated[i], known[i] = trust.of(values[i])
-        if (zero := [standard[i].name for i in np.flatnonzero(known == 0)]) != []:
-            raise ExperimentError(f"--prior: {', '.join(zero)} is 0 in the file, of which no share is known: give a sigma")
+                _require_sigma(standard[i].name, known[i])
         if np.isfinite(known).any():
-            normal = NormalPrior.of(K, stated, known)
-            if not len(normal.known):
-                raise ExperimentError(f"--prior: {_grouped(grouping, self.values)}: say of all parts, or hold them (--hold)")
-            parts.append(normal)
+            used = (K[:, np.isfinite(known)] != 0).any(axis=1) & ~(K[:, ~np.isfinite(known)] != 0).any(axis=1)
+            idle = [standard[i].name for i in np.flatnonzero(np.isfinite(known)) if not (K[used, i] != 0).any()]
+            if idle:
+                raise ExperimentError(
+                    f"--prior: {_grouped(grouping, idle)}: say of all parts, hold them (--hold), or leave it out"
+                )
+            parts.append(NormalPrior.of(K, stated, known))
         if self.links:
+            given = {p.name for p in (*grouping.standard.held, *grouping.standard.tied) if p.kind in BODY}
+            if given:
+                raise ExperimentError(
+                    f"--prior file: {', '.join(sorted(given))} is held or tied, but links are near the file's as a whole: "
+                    "leave one out"
+                )
             parts.append(FilePrior(K, standard, values, share or self.share or SHARE))
         return parts[0] if len(parts) == 1 else PriorSum(tuple(parts))
 
 
-def _grouped(grouping: BaseParameters, names: Mapping[str, Trust]) -> str:
+def _require_sigma(name: str, sigma: float) -> None:
+    if not sigma > 0:
+        raise ExperimentError(f"--prior: {name} is 0, of which a share is nothing: give a sigma, as in {name}=0:0.1")
+
+
+def _grouped(grouping: BaseParameters, names: Sequence[str]) -> str:
     """Return what parameters are grouped with others in."""
-    made = [f"{base} = {text}" for base, text in grouping.groupings.items() if any(name in text for name in names)]
-    return f"no base parameter is made of {', '.join(names)} alone ({'; '.join(made[:3])})"
+    made = [f"{base} = {text}" for base, text in grouping.groupings.items() if any(name in text.split() for name in names)]
+    return f"no base parameter is made of {', '.join(names)} alone ({'; '.join(made[:3]) or 'they move nothing'})"
 
 
 def _number(text: str) -> float | None:

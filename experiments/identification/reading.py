@@ -276,7 +276,7 @@ def channel_of(stated: TorqueChannel | None, meaning: Meaning, delay: str | None
             f"a torque delay of {seconds:g} s is impossible: it must be below {LATEST:g} s in size; is it in ms or in samples? "
             "Write s, such as --torque-delay 0.002, or let --torque-delay estimate find it"
         )
-    return replace(stated, meaning=meaning, delay=seconds)
+    return replace(stated, meaning=meaning, delay=seconds, period=stated.period if stated.meaning == meaning else None)
 
 
 def _seconds(delay: str | None, otherwise: float) -> float:

@@ -12,6 +12,7 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.friction_choice import chosen_friction
 from idbench.experiments.identification.lack import advice_on_lack
 from idbench.experiments.identification.log_warnings import unusable, warnings_of_log
+from idbench.experiments.identification.prior_share import chosen_share
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.judgement.held_out import HeldOut
@@ -55,7 +56,7 @@ def delay_advice(result: Fit) -> Iterator[str]:
     """Yield the torque delay that the log itself shows, where it differs from the assumed one."""
     logs = result.logs.fitted
     assumed = logs[0].torque.delay
-    if wrong_sign(result):
+    if wrong_sign(result) or result.robot_model.asked.prior:  # where a log needs a prior, its delay is not known without
         return
     try:
         measured = estimate_delay(list(logs), result.basis, result.processing)
@@ -126,6 +127,8 @@ class Remedies:
 
     def _worst(self, request: Request) -> float:
         """Return the largest error [%] of the explicit model on the held-out log."""
+        if request.robot_model.share_sought:
+            request = replace(request, share=chosen_share(request, self.held_out.fit.logs.fitted))
         problem = request.problem(self.held_out.fit.logs.fitted)
         solver = WeightedLeastSquares() if request.simulates else request.solver  # simulation takes far too long to try with
         X = estimate(problem, solver).X

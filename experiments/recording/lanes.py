@@ -48,7 +48,7 @@ def noise_table(fit: Fit, joints: Sequence[str]) -> str:
     """Return the noise found in the log, joint by joint, as a markdown table."""
     every = zip(joints, *(fit.noise[name] for name in ("torque", "position", "encoder_step")), strict=True)
     rows = ([joint, *("" if x is None else f"{x:.2g}" for x in values)] for joint, *values in every)
-    return markdown("Noise found in the log, rms", ["torque [N m]", "position [rad]", "encoder step [rad]"], rows)
+    return markdown("White noise of the log, rms", ["torque [N m]", "position [rad]", "encoder step [rad]"], rows)
 
 
 def _title(fit: Fit) -> str:

@@ -10,6 +10,8 @@ from idbench.identify import Array, Estimate
 STRONG = 0.9
 """Correlation above which two parameters are named: a change of one is then hardly told from one of the other."""
 
+DELAY = "the delay"
+
 NAMED = 4
 """Pairs, or parameters, that are named; of more their number is."""
 
@@ -28,7 +30,7 @@ def words_of_uncertainty(fit: Fit) -> Iterator[str]:
     """Yield what limits the standard errors of the leading model."""
     estimate = fit.estimates[fit.leading]
     if pairs := correlated(estimate):
-        each = [f"{a} and {b} ({r:+.2f})" for a, b, r in pairs[:NAMED]]
+        each = [f"{a} and {b} ({r:+.2f})" if b != DELAY else f"{a} and {b} ({r:.2f}, of its size)" for a, b, r in pairs[:NAMED]]
         yield f"strongly correlated: {', '.join(each)}{_more(len(pairs))}"
     if estimate.between_logs is not None:
         share = np.sqrt(estimate.between_logs.variance) / np.maximum(np.abs(estimate.X), 1e-300)
@@ -57,7 +59,7 @@ def correlated(estimate: Estimate) -> list[tuple[str, str, float]]:
     found = [(estimate.names[i], estimate.names[j], float(R[i, j])) for i, j in _pairs(R)]
     if estimate.delay_covariance.any():
         of_delay = np.sqrt(np.maximum(np.diagonal(estimate.delay_covariance), 0.0)) / sigma
-        found += [(estimate.names[k], "the delay", float(of_delay[k])) for k in np.flatnonzero(of_delay > STRONG)]
+        found += [(estimate.names[k], DELAY, float(of_delay[k])) for k in np.flatnonzero(of_delay > STRONG)]
     return sorted(found, key=lambda pair: -abs(pair[2]))
 
 

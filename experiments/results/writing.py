@@ -37,7 +37,7 @@ def summarize(estimate: Estimate, truth: list[float] | None) -> dict[str, Any]:
         "paper_sigma": [finite(x) for x in estimate.own_sigma],
         **({} if (between := estimate.between_logs) is None else {"between_logs": np.sqrt(between.variance).tolist()}),
         "relative_sigma_percent": [finite(x) for x in estimate.paper_sigma_percent],
-        "condition_number": float(estimate.condition_number),
+        "condition_number": finite(float(estimate.condition_number)),
         "rows": int(estimate.row_count),
         "residual_rms": float(estimate.residual_rms),
     }

@@ -50,11 +50,11 @@ class TorqueChannel:
     gain: float | tuple[float, ...] = 1.0
     """Torque over logged value, of all joints or of each; 1 for a log in N m. G_T of the paper's Eq. 13 for a log of current
     references."""
-    period: float | None = field(default=None, repr=False)
-    """Time [s] over which a torque is held or averaged, of a controller that is faster or slower than the log; by default the
-    sampling period."""
     delay_sigma: float = field(default=0.0, repr=False)
     """Standard deviation of the error of the delay [s]; all logs with the same channel have the same error."""
+    period: float | None = field(default=None, repr=False)
+    """Time [s] over which a torque is held, of a controller that is faster than the log, or averaged; by default the sampling
+    period. (Of a slower controller the log has the staircase itself.)"""
 
     def __post_init__(self) -> None:
         if self.meaning not in get_args(Meaning):

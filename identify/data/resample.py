@@ -129,7 +129,7 @@ def resample(t: Array, q: Array, tau: Array, torque: TorqueChannel, fs: float, t
         grown: Array = np.asarray(
             scipy.interpolate.interp1d(own, impulse, axis=0, fill_value="extrapolate")(at), dtype=np.float64
         )
-        return MotionLog(fs, positions, np.diff(grown, axis=0) * fs, replace(torque, meaning="averaged"))
+        return MotionLog(fs, positions, np.diff(grown, axis=0) * fs, replace(torque, meaning="averaged", period=None))
     between = scipy.interpolate.interp1d(own, tau, axis=0)(at[:-1])
     return MotionLog(fs, positions, np.asarray(between, dtype=np.float64), torque)
 

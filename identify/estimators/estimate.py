@@ -86,7 +86,12 @@ class Estimate:
         """Return the estimate of a least-squares solution; `scaled` if its rows were divided by their noise."""
         inverse = fit.factor.inverse(problem.factors.together.status == Status.OK)
         covariance = _paper_covariance(fit.factor, fit.X, inverse)
-        return cls(problem, frozen(fit.X), frozen(covariance), OfWeightedRows(fit.weight, inverse, scaled, fit.factor.prior))
+        return cls(
+            problem,
+            frozen(fit.X),
+            frozen(covariance),
+            OfWeightedRows(fit.weight, inverse, scaled, fit.factor.prior, fit.factor.noise),
+        )
 
     def __repr__(self) -> str:
         return text_table(*self._table())
@@ -175,7 +180,7 @@ class Estimate:
         if self.solution is None:
             return None
         parts = self.problem.parts
-        found = ModelError.of(parts, self.X, self.solution.influence(parts), self.problem.share)
+        found = ModelError.of(parts, self.X, self.solution.influence(parts), self.problem.share, pieces=self.problem.long)
         usual = found.changes(self.problem.basis.parameters, self.X)
         return replace(found, scatter=usual if self.between_logs is None else self.between_logs.of_all(usual))
 

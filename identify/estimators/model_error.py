@@ -43,12 +43,12 @@ class ModelError:
     scatter: Array
     """Variance of X from log to log beyond that, shape (..., p)."""
     share: Array
-    """Share of residuals beyond `MARGIN` times noise, at the frequencies of the torque, shape (..., kind)."""
+    """Share of residuals significantly beyond `MARGIN` times noise, at the frequencies of the torque, shape (..., kind)."""
     independent: Array
     """Number of independent residuals: those of a time as long as their correlation count as one, shape (...)."""
 
     @classmethod
-    def of(cls, parts: Sequence[LogRows], X: Array, influence: Sequence[Array], whole: float) -> Self:
+    def of(cls, parts: Sequence[LogRows], X: Array, influence: Sequence[Array], whole: float, *, pieces: bool = False) -> Self:
         """Return the error of an estimate, from its residuals.
 
         The residual of kind j has a spectrum S_j, from its autocorrelation up to `MEMORY` (Hann taper), of which noise explains
@@ -58,8 +58,8 @@ class ModelError:
 
             sum over j of  G_j' R_j G_j   and   IN_PHASE^2 (sum over f of |g_j(f)| sqrt(N E_j(f)) / N)^2
 
-        where E_j counts in the second as far as it is beyond `MARGIN`^2 times noise. Both are divided by 1 - p / (independent
-        residuals): parameters absorb that share.
+        where E_j counts in the second as far as it is beyond `MARGIN`^2 (1 + 2 epsilon) S0_j. Both are divided by 1 - p over
+        the independent residuals: parameters absorb that share.
 
         Parameters
         ----------
@@ -71,7 +71,16 @@ class ModelError:
             G of each part.
         whole : float
             Share of all rows that the parts make.
+        pieces : bool
+            Whether parts are pieces of the same logs, whose effects that are in phase add before they are squared.
         """
+        steps = [round(part.rows.maps[0].grid.step / part.rows.maps[0].signals.fs, 6) for part in parts]
+        if len(set(steps)) > 1:  # lags of one are not those of the other
+            chosen = [[k for k, step in enumerate(steps) if step == own] for own in sorted(set(steps))]
+            found = [cls.of([parts[k] for k in own], X, [influence[k] for k in own], whole, pieces=pieces) for own in chosen]
+            covariance = np.sum([one.covariance for one in found], axis=0)
+            independent = np.sum([one.independent for one in found], axis=0)
+            return cls(covariance, np.zeros(X.shape), np.max([one.share for one in found], axis=0), independent)
         each = [_Residuals.of(part, X, G) for part, G in zip(parts, influence, strict=True)]
         lags = min(max(one.lags for one in each), max(one.rho.shape[-1] for one in each))
         taper = 0.5 + 0.5 * np.cos(np.pi * np.arange(lags) / lags)
@@ -84,7 +93,9 @@ class ModelError:
             S, S0 = part.spectra(taper * ratio, beyond_chance)
             share = np.maximum(share, part.share(S, S0))
             sandwich, most = part.sandwich(S, S0)
-            meat, worst = meat + sandwich / whole, worst + most / whole
+            meat = meat + sandwich / whole
+            worst = worst + (np.sqrt(most) / whole if pieces else most / whole)
+        worst = worst**2 if pieces else worst
         products = np.sum([part.products(lags) for part in each], axis=0)
         correlation = taper * products / np.maximum(products[..., :1], TINY)
         independent = np.sum(rows / whole / (1 + 2 * np.sum(correlation[..., 1:] ** 2, axis=-1)), axis=-1)

@@ -293,5 +293,5 @@ class Problem:
         for part in self.every_part():
             plain.append(part.rows.factors)
             found.append(reduced(part))
-        self.__dict__.setdefault("factors", Factors.merged(plain))
+        self.__dict__.setdefault("factors", Factors.merged(plain).known(self.prior))
         return found

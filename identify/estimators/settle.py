@@ -132,7 +132,7 @@ class AdaptiveRows:
             W = np.concatenate([fixed.W, moving.W], axis=-1)
             kept = [basis.places[parameter] for parameter in (*self._rest.parameters, *laws.parameters)]
             rows = replace(fixed, Y=fixed.Y + moving.Y - self._measured, W=W[..., np.argsort(kept)], names=basis.names)
-            self._last[:] = basis, rows.factors
+            self._last[:] = basis, rows.factors.known(self.problem.prior)
         return self._last[1]
 
     def misfit(self, basis: Basis) -> Array:

@@ -46,6 +46,8 @@ class OfWeightedRows(AbstractSolution):
     """Whether rows that differ from those of their kind had a weight of their own, too."""
     prior: Array | None = None
     """Rows of what is known before, in the unit of the weighted rows, shape (..., m, p + 1)."""
+    noise: Array | None = None
+    """Standard deviation of noise in that unit, shape (...)."""
 
     @property
     def known(self) -> Array | None:
@@ -54,8 +56,9 @@ class OfWeightedRows(AbstractSolution):
 
     @property
     def of_prior(self) -> Array:
-        """M P' P M with M = `inverse`."""
-        return _of_prior(self.prior, self.inverse)
+        """s^2 M P' P M with M = `inverse` and s the noise of the rows."""
+        found = _of_prior(self.prior, self.inverse)
+        return found if self.noise is None else found * self.noise[..., None, None] ** 2
 
     def influence(self, parts: Sequence[LogRows]) -> list[Array]:
         """Return w^2 W (W' w^2 W)^-1."""

@@ -204,7 +204,7 @@ class _Files:
         try:
             known = json.loads(stated)
             return TorqueChannel(
-                known["meaning"], known["delay"], known["gain"], known.get("period"), known.get("delay_sigma", 0.0)
+                known["meaning"], known["delay"], known["gain"], known.get("delay_sigma", 0.0), known.get("period")
             )
         except (ValueError, KeyError, TypeError) as error:
             words = stated.decode(errors="replace")

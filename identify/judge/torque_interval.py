@@ -24,6 +24,9 @@ MIN_LOGS = 3
 MOST = 0.99
 """Quantile of speeds and torques of the fit beyond which a motion is outside of what was fitted."""
 
+BEYOND = 3
+"""Blocks, beyond the last of an estimate's rows, that rows of the explicit model may reach."""
+
 LITTLE = 0.5
 """Share of a row that the mask must leave for its error to count."""
 
@@ -112,9 +115,9 @@ def _errors(part: LogRows, X: Array) -> list[Array]:
 
 
 def _blocks(part: LogRows, several: bool) -> Array:
-    """Return the number of the block of every row of the explicit model, or of another with rows at the same instants."""
+    """Return the number of the block of every row, by the time of the log."""
     time = part.rows.time
-    return np.zeros(len(time), dtype=np.intp) if several else ((time - time[0]) / BLOCK).astype(np.intp)
+    return np.zeros(len(time), dtype=np.intp) if several else (time / BLOCK).astype(np.intp)
 
 
 def _left_out(estimate: Estimate, parts: Sequence[LogRows], several: bool) -> list[Array] | None:
@@ -124,8 +127,8 @@ def _left_out(estimate: Estimate, parts: Sequence[LogRows], several: bool) -> li
     grams = list[Array]()
     for part, rows in zip(parts, white, strict=True):
         block = _blocks(part, several)
-        starts = np.searchsorted(block, np.arange(int(block[-1]) + 1))
-        grams.append(np.stack([x.T @ x for x in np.split(rows, starts[1:])]))
+        starts = np.searchsorted(block, np.arange(1, BEYOND + int(block[-1])))
+        grams.append(np.stack([x.T @ x for x in np.split(rows, starts)]))
     every = np.sum([gram.sum(axis=0) for gram in grams], axis=0)
     if (known := estimate.solution.known) is not None:
         every = every + known.T @ known

@@ -93,7 +93,7 @@ def torque_noise(logs: Sequence[Signals], residual: Array) -> Array:
     residual : Array, shape (..., joint)
         The noise of the torques that would explain residuals [N m].
     """
-    rms = np.sqrt(np.mean([np.mean(each.log.tau**2, axis=-2) for each in logs], axis=0))
+    rms = np.sqrt(np.mean([np.mean(_logged(each, "tau") ** 2, axis=-1) for each in logs], axis=0))
     return np.minimum(np.maximum(white_noise(logs, "tau"), EXACT * rms), residual)
 
 
@@ -119,9 +119,15 @@ def white_noise(logs: Sequence[Signals], logged: Literal["q", "tau"]) -> Array:
     for signals in logs:
         inner = slice(ORDER // 2, -(ORDER // 2))  # beyond the ends of a log there is nothing
         moving = (signals.weight == 1)[..., inner]
-        differences = slide(np.swapaxes(getattr(signals.log, logged), -1, -2), weights)[..., inner]
+        differences = slide(_logged(signals, logged), weights)[..., inner]
         counts = np.stack([moving, differences != 0])
         squares = squares + np.sum(differences**2 * counts, axis=-1)
         count = count + np.sum(counts, axis=-1)
     used, changing = np.where(np.asarray(count) >= MIN_SAMPLES, np.sqrt(squares / np.maximum(count, 1)), 0.0)
     return np.where(np.asarray(count)[0] >= MIN_SAMPLES, used, changing)
+
+
+def _logged(signals: Signals, name: Literal["q", "tau"]) -> Array:
+    """Return positions [rad], or torques [N m], as they were logged, shape (..., joint, time)."""
+    log = signals.log
+    return np.swapaxes(log.q if name == "q" else log.tau * np.asarray(log.torque.gain), -1, -2)

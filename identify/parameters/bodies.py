@@ -64,8 +64,8 @@ class Bodies:
 
     (T. Lee, P. M. Wensing and F. C. Park, "Geometric robot dynamic identification: a convex programming approach", IEEE T-RO 36
     (2020) 348-365): it depends on no frame, is half the square of relative changes where they are small, and infinite where no
-    body is. Armatures and frictions, which are not negative, count as matrices of one row. For others it is
-    1/2 ((x - x0) / size)^2.
+    body is. Armatures and frictions, which are not negative, count as matrices of one row. For others, and the parameters of a
+    link of which one is held, it is 1/2 ((x - x0) / size)^2.
 
     Parameters
     ----------
@@ -78,8 +78,9 @@ class Bodies:
     """
 
     def __init__(self, parameters: Sequence[Parameter], given: Array, size: Array) -> None:
-        links = sorted({p.joint for p in parameters if p.kind == "mass" and p.joint is not None})
         place = {(p.symbol, p.joint): i for i, p in enumerate(parameters)}
+        whole = [p.joint for p in parameters if p.kind == "mass" and all((x, p.joint) in place for x in INERTIAL)]
+        links = sorted(joint for joint in whole if joint is not None)
         self.links = [[place[x, joint] for x in INERTIAL] for joint in links]
         in_links = {i for link in self.links for i in link}
         alone = [i for i in range(len(parameters)) if i not in in_links]

@@ -11,8 +11,8 @@ from idbench.identify.basis.block import BODY, Parameter
 from idbench.identify.parameters.bodies import Bodies, nearest
 from idbench.identify.rows.factors import AbstractPrior, triangular
 
-PLAIN = 1e-9
-"""Share of the largest singular value below which one is zero."""
+PLAIN = 1e-12
+"""Share of the largest variance that every combination is taken to have at least: more than that is rounding."""
 
 
 @final
@@ -111,8 +111,7 @@ def _rows(mean: Array, covariance: Array, places: Array) -> Array:
     """Return [P, P x0] of some base parameters with a mean and a covariance, which may be singular, shape (m, b + 1)."""
     size = np.sqrt(np.diagonal(covariance))
     values, axes = np.linalg.eigh(covariance / np.outer(size, size))
-    kept = values > PLAIN * values.max(initial=0.0)
-    P = np.zeros((int(kept.sum()), len(places) + 1))
-    root = (axes[:, kept] / np.sqrt(values[kept])).T / size
+    P = np.zeros((len(size), len(places) + 1))
+    root = (axes / np.sqrt(np.maximum(values, PLAIN * values.max(initial=0.0)))).T / size
     P[:, np.flatnonzero(places)], P[:, -1] = root, root @ mean
     return P

@@ -48,6 +48,8 @@ class Factor:
     """Names of X."""
     prior: Array | None = None
     """What is known before: rows in the unit of those of R, shape (..., m, p + 1), optional."""
+    noise: Array | None = None
+    """Standard deviation of noise in that unit, shape (...), where something is known before."""
 
     @property
     def p(self) -> int:
@@ -265,7 +267,7 @@ class Factors:
 
     def _with_prior(self, factor: Factor, sigma: Array) -> Factor:
         """Return the factor of rows whose noise has the standard deviation `sigma`, shape (...), with what is known before."""
-        return factor if self.prior is None else replace(factor, prior=prior_rows(self.prior, factor.R, sigma))
+        return factor if self.prior is None else replace(factor, prior=prior_rows(self.prior, factor.R, sigma), noise=sigma)
 
     def _rms(self, X: Array) -> Array:
         """Return the rms of every kind's residuals, shape (..., kind); 1 where there are none."""

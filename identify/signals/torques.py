@@ -59,6 +59,7 @@ class Torque:
     @cached_property
     def _reading(self) -> Reading:
         plain, ratio = READINGS[self.meaning], 1.0 if self.period is None else self.period * self.fs
+        ratio = min(ratio, 1.0) if self.meaning == "held" else ratio
         return Reading(plain.middle * ratio, plain.torque * ratio**2, plain.columns * ratio**2)
 
     @property

@@ -145,6 +145,8 @@ def test_links_may_be_near_those_of_the_file(idbench, ran, tmp_path):
         (("Ia1=0.3:10%",), "no base parameter is made of Ia1 alone (ZZR1 = ZZ1 + Ia1"),
         (("Fs2=0.1:10%", "Fs2=0.2:10%"), "each name once"),
         (("links=file:10%",), "write file:25% for links"),
+        (("Fs2=0:10%",), "Fs2 is 0, of which a share is nothing"),
+        (("ZZ2=0.06:10%", "M1=3:10%"), "no base parameter is made of M1 alone"),
     ],
 )
 def test_priors_that_make_no_sense_are_refused(idbench, ran, words, why):
@@ -157,3 +159,23 @@ def test_estimators_without_a_place_for_priors_are_named(idbench, ran):
     code, _, err = idbench("identify", ran, "--prior", "file", "--estimator", "IV", "--no-rerun")
     assert code == 2
     assert "IV takes nothing that is known before; use --estimator GLS, WLS or OLS, or --hold" in err
+
+
+def test_a_base_parameter_may_be_roughly_known_and_a_short_log_loses_nothing(idbench, ran, tmp_path):
+    """Three seconds, all models: Cond(W) of one of them is infinite, which JSON has no word for."""
+    write_log(read_log(ran / "log.parquet").part(100, 470), tmp_path / "short.parquet")
+    words = ("identify", "short.parquet", "--model", "all", "--no-rerun", "--no-trials", "--prior", "file", "ZZR1=3.5:10%")
+    code, _, err = idbench(*words, "--out", "short")
+    assert code == 0, err
+    found = json.loads((tmp_path / "short" / "summary.json").read_text())
+    k = found["parameters"].index("ZZR1")
+    assert found["models"]["explicit"]["sigma_noise"][k] <= 0.351
+
+
+def test_links_near_the_file_and_one_parameter_of_a_link_held_contradict(idbench, ran):
+    code, _, err = idbench("identify", ran, "--prior", "file", "--hold", "M2=2", "--no-rerun")
+    assert code == 2
+    assert "--prior file: M2 is held or tied" in err
+    code, _, err = idbench("robot", "scara", "--prior", "nonsense")
+    assert code == 2
+    assert "--prior nonsense: write file" in err

@@ -10,11 +10,13 @@ from idbench.identify import (
     IdentificationError,
     MotionLog,
     Problem,
+    TorqueChannel,
     estimate,
     idbench_chain,
 )
 from idbench.identify.basis import tree_basis
-from idbench.identify.parameters.bodies import pseudo_inertia
+from idbench.identify.data.kinematics import INERTIAL
+from idbench.identify.parameters.bodies import inertial, pseudo_inertia
 from idbench.identify.parameters.prior import FilePrior, NormalPrior, PriorSum
 from idbench.identify.rows.factors import prior_rows
 from idbench.sim.robot.robot import Robot
@@ -150,3 +152,38 @@ def test_estimators_that_take_no_prior_say_so(noisy, grouping, acronym):
     prior = NormalPrior.of(np.eye(8)[:, [1]], np.array([0.05]), np.array([0.01]))
     with pytest.raises(IdentificationError, match="takes nothing that is known before: use GLS, WLS or OLS"):
         estimate(problem_of(noisy, grouping, prior), ESTIMATORS.create(acronym))
+
+
+@pytest.mark.parametrize("acronym", LINEAR)
+def test_the_part_of_the_prior_is_what_a_change_of_it_makes(noisy, grouping, acronym):
+    """of_prior = sum of squares of what X moves by when each believed value moves by its sigma."""
+    places = [grouping.names.index(name) for name in ("Fs1", "Fs2")]
+    values, sigma = np.array([0.5, 0.1]), np.array([0.05, 0.002])
+
+    def fit(change):
+        prior = NormalPrior.of(np.eye(8)[:, places], values + change, sigma)
+        return estimate(problem_of(noisy, grouping, prior), ESTIMATORS.create(acronym))
+
+    base = fit(np.zeros(2))
+    moved = [(fit(0.01 * sigma * unit).X - base.X) / 0.01 for unit in np.eye(2)]
+    expected = sum(np.outer(x, x) for x in moved)
+    near = 0.1 if acronym == "WLS" else 1e-3  # whose weights move with the residuals
+    np.testing.assert_allclose(np.diag(base.solution.of_prior), np.diag(expected), rtol=near, atol=1e-12)
+
+
+def test_thin_links_are_known_in_all_directions(noisy, grouping, values):
+    """A rod: its best-known directions stay known, and the solution is that of bodies."""
+    rod, first = values.copy(), grouping.standard.names
+    for j in (1, 2):
+        S = np.diag([0.2, 1e-8, 1e-8, 0.0]) + 2 * np.outer(c := np.array([0.25, 0.0, 0.0, 1.0]), c)
+        rod[[first.index(f"{x}{j}") for x in INERTIAL]] = inertial(S)
+    prior = FilePrior(grouping.K, grouping.standard.parameters, rod, 0.1)
+    R = problem_of(noisy, grouping).independent_factor
+    rows = prior.rows(R)
+    assert np.linalg.matrix_rank(rows[:, :-1]) == len(rows)
+
+
+def test_noise_levels_are_in_newton_metres_whatever_the_gain(noisy, grouping):
+    scaled = MotionLog(noisy.fs, noisy.q, noisy.tau / 10, TorqueChannel(noisy.torque.meaning, noisy.torque.delay, 10.0))
+    one, other = (problem_of(log, grouping).noise.torque for log in (noisy, scaled))
+    np.testing.assert_allclose(one, other, rtol=1e-6)

@@ -31,6 +31,7 @@ def describe(options: DescribeRobot) -> None:
     asked, page = with_own_parts(options), new_page(machine=options.json)
     robot_model = RobotModel(absolute(asked.name), asked.parameters, asked.mounting.mounting)
     robot_model.require_laws()
+    _ = robot_model.prior()
     if robot_model.robot.n > MANY:
         sys.stderr.write(f"idbench: grouping the parameters of {robot_model.robot.n} joints takes a while\n")
     truth = robot_model.truth(robot_model.robot)

@@ -61,7 +61,7 @@ class Identify(jobs.IdentifyRequest, RecordedOptions, Command, action="identify:
     show estimates and residuals as they develop."""
     write_mjcf: File = None
     """Write the robot's MJCF file with the identified inertias, armatures and frictions of the first model, made physically
-    consistent (extra `consistent`)."""
+    consistent."""
     write: Files = ()
     """Files to write: .urdf or .xml, the identified robot; .json, base parameters with covariance and regressor; .py, the
     inverse dynamics as a function that needs only NumPy."""
