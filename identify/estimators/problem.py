@@ -10,7 +10,6 @@ import numpy as np
 
 from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
-from idbench.identify.data.jumps import encoder_steps
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import IdentificationError, LogError
 from idbench.identify.estimators.given_logs import require_logs, same_form
@@ -20,7 +19,7 @@ from idbench.identify.models import AbstractModel, ExplicitModel
 from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.noise.restricted_likelihood import likely, likely_levels
 from idbench.identify.noise.row_weights import floor_of, reciprocal_root
-from idbench.identify.noise.white_noise import repeats, residual_level, torque_noise, white_noise
+from idbench.identify.noise.white_noise import count_noise, repeats, residual_level, torque_noise, white_noise
 from idbench.identify.rows.chain import Chain
 from idbench.identify.rows.factors import AbstractPrior, Factors, LeastSquaresFit, triangular
 from idbench.identify.rows.rows import Rows, is_long
@@ -31,9 +30,6 @@ Reduced = TypeVar("Reduced")
 
 SAMPLED = 8
 """Pieces of long logs from which noise is estimated and propagated."""
-
-COUNT = 1 / np.sqrt(12)
-"""Standard deviation of an error that is anything within a step, over the step."""
 
 BEGIN, LEAST = (1.0, 0.1, 0.1), 1e-4
 """Shares of the errors of rows of which one kind is not alike, to begin with, and at least."""
@@ -133,8 +129,7 @@ class Problem:
         """Noise of the positions [rad], shape (..., joint): from their differences, at least that of an encoder's count."""
         if self.explicit is not self:
             return self.explicit.position_noise
-        steps = np.nan_to_num(encoder_steps(np.concatenate([log.q for log in self.logs], axis=-2)))
-        return np.maximum(white_noise(self.signals, "q"), steps * COUNT)
+        return np.maximum(white_noise(self.signals, "q"), count_noise(self.logs))
 
     @cached_property
     def repeats(self) -> Array:

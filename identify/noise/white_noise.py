@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from idbench.identify.arrays import Array
-from idbench.identify.data.jumps import ORDER
+from idbench.identify.data.jumps import ORDER, encoder_steps
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.noise.noisy_rows import NoisyRows
 from idbench.identify.rows.factors import Factors
@@ -125,6 +125,15 @@ def white_noise(logs: Sequence[Signals], logged: Literal["q", "tau"]) -> Array:
         count = count + np.sum(counts, axis=-1)
     used, changing = np.where(np.asarray(count) >= MIN_SAMPLES, np.sqrt(squares / np.maximum(count, 1)), 0.0)
     return np.where(np.asarray(count)[0] >= MIN_SAMPLES, used, changing)
+
+
+def count_noise(logs: Sequence[MotionLog]) -> Array:
+    """Return the standard deviation of rounding to an encoder's step [rad], shape (..., joint); 0 where positions have none."""
+    q = np.concatenate([log.q for log in logs], axis=-2)
+    found = np.zeros((*q.shape[:-2], q.shape[-1]))
+    for run in np.ndindex(q.shape[:-2]):  # each by itself, or its bits would depend on the others
+        found[run] = np.nan_to_num(encoder_steps(q[run])) / np.sqrt(12)
+    return found
 
 
 def _logged(signals: Signals, name: Literal["q", "tau"]) -> Array:

@@ -141,7 +141,7 @@ def test_links_may_be_near_those_of_the_file(idbench, ran, tmp_path):
     [
         (("file:-3%",), "--prior file:-3%: write file, file:25%"),
         (("Fs2=0.1",), "--prior Fs2=0.1: write file"),
-        (("Fs9=0.1:10%",), "there is no parameter 'Fs9', did you mean"),
+        (("Fs9=0.1:10%",), "there is no parameter 'Fs9' (did you mean"),
         (("Ia1=0.3:10%",), "no base parameter is made of Ia1 alone (ZZR1 = ZZ1 + Ia1"),
         (("Fs2=0.1:10%", "Fs2=0.2:10%"), "each name once"),
         (("links=file:10%",), "write file:25% for links"),

@@ -64,7 +64,7 @@ def test_several_logs_of_other_rates_meanings_and_kinds_in_one_fit(idbench, logs
     words = ("--validate", logs / "second.parquet", "--out", "one", "--no-rerun", "--model", "explicit")
     assert idbench("identify", "a.parquet", *PUMA, *words)[0] == 0
     # Each half shows half of the motion: together they know more.
-    sigmas = [np.array(x["models"]["explicit"]["sigma"]) for x in (summary, found(tmp_path / "one"))]
+    sigmas = [np.array(x["models"]["explicit"]["sigma_noise"]) for x in (summary, found(tmp_path / "one"))]
     assert np.mean(sigmas[0] < sigmas[1]) > 0.9
     assert (unseen(summary) < 1.1 * unseen(found(tmp_path / "one"))).all()
 
