@@ -47,10 +47,17 @@ def _kept(row: Row) -> Row:
         "verdict": row["verdict"],
         "R2": short(worst_R2(row).tolist()),
         "agree": row["repeats"].get("compared", 0) and short(row["repeats"]["inside"] / row["repeats"]["compared"]),
+        "contained": _contained(row),
         "free_run": short(free) if free == free else None,  # noqa: PLR0124  # NaN is not itself
         "seconds": {tool: short(seconds) for tool, (_, seconds) in tools.items()},
         "percent": {tool: short(share(row, logs).tolist()) for tool, (logs, _) in tools.items()},
     }
+
+
+def _contained(row: Row) -> float | None:
+    """Return the share of the held-out torques that lie in their intervals."""
+    inside = [x for log in row["logs"] for x in log.get("within_interval", ()) if x is not None]
+    return short(sum(inside) / len(inside)) if inside else None
 
 
 def _rows() -> list[Row]:
@@ -71,6 +78,7 @@ def overview() -> Iterator[str]:
         "worst joint %",
         "R2, worst",
         "intervals agree",
+        "torques in 95 %",
         "free run",
         "seconds",
         "verdict",
@@ -82,6 +90,7 @@ def overview() -> Iterator[str]:
             *(f"{of(row['percent'][OWN]):.2g}" if row["percent"][OWN] else "" for of in (median, max)),
             f"{min(row['R2']):.3f}" if row["R2"] else "",
             f"{100 * row['agree']:.0f} %" if row["agree"] else "",
+            f"{100 * row['contained']:.0f} %" if row.get("contained") else "",
             "" if row["free_run"] is None else f"{row['free_run']:.2g}",
             f"{row['seconds'][OWN]:.0f}",
             row["verdict"] or "",
