@@ -11,8 +11,10 @@ from idbench.identify.arrays import TINY, Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.errors import LogError, RangeError, SettingError
+from idbench.identify.estimators.log_rows import DELAY_STEP
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.models import ExplicitModel
+from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.rows.chain import Chain, idbench_chain
 from idbench.identify.rows.rows import Rows, manageable
 
@@ -50,6 +52,7 @@ def estimate_delay(
     basis: Basis,
     chain: Chain | None = None,
     within: tuple[float, float] | None = None,
+    noise: NoiseLevels | None = None,
 ) -> DelayEstimate:
     """Return the delay with which the explicit model explains the torques best.
 
@@ -68,6 +71,8 @@ def estimate_delay(
         Signal processing that reads torques by their channel; chain `idbench` by default.
     within : tuple of float, optional
         Smallest and largest delay to look at [s]; by default -20 to 50 ms, and farther if the best is at an end.
+    noise : NoiseLevels, optional
+        The noise by which rows are weighted, such as that of a fit of these logs; by default it is found once.
 
     Raises
     ------
@@ -88,7 +93,7 @@ def estimate_delay(
     farthest = min(FARTHEST, SHARE * min(one.samples / one.fs for one in logs))
     while True:
         try:
-            return _Search(logs, basis, chain, (low, high)).run()
+            return _Search(logs, basis, chain, (low, high), noise).run()
         except RangeError:
             if within or high >= farthest or not _is_read(logs, chain):
                 raise
@@ -102,13 +107,15 @@ def _is_read(logs: Sequence[MotionLog], chain: Chain) -> bool:
 
 
 class _Search:
-    def __init__(self, logs: list[MotionLog], basis: Basis, chain: Chain, within: tuple[float, float]) -> None:
+    def __init__(
+        self, logs: list[MotionLog], basis: Basis, chain: Chain, within: tuple[float, float], noise: NoiseLevels | None
+    ) -> None:
         self._logs, self._within = logs, within
-        self._basis = basis
         halos = [chain.halo(log.fs, replace(log.torque, delay=delay)) for log in logs for delay in within]
         # The same rows at all delays, or their misfits could not be compared.
         self._chain = replace(chain, trim=max(*halos, chain.trim or 0.0))
-        self._rows = Problem(tuple(logs), basis, ExplicitModel(), self._chain).rows
+        self._problem = Problem(tuple(logs), basis, ExplicitModel(), self._chain, weighted_by=noise)
+        self._rows = self._problem.rows
 
     def run(self) -> DelayEstimate:
         low, high = self._within
@@ -130,27 +137,26 @@ class _Search:
 
         If its steps leave the bracket of the search, which they do where the model is far off, it is the search's.
         """
-        found = delay
+        found, W = delay, self._white([part.unbiased.W for part in self._problem.parts])
         for _ in range(STEPS):
-            A, y = self._rows_with_delay(found)
-            steps, whole = _left_out(A, y, np.arange(len(A)) * BLOCKS // len(A))
+            steps, whole = self._step(found, W)
             if not within[0] <= found + whole <= within[1]:
-                A, y = self._rows_with_delay(delay)
-                return DelayEstimate(delay, _jackknife(_left_out(A, y, np.arange(len(A)) * BLOCKS // len(A))[0]))
+                return DelayEstimate(delay, _jackknife(self._step(delay, W)[0]))
             found += whole
         return DelayEstimate(found, _jackknife(steps))
 
-    def _rows_with_delay(self, delay: float) -> tuple[Array, Array]:
-        """Return [W -d] and Y, made independent: Y(delay + delta) = Y + d delta = W X."""
-        logs = [replace(log, torque=replace(log.torque, delay=delay)) for log in self._logs]
-        problem = Problem(tuple(logs), self._basis, ExplicitModel(), self._chain)
-        parts = problem.parts
-        whole = [
-            part.whitening.whiten(np.concatenate([part.unbiased.W, -part.delay_slope[:, None], part.rows.Y[:, None]], axis=1))
-            for part in parts
-        ]
-        rows = np.concatenate([white[part.rows.valid] for white, part in zip(whole, parts, strict=True)])
-        return rows[:, :-1], rows[:, -1]
+    def _step(self, delay: float, W: Array) -> tuple[Array, float]:
+        """Return the step of the delay without each block, and of all: Y(delay + delta) = Y + d delta = W X."""
+        Y, slope = self._at(delay).Y, (self._at(delay + DELAY_STEP).Y - self._at(delay - DELAY_STEP).Y) / (2 * DELAY_STEP)
+        ends = np.cumsum([len(part.rows.time) for part in self._problem.parts])[:-1]
+        last = self._white(np.split(np.stack([-slope, Y], axis=1), ends))
+        A = np.concatenate([W, last[:, :1]], axis=1)
+        return _left_out(A, last[:, 1], np.arange(len(A)) * BLOCKS // len(A))
+
+    def _white(self, each: Sequence[Array]) -> Array:
+        """Return columns of the rows of each log, made independent, of the rows that are not void."""
+        parts = zip(self._problem.parts, each, strict=True)
+        return np.concatenate([part.whitening.whiten(x)[part.rows.valid] for part, x in parts])
 
     def _at(self, delay: float) -> Rows:
         """Return the rows at a delay, of which Y alone depends on it."""
