@@ -112,7 +112,8 @@ class Remedies:
         asked = robot_model.asked
         mounting = robot_model.mounting
         joints = robot_model.robot.joints
-        if not (asked.prior or "links=file" in asked.hold) and request.solver.takes_prior:
+        known = asked.prior or "links=file" in asked.hold
+        if not known and request.solver.takes_prior and not robot_model.basis.is_nonlinear:  # which takes minutes
             found["--prior file"] = lambda: replace(robot_model, asked=replace(asked, prior=("file",)))
         if not all(joint.armature for joint in robot_model.tree.joints):
             found["--armature all"] = lambda: replace(robot_model, asked=replace(asked, armature="all"))
