@@ -255,7 +255,7 @@ class Identification:
         return f"{self.fit.logs.title}, {self.fit.request.estimator}", heads, list(self._rows())
 
     def _rows(self) -> Iterator[list[str]]:
-        functions = {p.name for p in self.fit.basis.parameters if p.kind == "smooth friction"}
+        functions = {p.name for p in self.fit.basis.parameters if p.is_random_effect}
         for p in (p for p in self.parameters.values() if p.name not in functions):
             share = f"{100 * p.sigma / abs(p.value):.2g}" if p.value else ""
             yield [p.name, *significant(p.value, p.sigma), share, p.unit, *([] if p.truth is None else [f"{p.truth:.6g}"])]

@@ -1,4 +1,4 @@
-"""Estimates moved to where bodies can exist."""
+"""The physically consistent parameters nearest to an estimate."""
 
 import numpy as np
 
@@ -26,7 +26,7 @@ def _places(robot_model: RobotModel, estimate: Estimate) -> list[int]:
 
 def _of_all(robot_model: RobotModel, estimate: Estimate) -> tuple[Array, Array]:
     """Return estimate and covariance with the parameters that were left out: they are zero, and known to be."""
-    C = estimate.covariance
+    C = estimate.within_covariance  # the scatter between logs is not known of combinations
     place = _places(robot_model, estimate)
     p = len(robot_model.grouping.names)
     X, sure = np.zeros(p), SURE * np.sqrt(np.diagonal(C).min())

@@ -73,7 +73,7 @@ class WrittenRobot:
                 f"differ by {far or f'less than {LITTLE:g} %'} of the log's"
             )
         if self.lost:
-            smooth = {p.name for p in self.fit.basis.parameters if p.kind == "smooth friction"}
+            smooth = {p.name for p in self.fit.basis.parameters if p.is_random_effect}
             others = [name for name in self.lost if name not in smooth]
             names = ", ".join([*others, *(["smooth functions of friction"] if smooth & self.lost.keys() else [])])
             messages.append(f"{names} have no place in an MJCF file and are left out")

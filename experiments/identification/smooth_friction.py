@@ -62,7 +62,7 @@ def sizes_of(logs: tuple[MotionLog, ...]) -> tuple[float, ...]:
 
 def places_of(basis: Basis) -> tuple[list[int], list[int]]:
     """Return the places of the functions among the parameters, and their joints."""
-    found = [(i, p.joint or 0) for i, p in enumerate(basis.parameters) if p.kind == "smooth friction"]
+    found = [(i, p.joint or 0) for i, p in enumerate(basis.parameters) if p.is_random_effect]
     return [i for i, _ in found], [joint for _, joint in found]
 
 

@@ -217,7 +217,7 @@ def _left_open(fit: Fit) -> list[str]:
     """
     robot_model, (model, estimate) = fit.robot_model, next(iter(fit.estimates.items()))
     shares = brisk_shares(robot_model.tree, fit.basis, estimate.X, estimate.noise_sigma)
-    of_laws = [p.kind != "smooth friction" for p in fit.basis.parameters]
+    of_laws = [not p.is_random_effect for p in fit.basis.parameters]
     names = [name for name, share, law in zip(fit.basis.names, shares, of_laws, strict=True) if share > OPEN and law]
     if not names:
         return []

@@ -225,7 +225,7 @@ class StudyRecording:
 
 
 def _send_sigmas(stream: Stream, cells: Sequence[Cell]) -> None:
-    """Send the distribution of all errors over their corrected sigma, a line a model, beside the normal one."""
+    """Send the distribution of all errors over their standard errors, a line a model, beside the normal one."""
     middle = (EDGES[:-1] + EDGES[1:]) / 2
     normal = np.exp(-(middle**2) / 2) / np.sqrt(2 * np.pi) * np.diff(EDGES)
     shares = {}

@@ -73,7 +73,7 @@ class EstimatesTable:
     def _shown(self) -> list[tuple[int, str]]:
         """Places and names of the parameters but for smooth functions, which are no physical ones."""
         parameters = enumerate(self.fit.basis.parameters)
-        return [(i, p.name) for i, p in parameters if p.kind != "smooth friction"]
+        return [(i, p.name) for i, p in parameters if not p.is_random_effect]
 
     @property
     def _width(self) -> int:

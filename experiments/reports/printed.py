@@ -108,7 +108,8 @@ def _told(fit: Fit) -> Iterator[str]:
         yield f"{model}: reversals are left out, as ML does: {why}"
     if fit.request.smooth:
         sizes = " ".join(f"{x:.2g}" for x in fit.request.smooth)
-        yield f"smooth functions of velocity beside these laws, of a size that the log decides: {sizes} N m"
+        unit = ", ".join(dict.fromkeys(fit.robot_model.units(j)[0] for j in range(fit.basis.n)))
+        yield f"smooth functions of velocity beside these laws, of a size that the log decides: {sizes} {unit}"
     if fit.robot_model.asked.prior:
         share = fit.request.share or fit.robot_model.roughly_known.share
         near = f"; links near the file's, to {100 * share:.0f} % as the log decides" if fit.request.share and share else ""
@@ -132,8 +133,8 @@ def _rotors(fit: Fit) -> Iterator[str]:
         yield f"{words} (--armature none)" + ("" if filed else "; the robot's file has none either")
     elif fit.robot_model.rotors_assumed:
         yield (
-            f"rotor inertias are identified, because a {Path(fit.robot_model.name).suffix[1:]} file cannot state any (torques "
-            "measured at the links: --armature none)"
+            f"rotor inertias are identified, because a {Path(fit.robot_model.name).suffix[1:].upper()} cannot state any "
+            "(torques measured at the links: --armature none)"
         )
     elif asked in ("auto", "file") and not filed:
         yield (
@@ -199,10 +200,13 @@ def _interval_words(one: HeldOut, model: str, inside: Array, outside: float) -> 
     interval, joints = one.fit.torque_intervals[model], one.fit.robot_model.robot.joints
     assert interval is not None
     half = " ".join(f"{x:.2g}" for x in interval.half)
+    unit = ", ".join(dict.fromkeys(one.fit.robot_model.units(j)[0] for j in range(len(joints))))
     share = np.nan_to_num(inside, nan=1.0)
     worst = f", of {joints[int(share.argmin())]} {100 * share.min():.0f} %" if len(joints) > 1 else ""
     expected = 2 * (1 - MOST) * len(joints)  # of speeds and torques
-    words = f"{100 * LEVEL:.0f} % intervals of the torque, +- {half} N m: they contain {100 * np.nanmean(inside):.0f} %{worst}"
+    words = (
+        f"{100 * LEVEL:.0f} % intervals of the torque, +- {half} {unit}: they contain {100 * np.nanmean(inside):.0f} %{worst}"
+    )
     return (
         f"{words}; {100 * outside:.0f} % of the motion is outside the fitted speeds and torques"
         if outside > 2 * expected

@@ -54,7 +54,7 @@ def correlated(estimate: Estimate) -> list[tuple[str, str, float]]:
     C = estimate.within_covariance
     sigma = np.sqrt(np.maximum(np.diagonal(C), 1e-300))
     R = C / np.outer(sigma, sigma)
-    of_functions = [p.kind == "smooth friction" for p in estimate.problem.basis.parameters]
+    of_functions = [p.is_random_effect for p in estimate.problem.basis.parameters]
     R[of_functions], R[:, of_functions] = 0.0, 0.0
     found = [(estimate.names[i], estimate.names[j], float(R[i, j])) for i, j in _pairs(R)]
     if estimate.delay_covariance.any():

@@ -80,6 +80,11 @@ class Parameter:
         letters = (self.label or self.symbol) + "R" * self.grouped
         return f"{letters}_{self.drive}" if self.drive else letters if self.joint is None else named(letters, self.joint)
 
+    @property
+    def is_random_effect(self) -> bool:
+        """Whether it is no physical parameter, but a height of a smooth function whose size the log decides."""
+        return self.kind == "smooth friction"
+
     def of_a_slide(self) -> Self:
         """Return this parameter with the unit that it has where the joint slides."""
         return self if self.kind in BODY else replace(self, unit=OF_A_SLIDE.get(self.unit, self.unit))

@@ -44,20 +44,15 @@ class OfWeightedRows(AbstractSolution):
     """Of W' W of the weighted rows and what is known before, shape (..., p, p)."""
     scaled: bool
     """Whether rows that differ from those of their kind had a weight of their own, too."""
-    prior: Array | None = None
+    known: Array | None = None
     """Rows of what is known before, in the unit of the weighted rows, shape (..., m, p + 1)."""
     noise: Array | None = None
     """Standard deviation of noise in that unit, shape (...)."""
 
     @property
-    def known(self) -> Array | None:
-        """Rows of what is known before."""
-        return self.prior
-
-    @property
     def of_prior(self) -> Array:
         """s^2 M P' P M with M = `inverse` and s the noise of the rows."""
-        found = _of_prior(self.prior, self.inverse)
+        found = _of_prior(self.known, self.inverse)
         return found if self.noise is None else found * self.noise[..., None, None] ** 2
 
     def influence(self, parts: Sequence[LogRows]) -> list[Array]:
@@ -83,18 +78,13 @@ class OfWhitenedRows(AbstractSolution):
 
     inverse: Array
     """Of W' C^-1 W and what is known before, shape (..., p, p)."""
-    prior: Array | None = None
+    known: Array | None = None
     """Rows of what is known before, shape (..., m, p + 1)."""
-
-    @property
-    def known(self) -> Array | None:
-        """Rows of what is known before."""
-        return self.prior
 
     @property
     def of_prior(self) -> Array:
         """M P' P M with M = `inverse`."""
-        return _of_prior(self.prior, self.inverse)
+        return _of_prior(self.known, self.inverse)
 
     def influence(self, parts: Sequence[LogRows]) -> list[Array]:
         """Return C^-1 W (W' C^-1 W)^-1."""
@@ -132,8 +122,8 @@ def _ends(parts: Sequence[LogRows]) -> Array:
     return np.cumsum([len(part.rows.time) for part in parts])[:-1]
 
 
-def _of_prior(prior: Array | None, inverse: Array) -> Array:
-    if prior is None:
+def _of_prior(known: Array | None, inverse: Array) -> Array:
+    if known is None:
         return np.zeros(())
-    P = np.matmul(prior[..., :-1], inverse)
+    P = np.matmul(known[..., :-1], inverse)
     return np.matmul(np.swapaxes(P, -1, -2), P)

@@ -121,15 +121,6 @@ class BandedCovariance:
         """Sum over instants of the covariance of rows of a kind with those some instants later, shape (..., kind, lag)."""
         return np.swapaxes(np.diagonal(np.sum(self.bands, axis=-3), axis1=-2, axis2=-1), -1, -2)
 
-    @property
-    def spectrum(self) -> Array:
-        """Expected |DFT|^2 of the rows of every kind, at twice as many frequencies, shape (..., kind, frequency)."""
-        lags, count = self.bands.shape[-4:-2]
-        sums = self.autocovariance
-        correlations = np.zeros((*sums.shape[:-1], 2 * count))
-        correlations[..., :lags] = sums
-        return np.maximum(2 * np.fft.rfft(correlations).real - correlations[..., :1], 0.0)
-
     def of_sums(self, G: Array) -> Array:
         """Return G' C G, shape (..., m, m): the covariance of sums of rows with weights G, shape (..., r, m)."""
         lags, count, kinds = self.bands.shape[-4:-1]

@@ -77,7 +77,7 @@ class BaseParameters:
         large = _large(tree, standard, np.linalg.norm(W, axis=0))
         resists = np.array([parameter.kind in FRICTION for parameter in standard.parameters])
         # Random effects are not parameters to be told apart: slow random states hardly show those of slow motion.
-        random = np.array([parameter.kind == "smooth friction" for parameter in standard.parameters])
+        random = np.array([parameter.is_random_effect for parameter in standard.parameters])
         K, kept = np.diag(random.astype(np.float64)), [int(k) for k in np.flatnonzero(random)]
         for group in (~resists, resists & ~random):
             own = np.flatnonzero(group)
