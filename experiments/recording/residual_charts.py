@@ -78,11 +78,11 @@ def _label(name: str, relative: float) -> str:
 
 def _parts(fit: Fit, relative: Array) -> Iterator[tuple[str, npt.NDArray[np.intp]]]:
     """Yield title and parameters of each chart: all of few; of many those of each joint, the least certain first."""
-    every = np.arange(len(fit.basis.names))
+    every = np.array(fit.basis.without_random_effects)
     if len(every) <= MAX_ROWS:
         yield "all", every
         return
-    joints = np.array([parameter.joint or 0 for parameter in fit.basis.parameters])
+    joints = np.array([fit.basis.parameters[p].joint or 0 for p in every])
     for j in np.unique(joints):
         mine = every[joints == j]
         yield fit.robot_model.robot.joints[j], mine[np.argsort(-relative[mine], kind="stable")]

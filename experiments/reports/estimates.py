@@ -72,8 +72,8 @@ class EstimatesTable:
     @property
     def _shown(self) -> list[tuple[int, str]]:
         """Places and names of the parameters but for smooth functions, which are no physical ones."""
-        parameters = enumerate(self.fit.basis.parameters)
-        return [(i, p.name) for i, p in parameters if not p.is_random_effect]
+        names = self.fit.basis.names
+        return [(i, names[i]) for i in self.fit.basis.without_random_effects]
 
     @property
     def _width(self) -> int:

@@ -100,10 +100,10 @@ def _share(x: Array, size: Array) -> Array:
 
 def parameters_figure(fit: Fit) -> str:
     """Return estimates with intervals, over the size of each: those of the first model, and how others differ."""
-    names = fit.basis.names
-    lines = -(-len(names) // ACROSS)  # names that would run together go on in another panel
+    shown = fit.basis.without_random_effects
+    lines = -(-len(shown) // ACROSS)  # names that would run together go on in another panel
     figure, panels = _panels(lines, 2.4, columns=1)
-    for panel, members in zip(panels, np.array_split(np.arange(len(names)), lines), strict=True):
+    for panel, members in zip(panels, np.array_split(np.array(shown), lines), strict=True):
         _parameters_panel(panel, fit, members)
     _legend(figure, panels[0])
     return svg(figure)

@@ -89,8 +89,9 @@ def _held_out(one: HeldOut, attempts: Attempts) -> tuple[str, str, str, list[str
 
 def _parameters(fit: Fit, table: EstimatesTable) -> Iterator[list[str]]:
     made = fit.robot_model.grouping.groupings
-    for (name, *cells), unit in zip(table.rows(), fit.basis.units, strict=True):
-        yield [f"{name} [{unit}]", *cells, made[name]]
+    units = dict(zip(fit.basis.names, fit.basis.units, strict=True))
+    for name, *cells in table.rows():
+        yield [f"{name} [{units[name]}]", *cells, made[name]]
 
 
 def _logs(fit: Fit) -> Iterator[list[Any]]:

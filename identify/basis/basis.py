@@ -67,6 +67,11 @@ class Basis:
         """Units of the p parameters."""
         return tuple(parameter.unit for parameter in self.parameters)
 
+    @property
+    def without_random_effects(self) -> list[int]:
+        """Places in X of the parameters that are shown one by one: all but heights of smooth functions."""
+        return [i for i, parameter in enumerate(self.parameters) if not parameter.is_random_effect]
+
     @cached_property
     def places(self) -> dict[Parameter, int]:
         """Where the parameters stand in X."""

@@ -67,6 +67,17 @@ def test_a_view_that_fails_leaves_everything_else(view, error, idbench, logs, tm
         assert "it cannot be drawn" in err
 
 
+def test_smooth_functions_which_no_table_shows_break_no_view(idbench, logs, tmp_path):
+    words = *WORDS, "--friction", "smooth", "--no-trials"
+    code, _, err = idbench("identify", logs / "first.parquet", *words, "--out", "found")
+    assert (code, err) == (0, "")
+    there = {path.name for path in (tmp_path / "found").iterdir()} - {NAME}
+    assert there == {"summary.json", "log.parquet", "report.html", *RECORDING}
+    page = (tmp_path / "found" / "report.html").read_text()
+    assert "ZZ6 [kg m^2]" in page
+    assert "u1_1" not in page
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("error", [broken, refused], ids=["fault", "refusal"])
 def test_a_held_out_log_that_cannot_be_judged_leaves_the_others(error, idbench, logs, tmp_path, monkeypatch):
