@@ -59,8 +59,7 @@ def delay_advice(result: Fit) -> Iterator[str]:
     if wrong_sign(result) or result.robot_model.asked.prior:  # where a log needs a prior, its delay is not known without
         return
     try:
-        noise = result.problem.explicit.likely_noise
-        measured = estimate_delay(list(logs), result.basis, result.processing, noise=noise)
+        measured = estimate_delay(list(logs), result.basis, result.processing)
     except RangeError as error:
         yield f"the delay of the torque is far from the assumed one, or unrelated to this motion: {error}"
         return

@@ -51,8 +51,6 @@ class Problem:
     """How the robot is simulated, for estimators that need it."""
     prior: AbstractPrior | None = None
     """What is known of the parameters before."""
-    weighted_by: NoiseLevels | None = None
-    """The noise by which rows are weighted, where that is known from nearly the same logs; by default it is found."""
     _signals: tuple[Signals, ...] = field(default=(), repr=False)
     _explicit: "Problem | None" = field(default=None, repr=False)
 
@@ -198,8 +196,6 @@ class Problem:
         """The noise by which rows are weighted: of torques what makes the explicit rows most likely (REML), model error too."""
         if self.explicit is not self:
             return self.explicit.likely_noise
-        if self.weighted_by is not None:
-            return self.weighted_by
         rows, noisy = zip(*((part.unbiased, part.noisy) for part in self.parts), strict=True)
         begin = residual_level(rows, noisy, self.some_rows.factors, self.start.X)
         return likely_levels(rows, noisy, NoiseLevels(begin, self.position_noise, self.repeats))

@@ -14,7 +14,6 @@ from idbench.identify.errors import LogError, RangeError, SettingError
 from idbench.identify.estimators.log_rows import DELAY_STEP
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.models import ExplicitModel
-from idbench.identify.noise.propagation import NoiseLevels
 from idbench.identify.rows.chain import Chain, idbench_chain
 from idbench.identify.rows.rows import Rows, manageable
 
@@ -52,7 +51,6 @@ def estimate_delay(
     basis: Basis,
     chain: Chain | None = None,
     within: tuple[float, float] | None = None,
-    noise: NoiseLevels | None = None,
 ) -> DelayEstimate:
     """Return the delay with which the explicit model explains the torques best.
 
@@ -71,8 +69,6 @@ def estimate_delay(
         Signal processing that reads torques by their channel; chain `idbench` by default.
     within : tuple of float, optional
         Smallest and largest delay to look at [s]; by default -20 to 50 ms, and farther if the best is at an end.
-    noise : NoiseLevels, optional
-        The noise by which rows are weighted, such as that of a fit of these logs; by default it is found once.
 
     Raises
     ------
@@ -93,7 +89,7 @@ def estimate_delay(
     farthest = min(FARTHEST, SHARE * min(one.samples / one.fs for one in logs))
     while True:
         try:
-            return _Search(logs, basis, chain, (low, high), noise).run()
+            return _Search(logs, basis, chain, (low, high)).run()
         except RangeError:
             if within or high >= farthest or not _is_read(logs, chain):
                 raise
@@ -107,14 +103,12 @@ def _is_read(logs: Sequence[MotionLog], chain: Chain) -> bool:
 
 
 class _Search:
-    def __init__(
-        self, logs: list[MotionLog], basis: Basis, chain: Chain, within: tuple[float, float], noise: NoiseLevels | None
-    ) -> None:
+    def __init__(self, logs: list[MotionLog], basis: Basis, chain: Chain, within: tuple[float, float]) -> None:
         self._logs, self._within = logs, within
         halos = [chain.halo(log.fs, replace(log.torque, delay=delay)) for log in logs for delay in within]
         # The same rows at all delays, or their misfits could not be compared.
         self._chain = replace(chain, trim=max(*halos, chain.trim or 0.0))
-        self._problem = Problem(tuple(logs), basis, ExplicitModel(), self._chain, weighted_by=noise)
+        self._problem = Problem(tuple(logs), basis, ExplicitModel(), self._chain)
         self._rows = self._problem.rows
 
     def run(self) -> DelayEstimate:
@@ -135,8 +129,10 @@ class _Search:
     def _refined(self, delay: float, within: tuple[float, float]) -> DelayEstimate:
         """Return the delay as a parameter, delta(k+1) = delta(k) + its GLS step, and its jackknife's standard deviation.
 
-        If its steps leave the bracket of the search, which they do where the model is far off, it is the search's.
+        Rows are weighted by the noise at the delay of the search: at the stated one, what is late would count as noise. If the
+        steps leave the bracket of the search, which they do where the model is far off, it is the search's.
         """
+        self._problem = replace(self._problem, logs=self._delayed(delay))
         found, W = delay, self._white([part.unbiased.W for part in self._problem.parts])
         for _ in range(STEPS):
             steps, whole = self._step(found, W)
@@ -160,12 +156,13 @@ class _Search:
 
     def _at(self, delay: float) -> Rows:
         """Return the rows at a delay, of which Y alone depends on it."""
-        channels = [replace(log.torque, delay=delay) for log in self._logs]
-        delayed = [replace(log, torque=channel) for log, channel in zip(self._logs, channels, strict=True)]
-        parts = zip(self._rows.maps, delayed, strict=True)
+        parts = zip(self._rows.maps, self._delayed(delay), strict=True)
         return replace(
             self._rows, Y=np.concatenate([rows.measurement(self._chain.signals(log).torque.mean) for rows, log in parts])
         )
+
+    def _delayed(self, delay: float) -> tuple[MotionLog, ...]:
+        return tuple(replace(log, torque=replace(log.torque, delay=delay)) for log in self._logs)
 
     def _misfit(self, delay: float) -> float:
         factors = self._at(delay).factors

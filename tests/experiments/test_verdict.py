@@ -16,6 +16,7 @@ from idbench.experiments.judgement.warnings import warnings_of_result
 from idbench.experiments.requests.shared import Parameters
 from idbench.identify import MotionLog
 from idbench.identify.files.log_file import read_log
+from idbench.identify.judge.delay import estimate_delay
 
 PUMA = "puma560"
 
@@ -91,10 +92,13 @@ def test_noise_that_could_hide_a_wrong_model_leaves_it_unsure(pair):
 
 @pytest.mark.thorough
 def test_a_wrong_delay_is_named_by_the_log_itself(pair):
-    """8 ms too late: small in the torque, not in friction."""
+    """8 ms too late: small in the torque, not in friction. What is found does not depend on what was stated."""
     (found,) = delay_advice(validated([late(log, 8) for log in pair]).fit)
     assert "where 8.66 ms is assumed: --torque-delay estimate" in found
-    assert "the log shows a torque delay of 0.6" in found
+    assert "the log shows a torque delay of 0.658 ms (sigma 0.001)" in found
+    stated = [estimate_delay([late(log, ms) for log in pair], RobotModel(PUMA).basis) for ms in (-3, 3)]
+    assert stated[0].delay == pytest.approx(stated[1].delay, rel=1e-9)
+    assert abs(stated[0].delay - pair[0].torque.delay) < 3 * stated[0].sigma
     assert not list(delay_advice(validated(pair).fit))
 
 
