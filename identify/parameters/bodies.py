@@ -11,8 +11,7 @@ from idbench.identify.data.kinematics import INERTIAL
 from idbench.identify.errors import IdentificationError
 
 
-def pseudo_inertia(values: Array) -> Array:
-    """Return the pseudo-inertia of a link's XX XY XZ YY YZ ZZ MX MY MZ M, shape (4, 4)."""
+def _pseudo_inertia(values: Sequence[float]) -> Array:
     xx, xy, xz, yy, yz, zz, *first, mass = values
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     S = np.empty((4, 4))
@@ -22,15 +21,21 @@ def pseudo_inertia(values: Array) -> Array:
     return S
 
 
+PSEUDO = np.array([_pseudo_inertia(e) for e in np.eye(len(INERTIAL)).tolist()])
+"""What each inertial parameter adds to a pseudo-inertia, shape (10, 4, 4)."""
+
+
+def pseudo_inertia(values: Array) -> Array:
+    """Return the pseudo-inertias of links' XX XY XZ YY YZ ZZ MX MY MZ M of shape (..., 10), shape (..., 4, 4)."""
+    return np.tensordot(values, PSEUDO, 1)
+
+
 def inertial(S: Array) -> Array:
     """Return XX XY XZ YY YZ ZZ MX MY MZ M of a pseudo-inertia, shape (10,)."""
     second = S[:3, :3]
     inertia = np.trace(second) * np.eye(3) - second
     return np.array([*inertia[np.triu_indices(3)], *S[:3, 3], S[3, 3]])
 
-
-PSEUDO = np.array([pseudo_inertia(e) for e in np.eye(len(INERTIAL))])
-"""What each inertial parameter adds to a pseudo-inertia, shape (10, 4, 4)."""
 
 FLAT = 1e-6
 """Share of the largest eigenvalue below which the least says that a body is flat."""
@@ -89,7 +94,8 @@ class Bodies:
         thick = [_thick(pseudo_inertia(given[link]), j + 1) for j, link in zip(links, self.links, strict=True)]
         mean = _mean(thick)
         inertias = [_at_least(S, SMALL * mean) if S[3, 3] < SMALL * mean[3, 3] else S for S in thick]
-        self._inverses = [np.linalg.inv(S) for S in inertias]
+        self._inverses = np.linalg.inv(np.reshape(inertias, (-1, 4, 4)))
+        self._places = np.reshape(np.array(self.links, dtype=np.intp), (-1, len(INERTIAL)))
         self.given, self._size = given.copy(), size
         for link, S in zip(self.links, inertias, strict=True):
             self.given[link] = inertial(S)
@@ -107,26 +113,26 @@ class Bodies:
     def room(self, x: Array, step: Array) -> float:
         """Return how many times a step can be made from x before it reaches bodies that do not exist."""
         least = [float(np.min(step[self._signed] / x[self._signed], initial=0.0))]
-        for link in self.links:
-            inner = np.linalg.inv(np.linalg.cholesky(pseudo_inertia(x[link])))
-            least.append(float(np.linalg.eigvalsh(inner @ pseudo_inertia(step[link]) @ inner.T)[0]))
+        inner = np.linalg.inv(np.linalg.cholesky(pseudo_inertia(x[self._places])))
+        changes = inner @ pseudo_inertia(step[self._places]) @ np.swapaxes(inner, 1, 2)
+        least.append(float(np.min(np.linalg.eigvalsh(changes), initial=0.0)))
         return -1 / min(least) if min(least) < 0 else np.inf
 
     def divergence(self, x: Array) -> Divergence | None:
         """Return the distance of x from the given parameters; None where no bodies have them."""
         gradient, root = np.zeros(len(x)), np.zeros((len(x), len(x)))
-        value = 0.0
-        for link, inverse in zip(self.links, self._inverses, strict=True):
-            P = pseudo_inertia(x[link])
-            try:
-                inner = np.linalg.inv(np.linalg.cholesky(P))
-            except np.linalg.LinAlgError:
-                return None
-            ratio = inverse @ P
-            value += float(np.trace(ratio)) - float(np.linalg.slogdet(ratio)[1]) - len(P)
-            units = np.matmul(np.matmul(inner, PSEUDO), inner.T).reshape(len(link), -1)
-            gradient[link] = np.sum(inverse * PSEUDO, axis=(1, 2)) - units @ np.eye(len(P)).ravel()
-            root[np.ix_(link, link)] = np.linalg.inv(np.linalg.qr(units.T, mode="r"))
+        P = pseudo_inertia(x[self._places])
+        try:
+            inner = np.linalg.inv(np.linalg.cholesky(P))
+        except np.linalg.LinAlgError:
+            return None
+        ratios = self._inverses @ P
+        value = float(np.sum(np.trace(ratios, axis1=1, axis2=2) - np.linalg.slogdet(ratios)[1] - P.shape[-1]))
+        units = inner[:, None] @ PSEUDO @ np.swapaxes(inner, 1, 2)[:, None]
+        own = np.tensordot(self._inverses, PSEUDO, ((1, 2), (1, 2))) - np.trace(units, axis1=2, axis2=3)
+        roots = np.linalg.inv(np.linalg.qr(np.swapaxes(units.reshape(len(P), len(INERTIAL), 16), 1, 2), mode="r"))
+        gradient[self._places] = own
+        root[self._places[:, :, None], self._places[:, None, :]] = roots
         ratio, free = x[self._signed] / self.given[self._signed], (x - self.given)[self._free] / self._size[self._free]
         if (ratio <= 0).any():
             return None

@@ -5,11 +5,21 @@ from dataclasses import dataclass
 from typing import final
 
 import numpy as np
+import numpy.typing as npt
 
 from idbench.identify.arrays import TINY, Array
 from idbench.identify.basis.block import BODY, Parameter
 from idbench.identify.parameters.bodies import Bodies, nearest
 from idbench.identify.rows.factors import AbstractPrior, triangular
+
+ROUNDS, CLOSE = 60, 0.01
+"""Iterations of the evidence at most, and the relative change of a size at which they end."""
+
+LEAST = 1e-3
+"""Least size, over the one that the evidence begins with: a thousandth of the torque is told from none in no log."""
+
+DECIDED = 0.1
+"""Parameters of a group that the rows decide at least: the size of a group of which they decide nothing falls slowly."""
 
 PLAIN = 1e-12
 """Share of the largest variance that every combination is taken to have at least: more than that is rounding."""
@@ -53,6 +63,8 @@ class FilePrior:
     """Links near those of a file: weight times the log-determinant divergence of `Bodies`, linearized at its minimum.
 
     The others are weakly known: none makes more than the whole torque alone, so that a short log, too, has an estimate.
+    Offsets of the torques are alike in size beside the noise of each joint, and the rows decide how large (`evident_sizes`): a
+    joint that has turned one way only shows friction or an offset, and what the others show of theirs decides which.
 
     With x the standard parameters of links, X = K x base parameters that are made of links alone, and x* the minimum of
     1/2 |R (K x, X_free)|^2 + weight d(x), the rows are those of x* - H^-1 g, with covariance H^-1, g and H the gradient and
@@ -79,6 +91,7 @@ class FilePrior:
         weak = np.zeros((free, R.shape[-1]))
         size = np.linalg.norm(R[:, :-1][:, ~own], axis=0) / max(float(np.linalg.norm(R[:, -1])), TINY)
         weak[np.arange(free), np.flatnonzero(~own)] = size
+        weak = self._with_alike(R, weak)
         R = np.concatenate([R, weak])
         part = triangular(R[:, [*order, -1]])[free:, free:]
         x = nearest(part[:, :-1] @ K, part[:, -1], bodies, weight := self.share**-2)
@@ -87,6 +100,52 @@ class FilePrior:
         root = K @ d.root / np.sqrt(weight)
         of_links = _rows(K @ x - root @ (d.root.T @ d.gradient) * np.sqrt(weight), root @ root.T, own)
         return np.concatenate([weak, of_links])
+
+    def _with_alike(self, R: Array, weak: Array) -> Array:
+        """Return weak rows of which those of offsets know them by the size that they have in common."""
+        offsets = np.flatnonzero((self.K[:, [p.kind == "offset" for p in self.parameters]] != 0).any(axis=1))
+        if not len(offsets):
+            return weak
+        length = np.maximum(np.linalg.norm(R[:, offsets], axis=0), TINY)
+        rows = np.concatenate([R, weak])
+        rows[:, offsets] /= length
+        (size,) = evident_sizes(rows, [offsets], np.linalg.norm(R[:, -1:], axis=0))
+        known = weak.copy()
+        known[np.argmax(weak[:, offsets] != 0, axis=0), offsets] = length / size
+        return known
+
+
+def evident_sizes(R: Array, groups: Sequence[npt.NDArray[np.intp]], sizes: Array) -> Array:
+    """Return the standard deviations of groups of parameters, each near zero, that make rows most likely.
+
+        s_k^2 = u_k' u_k / (n_k - tr C_k / s_k^2),   C = (R' R + diag(1 / s^2))^-1,  u_k the n_k parameters of a group
+
+    (a linear mixed model; D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4 (1992) 415-447).
+
+    Parameters
+    ----------
+    R : Array, shape (r, p + 1)
+        Rows of all parameters and of what they make, in units of their noise.
+    groups : sequence of array of int
+        Places of the parameters of each group.
+    sizes : Array, shape (group,)
+        Where the search begins: what a group would be if it made the whole.
+    """
+    least, member = LEAST * sizes, np.repeat(np.arange(len(groups)), [len(group) for group in groups])
+    for _ in range(ROUNDS):
+        rows = np.zeros((len(member), R.shape[-1]))
+        rows[np.arange(len(member)), np.concatenate(groups)] = 1 / sizes[member]
+        whole = triangular(np.concatenate([R, rows]))
+        root = np.linalg.inv(whole[:-1, :-1])
+        X, variance = root @ whole[:-1, -1], np.sum(root**2, axis=1)
+        decided = [max(len(k) - float(variance[k].sum()) / s**2, DECIDED) for k, s in zip(groups, sizes, strict=True)]
+        found = np.sqrt([np.sum(X[k] ** 2) / count for k, count in zip(groups, decided, strict=True)])
+        found = np.maximum(found, least)
+        done = (np.abs(np.log(found / sizes)) < CLOSE).all()
+        sizes = found
+        if done:
+            break
+    return sizes
 
 
 @final

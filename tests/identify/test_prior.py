@@ -14,10 +14,10 @@ from idbench.identify import (
     estimate,
     idbench_chain,
 )
-from idbench.identify.basis import tree_basis
+from idbench.identify.basis import CoulombFriction, Offset, ViscousFriction, tree_basis
 from idbench.identify.data.kinematics import INERTIAL
 from idbench.identify.parameters.bodies import inertial, pseudo_inertia
-from idbench.identify.parameters.prior import FilePrior, NormalPrior, PriorSum
+from idbench.identify.parameters.prior import FilePrior, NormalPrior, PriorSum, evident_sizes
 from idbench.identify.rows.factors import prior_rows
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import kinematic_tree, standard_parameters
@@ -187,3 +187,37 @@ def test_noise_levels_are_in_newton_metres_whatever_the_gain(noisy, grouping):
     scaled = MotionLog(noisy.fs, noisy.q, noisy.tau / 10, TorqueChannel(noisy.torque.meaning, noisy.torque.delay, 10.0))
     one, other = (problem_of(log, grouping).noise.torque for log in (noisy, scaled))
     np.testing.assert_allclose(one, other, rtol=1e-6)
+
+
+def test_sizes_are_those_that_parameters_were_drawn_with():
+    """Two groups of 100, drawn with sizes 0.1 and 3, beside 5 that are free: their sizes are found within 2.5 sd / sqrt(200)."""
+    rng, sizes = np.random.default_rng(0), np.array([0.1, 3.0])
+    groups = [np.arange(5, 105), np.arange(105, 205)]
+    x = np.concatenate([10 * rng.standard_normal(5), *(size * rng.standard_normal(100) for size in sizes)])
+    W = rng.standard_normal((2000, 205))
+    rows = np.column_stack([W, W @ x + rng.standard_normal(2000)])
+    found = evident_sizes(rows, groups, np.array([10.0, 10.0]))
+    np.testing.assert_allclose(found, sizes, rtol=2.5 / np.sqrt(200))
+
+
+def test_a_joint_that_turned_one_way_has_friction_where_the_others_show_no_offset(noisy, values):
+    """Joint 2 always forwards: Fs2 and off2 make the same column; joint 1 shows an offset of 0, or one of 5 N m."""
+    tree = kinematic_tree(Robot.load("scara"))
+    grouping = BaseParameters.of(tree, tree_basis(tree, (ViscousFriction(), CoulombFriction(), Offset())))
+    standard, names = grouping.standard, grouping.names
+    given = np.array([dict(zip(tree_basis(tree).names, values, strict=True)).get(name, 0.0) for name in standard.names])
+    prior, found = FilePrior(grouping.K, standard.parameters, given, 0.2), {}
+    R = problem_of(noisy, grouping).independent_factor
+    R[:, names.index("Fs2")] = R[:, names.index("off2")]
+    for offset in (0.0, 5.0):
+        true = grouping.base(given)
+        true[names.index("off1")] = offset
+        Y = R[:, :-1] @ true
+        Y[-1] = R[-1, -1]  # the noise
+        measured = np.column_stack([R[:, :-1], Y])
+        known = np.concatenate([measured, prior.rows(measured)])
+        found[offset] = dict(zip(names, np.linalg.lstsq(known[:, :-1], known[:, -1])[0], strict=True))
+        assert found[offset]["Fs2"] + found[offset]["off2"] == pytest.approx(true[names.index("Fs2")], abs=0.002)
+        assert found[offset]["off1"] == pytest.approx(offset, abs=0.01)
+    assert abs(found[0.0]["off2"]) < 0.01 * found[0.0]["Fs2"]
+    assert abs(found[5.0]["off2"]) > 0.01 * found[5.0]["Fs2"]
