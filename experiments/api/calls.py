@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from idbench.experiments.api.logs import given_log, late, motion_log
+from idbench.experiments.api.logs import given_log, motion_log
 from idbench.experiments.api.results import Identification, SimulatedRun
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.friction_laws import AUTO
@@ -20,7 +20,8 @@ from idbench.experiments.identification.job import (
     truth_of,
 )
 from idbench.experiments.identification.load import judged_on, prepared, with_held_out
-from idbench.experiments.identification.reading import ReadLog, file_of, read
+from idbench.experiments.identification.logs import sought_of
+from idbench.experiments.identification.reading import ReadLog, file_of, late, read
 from idbench.experiments.identification.robot_model import SCARA, RobotModel, absolute
 from idbench.experiments.requests import jobs
 from idbench.experiments.requests.shared import ColumnOptions, LogRequest, MountingOptions, Parameters
@@ -92,8 +93,8 @@ def read_log(
     table = keys if torque is None else {**keys, "torque": torque}
     taken = _others((Parameters, MountingOptions), but=True) | {"robot", "mask_speed", "cutoff", "estimator"}
     asked = request_from(LogRequest, table, "read_log", taken=taken)
-    if asked.torque_delay == "estimate":
-        raise ExperimentError("torque_delay: the robot is needed for it: idbench.fit(..., torque_delay='estimate')")
+    if sought := sought_of(asked.torque_delay):
+        raise ExperimentError(f"torque_delay: the robot is needed for it: idbench.fit(..., torque_delay={sought!r})")
     return motion_log(file_of(Path(path)), read_options(asked), robot)
 
 
@@ -141,24 +142,24 @@ def fit(
     table = named(keys) | ({} if robot is None or model else {"robot": robot})
     paths = {name: tuple(map(Path, given)) for name, given in (("log", logs), ("validate", held_out)) if _files(given)}
     asked = request_from(jobs.IdentifyRequest, table | paths, "fit", taken={"label"})
-    delay_given = asked.torque_delay != "estimate"
+    sought = sought_of(asked.torque_delay)
     if model is None and _files(logs) and _files(held_out) and truth is None:
-        return Identification(identified(asked), delay_given)
+        return Identification(identified(asked), sought is None)
     if model is not None:
         model = _with_keys(model, asked, table)
     else:
         model = RobotModel(_name_of(asked), asked.parameters, asked.mounting.mounting)
     request = request_of(asked, model)
     _require_truth(truth, model)
-    loaded = prepared(_read(logs, asked, model), request, seek_delay=not delay_given, band=chooses_band(asked))
+    loaded = prepared(_read(logs, asked, model), request, sought=sought, band=chooses_band(asked))
     known = truth if truth is not None or not _files(logs) else truth_of(asked, request)
     if held_out and _files(held_out):
         found = with_held_out(loaded, asked.validate, read_options(asked), known)
     else:
         others = _read(held_out, asked, model)
-        others = others if delay_given else [late(each, loaded.read[0].channel.delay) for each in others]
-        found = judged_on(loaded, {f"{k + 1}": each for k, each in enumerate(others)}, known, not delay_given)
-    return Identification(fit_of(loaded.request, found), delay_given)
+        others = [late(each, loaded.read[0].channel) for each in others] if sought else others
+        found = judged_on(loaded, {f"{k + 1}": each for k, each in enumerate(others)}, known, sought)
+    return Identification(fit_of(loaded.request, found), sought is None)
 
 
 def simulate(scenario: str | Path | Scenario, seed: int | None = None, **keys: Any) -> SimulatedRun:
@@ -235,7 +236,7 @@ def _require_logs(logs: Sequence[Any], held_out: Sequence[Any], keys: Mapping[st
         *keys_of(ColumnOptions),
         "torque",
         "unwrap",
-        *(("torque_delay",) if keys.get("torque_delay") != "estimate" else ()),
+        *(() if sought_of(keys.get("torque_delay")) else ("torque_delay",)),
     }
     if not _files(logs) and (given := [key for key in keys if key in reading]):
         raise ExperimentError(f"fit: {', '.join(given)} is how a log is read, and this one is: give it to read_log")

@@ -38,8 +38,3 @@ def given_log(name: str, log: MotionLog, robot_model: RobotModel) -> ReadLog:
         log = replace(log, q=log.q[..., place], tau=log.tau[..., place], torque=torque, conditions=conditions, joints=joints)
     columns = LogColumns(log.t, log.q, log.tau, log.torque, joints)
     return ReadLog(Path(name), (replace(log, joints=()),), columns, log.torque)
-
-
-def late(log: ReadLog, delay: float) -> ReadLog:
-    """Return a log whose torques have a delay [s]."""
-    return replace(log, logs=tuple(replace(each, torque=replace(each.torque, delay=delay)) for each in log.logs))

@@ -9,12 +9,13 @@ from typing import Any, final
 
 import numpy as np
 
-from idbench.experiments.api.logs import given_log, late
+from idbench.experiments.api.logs import given_log
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.exports.exports import EXPORTS
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.job import summary_of
 from idbench.experiments.identification.load import within
+from idbench.experiments.identification.reading import late
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.judgement.held_out import Verdict
 from idbench.experiments.judgement.judgement import Judgement, judge
@@ -185,7 +186,7 @@ class Identification:
         if not isinstance(log, MotionLog):
             raise ExperimentError(f"score: {log!r:.60} is no log: give a MotionLog, as read_log returns it")
         read = given_log("the held-out log", log, robot)
-        held_out = (read if self.delay_given else late(read, self.fit.logs.fitted[0].torque.delay)).longest
+        held_out = (read if self.delay_given else late(read, self.fit.logs.fitted[0].torque)).longest
         if any(within(held_out, other) for other in self.fit.logs.fitted):
             raise ExperimentError("score: the log holds the motion that is identified: give another motion")
         problem = Problem((manageable([held_out])[0],), self.fit.basis, self.fit.problem.model, self.fit.processing)

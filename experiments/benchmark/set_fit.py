@@ -10,7 +10,7 @@ from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.job import fit_of, read_logs, read_options, request_of
 from idbench.experiments.identification.load import Loaded, with_held_out
 from idbench.experiments.identification.logs import Logs
-from idbench.experiments.identification.reading import ReadLog, file_of, read_as
+from idbench.experiments.identification.reading import ReadLog, file_of, late, read_as
 from idbench.experiments.requests.jobs import IdentifyRequest
 from idbench.identify import MotionLog
 from idbench.identify.judge.excitation import seen
@@ -51,9 +51,8 @@ class SetFit:
     @property
     def repeated(self) -> dict[str, MotionLog]:
         """The logs that are fitted one by one, with the delay of the fit."""
-        names, delay = self.definition.every_repeat, self.fit.logs.fitted[0].torque.delay
-        logs = {name: self.read[name].longest for name in names} if len(names) > 1 else {}
-        return {name: replace(log, torque=replace(log.torque, delay=delay)) for name, log in logs.items()}
+        names, channel = self.definition.every_repeat, self.fit.logs.fitted[0].torque
+        return {name: late(self.read[name], channel).longest for name in names} if len(names) > 1 else {}
 
     @property
     def seen(self) -> dict[str, int]:

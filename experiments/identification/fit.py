@@ -281,9 +281,8 @@ class Fit:
 
     def _channel(self, k: int) -> dict[str, Any]:
         channel = self.logs.fitted[k].torque
-        sigma = {"delay_sigma": channel.delay_sigma} if channel.delay_sigma else {}
-        period = {"period": channel.period} if channel.period else {}
-        return {"meaning": channel.meaning, "delay": channel.delay, "gain": channel.gain, **sigma, **period}
+        more = {name: x for name in ("delay_sigma", "period", "lags") if (x := getattr(channel, name))}
+        return {"meaning": channel.meaning, "delay": channel.delay, "gain": channel.gain, **more}
 
     def _of_log(self, k: int) -> dict[str, Any]:
         """Return what a summary.json says of one of the logs."""

@@ -9,8 +9,8 @@ import numpy as np
 
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.chain_settings import with_cutoff
-from idbench.experiments.identification.logs import Logs
-from idbench.experiments.identification.reading import ReadLog, ReadOptions, file_of, read, read_as, with_delays
+from idbench.experiments.identification.logs import Logs, sought_of
+from idbench.experiments.identification.reading import ReadLog, ReadOptions, file_of, late, read, read_as, with_delays
 from idbench.experiments.identification.request import Request
 from idbench.experiments.text import of_each
 from idbench.identify import LogError, MotionLog
@@ -70,10 +70,10 @@ def load(paths: Sequence[Path], options: ReadOptions, request: Request, *, band:
     require_different(paths)
     with stage("reading logs"):
         every = [read(file_of(path), options, request.robot_model) for path in paths]
-    return prepared(every, request, seek_delay=options.delay == "estimate", band=band, more=more)
+    return prepared(every, request, sought=sought_of(options.delay), band=band, more=more)
 
 
-def prepared(every: Sequence[ReadLog], request: Request, *, seek_delay: bool, band: bool, more: int = 0) -> Loaded:
+def prepared(every: Sequence[ReadLog], request: Request, *, sought: str | None, band: bool, more: int = 0) -> Loaded:
     """Return logs of one fit that were read, with the band that suits them and, if it is sought, the delay of their torques."""
     _require_other_samples(every)
     of_band = list[str]()
@@ -82,9 +82,9 @@ def prepared(every: Sequence[ReadLog], request: Request, *, seek_delay: bool, ba
         needed = Band.of([log for one in every for log in one.logs], p, least)
         if needed.cutoff > least:
             request, of_band = in_band(request, needed.cutoff), [needed.words(p, least)]
-    if seek_delay:
+    if sought:
         with stage("the delay of the torques"):
-            every = with_delays(every, request)
+            every = with_delays(every, request, sought)
     named = zip(every, _names(every), strict=True)
     said = of_each((name, note) for one, name in named for note in one.notes) if len(every) > 1 else every[0].notes
     return Loaded(request, tuple(every), tuple(dict.fromkeys([*said, *of_band])))
@@ -101,20 +101,21 @@ def with_held_out(loaded: Loaded, paths: Sequence[Path], options: ReadOptions, t
     Where nothing says what the torques of these mean, it is what those of the first log do.
     """
     known = loaded.read[0].channel  # as it was logged; its gain is of its own file
-    delay, sought = str(known.delay) if options.delay else None, options.delay == "estimate"
-    options, every = replace(options, delay=delay, fallback=replace(known, gain=1.0)), dict[str, ReadLog]()
+    sought, every = sought_of(options.delay), dict[str, ReadLog]()
+    options = replace(options, fallback=replace(known, gain=1.0))
     require_different(paths)
     for given in paths:
         path = file_of(given)
         try:
-            every[str(given)] = read_as(loaded.read[0].path, path, options, loaded.request.robot_model)
+            one = read_as(loaded.read[0].path, path, options, loaded.request.robot_model)
+            every[str(given)] = late(one, known) if sought else one
         except (LogError, ExperimentError) as error:
             words = f"--validate {error}" if str(path) in str(error) else f"--validate {path}: {error}"
             raise ExperimentError(words) from error
     return judged_on(loaded, every, truth, sought)
 
 
-def judged_on(loaded: Loaded, every: Mapping[str, ReadLog], truth: Mapping[str, float] | None, delay_sought: bool) -> Logs:
+def judged_on(loaded: Loaded, every: Mapping[str, ReadLog], truth: Mapping[str, float] | None, sought: str | None) -> Logs:
     """Return logs of a fit with held-out logs that were read, by name."""
     said = list[tuple[str, str]]()
     for name, one in every.items():
@@ -123,7 +124,7 @@ def judged_on(loaded: Loaded, every: Mapping[str, ReadLog], truth: Mapping[str, 
         if any(within(one.longest, log) for log in loaded.logs()):
             raise ExperimentError(f"--validate {name} holds the motion that is identified: give another motion, or none")
     held_out, notes = {name: one.longest for name, one in every.items()}, (*loaded.notes, *of_each(said))
-    return Logs(loaded.logs(), loaded.names, held_out, notes, truth, delay_sought, tuple(every.values()))
+    return Logs(loaded.logs(), loaded.names, held_out, notes, truth, sought, tuple(every.values()))
 
 
 def require_different(paths: Sequence[Path]) -> None:

@@ -1,6 +1,6 @@
 """The logs of an identification: those of the fit, those held out to judge it, and what was done to them."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, final
@@ -12,7 +12,7 @@ from idbench.identify.data.jumps import white_noise
 from idbench.identify.data.log_columns import LogColumns
 from idbench.identify.data.resample import Repaired
 from idbench.identify.judge.band import content_end
-from idbench.identify.judge.delay import DelayEstimate, estimate_delay
+from idbench.identify.judge.delay import DelayEstimate, estimate_delay, estimate_joint_delays
 from idbench.identify.rows.rows import is_long
 
 if TYPE_CHECKING:
@@ -96,6 +96,18 @@ class LogFacts:
         }
 
 
+DELAYS: Mapping[str, Callable[[Sequence[MotionLog], Basis, Chain], DelayEstimate]] = {
+    "estimate": estimate_delay,
+    "joints": estimate_joint_delays,
+}
+"""Words for a delay that the logs are asked for, and who asks them: one of all joints, or one of each."""
+
+
+def sought_of(delay: str | None) -> str | None:
+    """Return which delay is to be found, of `DELAYS`, if one is."""
+    return delay if delay in DELAYS else None
+
+
 LEAST = 0.05
 """Share of a sample by which a delay must move to matter."""
 
@@ -116,8 +128,8 @@ class Logs:
     """What was read, done and assumed."""
     truth: Mapping[str, float] | None = None
     """The true parameters, where they are known."""
-    delay_sought: bool = False
-    """Whether the delay of the torques was estimated, and may be estimated again with more laws of friction."""
+    delay_sought: str | None = None
+    """Which delay of the torques was estimated, of `DELAYS`, and may be estimated again with more laws of friction."""
     read_held_out: tuple["ReadLog", ...] = ()
     """Held-out logs as they were read."""
 
@@ -126,13 +138,13 @@ class Logs:
 
         As they are if there is none.
         """
-        found = dict[str, DelayEstimate]()
+        found, estimated = dict[str, DelayEstimate](), DELAYS[self.delay_sought or "estimate"]
         for meaning in dict.fromkeys(log.torque.meaning for log in self.fitted):
             try:
-                found[meaning] = estimate_delay([log for log in self.fitted if log.torque.meaning == meaning], basis, chain)
+                found[meaning] = estimated([log for log in self.fitted if log.torque.meaning == meaning], basis, chain)
             except IdentificationError as error:
                 return replace(self, notes=(*self._notes, f"{WITH_LAWS}: {error}")), False
-        said = ", ".join(f"{1e3 * each.delay:.4g} ms, sigma {1e3 * each.sigma:.2g} ms" for each in found.values())
+        said = ", ".join(each.words for each in found.values())
         first = next(iter(found.values()))
         moved = any(_moved(log, found[log.torque.meaning]) for log in self.fitted)
         delayed = replace(
@@ -176,9 +188,9 @@ class Logs:
 
 
 def _moved(log: MotionLog, found: DelayEstimate) -> bool:
-    return abs(log.torque.delay - found.delay) > max(found.sigma, LEAST / log.fs)
+    return found.differs(log.torque, max(found.doubt, LEAST / log.fs))
 
 
 def with_delay(log: MotionLog, found: DelayEstimate) -> MotionLog:
     """Return a log whose torques have a delay."""
-    return replace(log, torque=replace(log.torque, delay=found.delay, delay_sigma=found.sigma))
+    return replace(log, torque=found.of(log.torque))

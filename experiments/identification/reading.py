@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from idbench.experiments.errors import ExperimentError
-from idbench.experiments.identification.logs import with_delay
+from idbench.experiments.identification.logs import DELAYS, with_delay
 from idbench.experiments.identification.request import Request
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.requests.shared import ColumnOptions
@@ -65,7 +65,7 @@ class ReadOptions:
     torque: Meaning | None = None
     """What a torque sample means, where options say it."""
     delay: str | None = None
-    """Delay of the torque [s], or `estimate`, where options say it."""
+    """Delay of the torque [s], or which of `DELAYS` is to be found, where options say it."""
     unwrap: bool = False
     """Whether 2 pi jumps of the angles are undone."""
     fallback: TorqueChannel | None = None
@@ -172,20 +172,18 @@ def read_as(first: Path, path: Path, options: ReadOptions, robot_model: RobotMod
     return replace(found, notes=(f"columns are what {beside[1].name} beside {first.name} says", *found.notes))
 
 
-def with_delays(every: Sequence[ReadLog], request: Request) -> list[ReadLog]:
-    """Return logs with the delay of their torques, estimated from all that have the same meaning together."""
-    from idbench.identify.judge.delay import estimate_delay
-
+def with_delays(every: Sequence[ReadLog], request: Request, sought: str) -> list[ReadLog]:
+    """Return logs with the delay of their torques, `sought` of `DELAYS`, from all that have the same meaning together."""
     if isinstance(request.processing.alignment, AsLogged):
         raise ExperimentError(
-            f"--torque-delay estimate: --chain {request.chain} takes torques as they were logged and reads no delay: "
+            f"--torque-delay {sought}: --chain {request.chain} takes torques as they were logged and reads no delay: "
             "leave one of the two out"
         )
     found, unknown = dict[str, DelayEstimate](), dict[str, str]()
     for meaning in {log.logs[0].torque.meaning for log in every}:
         alike = [log for read in every for log in read.logs if log.torque.meaning == meaning]
         try:
-            found[meaning] = estimate_delay(alike, request.robot_model.basis, request.processing)
+            found[meaning] = DELAYS[sought](alike, request.robot_model.basis, request.processing)
         except RangeError as error:
             laws = " ".join(request.robot_model.asked.friction)
             without = "" if request.robot_model.laws.standard else f", with --friction {laws}: does that fit the robot?"
@@ -200,9 +198,14 @@ def _delayed(read: ReadLog, every: Mapping[str, DelayEstimate], unknown: Mapping
         return replace(read, notes=(*read.notes, f"{unknown[meaning]}; {read.channel.delay:g} s is assumed"))
     found = every[meaning]
     logs = tuple(with_delay(log, found) for log in read.logs)
-    sure = f"{1e3 * found.delay:.4g} ms, sigma {1e3 * found.sigma:.2g} ms"
-    channel = replace(read.channel, delay=found.delay, delay_sigma=found.sigma)
-    return replace(read, logs=logs, channel=channel, notes=(*read.notes, f"torque delay estimated from the log: {sure}"))
+    notes = (*read.notes, f"torque delay estimated from the log: {found.words}")
+    return replace(read, logs=logs, channel=found.of(read.channel), notes=notes)
+
+
+def late(read: ReadLog, channel: TorqueChannel) -> ReadLog:
+    """Return a log whose torques have the delay of a channel."""
+    logs = (replace(log, torque=replace(log.torque, delay=channel.delay, lags=channel.lags)) for log in read.logs)
+    return replace(read, logs=tuple(logs))
 
 
 def columns_of(path: Path, options: ColumnOptions) -> LogColumns:
@@ -280,9 +283,11 @@ def channel_of(stated: TorqueChannel | None, meaning: Meaning, delay: str | None
 
 
 def _seconds(delay: str | None, otherwise: float) -> float:
-    if delay is None or delay == "estimate":
+    if delay is None or delay in DELAYS:
         return otherwise
     try:
         return float(delay)
     except ValueError:
-        raise ExperimentError(f"--torque-delay {delay} must be seconds, such as 0.002, or estimate") from None
+        raise ExperimentError(
+            f"--torque-delay {delay} must be seconds, such as 0.002, estimate, or joints, for one of each"
+        ) from None

@@ -65,9 +65,9 @@ def delay_advice(result: Fit) -> Iterator[str]:
         return
     except IdentificationError:
         return
-    if abs(measured.delay - assumed) > max(SURE * measured.sigma, NEGLIGIBLE / logs[0].fs):
+    if abs(measured.delay - assumed) > max(SURE * measured.doubt, NEGLIGIBLE / logs[0].fs):
         yield (
-            f"the log shows a torque delay of {1e3 * measured.delay:.3g} ms (sigma {1e3 * measured.sigma:.1g}), where "
+            f"the log shows a torque delay of {1e3 * measured.delay:.3g} ms (sigma {1e3 * measured.doubt:.1g}), where "
             f"{1e3 * assumed:.3g} ms is assumed: --torque-delay estimate"
         )
 

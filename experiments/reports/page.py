@@ -98,6 +98,6 @@ def _logs(fit: Fit) -> Iterator[list[Any]]:
     errors = next(iter(fit.torque_errors.values()), None)
     for k, log in enumerate(fit.logs.fitted):
         name = fit.logs.name(k)
-        torque = f"{log.torque.meaning}, delay {1e3 * log.torque.delay:.3g} ms"
+        torque = f"{log.torque.meaning}, delay {log.torque.late}"
         left = [] if errors is None else [f"{x:.2g}" for x in errors[k]]
         yield [name, f"{log.fs:.5g}", f"{log.samples / log.fs:.4g}", torque, *left]

@@ -84,11 +84,12 @@ def _told(fit: Fit) -> Iterator[str]:
     if asked.hold or asked.tie:
         known = (("held", asked.hold), ("tied", asked.tie))
         yield "; ".join(f"{what}: {', '.join(words)}" for what, words in known if words)
-    yield f"torque: {channel.meaning}, delay {1e3 * channel.delay:.4g} ms{ignored if logged else ''}"
+    yield f"torque: {channel.meaning}, delay {channel.late}{ignored if logged else ''}"
     if channel.delay_sigma:
         without = [name for name, estimate in fit.estimates.items() if not estimate.knows_delay]
         but = f", but for {', '.join(without)}" if without else ""
-        yield f"the standard errors contain that of the delay, {1e3 * channel.delay_sigma:.2g} ms{but}"
+        of_delay = ", ".join(f"{1e3 * x:.2g}" for x in np.atleast_1d(channel.delay_sigma))
+        yield f"the standard errors contain that of the delay, {of_delay} ms{but}"
     if fit.delay is not None:
         delay, sigma = (1e3 * x for x in fit.delay)
         words = f"delay found with the parameters: {delay:.4g} ms, sigma {sigma:.2g} ms"

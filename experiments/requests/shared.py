@@ -101,7 +101,7 @@ class LogRequest:
     """What a torque sample means: held for one period from its sample on (a controller's command), the torque at that instant
     (a measurement), or the mean over the period. Required unless the file states it."""
     torque_delay: Delay = None
-    """Delay from a sample to the torque that it stands for, in seconds, or `estimate` to estimate it from the log."""
+    """Delay from a sample to the torque that it stands for, in seconds; `estimate` finds it, `joints` one of each joint."""
     unwrap: bool = False
     """Unwrap 2 pi jumps of the angles."""
     reading: ColumnOptions = ColumnOptions()  # frozen

@@ -50,17 +50,24 @@ class TorqueChannel:
     gain: float | tuple[float, ...] = 1.0
     """Torque over logged value, of all joints or of each; 1 for a log in N m. G_T of the paper's Eq. 13 for a log of current
     references."""
-    delay_sigma: float = field(default=0.0, repr=False)
-    """Standard deviation of the error of the delay [s]; all logs with the same channel have the same error."""
+    delay_sigma: float | tuple[float, ...] = field(default=0.0, repr=False)
+    """Standard deviation of the error of the delay [s], which all joints share, or of that of each; all logs with the same
+    channel have the same error."""
     period: float | None = field(default=None, repr=False)
     """Time [s] over which a torque is held, of a controller that is faster than the log, or averaged; by default the sampling
     period. (Of a slower controller the log has the staircase itself.)"""
+    lags: tuple[float, ...] = ()
+    """What the torque of each joint is late beyond the delay [s]; by default nothing."""
 
     def __post_init__(self) -> None:
         if self.meaning not in get_args(Meaning):
             raise SettingError(f"torque meaning {self.meaning!r} is unknown; known: {', '.join(get_args(Meaning))}")
-        require_finite(delay=self.delay)
-        require_not_negative(delay_sigma=self.delay_sigma)
+        require_finite(delay=self.delay, **{f"lags[{j}]": lag for j, lag in enumerate(self.lags)})
+        for sigma in np.atleast_1d(self.delay_sigma):
+            require_not_negative(delay_sigma=float(sigma))
+        for name in ("delay_sigma", "lags"):  # a list of a file
+            if not isinstance(x := getattr(self, name), float | int):
+                object.__setattr__(self, name, tuple(float(each) for each in x))
         if self.period is not None:
             require_positive(period=self.period)
         try:
@@ -70,6 +77,12 @@ class TorqueChannel:
         if gains.ndim != 1 or not np.isfinite(gains).all() or (gains == 0).any():
             raise SettingError(f"torque gain = {self.gain} must be finite and not 0")
         object.__setattr__(self, "gain", float(gains[0]) if gains.size == 1 else tuple(float(g) for g in gains))
+
+    @property
+    def late(self) -> str:
+        """The delay, or that of each joint, in words."""
+        each = [self.delay + lag for lag in self.lags] or [self.delay]
+        return f"{', '.join(f'{1e3 * delay:.4g}' for delay in each)} ms"
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +117,7 @@ class MotionLog:
         runs = f"{np.prod(self.q.shape[:-2], dtype=int)} runs of " if self.q.ndim > 2 else ""
         names = f" ({', '.join(self.joints)})" if self.joints else ""
         what = f"{runs}{self.samples} samples of {self.n} joint{'s' if self.n > 1 else ''}{names}"
-        late = f", delay {1e3 * self.torque.delay:.4g} ms" if self.torque.delay else ""
+        late = f", delay {self.torque.late}" if self.torque.delay or self.torque.lags else ""
         return f"MotionLog: {what}, {self.samples / self.fs:.4g} s at {self.fs:.5g} Hz; torque {self.torque.meaning}{late}"
 
     def _repr_html_(self) -> str:
@@ -139,6 +152,9 @@ class MotionLog:
             raise LogError(f"{len(self.joints)} names for {self.n} joints: {', '.join(self.joints)}")
         if np.size(self.torque.gain) not in (1, self.n):
             raise LogError(f"{np.size(self.torque.gain)} torque gains for {self.n} joints: give one, or one per joint")
+        for name in ("lags", "delay_sigma"):
+            if isinstance(x := getattr(self.torque, name), tuple) and len(x) not in (0, self.n):
+                raise LogError(f"{len(x)} {name} of torques for {self.n} joints")
 
     def _condition(self, name: str, values: npt.ArrayLike) -> Array:
         found = frozen(_real(name, values))

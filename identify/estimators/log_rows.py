@@ -107,16 +107,17 @@ class LogRows:
         """The signals with more noise, which all models share."""
         return with_more_noise(self.signals, self.problem.position_noise) if self.explicit is None else self.explicit.noisier
 
-    @cached_property
-    def delay_slope(self) -> Array:
-        """The derivative of Y by the delay of the torques, by a central difference, shape (..., r) [1/s]."""
+    def delay_slopes(self, each: bool) -> list[Array]:
+        """Return the derivatives of Y by the delay of all torques, or of each, by central differences, shape (..., r) [1/s]."""
         to_rows, log = self.rows.maps[0], self.signals.log
 
-        def measured(change: float) -> Array:
+        def measured(tau: Array, change: float) -> Array:
             torque = replace(log.torque, delay=log.torque.delay + change)
-            return to_rows.measurement(torque_rows(to_rows.B, replace(self.signals, log=replace(log, torque=torque))))
+            moved = replace(self.signals, log=replace(log, tau=tau, torque=torque))
+            return to_rows.measurement(torque_rows(to_rows.B, moved))
 
-        return (measured(DELAY_STEP) - measured(-DELAY_STEP)) / (2 * DELAY_STEP)
+        parts = [log.tau * of_joint for of_joint in np.eye(log.n)] if each else [log.tau]
+        return [(measured(tau, DELAY_STEP) - measured(tau, -DELAY_STEP)) / (2 * DELAY_STEP) for tau in parts]
 
     @cached_property
     def bias(self) -> Array:
@@ -176,11 +177,12 @@ def delay_covariance(parts: Sequence[LogRows], influence: Sequence[Array]) -> Ar
 
     With X = G' Y and a delay that is off by d, X is off by G' (dY/d delay) d: logs with the same channel together.
     """
-    slopes: dict[TorqueChannel, Array] = {}
+    slopes: dict[tuple[TorqueChannel, int], Array] = {}
     for part, G in zip(parts, influence, strict=True):
         channel = part.signals.log.torque
-        slope = np.sum(G * part.delay_slope[..., None], axis=-2) * channel.delay_sigma
-        slopes[channel] = slopes.get(channel, 0.0) + slope
+        each, sigma = isinstance(channel.delay_sigma, tuple), np.atleast_1d(channel.delay_sigma)
+        for j, slope in enumerate(part.delay_slopes(each)):
+            slopes[channel, j] = slopes.get((channel, j), 0.0) + np.sum(G * slope[..., None], axis=-2) * sigma[j]
     return np.asarray(sum(slope[..., :, None] * slope[..., None, :] for slope in slopes.values()))
 
 

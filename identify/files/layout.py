@@ -110,7 +110,7 @@ class LogLayout:
         motors = dict(stated.get("motors", {}))
         _require_known("motors", motors, ("matrix",))
         torque = dict(stated.get("torque", {}))
-        _require_known("torque", torque, ("meaning", "delay", "gain", "delay_sigma", "period"))
+        _require_known("torque", torque, ("meaning", "delay", "gain", "delay_sigma", "period", "lags"))
         gain = torque.pop("gain", [])
         gains = tuple(map(float, gain if isinstance(gain, list) else [gain]))
         channel = TorqueChannel(**torque) if "meaning" in torque else None
@@ -154,6 +154,7 @@ class LogLayout:
         if self.torque:
             lines += [f'meaning = "{self.torque.meaning}"', f"delay = {self.torque.delay!r}"]
             lines += [f"period = {self.torque.period!r}"] if self.torque.period else []
+            lines += [f"lags = {list(self.torque.lags)}"] if self.torque.lags else []
         else:
             lines += ['# meaning = "held"  # or "instantaneous", "averaged": see docs/torque.md', "# delay = 0.0  # [s]"]
         unit = self.tau.unit or SI["tau"]

@@ -57,8 +57,7 @@ def write_log(log: MotionLog, path: Path | str, joints: Sequence[str] = ()) -> N
             csv.write_csv(table, file)
         return
     torque = {"meaning": log.torque.meaning, "delay": log.torque.delay, "gain": log.torque.gain}
-    torque |= {"period": log.torque.period} if log.torque.period else {}
-    torque |= {"delay_sigma": log.torque.delay_sigma} if log.torque.delay_sigma else {}
+    torque |= {name: x for name in ("period", "delay_sigma", "lags") if (x := getattr(log.torque, name))}
     with path.open("wb") as file:
         parquet.write_table(table.replace_schema_metadata({TORQUE: json.dumps(torque).encode()}), file)
 

@@ -204,7 +204,12 @@ class _Files:
         try:
             known = json.loads(stated)
             return TorqueChannel(
-                known["meaning"], known["delay"], known["gain"], known.get("delay_sigma", 0.0), known.get("period")
+                known["meaning"],
+                known["delay"],
+                known["gain"],
+                known.get("delay_sigma", 0.0),
+                known.get("period"),
+                tuple(known.get("lags", ())),
             )
         except (ValueError, KeyError, TypeError) as error:
             words = stated.decode(errors="replace")

@@ -4,12 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 import scipy
 
 from idbench.identify.arrays import TINY, Array
 from idbench.identify.basis.basis import Basis
-from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.data.motion_log import MotionLog, TorqueChannel
 from idbench.identify.errors import LogError, RangeError, SettingError
 from idbench.identify.estimators.log_rows import DELAY_STEP
 from idbench.identify.estimators.problem import Problem
@@ -29,6 +28,9 @@ SHARE = 0.05
 STEPS = 2
 """Steps of the generalized least squares in which the delay is a parameter."""
 
+ROUNDS, SETTLED = 10, 0.1
+"""Steps at most in which each joint's is, and share of a sigma by which the last one may move them: 1 % of sigma^2."""
+
 BLOCKS = 16
 """Stretches of the log of which each is left out once, to see how much the delay depends on it."""
 
@@ -42,8 +44,32 @@ class DelayEstimate:
 
     delay: float
     """[s], as `TorqueChannel` counts it."""
-    sigma: float
-    """Standard deviation [s], by the jackknife: from what happens when stretches of the log are left out."""
+    sigma: float | tuple[float, ...]
+    """Standard deviation [s], or that of each joint's, by the jackknife: from what happens when stretches of the log are left
+    out."""
+    lags: tuple[float, ...] = ()
+    """What each joint is late beyond the delay [s], if each has its own."""
+
+    def of(self, channel: TorqueChannel) -> TorqueChannel:
+        """Return a channel with this delay."""
+        return replace(channel, delay=self.delay, delay_sigma=self.sigma, lags=self.lags)
+
+    @property
+    def doubt(self) -> float:
+        """The largest standard deviation [s]."""
+        return float(np.max(self.sigma))
+
+    def differs(self, channel: TorqueChannel, least: float) -> bool:
+        """Return whether it differs from the delays of a channel by more than `least` [s]."""
+        found, stated = (one.delay + np.asarray(one.lags or 0.0) for one in (self, channel))
+        return bool((np.abs(found - stated) > least).any())
+
+    @property
+    def words(self) -> str:
+        """It and its sigma in words."""
+        return (
+            f"{self.of(TorqueChannel('held')).late}, sigma {', '.join(f'{1e3 * x:.2g}' for x in np.atleast_1d(self.sigma))} ms"
+        )
 
 
 def estimate_delay(
@@ -96,6 +122,47 @@ def estimate_delay(
             low, high = max(WIDER * low, -farthest), min(WIDER * high, farthest)
 
 
+def estimate_joint_delays(
+    log: MotionLog | Sequence[MotionLog],
+    basis: Basis,
+    chain: Chain | None = None,
+    within: tuple[float, float] | None = None,
+) -> DelayEstimate:
+    """Return the delay of each joint's torque, beside the parameters in generalized least squares.
+
+        [X; delta] = argmin (Y - W X - D delta)' C^-1 (Y - W X - D delta),   D = dY/d(delays), a column a joint
+
+    from the delay that is best for all: torques of joints are logged at different instants where drives answer one after the
+    other, or filter by themselves. Model errors that are alike in all joints move a common delay less than these.
+
+    Parameters, errors
+        As for `estimate_delay`.
+
+    Raises
+    ------
+    RangeError
+        If the delays do not settle.
+    """
+    common = estimate_delay(log, basis, chain, within)
+    logs = manageable([log] if isinstance(log, MotionLog) else list(log))
+    delays, sigma = np.full(basis.n, common.delay), np.zeros(basis.n)
+    for _ in range(ROUNDS):
+        mean = float(delays.mean())
+        found = DelayEstimate(mean, tuple(sigma.tolist()), tuple((delays - mean).tolist()))
+        delayed = [replace(one, torque=found.of(one.torque)) for one in logs]
+        problem = Problem(tuple(delayed), basis, ExplicitModel(), chain or idbench_chain())
+        D = [np.stack(part.delay_slopes(each=True), axis=-1) for part in problem.parts]
+        each = zip(problem.parts, D, strict=True)
+        A = _white(problem, [np.column_stack([part.unbiased.W, -slopes, part.rows.Y]) for part, slopes in each])
+        steps, whole = _left_out(A[:, :-1], A[:, -1], basis.n)
+        delays, sigma = delays + whole, _jackknife(steps)
+        if (np.abs(whole) < SETTLED * sigma).all():
+            return replace(found, sigma=tuple(sigma.tolist()))
+    raise RangeError(
+        "the delays of the joints do not settle: does the model fit the robot? `estimate` finds one delay for all joints"
+    )
+
+
 def _is_read(logs: Sequence[MotionLog], chain: Chain) -> bool:
     """Return whether the chain reads the delay of a log at all."""
     late = replace(logs[0], torque=replace(logs[0].torque, delay=1 / logs[0].fs))
@@ -133,26 +200,20 @@ class _Search:
         steps leave the bracket of the search, which they do where the model is far off, it is the search's.
         """
         self._problem = replace(self._problem, logs=self._delayed(delay))
-        found, W = delay, self._white([part.unbiased.W for part in self._problem.parts])
+        found, W = delay, _white(self._problem, [part.unbiased.W for part in self._problem.parts])
         for _ in range(STEPS):
-            steps, whole = self._step(found, W)
+            steps, (whole,) = self._step(found, W)
             if not within[0] <= found + whole <= within[1]:
-                return DelayEstimate(delay, _jackknife(self._step(delay, W)[0]))
+                return DelayEstimate(delay, float(_jackknife(self._step(delay, W)[0])[0]))
             found += whole
-        return DelayEstimate(found, _jackknife(steps))
+        return DelayEstimate(float(found), float(_jackknife(steps)[0]))
 
-    def _step(self, delay: float, W: Array) -> tuple[Array, float]:
+    def _step(self, delay: float, W: Array) -> tuple[Array, Array]:
         """Return the step of the delay without each block, and of all: Y(delay + delta) = Y + d delta = W X."""
         Y, slope = self._at(delay).Y, (self._at(delay + DELAY_STEP).Y - self._at(delay - DELAY_STEP).Y) / (2 * DELAY_STEP)
         ends = np.cumsum([len(part.rows.time) for part in self._problem.parts])[:-1]
-        last = self._white(np.split(np.stack([-slope, Y], axis=1), ends))
-        A = np.concatenate([W, last[:, :1]], axis=1)
-        return _left_out(A, last[:, 1], np.arange(len(A)) * BLOCKS // len(A))
-
-    def _white(self, each: Sequence[Array]) -> Array:
-        """Return columns of the rows of each log, made independent, of the rows that are not void."""
-        parts = zip(self._problem.parts, each, strict=True)
-        return np.concatenate([part.whitening.whiten(x)[part.rows.valid] for part, x in parts])
+        last = _white(self._problem, np.split(np.stack([-slope, Y], axis=1), ends))
+        return _left_out(np.concatenate([W, last[:, :1]], axis=1), last[:, 1], 1)
 
     def _at(self, delay: float) -> Rows:
         """Return the rows at a delay, of which Y alone depends on it."""
@@ -169,14 +230,20 @@ class _Search:
         return float(np.sum(factors.rows * np.log(np.maximum(factors.squares(factors.fit(2).X), TINY))))
 
 
-def _jackknife(steps: Array) -> float:
-    """Return the standard deviation of what is estimated with each block left out."""
-    return float(np.sqrt((BLOCKS - 1) / BLOCKS * np.sum((steps - steps.mean()) ** 2)))
+def _white(problem: Problem, each: Sequence[Array]) -> Array:
+    """Return columns of the rows of each log, made independent, of the rows that are not void."""
+    parts = zip(problem.parts, each, strict=True)
+    return np.concatenate([part.whitening.whiten(x)[part.rows.valid] for part, x in parts])
 
 
-def _left_out(A: Array, y: Array, block: npt.NDArray[np.signedinteger]) -> tuple[Array, float]:
-    """Return the last unknown of A x = y, by least squares, with each block of rows left out, and of all rows."""
-    scale = np.linalg.norm(A, axis=0)
+def _jackknife(steps: Array) -> Array:
+    """Return the standard deviations of what is estimated with each block left out, shape (block, k)."""
+    return np.asarray(np.sqrt((BLOCKS - 1) / BLOCKS * np.sum((steps - steps.mean(axis=0)) ** 2, axis=0)))
+
+
+def _left_out(A: Array, y: Array, last: int) -> tuple[Array, Array]:
+    """Return the `last` unknowns of A x = y, by least squares, with each block of rows left out, and of all rows."""
+    block, scale = np.arange(len(A)) * BLOCKS // len(A), np.linalg.norm(A, axis=0)
     A = A / scale
     squares = np.array([A[block == b].T @ A[block == b] for b in range(BLOCKS)])
     products = np.array([A[block == b].T @ y[block == b] for b in range(BLOCKS)])
@@ -185,5 +252,5 @@ def _left_out(A: Array, y: Array, block: npt.NDArray[np.signedinteger]) -> tuple
         np.linalg.pinv(left, hermitian=True)
         @ np.concatenate([products.sum(axis=0) - products, products.sum(axis=0, keepdims=True)])[..., None]
     )
-    last = x[:, -1, 0] / scale[-1]
-    return last[:-1], float(last[-1])
+    found = x[:, -last:, 0] / scale[-last:]
+    return found[:-1], found[-1]

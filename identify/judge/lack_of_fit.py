@@ -116,7 +116,7 @@ def _impulses(log: MotionLog, chain: Chain) -> tuple[Array, Array]:
     x[len(x) // 2] = 1.0
     x = chain.prefilter.apply(x, fs)
     position = chain.differentiator.derivative(chain.differentiator.derivative(x, fs), fs)
-    return chain.alignment.align(x[None], log.torque, fs).mean[0], position
+    return chain.alignment.align(x[None], replace(log.torque, lags=()), fs).mean[0], position
 
 
 def _gain(impulse: Array, f: Array, fs: float) -> Array:

@@ -1,7 +1,7 @@
 """The signals that identification models are made of: motion, torque and mask weights of one log."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import ceil
 from typing import Any, Self, TypeVar
@@ -10,7 +10,7 @@ import numpy as np
 
 from idbench.identify.arrays import Array
 from idbench.identify.blame import expect
-from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.data.motion_log import MotionLog, TorqueChannel
 from idbench.identify.errors import LogError, PluginError
 from idbench.identify.signals.filters import AbstractDifferentiator, AbstractPrefilter
 from idbench.identify.signals.masks import AbstractMask
@@ -107,7 +107,7 @@ class Signals:
     def torque(self) -> Torque:
         """The prefiltered torque, aligned."""
         tau = self._prefiltered(self.log.tau * np.asarray(self.log.torque.gain))
-        return self._aligned(tau)
+        return self._aligned(tau, self.log.torque)
 
     @cached_property
     def weight(self) -> Array:
@@ -137,18 +137,19 @@ class Signals:
     def torque_adjoint(self, z: Array) -> Array:
         """Return the adjoint of prefilter and alignment at `z`, shape (..., time).
 
-        Both act alike at all times, so that their adjoint is what they do in reversed time (away from the ends of the log).
+        Both act alike at all times, so that their adjoint is what they do in reversed time (away from the ends of the log). It
+        is that of a joint without a lag of its own: what a row looks at changes little over a lag.
         """
         back = self.prefilter.apply(z[..., ::-1], self.fs)
-        return self._aligned(back).mean[..., ::-1]
+        return self._aligned(back, replace(self.log.torque, lags=())).mean[..., ::-1]
 
     def position_adjoint(self, z: tuple[Array, Array, Array]) -> Array:
         """Return the adjoint of q -> (q, s q, s^2 q), prefilter included, at three signals of shape (..., time)."""
         back = [x[..., ::-1] for x in z]
         return self.prefilter.apply(back[0] + self.s(back[1] + self.s(back[2])), self.fs)[..., ::-1]
 
-    def _aligned(self, tau: Array) -> Torque:
-        torque = self.alignment.align(tau, self.log.torque, self.fs)
+    def _aligned(self, tau: Array, channel: TorqueChannel) -> Torque:
+        torque = self.alignment.align(tau, channel, self.fs)
         if not isinstance(torque, Torque):
             raise PluginError(f"plug-in {type(self.alignment).__name__}.align returned {torque!r:.60}, expected a Torque")
         return torque

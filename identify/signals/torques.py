@@ -55,6 +55,8 @@ class Torque:
     """[Hz]."""
     period: float | None = None
     """Time [s] over which it is held or averaged; by default the sampling period."""
+    lags: tuple[float, ...] = ()
+    """What each joint is late beyond the delay [s], optional."""
 
     @cached_property
     def _reading(self) -> Reading:
@@ -69,13 +71,15 @@ class Torque:
 
     def halo(self) -> float:
         """Return how far [s] the mean torque and averaged columns look to either side."""
-        interpolated, window = (REACH + 1) * (self._late != 0), self._reading.torque + self._reading.columns > 0
-        return abs(self.delay) + (interpolated + window) / self.fs
+        moved, window = self._late != 0 or any(self.lags), self._reading.torque + self._reading.columns > 0
+        return abs(self.delay) + max(map(abs, self.lags), default=0.0) + ((REACH + 1) * moved + window) / self.fs
 
     @cached_property
     def mean(self) -> Array:
         """Mean torque over the window of every sample, shape (..., joint, time) [N m]."""
-        return averaged(shift(self.tau, -self._late), self._reading.torque)
+        late = [self._late + lag * self.fs for lag in self.lags]
+        moved = [shift(self.tau[..., j, :], -samples) for j, samples in enumerate(late)]
+        return averaged(np.stack(moved, axis=-2) if moved else shift(self.tau, -self._late), self._reading.torque)
 
     def average(self, x: Array) -> Array:
         """Return the mean of `x`, shape (..., time), over the window of every sample, to fourth order."""
@@ -108,7 +112,7 @@ class ByChannel(AbstractAlignment):
 
     def align(self, tau: Array, channel: TorqueChannel, fs: float) -> Torque:
         """Return the torque with its meaning and delay."""
-        return Torque(tau, channel.meaning, channel.delay, fs, channel.period)
+        return Torque(tau, channel.meaning, channel.delay, fs, channel.period, channel.lags)
 
 
 @final

@@ -9,6 +9,7 @@ import pytest
 
 import idbench
 from idbench.experiments.errors import ExperimentError
+from idbench.experiments.identification.logs import DELAYS
 from idbench.experiments.reports.uncertainty import correlated, words_of_uncertainty
 from idbench.identify import MODELS, TorqueChannel, identify, scara
 from idbench.sim import load_scenario, run
@@ -77,7 +78,7 @@ def test_a_delay_that_no_range_holds_does_not_end_the_fit(log, monkeypatch):
     def lost(*given, **settings):
         raise RangeError("the torque fits best at an end of the range, 0.6 s")
 
-    monkeypatch.setattr("idbench.identify.judge.delay.estimate_delay", lost)
+    monkeypatch.setitem(DELAYS, "estimate", lost)
     found = idbench.fit(replace(log, torque=TorqueChannel("held")), "scara", model="explicit", torque_delay="estimate")
     assert any("torque delay not found: the torque fits best at an end" in note for note in found.fit.logs.notes)
     assert np.isfinite(found.parameters["ZZR1"].value)

@@ -190,7 +190,7 @@ def test_noise_levels_are_in_newton_metres_whatever_the_gain(noisy, grouping):
 
 
 def test_sizes_are_those_that_parameters_were_drawn_with():
-    """Two groups of 100, drawn with sizes 0.1 and 3, beside 5 that are free: their sizes are found within 2.5 sd / sqrt(200)."""
+    """Two groups of 100, drawn with sizes 0.1 and 3, beside 5 that are free: sizes are found within 2.5 / sqrt(200)."""
     rng, sizes = np.random.default_rng(0), np.array([0.1, 3.0])
     groups = [np.arange(5, 105), np.arange(105, 205)]
     x = np.concatenate([10 * rng.standard_normal(5), *(size * rng.standard_normal(100) for size in sizes)])

@@ -15,6 +15,7 @@ from idbench.experiments.cli.options.jobs import Identify
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.job import files_of, fit_of, loaded_logs, notes_of, read_options, request_of, summary_of
+from idbench.experiments.identification.logs import sought_of
 from idbench.experiments.identification.request import Request
 from idbench.experiments.judgement.judgement import Judgement, judge
 from idbench.experiments.judgement.remedies import checks
@@ -60,7 +61,7 @@ def identify(options: Identify) -> None:
             for log in judgement.failures:
                 attempts.failed(log.title, log.why, log.traceback)
             with stages_of("checking"):
-                delay = options.torque_delay != "estimate"
+                delay = sought_of(options.torque_delay) is None
                 warnings = (
                     attempts.attempt("the checks", lambda: checks(judgement, delay=delay, trials=not options.no_trials)) or {}
                 )

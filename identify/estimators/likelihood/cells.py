@@ -1,6 +1,6 @@
 """A motion as cubic polynomials between nodes, and what a log says in every cell of it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from idbench.identify.arrays import Array
 from idbench.identify.data.motion_log import Meaning, MotionLog
+from idbench.identify.signals.filters import shift
 
 GAUSS = 0.5 - np.sqrt(3) / 6, 0.5 + np.sqrt(3) / 6
 """Where the torque equation is asked for in a cell: their mean has the torque's mean over it, to fourth order."""
@@ -90,7 +91,11 @@ class Cells:
 
     @classmethod
     def of(cls, log: MotionLog) -> Self:
-        """Return the cells of a log, with its own delay."""
+        """Return the cells of a log, with its own delay; torques of joints with lags are moved by these first."""
+        if log.torque.lags:
+            samples = log.fs * np.array(log.torque.lags)
+            tau = np.stack([shift(x, -late) for x, late in zip(np.moveaxis(log.tau, -1, 0), samples, strict=True)], axis=-1)
+            log = replace(log, tau=tau, torque=replace(log.torque, lags=()))
         return cls(log, log.torque.delay)
 
 
