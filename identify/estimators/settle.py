@@ -7,6 +7,7 @@ from itertools import product
 from typing import Any, final
 
 import numpy as np
+import numpy.typing as npt
 
 from idbench.identify.arrays import TINY, Array
 from idbench.identify.basis.basis import Basis
@@ -15,7 +16,7 @@ from idbench.identify.basis.friction.shape import ShapedFriction, with_settings
 from idbench.identify.basis.joint_law import AbstractFriction, AbstractJointLaw
 from idbench.identify.basis.of_joints import OfJoints
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.rows.factors import Factors, Status
+from idbench.identify.rows.factors import Factors, Status, triangular
 from idbench.identify.rows.rows import Rows
 from idbench.identify.signals.signals import State
 
@@ -127,13 +128,38 @@ class AdaptiveRows:
     def factors(self, basis: Basis) -> Factors:
         """Return the factors with the laws of a basis in the place of those of the problem."""
         if not self._last or self._last[0] is not basis:
-            laws, fixed = basis.split()[1], self._fixed
+            laws = basis.split()[1]
             moving = self._rows_of(laws)
-            W = np.concatenate([fixed.W, moving.W], axis=-1)
             kept = [basis.places[parameter] for parameter in (*self._rest.parameters, *laws.parameters)]
-            rows = replace(fixed, Y=fixed.Y + moving.Y - self._measured, W=W[..., np.argsort(kept)], names=basis.names)
-            self._last[:] = basis, rows.factors.known(self.problem.prior)
+            R = self._with(replace(moving, Y=moving.Y - self._measured).joined_by_kind, np.argsort(kept))
+            self._last[:] = basis, Factors(R, self._fixed.count, basis.names).known(self.problem.prior)
         return self._last[1]
+
+    def _with(self, moving: Array, order: npt.NDArray[np.intp]) -> Array:
+        """Return the factor of fixed columns W and Y and moving ones V and y, [W V Y + y], columns of parameters in an order.
+
+        With W = Q R, that of [W Y V y] is [R Q'Z; 0 S], Z = [V y], S of Z - Q Q'Z: rows are turned once, however often V moves.
+        """
+        Q, R = self._turned
+        back = np.swapaxes(Q, -1, -2)
+        inside = np.matmul(back, moving)
+        left = moving - np.matmul(Q, inside)
+        again = np.matmul(back, left)  # what rounding left of Q in it
+        S = triangular(left - np.matmul(Q, again))
+        below = np.zeros((*S.shape[:-1], R.shape[-1]))
+        whole = np.concatenate([np.concatenate([R, inside + again], axis=-1), np.concatenate([below, S], axis=-1)], axis=-2)
+        p = R.shape[-1] - 1
+        columns = np.delete(whole, [p, whole.shape[-1] - 1], axis=-1)[..., order]
+        return triangular(np.concatenate([columns, (whole[..., p] + whole[..., -1])[..., None]], axis=-1))
+
+    @cached_property
+    def _turned(self) -> tuple[Array, Array]:
+        """Q and R of the columns that are made once, and of what is measured."""
+        joined = self._fixed.joined_by_kind
+        if (short := joined.shape[-1] - joined.shape[-2]) > 0:
+            joined = np.concatenate([joined, np.zeros((*joined.shape[:-2], short, joined.shape[-1]))], axis=-2)
+        Q, R = np.linalg.qr(joined)
+        return Q, R
 
     def misfit(self, basis: Basis) -> Array:
         """Return the misfit with the current nonlinear parameters of friction, shape (...)."""

@@ -112,13 +112,19 @@ class Rows:
 
     def factors_of(self, weights: Array | None) -> Factors:
         """Return the triangular factors of rows multiplied by `weights`, shape (..., r), or as they are."""
-        p = len(self.names)
-        joined = np.empty((*self.Y.shape[:-1], self.kinds, len(self.time) // self.kinds, p + 1))
-        joined[..., :p] = np.swapaxes(self.W.reshape(*self.W.shape[:-2], -1, self.kinds, p), -2, -3)
-        joined[..., p] = self.by_kind(self.Y)
+        joined = self.joined_by_kind
         if weights is not None:
             joined *= self.by_kind(weights)[..., None]
         return Factors.of(joined, self.count, self.names)
+
+    @property
+    def joined_by_kind(self) -> Array:
+        """[W Y] of each kind, shape (..., kind, instant, p + 1)."""
+        p = self.W.shape[-1]
+        joined = np.empty((*self.Y.shape[:-1], self.kinds, len(self.time) // self.kinds, p + 1))
+        joined[..., :p] = np.swapaxes(self.W.reshape(*self.W.shape[:-2], -1, self.kinds, p), -2, -3)
+        joined[..., p] = self.by_kind(self.Y)
+        return joined
 
     def predicted(self, X: Array) -> Array:
         """Return W X, shape (..., r)."""

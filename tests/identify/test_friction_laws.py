@@ -22,7 +22,7 @@ from idbench.identify import (
 )
 from idbench.identify.basis import LoadFriction, StribeckFriction
 from idbench.identify.estimators.settle import settled
-from idbench.identify.judge.friction_choice import choose_friction
+from idbench.identify.judge.friction_choice import choose_friction, falls
 from idbench.identify.signals.signals import State
 
 X = np.array([3.5, 0.5, 0.5, 0.06, 0.12, 0.005, 0.1, 0.2])
@@ -210,3 +210,23 @@ def test_a_law_whose_shape_the_motion_leaves_open_is_not_chosen():
     """Arctan of a velocity above those of the log, about whose size nothing is known: it stands in for viscous friction."""
     problem = Problem((made(lambda q, qd, load: -0.02 * qd**3, 0.02),), scara(), ExplicitModel(), idbench_chain())
     assert choose_friction(problem, {"arctan": BLOCKS.create("arctan")}).laws == ((), ())
+
+
+def test_friction_that_falls_beyond_the_speeds_of_the_log_is_seen():
+    """Viscous friction of 0.1, and of -0.7, beyond that of the robot."""
+    rising, falling = (
+        Problem((made(lambda q, qd, load, a=a: a * qd, 0.02),), scara(), ExplicitModel(), idbench_chain()) for a in (0.1, -0.7)
+    )
+    assert [falls(rising, j) for j in (0, 1)] == [False, False]
+    assert [falls(falling, j) for j in (0, 1)] == [True, True]
+
+
+def test_a_law_that_makes_friction_fall_beyond_the_log_is_not_chosen():
+    """Viscous friction that fades as |qd| grows: arctan about 1 rad/s and a negative Fv explain it."""
+    problem = Problem(
+        (made(lambda q, qd, load: 2 * np.arctan(qd / 1.0) - 1.2 * qd, 0.02),), scara(), ExplicitModel(), idbench_chain()
+    )
+    candidates = {"arctan": BLOCKS.create("arctan")}
+    plain = settled(problem.with_basis(scara() + candidates["arctan"]))
+    assert all(falls(plain, j) for j in (0, 1))
+    assert choose_friction(problem, candidates).laws == ((), ())
