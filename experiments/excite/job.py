@@ -65,6 +65,10 @@ def designed(asked: ExciteRequest) -> Design:
     _require_between("repeat", asked.repeat, 1, max(1.0, LONGEST // asked.duration))
     if asked.seed < 0:
         raise ExperimentError(f"--seed {asked.seed} must be at least 0")
+    if asked.parameters.prior:
+        raise ExperimentError(
+            "--prior is for logs: a motion is designed for what it shows by itself; leave --prior out, or --hold what is known"
+        )
     if asked.until is not None and asked.log:
         raise ExperimentError("--until simulates its own logs: leave --log out")
     robot_model, limits = RobotModel(absolute(asked.robot), asked.parameters), _limits(asked)

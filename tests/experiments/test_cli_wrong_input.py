@@ -28,6 +28,7 @@ def test_an_output_folder_that_cannot_be_written_is_told(tmp_path, complaint):
     ("args", "message"),
     [
         (["table1", "--seed", "-1"], "seed = -1 must be 0 or a positive whole number"),
+        (["excite", "scara", "--prior", "file"], "--prior is for logs: a motion is designed for what it shows by itself"),
         (["search", "--seed", "-1"], "seed = -1 must be 0 or a positive whole number"),
         (["table1", "--out", "a" * 300], "File name too long"),
         (["table1", "--seed", "1", "--scenario", "x.toml"], "name two trajectories: give one"),

@@ -9,6 +9,7 @@ from idbench.identify import (
     ESTIMATORS,
     MODELS,
     ExcitationError,
+    IdentificationError,
     LogError,
     MotionLog,
     Problem,
@@ -162,3 +163,10 @@ def test_a_delay_of_several_logs_is_one_error(log):
 def test_a_delay_without_a_size_of_its_error_is_refused():
     with pytest.raises(SettingError, match="delay_sigma"):
         TorqueChannel("held", delay_sigma=-1e-3)
+
+
+@pytest.mark.parametrize("acronym", ["ML", "UKF"])
+def test_estimators_that_hold_a_torque_for_a_sampling_period_refuse_another(acronym, log):
+    slower = replace(log, torque=TorqueChannel("held", period=3 / log.fs))
+    with pytest.raises(IdentificationError, match=r"is held for 0\.03 s, not for its sampling period of 0\.01 s"):
+        identify(slower, scara(), MODELS.create("explicit"), estimator=ESTIMATORS.create(acronym))

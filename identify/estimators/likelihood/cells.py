@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from idbench.identify.arrays import Array
-from idbench.identify.data.motion_log import Meaning, MotionLog
+from idbench.identify.data.motion_log import UNIFORMITY, Meaning, MotionLog
+from idbench.identify.errors import IdentificationError
 from idbench.identify.signals.filters import shift
 
 GAUSS = 0.5 - np.sqrt(3) / 6, 0.5 + np.sqrt(3) / 6
@@ -91,7 +92,19 @@ class Cells:
 
     @classmethod
     def of(cls, log: MotionLog) -> Self:
-        """Return the cells of a log, with its own delay; torques of joints with lags are moved by these first."""
+        """Return the cells of a log, with its own delay; torques of joints with lags are moved by these first.
+
+        Raises
+        ------
+        IdentificationError
+            If a torque is held or averaged over another time than the sampling period.
+        """
+        channel = log.torque
+        if channel.period is not None and channel.meaning != "instantaneous" and abs(channel.period * log.fs - 1) > UNIFORMITY:
+            raise IdentificationError(
+                f"the log's torque is {channel.meaning} for {channel.period:g} s, not for its sampling period of "
+                f"{1 / log.fs:.3g} s, which ML and UKF take it for: use GLS"
+            )
         if log.torque.lags:
             samples = log.fs * np.array(log.torque.lags)
             tau = np.stack([shift(x, -late) for x, late in zip(np.moveaxis(log.tau, -1, 0), samples, strict=True)], axis=-1)
