@@ -20,10 +20,13 @@ residuals contains it. Fits of single logs agree, with 0.2 and 0.25, in 98 and 9
 from simulated arms whose friction depends on load, of which intervals then hold 90 % of the parameters."""
 
 MOST = 0.75
-"""Share of independent residuals, at most, that the parameters are taken to absorb: of fewer nothing is left to count."""
+"""Share of independent residuals, at most, that the parameters are taken to absorb: of fewer nothing is left to count. From 0.5
+to 0.9 no figure of UR10e and KR300 changes; shorter logs are said to be too short."""
 
 MARGIN = 1.3
-"""Residuals up to this multiple of those of noise count as noise: levels of noise are known to some 20 %."""
+"""Residuals up to this multiple of those of noise count as noise: levels of noise are known to some 20 %. With 1, sigma is ten
+times that of noise in one of six simulated PUMAs with encoder noise alone (1.13 on average with 1.3 and with 1.6); from 1 to 2,
+fits of single logs agree in 99.1 to 97.1 % (UR10e) and 85 to 82 % (KR300)."""
 
 CHANCE = 0.1
 """Share of residuals beyond noise that chance may give: with noise alone 0.00 to 0.02 on average over motions and robots."""

@@ -22,10 +22,12 @@ MIN_LOGS = 3
 """Logs from which on each of them is left out, in the place of blocks."""
 
 MOST = 0.99
-"""Quantile of speeds and torques of the fit beyond which a motion is outside of what was fitted."""
+"""Quantile of speeds and torques of the fit beyond which a motion is outside of what was fitted: one of a hundred samples of
+the fit itself is, and single peaks of noise do not widen it."""
 
 BEYOND = 3
-"""Blocks, beyond the last of an estimate's rows, that rows of the explicit model may reach."""
+"""Blocks, beyond the last of an estimate's rows, that rows of the explicit model may reach: rows of windows or of one equation
+a sample end earlier, by less than a window."""
 
 LITTLE = 0.5
 """Share of a row that the mask must leave for its error to count."""
