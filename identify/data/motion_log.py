@@ -56,7 +56,7 @@ class TorqueChannel:
     period: float | None = field(default=None, repr=False)
     """Time [s] over which a torque is held, of a controller that is faster than the log, or averaged; by default the sampling
     period. (Of a slower controller the log has the staircase itself.)"""
-    lags: tuple[float, ...] = ()
+    lags: tuple[float, ...] = field(default=(), repr=False)
     """What the torque of each joint is late beyond the delay [s]; by default nothing."""
 
     def __post_init__(self) -> None:

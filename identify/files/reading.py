@@ -203,14 +203,8 @@ class _Files:
             return None
         try:
             known = json.loads(stated)
-            return TorqueChannel(
-                known["meaning"],
-                known["delay"],
-                known["gain"],
-                known.get("delay_sigma", 0.0),
-                known.get("period"),
-                tuple(known.get("lags", ())),
-            )
+            more = {name: known[name] for name in ("delay_sigma", "period", "lags") if name in known}
+            return TorqueChannel(known["meaning"], known["delay"], known["gain"], **more)
         except (ValueError, KeyError, TypeError) as error:
             words = stated.decode(errors="replace")
             raise LogError(f"{path} states {words!r} of its torque, which makes no torque channel") from error

@@ -16,7 +16,7 @@ ROUNDS, CLOSE = 60, 0.01
 """Iterations of the evidence at most, and the relative change of a size at which they end."""
 
 LEAST = 1e-3
-"""Least size, over the one that the evidence begins with: a thousandth of the torque is told from none in no log."""
+"""Least size, over the one that the evidence begins with: no log shows a thousandth of a torque."""
 
 DECIDED = 0.1
 """Parameters of a group that the rows decide at least: the size of a group of which they decide nothing falls slowly."""
