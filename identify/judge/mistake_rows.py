@@ -1,0 +1,178 @@
+"""The rows that mistakes would leave unexplained: columns through mask and operator, as those of parameters."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import final
+
+import numpy as np
+
+from idbench.identify.arrays import Array
+from idbench.identify.basis.basis import Basis
+from idbench.identify.estimators.log_rows import LogRows
+from idbench.identify.judge.mistakes import (
+    BASE,
+    COLLISION,
+    FROM_AN_INSTANT,
+    OF_JOINTS,
+    OF_ROBOT,
+    FittedMotion,
+    Mistake,
+    Rows,
+    not_zero,
+)
+from idbench.identify.signals.signals import State
+
+RATE = 10.0
+"""Instants at which columns are made, in multiples of the operator's cut-off: they are smooth where rows count."""
+
+USUAL = 5.0
+"""Cut-off of an operator that states none [Hz]."""
+
+AT_ONCE = 32
+"""Columns that are filtered at once."""
+
+INSTANTS = 12
+"""Instants from which on something may have changed: a twelfth of a log apart."""
+
+PUSH = 0.3
+"""Time [s] that a collision takes, about: a robot that hits something stops, or gives way."""
+
+SLOWEST = 0.5
+"""Least frequency [Hz] at which a base is taken to move by itself."""
+
+LINE = 12.0
+"""A spectral line of the residuals is this many times their median: of 1000 frequencies one is so by chance in 200 logs."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A mistake that may have been made, and its rows."""
+
+    mistake: Mistake
+    """Which."""
+    joint: int | None
+    """Of which joint, from 0; None if it is the whole robot's."""
+    plain: Array
+    """Its columns, as the rows are, shape (r, g)."""
+    white: Array
+    """The same, made independent."""
+    instant: float | None = None
+    """When it happened, or from when on it is there [s]."""
+
+    @property
+    def key(self) -> tuple[str, int | None]:
+        """Its cause, and joint."""
+        return self.mistake.cause, self.joint
+
+
+@dataclass(frozen=True, eq=False)
+class MistakeRows:
+    """The rows of mistakes at an estimate."""
+
+    parts: Sequence[LogRows]
+    """Rows of each log."""
+    basis: Basis
+    """The robot."""
+    X: Array
+    """The estimate, shape (p,)."""
+
+    def every(self) -> list[Candidate]:
+        """Return the mistakes of joints and of the robot, and those that are looked for from an instant on."""
+        joints, robot = range(self.basis.n), (None,)
+        asked = [(m, j) for m in OF_JOINTS for j in joints] + [(m, j) for m in (*OF_ROBOT, *FROM_AN_INSTANT) for j in robot]
+        found = list(self._made(asked))
+        slips = [replace(c, mistake=c.mistake._replace(cause="slip")) for c in found if c.mistake.cause == "zero"]
+        held = [c for c in found if c.mistake in FROM_AN_INSTANT]
+        steady = [c for c in found if c.mistake not in FROM_AN_INSTANT]
+        return [*steady, *(late for c in (*slips, *held) for late in self._from_instants(c))]
+
+    def pushed(self, e: Array) -> Iterator[Candidate]:
+        """Yield a collision of each joint where its residuals e, shape (r,), are largest for so long."""
+        time, step = self._time, self._step
+        width = max(2, round(PUSH / step))
+        kinds = self.parts[0].rows.kinds
+        by_kind = e.reshape(-1, kinds).T
+        for j, x in enumerate(by_kind):
+            sums = np.abs(np.convolve(x, np.ones(width), "same"))
+            k = int(sums.argmax())
+            inside = np.zeros((len(x), kinds))
+            inside[max(0, k - width // 2) : k - width // 2 + width, j] = 1.0
+            yield self._candidate(COLLISION, j, inside.reshape(-1, 1), float(time[k * kinds]))
+
+    def shaken(self, e: Array) -> Iterator[Candidate]:
+        """Yield motions of the base, along each axis, at the highest line in the spectrum of residuals e, shape (r,)."""
+        kinds, step = self.parts[0].rows.kinds, self._step
+        power = np.sum(np.abs(np.fft.rfft(e.reshape(-1, kinds), axis=0)) ** 2, axis=1)
+        f = np.fft.rfftfreq(len(e) // kinds, step)
+        some = f > SLOWEST
+        if not some.any() or power[some].max() < LINE * np.median(power[some]):
+            return
+        line = 2 * np.pi * f[some][power[some].argmax()] * self._time
+        for c in self._made([(m, None) for m in BASE]):
+            plain = c.plain * np.stack([np.sin(line), np.cos(line)], axis=-1)
+            yield self._candidate(c.mistake, None, plain)
+
+    @property
+    def looks(self) -> int:
+        """How many collisions, and motions of the base, are looked for."""
+        kinds, count = self.parts[0].rows.kinds, len(self._time)
+        return count + 3 * count // (2 * kinds)
+
+    @property
+    def _step(self) -> float:
+        to_rows = self.parts[0].rows.maps[0]
+        return to_rows.grid.step / to_rows.signals.fs
+
+    @property
+    def _time(self) -> Array:
+        """Times of the rows [s], shape (r,), those of several logs one after the other."""
+        ends = np.cumsum([0.0, *(part.rows.time[-1] for part in self.parts)])
+        return np.concatenate([part.rows.time + end for part, end in zip(self.parts, ends, strict=False)])
+
+    def _from_instants(self, c: Candidate) -> Iterator[Candidate]:
+        time = self._time
+        for instant in np.linspace(time[0], time[-1], INSTANTS + 1)[1:-1]:
+            yield self._candidate(c.mistake, c.joint, c.plain * (time > instant)[:, None], float(instant))
+
+    def _candidate(self, mistake: Mistake, joint: int | None, plain: Array, instant: float | None = None) -> Candidate:
+        ends = np.cumsum([len(part.rows.time) for part in self.parts])[:-1]
+        each = zip(self.parts, np.split(plain, ends), strict=True)
+        return Candidate(mistake, joint, plain, np.concatenate([part.whitening.whiten(x) for part, x in each]), instant)
+
+    def _made(self, asked: Sequence[tuple[Mistake, int | None]]) -> Iterator[Candidate]:
+        """Yield mistakes with their rows, those that have as many columns in every log."""
+        of_parts = [self._of_part(part, asked) for part in self.parts]
+        for (mistake, joint), *each in zip(asked, *of_parts, strict=True):
+            if each[0] and len({len(columns) for columns in each}) == 1:
+                yield self._candidate(mistake, joint, np.concatenate([np.stack(columns, axis=-1) for columns in each]))
+
+    def _of_part(self, part: LogRows, asked: Iterable[tuple[Mistake, int | None]]) -> list[list[Array]]:
+        """Return the rows of each column of mistakes."""
+        signals = part.signals
+        cutoff = getattr(part.problem.own_chain.operator, "cutoff", None) or USUAL
+        thin = max(1, int(signals.fs / (RATE * cutoff)))
+        motion = _thinned(part, self.basis, self.X, thin)
+        columns = [not_zero(mistake.columns(motion, joint or 0)) for mistake, joint in asked]
+        made = _filtered(part, [rows for each in columns for rows in each], motion.t, thin)
+        return [[next(made) for _ in each] for each in columns]
+
+
+def _thinned(part: LogRows, basis: Basis, X: Array, thin: int) -> FittedMotion:
+    state = part.signals.state
+    q, qd, qdd = (np.ascontiguousarray(x[..., ::thin]) for x in (state.q, state.qd, state.qdd))
+    conditions = {name: x[..., ::thin] for name, x in state.conditions.items()}
+    return FittedMotion(basis, X, State(q, qd, lambda _: qdd, conditions), np.arange(q.shape[-1]) * thin / part.signals.fs)
+
+
+def _filtered(part: LogRows, columns: Sequence[Rows], t: Array, thin: int) -> Iterator[Array]:
+    """Yield the rows of torques at some instants."""
+    to_rows, log = part.rows.maps[0], part.signals.log
+    every = np.arange(log.samples) / part.signals.fs
+    for begin in range(0, len(columns), AT_ONCE):
+        some = columns[begin : begin + AT_ONCE]
+        whole = np.zeros((len(some), log.n, log.samples))
+        for i, rows in enumerate(some):
+            for j, x in rows.items():
+                whole[i, j] = x if thin == 1 else np.interp(every, t, x)
+        yield from to_rows.measurement(whole)

@@ -1,0 +1,297 @@
+"""Which mistakes the residuals of a fit show: one test each, against residuals as correlated as they are."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import final
+
+import numpy as np
+import scipy
+
+from idbench.identify.arrays import TINY, Array
+from idbench.identify.estimators.log_rows import LogRows
+from idbench.identify.estimators.model_error import MEMORY
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.judge.mistake_rows import Candidate, MistakeRows
+from idbench.identify.judge.mistakes import COLLISION
+
+LEFT = 1e-3
+"""Share of a column's squares that parameters must leave for a mistake to be distinct from them. With 1e-4, noise of encoders in
+slow motion is called a tilt in 3 of 24 logs without a fault."""
+
+CERTAIN = 1e-5
+"""Probability that any of all mistakes seems as significant by chance, below which one is suspected. Counts of encoders are not
+Gaussian: with 1e-3, 5 of 120 logs without a fault, of four robots, have a suspect, all with 12 bits."""
+
+WORTH = 0.99
+"""Share of an error on stretches that were not fitted that a mistake may leave: less of a gain is of no use."""
+
+ALIKE = 0.9
+"""Share of what a mistake explains that another one must explain to be its alternative."""
+
+MOST = 3
+"""Mistakes that are looked for, one beside the other."""
+
+MEDIAN = 0.4549
+"""Of chi squared with one degree of freedom."""
+
+BLOCKS = 5
+"""Stretches of the rows, each of which is predicted by a fit of the others."""
+
+
+@final
+@dataclass(frozen=True)
+class Suspect:
+    """A mistake that would explain residuals."""
+
+    cause: str
+    """What is wrong, in a word."""
+    of: str
+    """What it is a mistake of: torque, position, friction, drive, base, link or clock."""
+    joint: int | None
+    """Of which joint, from 0; None if it is the whole robot's."""
+    size: tuple[float, ...]
+    """How large, as far as it is small."""
+    sigma: tuple[float, ...]
+    """Standard deviations of that, with residuals as correlated as they are."""
+    unit: str
+    """Of both."""
+    p: float
+    """Probability that any mistake seems as significant by chance."""
+    t: float
+    """Its size over sigma, or the root of the sum of squares of independent ones."""
+    alternatives: tuple[tuple[str, int | None], ...]
+    """Causes, and joints, that explain as much: the log does not tell them apart."""
+    held_out: tuple[float, float]
+    """Largest error of a torque that changes, on stretches that were not fitted, without and with it [%]."""
+    gain: float
+    """What it takes of minus twice the logarithm of the likelihood."""
+    instant: float | None = None
+    """When it happened, or from when on it is there [s]."""
+
+
+def suspects(problem: Problem, X: Array) -> tuple[Suspect, ...]:
+    """Return the mistakes that residuals show, each beside those before it, and proved on stretches that were not fitted.
+
+    With whitened rows of a fit and the column c of a mistake, c' what parameters leave of it,
+
+        b = c' r / c'c',   var b = sum over kinds and lags of rho(l) (c' * c')(l) / (c'c')^2
+
+    rho being the autocorrelation of what is left of the residuals with it (Hann taper, `MEMORY`), not less than that of white
+    ones. Of those that are sure that counts which makes the rows most likely.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of one run, whose rows are kept.
+    X : Array, shape (p,)
+        Its estimate.
+    """
+    problem.require_rows("mistakes are looked for by rows, and ")
+    explicit = problem.explicit
+    return tuple(_Search(explicit, MistakeRows(explicit.parts, explicit.basis, X)).found())
+
+
+@dataclass(frozen=True, eq=False)
+class _Tested:
+    candidate: Candidate
+    left: Array
+    """Directions of what parameters leave of its columns, shape (r, g)."""
+    size: Array
+    sigma: Array
+    signal: Array
+    """What it explains of the residuals, shape (r,)."""
+    chi2: float
+    gain: float
+    """What it takes of minus twice the logarithm of the likelihood, less what as many columns of noise take."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    problem: Problem
+    rows: MistakeRows
+
+    @property
+    def parts(self) -> Sequence[LogRows]:
+        return self.problem.parts
+
+    def found(self) -> Iterator[Suspect]:
+        """Yield mistakes, each the most likely one beside those before: c(k+1) = argmax gain(c | W, c(1), ..., c(k)).
+
+        It counts if it is as sure beside what the tests of all others scatter once it is explained: of noise they scatter by 1.
+        """
+        every, taken = self.rows.every(), list[Candidate]()
+        tested = self._all_tested(every, taken)
+        while len(taken) < MOST:
+            for best, errors in self._proved(tested, taken):
+                rest = [c for c in every if c.key != best.candidate.key]
+                left = self._all_tested(rest, [*taken, best.candidate])
+                p = self._by_chance(best, len(every) + self.rows.looks, _scatter_of(left))
+                if p < CERTAIN:
+                    yield self._suspect(best, tested, errors, p)
+                    break
+            else:
+                return
+            every, tested = rest, left
+            taken.append(best.candidate)
+
+    def _all_tested(self, every: Sequence[Candidate], taken: Sequence[Candidate]) -> list[_Tested]:
+        """Return tests of mistakes beside others."""
+        W = np.concatenate([self._W, *(self._padded(c.white) for c in taken)], axis=1)
+        Q = np.linalg.qr(W)[0]
+        e = self._Y - Q @ (Q.T @ self._Y)
+        own = e[: len(e) - self._known]
+        candidates = [*every, *self.rows.pushed(own), *self.rows.shaken(own)]
+        return [one for c in candidates if (one := self._tested(c, Q, e)) is not None]
+
+    def _by_chance(self, one: _Tested, count: int, scatter: float) -> float:
+        """Return the probability that any of as many mistakes seems as significant by chance."""
+        return min(1.0, count * float(scipy.special.chdtrc(one.left.shape[1], one.chi2 / scatter)))
+
+    def _proved(self, tested: Sequence[_Tested], taken: Sequence[Candidate]) -> Iterator[tuple[_Tested, tuple[float, float]]]:
+        """Yield the sure ones, the most likely first, that predict stretches better that were not fitted, and errors [%]."""
+        before, count = self._held_out(taken), len(tested) + self.rows.looks
+        sure = [t for t in tested if t.gain > 0 and self._by_chance(t, count, 1.0) < CERTAIN]
+        for one in sorted(sure, key=lambda t: -t.gain)[:MOST]:
+            after = self._held_out([*taken, one.candidate])
+            # What happened once cannot be predicted; without it, the rest is.
+            j = int(np.argmax(np.log(before) - np.log(after)))
+            better = np.sum(np.log(after)) < np.sum(np.log(before)) and after[j] < WORTH * before[j]
+            if better or one.candidate.mistake is COLLISION:
+                yield one, (float(before[j]), float(after[j]))
+
+    @cached_property
+    def _known(self) -> int:
+        """Rows of what is known before."""
+        prior = self.problem.start.factor.prior
+        return 0 if prior is None else len(prior)
+
+    @cached_property
+    def _W(self) -> Array:
+        """Whitened W, and below what is known before, shape (r + m, p)."""
+        prior = self.problem.start.factor.prior
+        return np.concatenate(
+            [part.whitening.whiten(part.unbiased.W) for part in self.parts] + ([] if prior is None else [prior[:, :-1]])
+        )
+
+    @cached_property
+    def _Y(self) -> Array:
+        prior = self.problem.start.factor.prior
+        return np.concatenate(
+            [part.whitening.whiten(part.rows.Y[:, None])[:, 0] for part in self.parts]
+            + ([] if prior is None else [prior[:, -1]])
+        )
+
+    def _padded(self, columns: Array) -> Array:
+        return np.concatenate([columns, np.zeros((self._known, columns.shape[1]))])
+
+    def _tested(self, candidate: Candidate, Q: Array, e: Array) -> _Tested | None:
+        c = self._padded(candidate.white)
+        left = c - Q @ (Q.T @ c)
+        left -= Q @ (Q.T @ left)
+        size = np.linalg.norm(left, axis=0)
+        shown = size**2 > LEFT * np.sum(c**2, axis=0)
+        if not shown.any():
+            return None
+        # Columns that are nearly each other's multiples count by what they have in common.
+        U, s, axes = np.linalg.svd(left[:, shown] / size[shown], full_matrices=False)
+        some = s**2 > LEFT * s[0] ** 2
+        U, turn = U[:, some], (axes[some].T / s[some]) / size[shown][:, None]
+        b, own = U.T @ e, len(e) - self._known
+        rest = e - U @ b
+        each = zip(self.parts, self._split(U[:own]), self._split(rest[:own]), strict=True)
+        V = sum((_scatter(part, x, r) for part, x, r in each), start=np.zeros(()))
+        gain = self._unlikely(e[:own]) - self._unlikely(rest[:own]) - len(b) * np.log(own)
+        chi2 = float(b @ np.linalg.solve(V, b))
+        sizes, sigma = np.zeros((2, len(size)))
+        sizes[shown], sigma[shown] = turn @ b, np.sqrt(np.sum((turn @ V) * turn, axis=1))
+        if candidate.mistake.positive and sizes.min() < 0:
+            return None
+        return _Tested(candidate, U[:own], sizes, sigma, U[:own] @ b, chi2, gain)
+
+    def _split(self, x: Array) -> list[Array]:
+        return np.split(x, np.cumsum([len(part.rows.time) for part in self.parts])[:-1])
+
+    def _unlikely(self, e: Array) -> float:
+        """Return minus twice the logarithm of the likelihood, with a level of each kind."""
+        rows = self.problem.rows
+        squares = np.sum(rows.by_kind(e * rows.valid) ** 2, axis=-1)
+        return float(np.sum(rows.count * np.log(np.maximum(squares, TINY))))
+
+    def _suspect(self, best: _Tested, tested: Sequence[_Tested], errors: tuple[float, float], p: float) -> Suspect:
+        signal, candidate = best.signal, best.candidate
+        others = list[tuple[str, int | None]]()
+        for other in sorted(tested, key=lambda t: -t.gain):
+            key = other.candidate.key
+            explained = float(np.sum((other.left.T @ signal) ** 2))
+            if key != candidate.key and key not in others and explained > ALIKE * float(signal @ signal):
+                others.append(key)
+        return Suspect(
+            candidate.mistake.cause,
+            candidate.mistake.of,
+            candidate.joint,
+            tuple(best.size.tolist()),
+            tuple(best.sigma.tolist()),
+            candidate.mistake.unit,
+            p,
+            float(np.sqrt(best.chi2)),
+            tuple(others),
+            errors,
+            best.gain,
+            candidate.instant,
+        )
+
+    def _held_out(self, more: Sequence[Candidate]) -> Array:
+        """Return the errors of each joint on stretches that were not fitted [% of its torque], shape (joint,)."""
+        white = np.concatenate([self._W, *(self._padded(c.white) for c in more)], axis=1)
+        plain = np.concatenate([np.concatenate([part.rows.W for part in self.parts]), *(c.plain for c in more)], axis=1)
+        return _errors(self.problem, white, self._Y, plain)
+
+
+def _scatter_of(tested: Sequence[_Tested]) -> float:
+    """Return the variance of standardized tests, by the median of those of one column; at least 1, which it is of noise."""
+    alone = [one.chi2 for one in tested if one.left.shape[1] == 1]
+    return max(1.0, float(np.median(alone)) / MEDIAN) if alone else 1.0
+
+
+def held_out_errors(problem: Problem) -> Array:
+    """Return the rms errors of each joint on stretches of the rows that were not fitted [% of its torque], shape (joint,).
+
+    By weighted least squares, as fits of single stretches are by then.
+    """
+    rows, fit = problem.explicit.rows, problem.explicit.factors.fit(2)
+    weight = np.tile(fit.weight, len(rows.time) // rows.kinds) * rows.valid
+    return _errors(problem.explicit, rows.W * weight[:, None], rows.Y * weight, rows.W)
+
+
+def _errors(problem: Problem, white: Array, Y: Array, plain: Array) -> Array:
+    """Return what fits of `BLOCKS` - 1 stretches leave of the other, of rows (white, Y) that are made independent."""
+    rows, own = problem.rows, len(plain)
+    block = np.r_[np.arange(own) * BLOCKS // own, np.full(len(Y) - own, -1)]
+    errors = np.zeros(own)
+    for b in range(BLOCKS):
+        size = np.maximum(np.linalg.norm(white[block != b], axis=0), TINY)
+        x = np.linalg.lstsq(white[block != b] / size, Y[block != b], rcond=LEFT**2)[0] / size
+        mine = block[:own] == b
+        errors[mine] = rows.Y[mine] - plain[mine] @ x
+    squares, whole = (np.sum(rows.by_kind(x * rows.valid) ** 2, axis=-1) for x in (errors, rows.Y))
+    return np.asarray(100 * np.sqrt(np.maximum(squares, TINY) / np.maximum(whole, TINY)))
+
+
+def _scatter(part: LogRows, left: Array, rest: Array) -> Array:
+    """Return the covariance of left' rest, rest being as correlated as it is, and not less than white, shape (g, g)."""
+    to_rows = part.rows.maps[0]
+    lags = min(max(2, int(MEMORY * to_rows.signals.fs / to_rows.grid.step)), to_rows.grid.count)
+    c = np.stack([part.rows.by_kind(x) for x in left.T], axis=-1)
+    e = part.rows.by_kind(rest * part.rows.valid)
+    count = np.maximum(part.rows.count, 1)
+    taper = 0.5 + 0.5 * np.cos(np.pi * np.arange(lags) / lags)
+    each = [
+        np.einsum("k,kta,ktb->ab", np.sum(e[:, k:] * e[:, : e.shape[1] - k], axis=1) / count, c[:, k:], c[:, : c.shape[1] - k])
+        for k in range(lags)
+    ]
+    white = each[0]
+    size = np.sqrt(np.maximum(np.diagonal(white), TINY))
+    total = white + sum((w * (x + x.T) for w, x in zip(taper[1:], each[1:], strict=True)), start=np.zeros(()))
+    values, axes = np.linalg.eigh(total / np.outer(size, size))
+    return np.asarray((axes * np.maximum(values, 1.0)) @ axes.T * np.outer(size, size))

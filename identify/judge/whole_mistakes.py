@@ -1,0 +1,164 @@
+"""Mistakes that are not small: signs, exchanged torques, gravity that points elsewhere, torques that were not logged."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from idbench.identify.arrays import TINY, Array
+from idbench.identify.basis.tree_links import TreeLinks
+from idbench.identify.estimators.problem import Problem
+from idbench.identify.judge.suspects import Suspect, held_out_errors, suspects
+from idbench.identify.rows.factors import Factors
+
+POOR = 5.0
+"""Residuals [% of a joint's torque] above which more is tried than signs of torques: a wrong axis leaves tens."""
+
+SURELY = 40.0
+"""What a mistake takes of minus twice the logarithm of the likelihood at least: with rows that are correlated over ten of their
+steps, four sigma of independent ones."""
+
+RATES = (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)
+"""Rates of the clock, over the stated one, that are tried where something is wrong."""
+
+NOTHING_LEFT = 1 / 3
+"""Share of the largest error that the right sign or axis leaves at most: a wrong one also explains a part of other mistakes."""
+
+UPSIDE_DOWN, OFF = -1.0, 1e-3
+"""Factors of gravity: a robot on a ceiling, and torques without it, but for so little that parameters stay apart."""
+
+
+@dataclass(frozen=True)
+class _Tried:
+    cause: str
+    of: str
+    joint: int | None
+    size: float
+    problem: Problem
+    """The problem as it would be without the mistake."""
+
+
+def diagnosed(problem: Problem, X: Array) -> tuple[Suspect, ...]:
+    """Return what is wrong: a mistake that is not small, or small ones, whatever makes the rows most likely.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of one run, whose rows are kept.
+    X : Array, shape (p,)
+        Its estimate.
+    """
+    problem.require_rows("mistakes are looked for by rows, and ")
+    if (silent := _silent(problem.explicit)) is not None:
+        return (silent,)
+    small = suspects(problem, X)
+    whole = whole_mistake(problem, small[0].gain if small else 0.0)
+    return (whole,) if whole else small
+
+
+def whole_mistake(problem: Problem, small: float = 0.0) -> Suspect | None:
+    """Return the mistake without which the rows are by far most likely, by more than a `small` one; None where none is."""
+    explicit = problem.explicit
+    before = _unlikely(explicit.factors)
+    tried = [*_signs(explicit), *(_rates(explicit) if small else ())]
+    if _worst(explicit) > POOR:
+        tried += [*_exchanged(explicit), *_gravities(explicit), *_turned(explicit)]
+    gains = [before - _unlikely(each.problem.factors) for each in tried]
+    if not gains or max(gains) < max(SURELY, small):
+        return None
+    best = tried[int(np.argmax(gains))]
+    near = [each for each, gain in zip(tried, gains, strict=True) if gain > 0.9 * max(gains) and each is not best]
+    others = tuple(dict.fromkeys((each.cause, each.joint) for each in near))
+    errors = [held_out_errors(each) for each in (explicit, best.problem)]
+    k = int(np.argmax(np.log(errors[0]) - np.log(errors[1])))
+    if errors[1][k] > NOTHING_LEFT * errors[0][k]:
+        return None
+    found, gain = (float(errors[0][k]), float(errors[1][k])), float(max(gains))
+    return Suspect(best.cause, best.of, best.joint, (best.size,), (0.0,), "1", 0.0, float(np.sqrt(gain)), others, found, gain)
+
+
+def _silent(problem: Problem) -> Suspect | None:
+    """Return that the torque of the first joint whose torque never changes though it moves was not logged."""
+    for log in problem.logs:
+        silent = np.flatnonzero((np.ptp(log.tau, axis=-2) == 0) & (np.ptp(log.q, axis=-2) > 0))
+        if len(silent):
+            j = int(silent[0])
+            return Suspect("missing_torque", "torque", j, (1.0,), (0.0,), "1", 0.0, np.inf, (), (100.0, 0.0), np.inf)
+    return None
+
+
+def _unlikely(factors: Factors) -> float:
+    """Return minus twice the logarithm of the likelihood, with a level of noise of each kind."""
+    X = factors.fit(2).X
+    if not np.isfinite(X).all():
+        return np.inf
+    return float(np.sum(factors.rows * np.log(np.maximum(factors.squares(X), TINY))))
+
+
+def _worst(problem: Problem) -> float:
+    """Return the largest residual of a joint [% of its torque]."""
+    factors = problem.factors
+    whole = np.sum(factors.R[..., -1] ** 2, axis=-1)
+    return float(100 * np.sqrt(np.max(factors.squares(factors.fit(2).X) / np.maximum(whole, TINY))))
+
+
+def _changed(problem: Problem, q: Array | None = None, tau: Array | None = None) -> Problem:
+    """Return the problem with positions and torques multiplied by a matrix, joint by joint."""
+    logs = [
+        replace(log, q=log.q if q is None else log.q @ q, tau=log.tau if tau is None else log.tau @ tau) for log in problem.logs
+    ]
+    return problem.with_logs(logs)
+
+
+def _signs(problem: Problem) -> Iterator[_Tried]:
+    """Yield the torque of each joint with the other sign: of the factors alone the last column changes."""
+    n, factors = problem.basis.n, problem.factors
+    for j in range(n):
+        R = factors.R.copy()
+        R[j, :, -1] *= -1
+        flipped = replace(factors, R=R, _fits=[])
+        if _unlikely(flipped) < _unlikely(factors) - SURELY:
+            yield _Tried("sign", "torque", j, -1.0, _changed(problem, tau=_diagonal(n, j)))
+
+
+def _diagonal(n: int, j: int) -> Array:
+    return np.diag(np.where(np.arange(n) == j, -1.0, 1.0))
+
+
+def _rates(problem: Problem) -> Iterator[_Tried]:
+    """Yield other rates of the clock: times stated in other units, or a controller that is slower than it says."""
+    for rate in RATES:
+        logs = [replace(log, fs=log.fs * rate) for log in problem.logs]
+        yield _Tried("rate", "clock", None, rate - 1, problem.with_logs(logs))
+
+
+def _exchanged(problem: Problem) -> Iterator[_Tried]:
+    n = problem.basis.n
+    for j, k in combinations(range(n), 2):
+        order = np.arange(n)
+        order[[j, k]] = k, j
+        yield _Tried("exchanged", "torque", j, float(k + 1), _changed(problem, tau=np.eye(n)[order]))
+
+
+def _gravities(problem: Problem) -> Iterator[_Tried]:
+    """Yield gravity the other way, none, and along the other axes of the base."""
+    tree = next((block.tree for block in problem.basis.blocks if isinstance(block, TreeLinks)), None)
+    if tree is None or not np.any(tree.gravity):
+        return
+    g = float(np.linalg.norm(tree.gravity))
+    across = [sign * g * a for a in np.linalg.svd(tree.gravity[None])[2][1:] for sign in (1, -1)]
+    for factor, gravity in [(UPSIDE_DOWN, -tree.gravity), (OFF, OFF * tree.gravity), *((1.0, a) for a in across)]:
+        moved = replace(tree, gravity=gravity)
+        blocks = tuple(replace(b, tree=moved) if isinstance(b, TreeLinks) else b for b in problem.basis.blocks)
+        yield _Tried("gravity", "base", None, factor, problem.with_basis(replace(problem.basis, blocks=blocks)))
+
+
+def _turned(problem: Problem) -> Iterator[_Tried]:
+    """Yield the position of each joint with the other sign, and from other zeros."""
+    n = problem.basis.n
+    for j in range(n):
+        yield _Tried("sign", "position", j, -1.0, _changed(problem, q=_diagonal(n, j)))
+        for turn in (np.pi / 2, -np.pi / 2, np.pi):
+            moved = [replace(log, q=log.q - turn * (np.arange(n) == j)) for log in problem.logs]
+            yield _Tried("zero", "position", j, turn, problem.with_logs(moved))
