@@ -1,13 +1,13 @@
 """Logs identified by some models: the estimates, and what follows from them."""
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self, final
 
 import numpy as np
 
+from idbench.experiments.identification.diagnosis import Cause
 from idbench.experiments.identification.friction_choice import chosen_in_turns, masked_laws, suited_mask
-from idbench.experiments.identification.lack import advice_on_lack
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.prior_share import chosen_share
 from idbench.experiments.identification.rates import CONTROLLER, Rates
@@ -30,8 +30,8 @@ from idbench.identify import (
     encoder_steps,
 )
 from idbench.identify.judge.friction_choice import FrictionChoice
-from idbench.identify.judge.lack_of_fit import Lack, lack_of_fit
 from idbench.identify.judge.torque_interval import TorqueInterval, torque_interval
+from idbench.identify.judge.whole_mistakes import diagnosed
 from idbench.identify.rows.rows import Rows
 
 NOTHING = 1e-12
@@ -81,10 +81,10 @@ def _with_its_cause(found: "Fit", error: IdentificationError) -> IdentificationE
     if isinstance(error, ExcitationError) or found.solver.filtered:
         return error
     try:
-        lack = lack_of_fit(found.problem, ESTIMATORS.create("GLS").fit(found.problem.explicit).X)
+        suspects = diagnosed(found.problem, ESTIMATORS.create("GLS").fit(found.problem.explicit).X)
     except IdentificationError:
         return error
-    causes = list(advice_on_lack(lack, found.robot_model.robot.joints))
+    causes = [Cause(each, found.robot_model, found.logs.fitted[0]).advice for each in suspects]
     return IdentificationError(f"{error}; with GLS, {'; '.join(causes)}") if causes else error
 
 
@@ -134,12 +134,13 @@ class Fit:
         return self.request.solver
 
     @cached_property
-    def lack(self) -> tuple[Lack, ...]:
-        """What the residual torques depend on, the most significant first; nothing where the rows do not allow the test."""
+    def diagnosis(self) -> tuple[Cause, ...] | None:
+        """What is wrong, as residuals show it; None where the rows do not allow the tests."""
         try:
-            return lack_of_fit(self.problem, self.estimates[self.leading].X)
-        except IdentificationError:  # an estimate is not lost because its test is
-            return ()
+            suspects = diagnosed(self.problem, self.estimates[self.leading].X)
+        except (IdentificationError, np.linalg.LinAlgError):  # an estimate is not lost because its tests are
+            return None
+        return tuple(Cause(each, self.robot_model, self.logs.fitted[0]) for each in suspects)
 
     @cached_property
     def truth(self) -> dict[str, float] | None:
@@ -267,7 +268,7 @@ class Fit:
             "reversals_left_out": self.left_out,
             "found_delay": None if delay is None else {"delay": delay[0], "sigma": delay[1]},
             "noise": self.noise,
-            "lack_of_fit": [asdict(lack) for lack in self.lack],
+            "diagnosis": [cause.summary() for cause in self.diagnosis or ()],
             "models": models,
             "failures": self.failures,
             "hidden": list(self.hidden),

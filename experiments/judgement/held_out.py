@@ -9,6 +9,7 @@ from typing import Any, Self, final
 import numpy as np
 
 from idbench.experiments.identification.consistent_robot import WrittenRobot
+from idbench.experiments.identification.diagnosis import Cause
 from idbench.experiments.identification.fit import Fit, fit
 from idbench.experiments.judgement.warnings import wrong_sign
 from idbench.experiments.results.writing import finite
@@ -42,17 +43,19 @@ class Verdict:
     """Its torque errors."""
     wrong: tuple[str, ...] = ()
     """Which of the fitted torques have the wrong sign, and why."""
+    causes: tuple[Cause, ...] = ()
+    """Mistakes that the fit shows: its parameters may be off by more than the torques."""
     unsimulated: str = ""
     """Why the identified robot was not simulated; empty if it was."""
 
     @classmethod
-    def of(cls, judged: Fit, validation: Validation, unsimulated: str = "") -> Self:
+    def of(cls, judged: Fit, validation: Validation, causes: tuple[Cause, ...] = (), unsimulated: str = "") -> Self:
         """Return the verdict on a model of a fit."""
-        return cls(judged.robot_model.robot.joints, validation, tuple(wrong_sign(judged)), unsimulated)
+        return cls(judged.robot_model.robot.joints, validation, tuple(wrong_sign(judged)), causes, unsimulated)
 
     @cached_property
     def word(self) -> str:
-        """good, fair or poor; unsure where noise or sigma would hide a poor model."""
+        """good, fair or poor; unsure where noise or sigma would hide a poor model. None is good that shows a mistake."""
         if self.wrong:
             return "poor"
         beyond, hidden = (
@@ -62,12 +65,13 @@ class Verdict:
             return "poor"
         if hidden > FAIR or not np.isfinite(self.validation.percent).any():
             return "unsure"
-        return "good" if beyond <= GOOD else "fair"
+        return "good" if beyond <= GOOD and not self.causes else "fair"
 
     @cached_property
     def reasons(self) -> list[str]:
         """Why, the worst joint first."""
-        return [*(reason.partition(":")[0] for reason in self.wrong), *self._errors(), *self._left()]
+        signs = [reason.partition(":")[0] for reason in self.wrong]
+        return [*signs, *self._errors(), *self._left(), *(cause.words for cause in self.causes[:1])]
 
     def _errors(self) -> Iterator[str]:
         validation, joints = self.validation, self.joints
@@ -122,7 +126,7 @@ LONGEST = 60.0
 
 def on_log(result: Fit, name: str, log: MotionLog) -> "HeldOut":
     """Return a fit on another log; of a long one on its beginning."""
-    return HeldOut(result, manageable([log])[0], f"held-out log {name}")
+    return HeldOut(result, manageable([log])[0], f"held-out log {name}", result.diagnosis or ())
 
 
 def on_last_quarter(result: Fit) -> "HeldOut":
@@ -132,7 +136,7 @@ def on_last_quarter(result: Fit) -> "HeldOut":
     fitted = (*logs.fitted[:k], rest, *logs.fitted[k + 1 :])
     laws = "" if result.choice is None else ", with the laws of friction that all of it chose"
     title = f"the last quarter of {logs.longest_name}, by a fit of the rest{laws}"
-    return HeldOut(fit(result.request, replace(logs, fitted=fitted)), manageable([end])[0], title)
+    return HeldOut(fit(result.request, replace(logs, fitted=fitted)), manageable([end])[0], title, result.diagnosis or ())
 
 
 @final
@@ -146,6 +150,8 @@ class HeldOut:
     """The log."""
     title: str
     """What to call it."""
+    causes: tuple[Cause, ...] = ()
+    """Mistakes that the whole fit shows."""
 
     @cached_property
     def problem(self) -> Problem:
@@ -171,7 +177,7 @@ class HeldOut:
     def verdicts(self) -> dict[str, Verdict]:
         """What to think of each model."""
         return {
-            model: Verdict.of(self.fit, validation, unsimulated=why if isinstance(why := self.replays[model], str) else "")
+            model: Verdict.of(self.fit, validation, self.causes, why if isinstance(why := self.replays[model], str) else "")
             for model, validation in self.torques.items()
         }
 

@@ -10,7 +10,6 @@ import numpy as np
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.friction_choice import chosen_friction
-from idbench.experiments.identification.lack import advice_on_lack
 from idbench.experiments.identification.log_warnings import unusable, warnings_of_log
 from idbench.experiments.identification.prior_share import chosen_share
 from idbench.experiments.identification.request import Request
@@ -163,7 +162,7 @@ def checks(judgement: Judgement, *, delay: bool, trials: bool = True) -> dict[st
         # Friction absorbs a wrong delay, and the verdict may be good: the log itself is asked.
         found[DELAY] += delay_advice(result) if delay else ()
         found[MODEL] += Remedies(hardest).options() if trials and not judgement.good else ()
-    found[MODEL] += advice_on_lack(result.lack, result.robot_model.robot.joints)
+    found[MODEL] += [cause.advice for cause in result.diagnosis or ()]
     return found
 
 

@@ -7,14 +7,13 @@ import numpy as np
 import numpy.typing as npt
 
 from idbench.experiments.identification.fit import Fit
-from idbench.experiments.identification.lack import lacking
 from idbench.experiments.recording.columns import time_columns
 from idbench.experiments.recording.stream import Stream
 from idbench.experiments.reports.estimates import EstimatesTable, markdown
 from idbench.identify import Array
 
-WHERE = {"velocity": "friction", "position": "friction", "load": "friction", "time": "parameters"}
-"""Tabs that show what residuals depend on."""
+WHERE = {"friction": "friction", "drive": "friction"}
+"""Tabs that show residuals over what a mistake is one of; of others that of the parameters."""
 
 
 def estimates_table(fit: Fit) -> str:
@@ -38,10 +37,8 @@ def _escaped(text: str) -> str:
 
 def _pointers(fit: Fit) -> Iterator[str]:
     """Yield where to look at what the fit lacks."""
-    wrong = lacking(fit.lack)
-    for over, tab in WHERE.items():
-        if joints := [fit.robot_model.robot.joints[lack.joint] for lack in wrong if lack.over == over]:
-            yield f"The residual torque of {', '.join(joints)} depends on {over}: tab *{tab}*."
+    for cause in fit.diagnosis or ():
+        yield f"{cause.words}: tab *{WHERE.get(cause.suspect.of, 'parameters')}*."
 
 
 def noise_table(fit: Fit, joints: Sequence[str]) -> str:

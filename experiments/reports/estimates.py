@@ -175,7 +175,8 @@ def _found(one: HeldOut | None) -> str:
     word, wrong = one.verdicts[model].word, one.verdicts[model].wrong
     if wrong:
         return f"Result: {word} ({model} model): {wrong[0].partition(':')[0]}"
-    return f"Result: {word} ({model} model), torque errors of at most {error_percentage(worst)} on {_short(one.title)}"
+    found = f"Result: {word} ({model} model), torque errors of at most {error_percentage(worst)} on {_short(one.title)}"
+    return "; ".join([found, *(cause.words for cause in one.causes[:1])])
 
 
 def _short(title: str) -> str:
@@ -184,6 +185,9 @@ def _short(title: str) -> str:
 
 
 def _next(judgement: Judgement, first: str) -> str:
+    """Return what to do: what mends the first mistake that the fit shows, and was proved to, else what is suspicious."""
+    for cause in judgement.fit.diagnosis or ():
+        return f"next: {cause.mends}"
     if first:
         return f"next: check {first}"
     if judgement.good:

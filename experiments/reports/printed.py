@@ -10,9 +10,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from idbench.experiments.identification.diagnosis import words_of_diagnosis
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.iterations import words_of_iterations
-from idbench.experiments.identification.lack import words_of_lack
 from idbench.experiments.judgement.held_out import HeldOut
 from idbench.experiments.judgement.judgement import Unjudged
 from idbench.experiments.judgement.remedies import SURE
@@ -103,7 +103,7 @@ def _told(fit: Fit) -> Iterator[str]:
         yield f"slow motion is masked, because its friction differs from that of faster motion: {each} (--mask-speed)"
     yield _noise(fit)
     yield from words_of_uncertainty(fit)
-    yield words_of_lack(fit.lack, fit.robot_model)
+    yield words_of_diagnosis(fit.diagnosis)
     yield from words_of_iterations(fit)
     for model, why in fit.left_out.items():
         yield f"{model}: reversals are left out, as ML does: {why}"

@@ -9,13 +9,13 @@ import numpy as np
 from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.estimators.log_rows import LogRows
+from idbench.identify.judge.fitted_motion import FittedMotion
 from idbench.identify.judge.mistakes import (
     BASE,
     COLLISION,
     FROM_AN_INSTANT,
     OF_JOINTS,
     OF_ROBOT,
-    FittedMotion,
     Mistake,
     Rows,
     not_zero,

@@ -5,21 +5,17 @@ leave, such as friction that curves, has a line for each.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
-from typing import NamedTuple, TypeAlias, final
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from idbench.identify.arrays import Array, combined
-from idbench.identify.basis.basis import Basis
-from idbench.identify.basis.block import RIGID, Parameter
+from idbench.identify.arrays import Array
+from idbench.identify.basis.block import Parameter
 from idbench.identify.basis.tree_links import KINDS, TreeLinks
 from idbench.identify.data.kinematics import KinematicTree
-from idbench.identify.signals.signals import State
-
-SMALL = 1e-4
-"""Step of differences [rad, m, 1], small beside what robots move, large beside rounding."""
+from idbench.identify.judge.fitted_motion import SMALL, FittedMotion
 
 CREEP = (0.1, 0.3)
 """Velocities over a joint's rms speed above which friction near rest fades."""
@@ -34,89 +30,6 @@ Rows: TypeAlias = Mapping[int, Array]
 """Torques by the joint, shape (time,); none of the others."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class FittedMotion:
-    """A fitted robot along the motion of a log, at some instants of it."""
-
-    basis: Basis
-    """The robot."""
-    X: Array
-    """Its parameters, shape (p,)."""
-    state: State
-    """Its motion, shape (joint, time)."""
-    t: Array
-    """Instants [s], shape (time,)."""
-
-    @property
-    def n(self) -> int:
-        """Number of joints."""
-        return self.basis.n
-
-    @cached_property
-    def torque(self) -> Array:
-        """The predicted torque, shape (joint, time)."""
-        return self._of(self.basis, self.X, self.state)
-
-    @cached_property
-    def rigid(self) -> tuple[Basis, Array]:
-        """Links, and rotors, alone."""
-        basis = self.basis.only(RIGID)
-        return basis, self.X[[self.basis.places[p] for p in basis.parameters]]
-
-    @cached_property
-    def load(self) -> Array:
-        """Torque of links and rotors, shape (joint, time)."""
-        return self._of(*self.rigid, self.state)
-
-    @cached_property
-    def rates(self) -> tuple[Array, Array]:
-        """First and second time derivative of the load, shape (joint, time)."""
-        first = np.gradient(self.load, self.t, axis=-1)
-        return first, np.gradient(first, self.t, axis=-1)
-
-    def moved(self, j: int, x: Array, xd: Array, xdd: Array) -> Array:
-        """Return the derivative of the torque by a motion of joint j, x with its derivatives, shape (joint, time)."""
-        size = SMALL / max(float(np.abs(x).max()), 1e-12)
-        q, qd, qdd = (np.array(each) for each in (self.state.q, self.state.qd, self.state.qdd))
-        for each, change in ((q, x), (qd, xd), (qdd, xdd)):
-            each[j] += size * change
-        return np.asarray((self._of(*self.rigid, _state(q, qd, qdd)) - self.load) / size)
-
-    def faster(self) -> Array:
-        """Return the derivative of the torque by the rate of the clock: qd (1 + h), qdd (1 + 2 h)."""
-        state, h = self.state, SMALL
-        ahead = _state(state.q, state.qd * (1 + h), state.qdd * (1 + 2 * h))
-        return np.asarray((self._of(*self.rigid, ahead) - self.load) / h) + self._friction_slope()
-
-    def on(self, changed: Callable[[KinematicTree], KinematicTree]) -> Array | None:
-        """Return what the torque of a robot whose tree is changed by `SMALL` has more, over that; None if it has no tree."""
-        basis, X = self.rigid
-        blocks = tuple(replace(b, tree=changed(b.tree)) if isinstance(b, TreeLinks) else b for b in basis.blocks)
-        if self.tree is None:
-            return None
-        return np.asarray((self._of(replace(basis, blocks=blocks), X, self.state) - self.load) / SMALL)
-
-    @cached_property
-    def tree(self) -> KinematicTree | None:
-        """Of the links, if they are those of a tree."""
-        return next((block.tree for block in self.basis.blocks if isinstance(block, TreeLinks)), None)
-
-    def _friction_slope(self) -> Array:
-        """Return qd times the slope of what is no rigid torque."""
-        state, h = self.state, SMALL
-        rest, ahead = self.torque - self.load, _state(state.q, state.qd * (1 + h), state.qdd)
-        more = self._of(self.basis, self.X, ahead) - self._of(*self.rigid, ahead)
-        return np.asarray((more - rest) / h)
-
-    def _of(self, basis: Basis, X: Array, state: State) -> Array:
-        return combined(basis.explicit(replace(state, conditions=self.state.conditions)), X, np.zeros(state.q.shape))
-
-
-def _state(q: Array, qd: Array, qdd: Array) -> State:
-    return State(q, qd, lambda _: qdd)
-
-
 class Mistake(NamedTuple):
     """A mistake, and what it leaves unexplained."""
 
@@ -128,6 +41,8 @@ class Mistake(NamedTuple):
     """Of its size."""
     of: str = "torque"
     """What it is a mistake of: torque, position, friction, drive, base, link or clock."""
+    setting: float = 0.0
+    """Of cogging: waves a turn."""
     positive: bool = False
     """Whether nothing makes a size below zero, which then is noise of the positions: compliance, play, an inertia, a load."""
 
@@ -155,8 +70,8 @@ def _zero(m: FittedMotion, j: int) -> Rows:
 
 
 def _scale(m: FittedMotion, j: int) -> Rows:
-    q, qd, qdd = m.state.q[j], m.state.qd[j], m.state.qdd[j]
-    return _all(-m.moved(j, q, qd, qdd))
+    state = m.state
+    return _all(-m.moved(j, state.q[j], state.qd[j], state.qdd[j]))
 
 
 def _late_position(m: FittedMotion, j: int) -> Rows:
@@ -165,7 +80,7 @@ def _late_position(m: FittedMotion, j: int) -> Rows:
 
 
 def _eccentric(m: FittedMotion, j: int) -> tuple[Rows, ...]:
-    q, qd, qdd = m.state.q[j], m.state.qd[j], m.state.qdd[j]
+    q, qd, qdd = (x[j] for x in (m.state.q, m.state.qd, m.state.qdd))
     sin, cos = np.sin(q), np.cos(q)
     return (
         _all(-m.moved(j, sin, cos * qd, cos * qdd - sin * qd**2)),
@@ -250,8 +165,7 @@ def _axis_turned(tree: KinematicTree, j: int, by: Array) -> KinematicTree:
 def _rotation(v: Array) -> Array:
     """Return the rotation by a small vector (Rodrigues)."""
     angle = float(np.linalg.norm(v))
-    x, y, z = (float(each) / angle for each in v)
-    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    K = np.cross(np.eye(3), v / angle)
     return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * K @ K)
 
 
@@ -278,7 +192,12 @@ def _drag(m: FittedMotion, j: int) -> float:
     return _friction(m, j) / _rms(m.state.qd[j]) ** 2
 
 
-def _every(f: Signal, scale: Callable[[FittedMotion, int], float] = lambda m, j: 1.0) -> Columns:
+def _alike(m: FittedMotion, j: int) -> float:
+    del m, j
+    return 1.0
+
+
+def _every(f: Signal, scale: Callable[[FittedMotion, int], float] = _alike) -> Columns:
     """Return a column of all joints, whose drives are alike: each has its signal, times a scale of its own."""
     return lambda m, _: {j: scale(m, j) * f(m, j) for j in range(m.n)}
 
@@ -331,7 +250,7 @@ OF_JOINTS: tuple[Mistake, ...] = (
     Mistake("warming", _own(lambda m, j: (m.t - m.t[0]) * m.state.qd[j]), "N m/rad", "friction"),
     Mistake("warming", _own(lambda m, j: (m.t - m.t[0]) * np.sign(m.state.qd[j])), "N m/s", "friction"),
     *(Mistake("hysteresis", _own(_turning(share)), "N m", "friction", positive=True) for share in PRESLIDING),
-    *(Mistake("cogging", _cogging(k), "N m", "drive") for k in TURNS),
+    *(Mistake("cogging", _cogging(k), "N m", "drive", k) for k in TURNS),
     Mistake("backlash", _backlash, "rad", "drive", positive=True),
     Mistake("elasticity", _elasticity, "rad/(N m)", "drive", positive=True),
     *(Mistake("length", _length(axis), "m", "link") for axis in range(3)),

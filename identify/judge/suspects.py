@@ -16,15 +16,16 @@ from idbench.identify.judge.mistake_rows import Candidate, MistakeRows
 from idbench.identify.judge.mistakes import COLLISION
 
 LEFT = 1e-3
-"""Share of a column's squares that parameters must leave for a mistake to be distinct from them. With 1e-4, noise of encoders in
-slow motion is called a tilt in 3 of 24 logs without a fault."""
+"""Share of a column's squares that parameters must leave for a mistake to be distinct from them. With 1e-4, noise of encoders
+in slow motion is called a tilt in 3 of 24 logs without a fault."""
 
-CERTAIN = 1e-5
+CERTAIN = 1e-6
 """Probability that any of all mistakes seems as significant by chance, below which one is suspected. Counts of encoders are not
 Gaussian: with 1e-3, 5 of 120 logs without a fault, of four robots, have a suspect, all with 12 bits."""
 
-WORTH = 0.99
-"""Share of an error on stretches that were not fitted that a mistake may leave: less of a gain is of no use."""
+WORTH, MATTERS = 0.99, 0.02
+"""Share of an error on stretches that were not fitted that a mistake may leave, and error [%] below which none matters: a chain
+has errors of its own, of some 1e-5 %, and no drive is known to a fiftieth of a per cent."""
 
 ALIKE = 0.9
 """Share of what a mistake explains that another one must explain to be its alternative."""
@@ -66,6 +67,8 @@ class Suspect:
     """Largest error of a torque that changes, on stretches that were not fitted, without and with it [%]."""
     gain: float
     """What it takes of minus twice the logarithm of the likelihood."""
+    setting: float = 0.0
+    """Of cogging: waves a turn."""
     instant: float | None = None
     """When it happened, or from when on it is there [s]."""
 
@@ -77,7 +80,7 @@ def suspects(problem: Problem, X: Array) -> tuple[Suspect, ...]:
 
         b = c' r / c'c',   var b = sum over kinds and lags of rho(l) (c' * c')(l) / (c'c')^2
 
-    rho being the autocorrelation of what is left of the residuals with it (Hann taper, `MEMORY`), not less than that of white
+    rho being the autocorrelation of the residuals with it (Hann taper, `MEMORY`), not less than that of white
     ones. Of those that are sure that counts which makes the rows most likely.
 
     Parameters
@@ -110,10 +113,6 @@ class _Tested:
 class _Search:
     problem: Problem
     rows: MistakeRows
-
-    @property
-    def parts(self) -> Sequence[LogRows]:
-        return self.problem.parts
 
     def found(self) -> Iterator[Suspect]:
         """Yield mistakes, each the most likely one beside those before: c(k+1) = argmax gain(c | W, c(1), ..., c(k)).
@@ -156,8 +155,8 @@ class _Search:
             after = self._held_out([*taken, one.candidate])
             # What happened once cannot be predicted; without it, the rest is.
             j = int(np.argmax(np.log(before) - np.log(after)))
-            better = np.sum(np.log(after)) < np.sum(np.log(before)) and after[j] < WORTH * before[j]
-            if better or one.candidate.mistake is COLLISION:
+            better = np.sum(np.log(after)) < np.sum(np.log(before)) and max(after[j], MATTERS) < WORTH * before[j]
+            if better or (one.candidate.mistake is COLLISION and before.max() > MATTERS):
                 yield one, (float(before[j]), float(after[j]))
 
     @cached_property
@@ -171,14 +170,14 @@ class _Search:
         """Whitened W, and below what is known before, shape (r + m, p)."""
         prior = self.problem.start.factor.prior
         return np.concatenate(
-            [part.whitening.whiten(part.unbiased.W) for part in self.parts] + ([] if prior is None else [prior[:, :-1]])
+            [part.whitening.whiten(part.unbiased.W) for part in self.problem.parts] + ([] if prior is None else [prior[:, :-1]])
         )
 
     @cached_property
     def _Y(self) -> Array:
         prior = self.problem.start.factor.prior
         return np.concatenate(
-            [part.whitening.whiten(part.rows.Y[:, None])[:, 0] for part in self.parts]
+            [part.whitening.whiten(part.rows.Y[:, None])[:, 0] for part in self.problem.parts]
             + ([] if prior is None else [prior[:, -1]])
         )
 
@@ -199,7 +198,7 @@ class _Search:
         U, turn = U[:, some], (axes[some].T / s[some]) / size[shown][:, None]
         b, own = U.T @ e, len(e) - self._known
         rest = e - U @ b
-        each = zip(self.parts, self._split(U[:own]), self._split(rest[:own]), strict=True)
+        each = zip(self.problem.parts, self._split(U[:own]), self._split(rest[:own]), strict=True)
         V = sum((_scatter(part, x, r) for part, x, r in each), start=np.zeros(()))
         gain = self._unlikely(e[:own]) - self._unlikely(rest[:own]) - len(b) * np.log(own)
         chi2 = float(b @ np.linalg.solve(V, b))
@@ -210,7 +209,7 @@ class _Search:
         return _Tested(candidate, U[:own], sizes, sigma, U[:own] @ b, chi2, gain)
 
     def _split(self, x: Array) -> list[Array]:
-        return np.split(x, np.cumsum([len(part.rows.time) for part in self.parts])[:-1])
+        return np.split(x, np.cumsum([len(part.rows.time) for part in self.problem.parts])[:-1])
 
     def _unlikely(self, e: Array) -> float:
         """Return minus twice the logarithm of the likelihood, with a level of each kind."""
@@ -238,13 +237,14 @@ class _Search:
             tuple(others),
             errors,
             best.gain,
+            candidate.mistake.setting,
             candidate.instant,
         )
 
     def _held_out(self, more: Sequence[Candidate]) -> Array:
         """Return the errors of each joint on stretches that were not fitted [% of its torque], shape (joint,)."""
         white = np.concatenate([self._W, *(self._padded(c.white) for c in more)], axis=1)
-        plain = np.concatenate([np.concatenate([part.rows.W for part in self.parts]), *(c.plain for c in more)], axis=1)
+        plain = np.concatenate([np.concatenate([part.rows.W for part in self.problem.parts]), *(c.plain for c in more)], axis=1)
         return _errors(self.problem, white, self._Y, plain)
 
 

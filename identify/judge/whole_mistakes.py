@@ -15,7 +15,7 @@ from idbench.identify.rows.factors import Factors
 POOR = 5.0
 """Residuals [% of a joint's torque] above which more is tried than signs of torques: a wrong axis leaves tens."""
 
-SURELY = 40.0
+DECISIVE = 40.0
 """What a mistake takes of minus twice the logarithm of the likelihood at least: with rows that are correlated over ten of their
 steps, four sigma of independent ones."""
 
@@ -25,8 +25,8 @@ RATES = (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)
 NOTHING_LEFT = 1 / 3
 """Share of the largest error that the right sign or axis leaves at most: a wrong one also explains a part of other mistakes."""
 
-UPSIDE_DOWN, OFF = -1.0, 1e-3
-"""Factors of gravity: a robot on a ceiling, and torques without it, but for so little that parameters stay apart."""
+ALMOST_NONE = 1e-3
+"""Share of gravity in torques that are without it: so little that parameters stay apart."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class _Tried:
     cause: str
     of: str
     joint: int | None
-    size: float
+    size: tuple[float, ...]
     problem: Problem
     """The problem as it would be without the mistake."""
 
@@ -65,7 +65,7 @@ def whole_mistake(problem: Problem, small: float = 0.0) -> Suspect | None:
     if _worst(explicit) > POOR:
         tried += [*_exchanged(explicit), *_gravities(explicit), *_turned(explicit)]
     gains = [before - _unlikely(each.problem.factors) for each in tried]
-    if not gains or max(gains) < max(SURELY, small):
+    if not gains or max(gains) < max(DECISIVE, small):
         return None
     best = tried[int(np.argmax(gains))]
     near = [each for each, gain in zip(tried, gains, strict=True) if gain > 0.9 * max(gains) and each is not best]
@@ -75,7 +75,7 @@ def whole_mistake(problem: Problem, small: float = 0.0) -> Suspect | None:
     if errors[1][k] > NOTHING_LEFT * errors[0][k]:
         return None
     found, gain = (float(errors[0][k]), float(errors[1][k])), float(max(gains))
-    return Suspect(best.cause, best.of, best.joint, (best.size,), (0.0,), "1", 0.0, float(np.sqrt(gain)), others, found, gain)
+    return Suspect(best.cause, best.of, best.joint, best.size, (0.0,), "1", 0.0, float(np.sqrt(gain)), others, found, gain)
 
 
 def _silent(problem: Problem) -> Suspect | None:
@@ -118,8 +118,8 @@ def _signs(problem: Problem) -> Iterator[_Tried]:
         R = factors.R.copy()
         R[j, :, -1] *= -1
         flipped = replace(factors, R=R, _fits=[])
-        if _unlikely(flipped) < _unlikely(factors) - SURELY:
-            yield _Tried("sign", "torque", j, -1.0, _changed(problem, tau=_diagonal(n, j)))
+        if _unlikely(flipped) < _unlikely(factors) - DECISIVE:
+            yield _Tried("sign", "torque", j, (-1.0,), _changed(problem, tau=_diagonal(n, j)))
 
 
 def _diagonal(n: int, j: int) -> Array:
@@ -130,7 +130,7 @@ def _rates(problem: Problem) -> Iterator[_Tried]:
     """Yield other rates of the clock: times stated in other units, or a controller that is slower than it says."""
     for rate in RATES:
         logs = [replace(log, fs=log.fs * rate) for log in problem.logs]
-        yield _Tried("rate", "clock", None, rate - 1, problem.with_logs(logs))
+        yield _Tried("rate", "clock", None, (rate - 1,), problem.with_logs(logs))
 
 
 def _exchanged(problem: Problem) -> Iterator[_Tried]:
@@ -138,7 +138,7 @@ def _exchanged(problem: Problem) -> Iterator[_Tried]:
     for j, k in combinations(range(n), 2):
         order = np.arange(n)
         order[[j, k]] = k, j
-        yield _Tried("exchanged", "torque", j, float(k + 1), _changed(problem, tau=np.eye(n)[order]))
+        yield _Tried("exchanged", "torque", j, (k + 1.0,), _changed(problem, tau=np.eye(n)[order]))
 
 
 def _gravities(problem: Problem) -> Iterator[_Tried]:
@@ -148,17 +148,19 @@ def _gravities(problem: Problem) -> Iterator[_Tried]:
         return
     g = float(np.linalg.norm(tree.gravity))
     across = [sign * g * a for a in np.linalg.svd(tree.gravity[None])[2][1:] for sign in (1, -1)]
-    for factor, gravity in [(UPSIDE_DOWN, -tree.gravity), (OFF, OFF * tree.gravity), *((1.0, a) for a in across)]:
+    for gravity in (-tree.gravity, ALMOST_NONE * tree.gravity, *across):
         moved = replace(tree, gravity=gravity)
         blocks = tuple(replace(b, tree=moved) if isinstance(b, TreeLinks) else b for b in problem.basis.blocks)
-        yield _Tried("gravity", "base", None, factor, problem.with_basis(replace(problem.basis, blocks=blocks)))
+        yield _Tried(
+            "gravity", "base", None, tuple(gravity.tolist()), problem.with_basis(replace(problem.basis, blocks=blocks))
+        )
 
 
 def _turned(problem: Problem) -> Iterator[_Tried]:
     """Yield the position of each joint with the other sign, and from other zeros."""
     n = problem.basis.n
     for j in range(n):
-        yield _Tried("sign", "position", j, -1.0, _changed(problem, q=_diagonal(n, j)))
+        yield _Tried("sign", "position", j, (-1.0,), _changed(problem, q=_diagonal(n, j)))
         for turn in (np.pi / 2, -np.pi / 2, np.pi):
             moved = [replace(log, q=log.q - turn * (np.arange(n) == j)) for log in problem.logs]
-            yield _Tried("zero", "position", j, turn, problem.with_logs(moved))
+            yield _Tried("zero", "position", j, (turn,), problem.with_logs(moved))

@@ -1,0 +1,199 @@
+"""What is wrong with a fit, in words, and the option or the line of a file that mends it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, final
+
+import numpy as np
+
+from idbench.experiments.identification.friction_laws import said
+from idbench.experiments.identification.robot_model import RobotModel
+from idbench.experiments.text import error_percentage
+from idbench.identify import Array, MotionLog
+from idbench.identify.judge.suspects import Suspect
+
+
+class Wording(NamedTuple):
+    """How a cause is called, and mended."""
+
+    what: str
+    """What is wrong, {size} being how much."""
+    mend: str = ""
+    """An option, {j} being the joint as options name it; empty if it is no option."""
+    by: str = ""
+    """What else mends it."""
+
+
+WORDINGS: Mapping[tuple[str, str], Wording] = {
+    ("gain", "torque"): Wording("torque constant {size} too large", "--gain {gains}"),
+    ("sign", "torque"): Wording("the torque has the other sign", "--gain {gains}"),
+    ("sign", "position"): Wording(
+        "the position has the other sign", by="turn the axis in the robot's file, or the sign in the log"
+    ),
+    ("offset", "torque"): Wording("torque offset of {size}", "--add offset"),
+    ("drift", "torque"): Wording("the torque drifts by {size}", by="a warm sensor, or a shorter log"),
+    ("saturation", "torque"): Wording(
+        "torque constant that falls with the torque, or a limit", by="slower motion, or lighter loads"
+    ),
+    ("dead_band", "torque"): Wording("dead band of the torque, {size}", by="its calibration"),
+    ("delay", "torque"): Wording("torque late by {size}, or lagging", "--torque-delay {delay}"),
+    ("delay", "position"): Wording("position late by {size}, or lagging", "--torque-delay {delay}"),
+    ("zero", "position"): Wording(
+        "zero of the position off by {size}", by="subtract it from the joint's positions, or turn the link's frame in the file"
+    ),
+    ("scale", "position"): Wording("positions {size} too large", by="the scale of the encoder, or its unit"),
+    ("slip", "position"): Wording("position slips by {size} at {instant}", by="the log up to there, or the encoder"),
+    ("eccentric", "position"): Wording("eccentric encoder, {size}", by="the encoder's mounting, or a table of its errors"),
+    ("rotor", "drive"): Wording("rotor inertia of {size} is missing", "--armature all"),
+    ("coupled_rotor", "drive"): Wording("its rotor also turns with the next joint, {size}", "--coupling {coupling}"),
+    ("spring", "drive"): Wording(
+        "a spring of {size}", by="stiffness and springref of the joint in the robot's file, or --balancer"
+    ),
+    ("load", "friction"): Wording("friction grows with the load, by {size}", "--friction {j}standard+load"),
+    ("velocity", "friction"): Wording("friction bends over velocity", "--friction {j}standard+stribeck"),
+    ("asymmetry", "friction"): Wording("friction differs by direction", "--friction {j}asymmetric"),
+    ("warming", "friction"): Wording(
+        "friction changes with time, as of a robot that warms up", by="a log of a warm robot, or its temperature"
+    ),
+    ("hysteresis", "friction"): Wording(
+        "friction turns gradually after a reversal", by="a larger --mask-speed, or longer strokes"
+    ),
+    ("cogging", "drive"): Wording("cogging of {setting:g} waves a turn, {size}", "--friction {j}standard+cogging:{setting:g}"),
+    ("backlash", "drive"): Wording("play of {size}", by="positions measured at the link"),
+    ("elasticity", "drive"): Wording("compliance of {size}", by="positions measured at the link, or slower motion"),
+    ("length", "link"): Wording("origin of the joint off by {size}", by="its origin in the robot's file"),
+    ("axis", "link"): Wording("axis turned by {size}", by="its axis in the robot's file"),
+    ("payload", "link"): Wording("a payload from {instant} on", by="the log up to there, or idbench payload"),
+    ("collision", "torque"): Wording("a push of {size} at {instant}", by="the log without it"),
+    ("tilt", "base"): Wording("the base is tilted by {size}", "--gravity {gravity}"),
+    ("gravity", "base"): Wording("gravity points elsewhere, or is not in the torques", "--gravity {gravity}"),
+    ("base_motion", "base"): Wording("the base moves, {size}", by="a stiffer stand, or slower motion"),
+    ("rate", "clock"): Wording("the motion is {size} faster than t says", by="the unit of t, or fs"),
+    ("clock_drift", "clock"): Wording(
+        "clocks of positions and torques drift apart by {size}", by="one clock, or a shorter log"
+    ),
+    ("exchanged", "torque"): Wording("its torque is exchanged with that of {other}", by="the order of the columns: --columns"),
+    ("missing_torque", "torque"): Wording("its torque was not logged", by="a log with it"),
+}
+"""Every cause of the table of mistakes, and what it is a mistake of."""
+
+LENGTHS = frozenset({"tilt", "axis", "eccentric", "cogging", "base_motion"})
+"""Causes of two sizes across each other, whose length is reported."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Cause:
+    """A mistake that residuals show, of a robot and its log."""
+
+    suspect: Suspect
+    """The mistake."""
+    robot_model: RobotModel
+    """The robot."""
+    log: MotionLog
+    """The first log."""
+
+    @property
+    def joint(self) -> str | None:
+        """Name of the joint; None if it is the whole robot's."""
+        return None if self.suspect.joint is None else self.robot_model.robot.joints[self.suspect.joint]
+
+    @property
+    def words(self) -> str:
+        """What is wrong, how sure, and what else it may be."""
+        suspect, wording = self.suspect, self._wording
+        what = wording.what.format(**self._values)
+        t = "" if np.isinf(suspect.t) else f" (t = {suspect.t:.0f})"
+        others = ", ".join(dict.fromkeys(map(self._named, suspect.alternatives)))
+        before = f"{self.joint}: " if self.joint else "all torques: " if wording.what.startswith("torque") else ""
+        return f"{before}{what}{t}{f'; or {others}, which this log does not tell apart' if others else ''}"
+
+    @property
+    def remedy(self) -> str:
+        """The option that mends it; empty if none does."""
+        return self._wording.mend.format(**self._values)
+
+    @property
+    def mends(self) -> str:
+        """What mends it, an option or else."""
+        return self.remedy or self._wording.by
+
+    @property
+    def advice(self) -> str:
+        """What is wrong, what mends it, and what that gains on stretches of the log that were not fitted."""
+        before, after = (error_percentage(x) for x in self.suspect.held_out)
+        gain = (
+            "" if np.isinf(self.suspect.t) else f"; without it, the error on held-out stretches falls from {before} to {after}"
+        )
+        return f"{self.words}{gain}; try {self.mends}"
+
+    def summary(self) -> dict[str, Any]:
+        """Return what a summary.json says of it."""
+        s, joints = self.suspect, self.robot_model.robot.joints
+        single = len(s.size) == 1
+        return {
+            "cause": s.cause,
+            "joint": self.joint,
+            "of": s.of,
+            "size": s.size[0] if single else list(s.size),
+            "sigma": s.sigma[0] if single else list(s.sigma),
+            "unit": s.unit,
+            "p": s.p,
+            "alternatives": [{"cause": c, "joint": None if j is None else joints[j]} for c, j in s.alternatives],
+            "remedy": self.mends,
+            "held_out": list(s.held_out),
+            "instant": s.instant,
+        }
+
+    @property
+    def _wording(self) -> Wording:
+        return WORDINGS[self.suspect.cause, self.suspect.of]
+
+    @property
+    def _values(self) -> dict[str, Any]:
+        s, joints = self.suspect, self.robot_model.robot.joints
+        size, sigma = s.size[0], s.sigma[0]
+        if s.cause in LENGTHS:
+            size, sigma = (float(np.linalg.norm(x[:2])) for x in (s.size, s.sigma))
+        unit = "" if s.unit == "1" else f" {s.unit}"
+        j = s.joint or 0
+        where = "" if s.joint is None else f"{said(j, joints)}="
+        gains = np.broadcast_to(np.asarray(self.log.torque.gain), (len(joints),)).copy()
+        gains[j] *= -1.0 if s.cause == "sign" else 1 / (1 + s.size[0]) if s.cause == "gain" else 1.0
+        last = min(j + 1, len(joints) - 1)
+        return {
+            "size": f"{size:.3g}{unit} +- {sigma:.1g}" if sigma else f"{size:.3g}{unit}",
+            "instant": "" if s.instant is None else f"{s.instant:.1f} s",
+            "j": where,
+            "gains": " ".join(f"{x:.4g}" for x in gains),
+            "delay": "joints" if s.joint is not None else "estimate",
+            "coupling": f"motor{last + 1}={joints[j]}+{joints[last]}",
+            "gravity": " ".join(f"{x:.3g}" for x in self._gravity()),
+            "other": joints[int(s.size[0]) - 1] if s.cause == "exchanged" else "",
+            "setting": s.setting,
+        }
+
+    def _gravity(self) -> Array:
+        """Return gravity as it would be without the mistake [m/s^2]."""
+        g = self.robot_model.tree.gravity
+        if self.suspect.cause == "gravity":
+            return np.round(self.suspect.size, 2) + 0.0
+        if self.suspect.cause == "tilt" and np.any(g):
+            axes = np.linalg.svd(g[None])[2][1:]
+            return np.asarray(g + sum(size * np.cross(a, g) for size, a in zip(self.suspect.size, axes, strict=False)))
+        return g
+
+    def _named(self, other: tuple[str, int | None]) -> str:
+        cause, j = other
+        return cause.replace("_", " ") if j is None else f"{cause.replace('_', ' ')} of {self.robot_model.robot.joints[j]}"
+
+
+def words_of_diagnosis(causes: Sequence[Cause] | None) -> str:
+    """Return what the tests say, in a line."""
+    if causes is None:
+        return "mistakes: not tested, the rows are too few or are not kept"
+    return (
+        f"mistakes: {'; '.join(cause.words for cause in causes)}"
+        if causes
+        else "mistakes: none of those that were tested shows"
+    )
