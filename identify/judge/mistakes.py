@@ -43,6 +43,8 @@ class Mistake(NamedTuple):
     """What it is a mistake of: torque, position, friction, drive, base, link or clock."""
     setting: float = 0.0
     """Of cogging: waves a turn."""
+    most: float = np.inf
+    """Size above which it is not small, and its column says nothing of it."""
     positive: bool = False
     """Whether nothing makes a size below zero, which then is noise of the positions: compliance, play, an inertia, a load."""
 
@@ -237,8 +239,8 @@ OF_JOINTS: tuple[Mistake, ...] = (
     Mistake("dead_band", _own(lambda m, j: -np.sign(m.torque[j])), "N m"),
     Mistake("delay", _own(_late), "s"),
     Mistake("delay", _late_position, "s", "position"),
-    Mistake("zero", _zero, "rad", "position"),
-    Mistake("scale", _scale, "1", "position"),
+    Mistake("zero", _zero, "rad", "position", most=0.5),
+    Mistake("scale", _scale, "1", "position", most=0.3),
     Mistake("eccentric", _eccentric, "rad", "position"),
     Mistake("rotor", _own(lambda m, j: m.state.qdd[j]), "kg m^2", "drive", positive=True),
     Mistake("coupled_rotor", _coupled, "kg m^2", "drive"),
@@ -267,7 +269,7 @@ OF_ROBOT: tuple[Mistake, ...] = (
     Mistake("velocity", _every(lambda m, j: m.state.qd[j] * np.abs(m.state.qd[j]), _drag), "1", "friction"),
     *(Mistake("hysteresis", _every(_turning(share), _friction), "1", "friction", positive=True) for share in PRESLIDING),
     Mistake("saturation", _every(lambda m, j: -(m.torque[j] ** 3), lambda m, j: 1 / _rms(m.torque[j]) ** 2), "1"),
-    Mistake("rate", lambda m, _: _all(m.faster()), "1", "clock"),
+    Mistake("rate", lambda m, _: _all(m.faster()), "1", "clock", most=0.3),
     Mistake("clock_drift", lambda m, _: _all(-(m.t - m.t[0]) * np.gradient(m.torque, m.t, axis=-1)), "s/s", "clock"),
 )
 """Mistakes of the whole robot, or of all torques."""

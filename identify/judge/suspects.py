@@ -14,6 +14,7 @@ from idbench.identify.estimators.model_error import MEMORY
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.mistake_rows import Candidate, MistakeRows
 from idbench.identify.judge.mistakes import COLLISION
+from idbench.identify.judge.stretches import errors_of_stretches
 
 LEFT = 1e-3
 """Share of a column's squares that parameters must leave for a mistake to be distinct from them. With 1e-4, noise of encoders
@@ -36,8 +37,8 @@ MOST = 3
 MEDIAN = 0.4549
 """Of chi squared with one degree of freedom."""
 
-BLOCKS = 5
-"""Stretches of the rows, each of which is predicted by a fit of the others."""
+SOME = 6
+"""One of so many tests is made whatever it says, to see how they scatter."""
 
 
 @final
@@ -92,7 +93,8 @@ def suspects(problem: Problem, X: Array) -> tuple[Suspect, ...]:
     """
     problem.require_rows("mistakes are looked for by rows, and ")
     explicit = problem.explicit
-    return tuple(_Search(explicit, MistakeRows(explicit.parts, explicit.basis, X)).found())
+    rows = MistakeRows(explicit.parts, explicit.basis, X)
+    return tuple(_Search(explicit, rows, rows.every()).found())
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,25 +109,28 @@ class _Tested:
     chi2: float
     gain: float
     """What it takes of minus twice the logarithm of the likelihood, less what as many columns of noise take."""
+    of_all: bool
+    """Whether it is one of those that are tested whatever they say."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Search:
     problem: Problem
     rows: MistakeRows
+    every: Sequence[Candidate]
 
     def found(self) -> Iterator[Suspect]:
         """Yield mistakes, each the most likely one beside those before: c(k+1) = argmax gain(c | W, c(1), ..., c(k)).
 
         It counts if it is as sure beside what the tests of all others scatter once it is explained: of noise they scatter by 1.
         """
-        every, taken = self.rows.every(), list[Candidate]()
+        every, taken = self.every, list[Candidate]()
         tested = self._all_tested(every, taken)
         while len(taken) < MOST:
             for best, errors in self._proved(tested, taken):
                 rest = [c for c in every if c.key != best.candidate.key]
                 left = self._all_tested(rest, [*taken, best.candidate])
-                p = self._by_chance(best, len(every) + self.rows.looks, _scatter_of(left))
+                p = self._by_chance(best.left.shape[1], best.chi2 / _scatter_of(left))
                 if p < CERTAIN:
                     yield self._suspect(best, tested, errors, p)
                     break
@@ -141,16 +146,17 @@ class _Search:
         e = self._Y - Q @ (Q.T @ self._Y)
         own = e[: len(e) - self._known]
         candidates = [*every, *self.rows.pushed(own), *self.rows.shaken(own)]
-        return [one for c in candidates if (one := self._tested(c, Q, e)) is not None]
+        each = ((c, i % SOME == 0) for i, c in enumerate(candidates))
+        return [one for c, of_all in each if (one := self._tested(c, Q, e, of_all=of_all)) is not None]
 
-    def _by_chance(self, one: _Tested, count: int, scatter: float) -> float:
-        """Return the probability that any of as many mistakes seems as significant by chance."""
-        return min(1.0, count * float(scipy.special.chdtrc(one.left.shape[1], one.chi2 / scatter)))
+    def _by_chance(self, columns: int, chi2: float) -> float:
+        """Return the probability that any of all mistakes, of so many columns, seems as significant by chance."""
+        return min(1.0, (len(self.every) + self.rows.looks) * float(scipy.special.chdtrc(columns, chi2)))
 
     def _proved(self, tested: Sequence[_Tested], taken: Sequence[Candidate]) -> Iterator[tuple[_Tested, tuple[float, float]]]:
         """Yield the sure ones, the most likely first, that predict stretches better that were not fitted, and errors [%]."""
-        before, count = self._held_out(taken), len(tested) + self.rows.looks
-        sure = [t for t in tested if t.gain > 0 and self._by_chance(t, count, 1.0) < CERTAIN]
+        before = self._held_out(taken)
+        sure = [t for t in tested if t.gain > 0 and self._by_chance(t.left.shape[1], t.chi2) < CERTAIN]
         for one in sorted(sure, key=lambda t: -t.gain)[:MOST]:
             after = self._held_out([*taken, one.candidate])
             # What happened once cannot be predicted; without it, the rest is.
@@ -184,7 +190,8 @@ class _Search:
     def _padded(self, columns: Array) -> Array:
         return np.concatenate([columns, np.zeros((self._known, columns.shape[1]))])
 
-    def _tested(self, candidate: Candidate, Q: Array, e: Array) -> _Tested | None:
+    def _tested(self, candidate: Candidate, Q: Array, e: Array, *, of_all: bool) -> _Tested | None:
+        """Return a test; None where parameters leave nothing. What white residuals excuse has chi2 = 0, if not `of_all`."""
         c = self._padded(candidate.white)
         left = c - Q @ (Q.T @ c)
         left -= Q @ (Q.T @ left)
@@ -197,16 +204,26 @@ class _Search:
         some = s**2 > LEFT * s[0] ** 2
         U, turn = U[:, some], (axes[some].T / s[some]) / size[shown][:, None]
         b, own = U.T @ e, len(e) - self._known
-        rest = e - U @ b
+        gain, rest = self._gain(e[:own], U[:own], b), e - U @ b
+        if not of_all and not self._may_matter(e[:own], b):
+            return _Tested(candidate, U[:own], np.zeros(0), np.zeros(0), U[:own] @ b, 0.0, gain, of_all)
         each = zip(self.problem.parts, self._split(U[:own]), self._split(rest[:own]), strict=True)
         V = sum((_scatter(part, x, r) for part, x, r in each), start=np.zeros(()))
-        gain = self._unlikely(e[:own]) - self._unlikely(rest[:own]) - len(b) * np.log(own)
         chi2 = float(b @ np.linalg.solve(V, b))
         sizes, sigma = np.zeros((2, len(size)))
         sizes[shown], sigma[shown] = turn @ b, np.sqrt(np.sum((turn @ V) * turn, axis=1))
-        if candidate.mistake.positive and sizes.min() < 0:
+        if (candidate.mistake.positive and sizes.min() < 0) or np.abs(sizes).max() > candidate.mistake.most:
             return None
-        return _Tested(candidate, U[:own], sizes, sigma, U[:own] @ b, chi2, gain)
+        return _Tested(candidate, U[:own], sizes, sigma, U[:own] @ b, chi2, gain, of_all)
+
+    def _gain(self, e: Array, U: Array, b: Array) -> float:
+        return self._unlikely(e) - self._unlikely(e - U @ b) - len(b) * np.log(len(e))
+
+    def _may_matter(self, e: Array, b: Array) -> bool:
+        """Return whether a mistake could be sure: residuals that are correlated scatter its size by more than white ones."""
+        rows = self.problem.rows
+        least = float(np.min(np.sum(rows.by_kind(e * rows.valid) ** 2, axis=-1) / np.maximum(rows.count, 1)))
+        return self._by_chance(len(b), float(b @ b) / max(least, TINY)) < CERTAIN
 
     def _split(self, x: Array) -> list[Array]:
         return np.split(x, np.cumsum([len(part.rows.time) for part in self.problem.parts])[:-1])
@@ -245,37 +262,13 @@ class _Search:
         """Return the errors of each joint on stretches that were not fitted [% of its torque], shape (joint,)."""
         white = np.concatenate([self._W, *(self._padded(c.white) for c in more)], axis=1)
         plain = np.concatenate([np.concatenate([part.rows.W for part in self.problem.parts]), *(c.plain for c in more)], axis=1)
-        return _errors(self.problem, white, self._Y, plain)
+        return errors_of_stretches(self.problem, white, self._Y, plain)
 
 
 def _scatter_of(tested: Sequence[_Tested]) -> float:
     """Return the variance of standardized tests, by the median of those of one column; at least 1, which it is of noise."""
-    alone = [one.chi2 for one in tested if one.left.shape[1] == 1]
+    alone = [one.chi2 for one in tested if one.left.shape[1] == 1 and one.of_all]
     return max(1.0, float(np.median(alone)) / MEDIAN) if alone else 1.0
-
-
-def held_out_errors(problem: Problem) -> Array:
-    """Return the rms errors of each joint on stretches of the rows that were not fitted [% of its torque], shape (joint,).
-
-    By weighted least squares, as fits of single stretches are by then.
-    """
-    rows, fit = problem.explicit.rows, problem.explicit.factors.fit(2)
-    weight = np.tile(fit.weight, len(rows.time) // rows.kinds) * rows.valid
-    return _errors(problem.explicit, rows.W * weight[:, None], rows.Y * weight, rows.W)
-
-
-def _errors(problem: Problem, white: Array, Y: Array, plain: Array) -> Array:
-    """Return what fits of `BLOCKS` - 1 stretches leave of the other, of rows (white, Y) that are made independent."""
-    rows, own = problem.rows, len(plain)
-    block = np.r_[np.arange(own) * BLOCKS // own, np.full(len(Y) - own, -1)]
-    errors = np.zeros(own)
-    for b in range(BLOCKS):
-        size = np.maximum(np.linalg.norm(white[block != b], axis=0), TINY)
-        x = np.linalg.lstsq(white[block != b] / size, Y[block != b], rcond=LEFT**2)[0] / size
-        mine = block[:own] == b
-        errors[mine] = rows.Y[mine] - plain[mine] @ x
-    squares, whole = (np.sum(rows.by_kind(x * rows.valid) ** 2, axis=-1) for x in (errors, rows.Y))
-    return np.asarray(100 * np.sqrt(np.maximum(squares, TINY) / np.maximum(whole, TINY)))
 
 
 def _scatter(part: LogRows, left: Array, rest: Array) -> Array:

@@ -8,8 +8,10 @@ import numpy as np
 
 from idbench.identify.arrays import TINY, Array
 from idbench.identify.basis.tree_links import TreeLinks
+from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.judge.suspects import Suspect, held_out_errors, suspects
+from idbench.identify.judge.stretches import held_out_errors
+from idbench.identify.judge.suspects import Suspect, suspects
 from idbench.identify.rows.factors import Factors
 
 POOR = 5.0
@@ -21,6 +23,9 @@ steps, four sigma of independent ones."""
 
 RATES = (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)
 """Rates of the clock, over the stated one, that are tried where something is wrong."""
+
+SAMPLES = 20.0
+"""Samples for each period of the operator's cut-off with which large mistakes are looked for."""
 
 NOTHING_LEFT = 1 / 3
 """Share of the largest error that the right sign or axis leaves at most: a wrong one also explains a part of other mistakes."""
@@ -53,11 +58,29 @@ def diagnosed(problem: Problem, X: Array) -> tuple[Suspect, ...]:
     if (silent := _silent(problem.explicit)) is not None:
         return (silent,)
     small = suspects(problem, X)
-    whole = whole_mistake(problem, small[0].gain if small else 0.0)
+    whole = whole_mistake(_thinned(problem.explicit), small[0] if small else None)
     return (whole,) if whole else small
 
 
-def whole_mistake(problem: Problem, small: float = 0.0) -> Suspect | None:
+def _thinned(problem: Problem) -> Problem:
+    """Return the problem of fewer samples, where there are many for the band of its rows: they show signs as well."""
+    cutoff = getattr(problem.own_chain.operator, "cutoff", None)
+    return problem.with_logs(
+        [_with_fewer(log, max(1, int(log.fs / (SAMPLES * cutoff))) if cutoff else 1) for log in problem.logs]
+    )
+
+
+def _with_fewer(log: MotionLog, every: int) -> MotionLog:
+    if every == 1:
+        return log
+    torque = replace(log.torque, period=log.torque.period or 1 / log.fs)
+    conditions = {name: x[..., ::every, :] for name, x in log.conditions.items()}
+    return replace(
+        log, fs=log.fs / every, q=log.q[..., ::every, :], tau=log.tau[..., ::every, :], torque=torque, conditions=conditions
+    )
+
+
+def whole_mistake(problem: Problem, small: Suspect | None = None) -> Suspect | None:
     """Return the mistake without which the rows are by far most likely, by more than a `small` one; None where none is."""
     explicit = problem.explicit
     before = _unlikely(explicit.factors)
@@ -65,7 +88,7 @@ def whole_mistake(problem: Problem, small: float = 0.0) -> Suspect | None:
     if _worst(explicit) > POOR:
         tried += [*_exchanged(explicit), *_gravities(explicit), *_turned(explicit)]
     gains = [before - _unlikely(each.problem.factors) for each in tried]
-    if not gains or max(gains) < max(DECISIVE, small):
+    if not gains or max(gains) < max(DECISIVE, small.gain if small else 0.0):
         return None
     best = tried[int(np.argmax(gains))]
     near = [each for each, gain in zip(tried, gains, strict=True) if gain > 0.9 * max(gains) and each is not best]

@@ -1,0 +1,36 @@
+"""Errors of a model on stretches of its own rows, each predicted by a fit of the others."""
+
+import numpy as np
+
+from idbench.identify.arrays import TINY, Array
+from idbench.identify.estimators.problem import Problem
+
+BLOCKS = 5
+"""Stretches of the rows, each of which is predicted by a fit of the others."""
+
+SHOWN = 1e-6
+"""Share of the largest singular value, of columns scaled to unit length, below which stretches do not show a direction."""
+
+
+def held_out_errors(problem: Problem) -> Array:
+    """Return the rms errors of each joint on stretches of the rows that were not fitted [% of its torque], shape (joint,).
+
+    By weighted least squares, as fits of single stretches are by then.
+    """
+    rows, fit = problem.explicit.rows, problem.explicit.factors.fit(2)
+    weight = np.tile(fit.weight, len(rows.time) // rows.kinds) * rows.valid
+    return errors_of_stretches(problem.explicit, rows.W * weight[:, None], rows.Y * weight, rows.W)
+
+
+def errors_of_stretches(problem: Problem, white: Array, Y: Array, plain: Array) -> Array:
+    """Return what fits of `BLOCKS` - 1 stretches leave of the other, of rows (white, Y) that are made independent."""
+    rows, own = problem.rows, len(plain)
+    block = np.r_[np.arange(own) * BLOCKS // own, np.full(len(Y) - own, -1)]
+    errors = np.zeros(own)
+    for b in range(BLOCKS):
+        size = np.maximum(np.linalg.norm(white[block != b], axis=0), TINY)
+        x = np.linalg.lstsq(white[block != b] / size, Y[block != b], rcond=SHOWN)[0] / size
+        mine = block[:own] == b
+        errors[mine] = rows.Y[mine] - plain[mine] @ x
+    squares, whole = (np.sum(rows.by_kind(x * rows.valid) ** 2, axis=-1) for x in (errors, rows.Y))
+    return np.asarray(100 * np.sqrt(np.maximum(squares, TINY) / np.maximum(whole, TINY)))
