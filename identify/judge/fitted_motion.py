@@ -62,10 +62,14 @@ class FittedMotion:
     def moved(self, j: int, x: Array, xd: Array, xdd: Array) -> Array:
         """Return the derivative of the torque by a motion of joint j, x with its derivatives, shape (joint, time)."""
         size = SMALL / max(float(np.abs(x).max()), 1e-12)
+        return np.asarray((self.at(j, size * x, size * xd, size * xdd) - self.load) / size)
+
+    def at(self, j: int, x: Array, xd: Array, xdd: Array) -> Array:
+        """Return the torque of links and rotors with joint j moved by x, with its derivatives, shape (joint, time)."""
         q, qd, qdd = (np.array(each) for each in (self.state.q, self.state.qd, self.state.qdd))
         for each, change in ((q, x), (qd, xd), (qdd, xdd)):
-            each[j] += size * change
-        return np.asarray((self._of(*self.rigid, _state(q, qd, qdd)) - self.load) / size)
+            each[j] += change
+        return self._of(*self.rigid, _state(q, qd, qdd))
 
     def faster(self) -> Array:
         """Return the derivative of the torque by the rate of the clock: qd (1 + h), qdd (1 + 2 h)."""

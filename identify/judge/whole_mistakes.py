@@ -95,7 +95,7 @@ def whole_mistake(problem: Problem, small: Suspect | None = None) -> Suspect | N
     others = tuple(dict.fromkeys((each.cause, each.joint) for each in near))
     errors = [held_out_errors(each) for each in (explicit, best.problem)]
     k = int(np.argmax(np.log(errors[0]) - np.log(errors[1])))
-    if errors[1][k] > NOTHING_LEFT * errors[0][k]:
+    if errors[1][k] > min(NOTHING_LEFT * errors[0][k], small.held_out[1] if small else np.inf):
         return None
     found, gain = (float(errors[0][k]), float(errors[1][k])), float(max(gains))
     return Suspect(best.cause, best.of, best.joint, best.size, (0.0,), "1", 0.0, float(np.sqrt(gain)), others, found, gain)
