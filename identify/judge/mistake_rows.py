@@ -14,6 +14,7 @@ from idbench.identify.judge.mistakes import (
     BASE,
     COLLISION,
     FROM_AN_INSTANT,
+    GAIN,
     OF_JOINTS,
     OF_ROBOT,
     Mistake,
@@ -80,12 +81,22 @@ class MistakeRows:
     def every(self) -> list[Candidate]:
         """Return the mistakes of joints and of the robot, and those that are looked for from an instant on."""
         joints, robot = range(self.basis.n), (None,)
-        asked = [(m, j) for m in OF_JOINTS for j in joints] + [(m, j) for m in (*OF_ROBOT, *FROM_AN_INSTANT) for j in robot]
-        found = list(self._made(asked))
+        asked = [(m, j) for m in OF_JOINTS if m is not GAIN for j in joints] + [
+            (m, j) for m in (*OF_ROBOT, *FROM_AN_INSTANT) for j in robot
+        ]
+        found = [*self._gains(), *self._made(asked)]
         slips = [replace(c, mistake=c.mistake._replace(cause="slip")) for c in found if c.mistake.cause == "zero"]
         held = [c for c in found if c.mistake in FROM_AN_INSTANT]
         steady = [c for c in found if c.mistake not in FROM_AN_INSTANT]
         return [*steady, *(late for c in (*slips, *held) for late in self._from_instants(c))]
+
+    def _gains(self) -> Iterator[Candidate]:
+        """Yield torques that are too large, from rows of what is predicted: parameters leave too little of others."""
+        predicted, group = (
+            np.concatenate(x) for x in zip(*((p.rows.predicted(self.X), p.rows.group) for p in self.parts), strict=True)
+        )
+        for j in range(self.basis.n):
+            yield self._candidate(GAIN, j, np.where(group == j, predicted, 0.0)[:, None])
 
     def pushed(self, e: Array) -> Iterator[Candidate]:
         """Yield a collision of each joint where its residuals e, shape (r,), are largest for so long."""

@@ -45,6 +45,9 @@ class Mistake(NamedTuple):
     """Of cogging: waves a turn."""
     most: float = np.inf
     """Size above which it is not small, and its column says nothing of it."""
+    left: float = 1e-4
+    """Share of its column's squares that parameters must leave for it to be distinct from them: less is noise of the positions,
+    from which no column is free that is not made of those of the parameters."""
     positive: bool = False
     """Whether nothing makes a size below zero, which then is noise of the positions: compliance, play, an inertia, a load."""
 
@@ -231,8 +234,11 @@ def _payload(m: FittedMotion, j: int) -> tuple[Rows, ...]:
     return tuple(rows.values())
 
 
+GAIN = Mistake("gain", _own(lambda m, j: m.torque[j]), most=1.0, left=1e-6)
+"""Torques that are all too large."""
+
 OF_JOINTS: tuple[Mistake, ...] = (
-    Mistake("gain", _own(lambda m, j: m.torque[j])),
+    GAIN,
     Mistake("offset", _own(lambda m, _: np.ones_like(m.t)), "N m"),
     Mistake("drift", _own(lambda m, _: m.t - m.t[0]), "N m/s"),
     Mistake("saturation", _own(lambda m, j: -(m.torque[j] ** 3)), "1/(N m)^2"),

@@ -1,8 +1,10 @@
-"""Errors of a model on stretches of its own rows, each predicted by a fit of the others."""
+"""Residuals: how sums of them scatter, and errors on stretches of rows, each predicted by a fit of the others."""
 
 import numpy as np
 
 from idbench.identify.arrays import TINY, Array
+from idbench.identify.estimators.log_rows import LogRows
+from idbench.identify.estimators.model_error import MEMORY
 from idbench.identify.estimators.problem import Problem
 
 BLOCKS = 5
@@ -34,3 +36,22 @@ def errors_of_stretches(problem: Problem, white: Array, Y: Array, plain: Array) 
         errors[mine] = rows.Y[mine] - plain[mine] @ x
     squares, whole = (np.sum(rows.by_kind(x * rows.valid) ** 2, axis=-1) for x in (errors, rows.Y))
     return np.asarray(100 * np.sqrt(np.maximum(squares, TINY) / np.maximum(whole, TINY)))
+
+
+def scatter_of_sums(part: LogRows, left: Array, rest: Array) -> Array:
+    """Return the covariance of left' rest, rest being as correlated as it is, and not less than white, shape (g, g)."""
+    to_rows = part.rows.maps[0]
+    lags = min(max(2, int(MEMORY * to_rows.signals.fs / to_rows.grid.step)), to_rows.grid.count)
+    c = np.stack([part.rows.by_kind(x) for x in left.T], axis=-1)
+    e = part.rows.by_kind(rest * part.rows.valid)
+    count = np.maximum(part.rows.count, 1)
+    taper = 0.5 + 0.5 * np.cos(np.pi * np.arange(lags) / lags)
+    each = [
+        np.einsum("k,kta,ktb->ab", np.sum(e[:, k:] * e[:, : e.shape[1] - k], axis=1) / count, c[:, k:], c[:, : c.shape[1] - k])
+        for k in range(lags)
+    ]
+    white = each[0]
+    size = np.sqrt(np.maximum(np.diagonal(white), TINY))
+    total = white + sum((w * (x + x.T) for w, x in zip(taper[1:], each[1:], strict=True)), start=np.zeros(()))
+    values, axes = np.linalg.eigh(total / np.outer(size, size))
+    return np.asarray((axes * np.maximum(values, 1.0)) @ axes.T * np.outer(size, size))

@@ -9,16 +9,14 @@ import numpy as np
 import scipy
 
 from idbench.identify.arrays import TINY, Array
-from idbench.identify.estimators.log_rows import LogRows
-from idbench.identify.estimators.model_error import MEMORY
 from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.mistake_rows import Candidate, MistakeRows
-from idbench.identify.judge.mistakes import COLLISION
-from idbench.identify.judge.stretches import errors_of_stretches
+from idbench.identify.judge.mistakes import COLLISION, GAIN
+from idbench.identify.judge.stretches import errors_of_stretches, scatter_of_sums
 
-LEFT = 1e-3
-"""Share of a column's squares that parameters must leave for a mistake to be distinct from them. With 1e-4, noise of encoders
-in slow motion is called a tilt in 3 of 24 logs without a fault."""
+APART = 1e-2
+"""Share of the squares of several columns that parameters must leave, and for one to be distinct from the others. With 1e-4,
+encoders in slow motion are called a tilt in 3 of 24 logs without one."""
 
 CERTAIN = 1e-6
 """Probability that any of all mistakes seems as significant by chance, below which one is suspected. Counts of encoders are not
@@ -36,6 +34,9 @@ MOST = 3
 
 MEDIAN = 0.4549
 """Of chi squared with one degree of freedom."""
+
+ROUNDS = 5
+"""Of the gain of a torque, which is not small where a constant is wrong by tenths."""
 
 SOME = 6
 """One of so many tests is made whatever it says, to see how they scatter."""
@@ -196,19 +197,19 @@ class _Search:
         left = c - Q @ (Q.T @ c)
         left -= Q @ (Q.T @ left)
         size = np.linalg.norm(left, axis=0)
-        shown = size**2 > LEFT * np.sum(c**2, axis=0)
+        shown = size**2 > (candidate.mistake.left if c.shape[1] == 1 else APART) * np.sum(c**2, axis=0)
         if not shown.any():
             return None
         # Columns that are nearly each other's multiples count by what they have in common.
         U, s, axes = np.linalg.svd(left[:, shown] / size[shown], full_matrices=False)
-        some = s**2 > LEFT * s[0] ** 2
+        some = s**2 > APART * s[0] ** 2
         U, turn = U[:, some], (axes[some].T / s[some]) / size[shown][:, None]
         b, own = U.T @ e, len(e) - self._known
         gain, rest = self._gain(e[:own], U[:own], b), e - U @ b
         if not of_all and not self._may_matter(e[:own], b):
             return _Tested(candidate, U[:own], np.zeros(0), np.zeros(0), U[:own] @ b, 0.0, gain, of_all)
         each = zip(self.problem.parts, self._split(U[:own]), self._split(rest[:own]), strict=True)
-        V = sum((_scatter(part, x, r) for part, x, r in each), start=np.zeros(()))
+        V = sum((scatter_of_sums(part, x, r) for part, x, r in each), start=np.zeros(()))
         chi2 = float(b @ np.linalg.solve(V, b))
         sizes, sigma = np.zeros((2, len(size)))
         sizes[shown], sigma[shown] = turn @ b, np.sqrt(np.sum((turn @ V) * turn, axis=1))
@@ -224,6 +225,23 @@ class _Search:
         rows = self.problem.rows
         least = float(np.min(np.sum(rows.by_kind(e * rows.valid) ** 2, axis=-1) / np.maximum(rows.count, 1)))
         return self._by_chance(len(b), float(b @ b) / max(least, TINY)) < CERTAIN
+
+    def _torque_gain(self, j: int) -> float:
+        """Return how much too large torques of a joint are: 1 + g(k+1) = (1 + g(k)) (1 + b), b that of Y_j / (1 + g(k))."""
+        rows, gain = self.problem.rows, 1.0
+        Q, R = np.linalg.qr(self._W)
+        for _ in range(ROUNDS):
+            Y = self._white(np.where(rows.group == j, rows.Y / gain, rows.Y))
+            X = np.linalg.lstsq(R, Q.T @ Y)[0]
+            c = self._white(np.where(rows.group == j, rows.predicted(X), 0.0))
+            left = c - Q @ (Q.T @ c)
+            gain *= 1 + float(left @ Y) / float(left @ left)
+        return gain - 1
+
+    def _white(self, x: Array) -> Array:
+        """Return what plain rows have, made independent, with zeros for what is known before."""
+        each = zip(self.problem.parts, self._split(x), strict=True)
+        return np.concatenate([*(part.whitening.whiten(y[:, None])[:, 0] for part, y in each), np.zeros(self._known)])
 
     def _split(self, x: Array) -> list[Array]:
         return np.split(x, np.cumsum([len(part.rows.time) for part in self.problem.parts])[:-1])
@@ -246,7 +264,7 @@ class _Search:
             candidate.mistake.cause,
             candidate.mistake.of,
             candidate.joint,
-            tuple(best.size.tolist()),
+            (self._torque_gain(candidate.joint or 0),) if candidate.mistake is GAIN else tuple(best.size.tolist()),
             tuple(best.sigma.tolist()),
             candidate.mistake.unit,
             p,
@@ -269,22 +287,3 @@ def _scatter_of(tested: Sequence[_Tested]) -> float:
     """Return the variance of standardized tests, by the median of those of one column; at least 1, which it is of noise."""
     alone = [one.chi2 for one in tested if one.left.shape[1] == 1 and one.of_all]
     return max(1.0, float(np.median(alone)) / MEDIAN) if alone else 1.0
-
-
-def _scatter(part: LogRows, left: Array, rest: Array) -> Array:
-    """Return the covariance of left' rest, rest being as correlated as it is, and not less than white, shape (g, g)."""
-    to_rows = part.rows.maps[0]
-    lags = min(max(2, int(MEMORY * to_rows.signals.fs / to_rows.grid.step)), to_rows.grid.count)
-    c = np.stack([part.rows.by_kind(x) for x in left.T], axis=-1)
-    e = part.rows.by_kind(rest * part.rows.valid)
-    count = np.maximum(part.rows.count, 1)
-    taper = 0.5 + 0.5 * np.cos(np.pi * np.arange(lags) / lags)
-    each = [
-        np.einsum("k,kta,ktb->ab", np.sum(e[:, k:] * e[:, : e.shape[1] - k], axis=1) / count, c[:, k:], c[:, : c.shape[1] - k])
-        for k in range(lags)
-    ]
-    white = each[0]
-    size = np.sqrt(np.maximum(np.diagonal(white), TINY))
-    total = white + sum((w * (x + x.T) for w, x in zip(taper[1:], each[1:], strict=True)), start=np.zeros(()))
-    values, axes = np.linalg.eigh(total / np.outer(size, size))
-    return np.asarray((axes * np.maximum(values, 1.0)) @ axes.T * np.outer(size, size))

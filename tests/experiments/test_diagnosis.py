@@ -1,0 +1,57 @@
+"""What is wrong, as a user sees it: the first and the last line, what mends it, and what a summary says."""
+
+import csv
+import json
+
+import pytest
+
+from idbench.experiments.identification.diagnosis import WORDINGS
+from idbench.experiments.identification.friction_laws import FrictionLaws
+from idbench.identify.judge.mistakes import BASE, COLLISION, FROM_AN_INSTANT, OF_JOINTS, OF_ROBOT
+
+
+def scaled(source, target, column, factor):
+    """Write a log with one column multiplied."""
+    with source.open() as file:
+        head, *rows = csv.reader(file)
+    k = head.index(column)
+    with target.open("w", newline="") as file:
+        csv.writer(file).writerows([head, *([*row[:k], repr(factor * float(row[k])), *row[k + 1 :]] for row in rows)])
+
+
+@pytest.mark.thorough
+def test_a_wrong_torque_constant_is_named_and_the_option_mends_it(idbench, tmp_path):
+    assert idbench("new", "example", "demo")[0] == 0
+    how = ["--robot", "demo/arm.xml", "--torque", "held", "--torque-delay", "0.002", "--model", "explicit", "--no-rerun"]
+    scaled(tmp_path / "demo/log.csv", tmp_path / "bad.csv", "tau3", 1.1)
+    code, out, err = idbench("identify", "bad.csv", *how, "--out", "bad")
+    last = out.strip().splitlines()[-2]
+    assert code == 0
+    assert last.startswith("Result: fair")
+    assert "joint3: torque constant" in last
+    (first, *_) = json.loads((tmp_path / "bad/summary.json").read_text())["diagnosis"]
+    assert (first["cause"], first["joint"], first["unit"]) == ("gain", "joint3", "1")
+    assert abs(first["size"] - 0.1) < 4 * first["sigma"] + 0.01
+    assert first["held_out"][1] < first["held_out"][0]
+    assert first["remedy"] in err.replace("\n", " ") + out.replace("\n", " ")
+    code, out, _ = idbench("identify", "bad.csv", *how, *first["remedy"].split(), "--out", "good")
+    assert "Result: good" in out
+    assert json.loads((tmp_path / "good/summary.json").read_text())["diagnosis"] == []
+
+
+def test_every_mistake_has_words():
+    small = {(m.cause, m.of) for m in (*OF_JOINTS, *OF_ROBOT, *FROM_AN_INSTANT, *BASE, COLLISION)}
+    large = {
+        ("sign", "torque"),
+        ("sign", "position"),
+        ("exchanged", "torque"),
+        ("gravity", "base"),
+        ("missing_torque", "torque"),
+    }
+    assert set(WORDINGS) == small | large | {("slip", "position")}
+
+
+@pytest.mark.parametrize("key", [key for key, wording in WORDINGS.items() if wording.mend.startswith("--friction")])
+def test_laws_that_are_advised_exist(key):
+    words = WORDINGS[key].mend.format(j="2=", setting=3.0).split()[1]
+    assert FrictionLaws.of([words], ["a", "b"]).names[1]
