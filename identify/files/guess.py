@@ -1,5 +1,6 @@
 """What the columns of a file probably are, from their names and values: a layout to start from, not one to rely on."""
 
+import json
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -52,6 +53,25 @@ ALIKE = 0.2
 """Departure of a column from the derivative of another, as a share, up to which it is its velocity."""
 
 
+class UnknownColumnsError(LogError):
+    """Names of columns that look like no positions, or no torques."""
+
+    def __init__(self, message: str, layout: LogLayout, columns: tuple[str, ...]) -> None:
+        super().__init__(message)
+        self.layout = layout
+        """What could be said."""
+        self.columns = columns
+        """All columns of the file."""
+
+    @property
+    def start(self) -> str:
+        """A layout to correct: what could be said, and all columns."""
+        every = ", ".join(json.dumps(name, ensure_ascii=False) for name in self.columns)
+        asked = [name for name in ("t", "q", "tau") if not getattr(self.layout, name).columns]
+        lines = [f"[{name}]\ncolumns = []  # of: {every}" for name in asked]
+        return "\n\n".join([self.layout.text.rstrip(), *lines]) + "\n"
+
+
 @dataclass(frozen=True)
 class Guess:
     """A layout that was guessed."""
@@ -81,14 +101,14 @@ def guess(path: Path, table: LogTable | None = None) -> Guess:
     if table.rows < FEWEST:
         raise LogError(f"{path} has {table.rows} rows: too few to say what its columns are")
     found = _by_names(table) if table.named else _by_values(path, table)
-    if not found.q.columns and not found.tau.columns and all(column.ndim == 1 for column in table.columns.values()):
-        found = _by_values(path, table)
     missing = [name for name in ("q", "tau") if not getattr(found, name).columns]
     if missing:
         what = " and ".join({"q": "positions", "tau": "torques or currents"}[name] for name in missing)
-        raise LogError(
+        raise UnknownColumnsError(
             f"nothing in {path} looks like {what}; its columns: {', '.join(list(table.columns)[:40])}; say what they are in a "
-            "log.toml"
+            "log.toml",
+            found,
+            tuple(table.columns),
         )
     episodes, doubts = _episodes(table)
     doubts += _alike(table, found)

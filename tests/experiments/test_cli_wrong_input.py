@@ -98,3 +98,15 @@ def test_view_needs_a_recording(tmp_path, complaint):
 def test_wrong_words_exit_with_2(capfd):
     assert main(["tabel1"]) == 2
     assert capfd.readouterr().err.startswith("idbench: no command 'tabel1' (did you mean 'table1'?); known: ")
+
+
+def test_names_that_look_like_nothing_are_not_halved_and_a_layout_is_written_to_correct(tmp_path, complaint):
+    """Six currents are not three positions and three torques."""
+    rows = "\n".join(f"{0.01 * k},{','.join(str(0.1 * (k + j)) for j in range(6))}" for k in range(20))
+    (tmp_path / "cur.csv").write_text(f"t,{','.join(f'i_j{j + 1}' for j in range(6))}\n{rows}\n")
+    found = complaint("log", str(tmp_path / "cur.csv"), "--write")
+    assert "nothing in" in found
+    assert "looks like positions and torques or currents" in found
+    text = (tmp_path / "cur.toml").read_text()
+    assert 'columns = "t"' in text
+    assert text.count('# of: "t", "i_j1"') == 2

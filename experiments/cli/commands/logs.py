@@ -20,7 +20,7 @@ from idbench.experiments.text import new_table, print_titled
 from idbench.identify import LogError, MotionLog
 from idbench.identify.data.log_columns import LogColumns
 from idbench.identify.data.resample import Repaired
-from idbench.identify.files.guess import Guess, guess
+from idbench.identify.files.guess import Guess, UnknownColumnsError, guess
 from idbench.identify.files.layout import LAYOUT, LogLayout, Source
 from idbench.identify.files.log_file import CSV, WRITTEN, read_log, write_log
 from idbench.identify.files.reading import LAYOUT_FILE, layout_of, read_columns
@@ -78,6 +78,11 @@ def _understood(options: ShowLog) -> tuple[Guess, LogColumns]:
         return Guess(beside[0]), read_columns(path, _looked_at(beside[0]))
     try:
         found = guess(path)
+    except UnknownColumnsError as error:
+        if not options.write:
+            raise ExperimentError(f"{error}; --write makes one to correct") from error
+        write_text(_target(options), error.start, "--write", force=options.force)
+        raise ExperimentError(f"{error}: {_target(options)} is one to correct") from error
     except LogError as error:
         raise ExperimentError(str(error)) from error
     layout = found.layout
