@@ -91,11 +91,12 @@ class MistakeRows:
         return [*steady, *(late for c in (*slips, *held) for late in self._from_instants(c))]
 
     def _gains(self) -> Iterator[Candidate]:
-        """Yield torques that are too large, from rows of what is predicted: parameters leave too little of others."""
-        predicted, group = (
-            np.concatenate(x) for x in zip(*((p.rows.predicted(self.X), p.rows.group) for p in self.parts), strict=True)
-        )
-        for j in range(self.basis.n):
+        """Yield torques that are too large beside others, from rows of what is predicted: parameters leave little of them."""
+        predicted = np.concatenate([part.rows.predicted(self.X) for part in self.parts])
+        measured = np.concatenate([part.rows.Y for part in self.parts])
+        group = np.concatenate([part.rows.group for part in self.parts])
+        driven = [j for j in range(self.basis.n) if np.any(measured[group == j])]
+        for j in driven if len(driven) > 1 else ():
             yield self._candidate(GAIN, j, np.where(group == j, predicted, 0.0)[:, None])
 
     def pushed(self, e: Array) -> Iterator[Candidate]:

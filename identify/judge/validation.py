@@ -49,7 +49,7 @@ class Validation:
     rms: Array
     """Of measured - predicted torque while the joint moves [N m]."""
     level: Array
-    """Rms of the measured torque there [N m]."""
+    """Rms of the measured torque there; of a joint without a drive, whose torque is 0, that of what balances in it [N m]."""
     R2: Array
     """Share of the measured torque's variance that is predicted there."""
     standing: Array
@@ -174,6 +174,7 @@ class _Joint:
     valid: npt.NDArray[np.bool_]
     spread: Array
     share: Array
+    X: Array
 
     @classmethod
     def of(cls, rows: Rows, X: Array, joint: int) -> "_Joint":
@@ -182,7 +183,7 @@ class _Joint:
         share = shares(rows.maps[0])[joint]
         # Y has the constant of laws that are linear about an estimate, too, which may be many times the torque.
         measured = rows.maps[0].measurement(rows.maps[0].signals.torque.mean)
-        return cls(measured[own], (rows.Y - rows.predicted(X))[own], rows.W[own], rows.valid[own], spread, share)
+        return cls(measured[own], (rows.Y - rows.predicted(X))[own], rows.W[own], rows.valid[own], spread, share, X)
 
     def judged(self) -> tuple[float, float, float, float, int]:
         """Return the rms of residual and torque, R2, correlation, and the number of valid rows."""
@@ -193,7 +194,12 @@ class _Joint:
             return np.nan, np.nan, np.nan, np.nan, 0
         mean = float(share @ y) / self.rows
         spread = float(np.sum((y - mean * share) ** 2))
-        return self._rms(rho), self._rms(y), 1 - float(rho @ rho) / max(spread, 1e-300), self._correlation(), len(rho)
+        R2 = 1 - float(rho @ rho) / spread if spread > 0 else np.nan
+        return self._rms(rho), self._rms(y) or self._balanced(), R2, self._correlation(), len(rho)
+
+    def _balanced(self) -> float:
+        """Return the rms of the terms of the model, W_i X_i, as if they were independent of each other."""
+        return sqrt(float(np.sum((self.W[self.valid] * self.X) ** 2)) / self.rows)
 
     @property
     def rows(self) -> float:

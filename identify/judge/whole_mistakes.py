@@ -24,6 +24,10 @@ steps, four sigma of independent ones."""
 RATES = (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)
 """Rates of the clock, over the stated one, that are tried where something is wrong."""
 
+BALANCED, KNOWN = 0.1, 4.0
+"""Share of its terms that a joint without a drive has as residual at most: what balances, balances to its noise; and sigma of
+parameters that count for that: those of a joint whose torque was not logged vanish."""
+
 SAMPLES = 20.0
 """Samples for each period of the operator's cut-off with which large mistakes are looked for."""
 
@@ -55,7 +59,7 @@ def diagnosed(problem: Problem, X: Array) -> tuple[Suspect, ...]:
         Its estimate.
     """
     problem.require_rows("mistakes are looked for by rows, and ")
-    if (silent := _silent(problem.explicit)) is not None:
+    if (silent := _silent(problem.explicit, X)) is not None:
         return (silent,)
     small = suspects(problem, X)
     whole = whole_mistake(_thinned(problem.explicit), small[0] if small else None)
@@ -101,12 +105,20 @@ def whole_mistake(problem: Problem, small: Suspect | None = None) -> Suspect | N
     return Suspect(best.cause, best.of, best.joint, best.size, (0.0,), "1", 0.0, float(np.sqrt(gain)), others, found, gain)
 
 
-def _silent(problem: Problem) -> Suspect | None:
-    """Return that the torque of the first joint whose torque never changes though it moves was not logged."""
+def _silent(problem: Problem, X: Array) -> Suspect | None:
+    """Return that the torque of the first joint whose torque never changes though it moves was not logged.
+
+    A joint without a drive has none: inertia and weight balance in it, where parameters of one that has vanish.
+    """
+    rows, factor = problem.rows, problem.factors.fit(2).factor
+    sigma = np.sqrt(np.diagonal(factor.inverse(np.array(factor.determined))))
+    known = np.where(np.abs(X) > KNOWN * sigma, X, 0.0)
     for log in problem.logs:
-        silent = np.flatnonzero((np.ptp(log.tau, axis=-2) == 0) & (np.ptp(log.q, axis=-2) > 0))
-        if len(silent):
-            j = int(silent[0])
+        for j in map(int, np.flatnonzero((np.ptp(log.tau, axis=-2) == 0) & (np.ptp(log.q, axis=-2) > 0))):
+            own = rows.group == j
+            terms, left = np.sum((rows.W[own] * known) ** 2), np.sum((rows.Y - rows.predicted(X))[own] ** 2)
+            if left < BALANCED**2 * terms:
+                continue
             return Suspect("missing_torque", "torque", j, (1.0,), (0.0,), "1", 0.0, np.inf, (), (100.0, 0.0), np.inf)
     return None
 
@@ -123,7 +135,8 @@ def _worst(problem: Problem) -> float:
     """Return the largest residual of a joint [% of its torque]."""
     factors = problem.factors
     whole = np.sum(factors.R[..., -1] ** 2, axis=-1)
-    return float(100 * np.sqrt(np.max(factors.squares(factors.fit(2).X) / np.maximum(whole, TINY))))
+    share = np.divide(factors.squares(factors.fit(2).X), whole, out=np.zeros(whole.shape), where=whole > 0)
+    return float(100 * np.sqrt(np.max(share)))
 
 
 def _changed(problem: Problem, q: Array | None = None, tau: Array | None = None) -> Problem:
@@ -158,7 +171,8 @@ def _rates(problem: Problem) -> Iterator[_Tried]:
 
 def _exchanged(problem: Problem) -> Iterator[_Tried]:
     n = problem.basis.n
-    for j, k in combinations(range(n), 2):
+    driven = [j for j in range(n) if np.any(problem.factors.R[j, :, -1])]
+    for j, k in combinations(driven, 2):
         order = np.arange(n)
         order[[j, k]] = k, j
         yield _Tried("exchanged", "torque", j, (k + 1.0,), _changed(problem, tau=np.eye(n)[order]))
