@@ -3,8 +3,6 @@
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from idbench.experiments.errors import ExperimentError
 from idbench.experiments.identification.reading import ReadLog, ReadOptions, read
 from idbench.experiments.identification.robot_model import RobotModel
@@ -32,8 +30,7 @@ def given_log(name: str, log: MotionLog, robot_model: RobotModel) -> ReadLog:
     names = tuple(joint.removeprefix(columns.prefixed(joints)) for joint in log.joints)
     if names and names != joints:
         place = [names.index(joint) for joint in joints]
-        gain = np.asarray(log.torque.gain)
-        torque = replace(log.torque, gain=tuple(gain[place].tolist())) if gain.size > 1 else log.torque
+        torque = log.torque.ordered(place)
         conditions = {key: x[..., place] if x.shape[-1] > 1 else x for key, x in log.conditions.items()}
         log = replace(log, q=log.q[..., place], tau=log.tau[..., place], torque=torque, conditions=conditions, joints=joints)
     columns = LogColumns(log.t, log.q, log.tau, log.torque, joints)

@@ -192,7 +192,7 @@ class Identification:
         problem = Problem((manageable([held_out])[0],), self.fit.basis, self.fit.problem.model, self.fit.processing)
         found = validate(problem, estimate.X, estimate.within_covariance)
         units = tuple(robot.units(j)[0] for j in range(self.fit.basis.n))
-        return Score(robot.robot.joints, units, found, Verdict.of(self.fit, found))
+        return Score(robot.robot.joints, units, found, Verdict.of(self.fit, found, self.fit.diagnosis or ()))
 
     def write(self, *paths: str | Path, force: bool = False) -> None:
         """Write files for other software: .urdf or .xml, the identified robot; .json, parameters; .py, a function.

@@ -22,11 +22,13 @@ class Wording(NamedTuple):
     """An option, {j} being the joint as options name it; empty if it is no option."""
     by: str = ""
     """What else mends it."""
+    law: str = ""
+    """The law of friction that explains it."""
 
 
 WORDINGS: Mapping[tuple[str, str], Wording] = {
-    ("gain", "torque"): Wording("torque constant {size} too large", "--gain {gains}"),
-    ("sign", "torque"): Wording("the torque has the other sign", "--gain {gains}"),
+    ("gain", "torque"): Wording("torque constant {size} too {large}", "--gain {gains} (times gains that were given)"),
+    ("sign", "torque"): Wording("the torque has the other sign", "--gain {gains} (times gains that were given)"),
     ("sign", "position"): Wording(
         "the position has the other sign", by="turn the axis in the robot's file, or the sign in the log"
     ),
@@ -36,12 +38,12 @@ WORDINGS: Mapping[tuple[str, str], Wording] = {
         "torque constant that falls with the torque, or a limit", by="slower motion, or lighter loads"
     ),
     ("dead_band", "torque"): Wording("dead band of the torque, {size}", by="its calibration"),
-    ("delay", "torque"): Wording("torque late by {size}, or lagging", "--torque-delay {delay}"),
-    ("delay", "position"): Wording("position late by {size}, or lagging", "--torque-delay {delay}"),
+    ("delay", "torque"): Wording("torque {late} by {size}, or lagging", "--torque-delay {delay}"),
+    ("delay", "position"): Wording("position {late} by {size}, or lagging", by="the delay of its position"),
     ("zero", "position"): Wording(
         "zero of the position off by {size}", by="subtract it from the joint's positions, or turn the link's frame in the file"
     ),
-    ("scale", "position"): Wording("positions {size} too large", by="the scale of the encoder, or its unit"),
+    ("scale", "position"): Wording("positions {size} too {large}", by="the scale of the encoder, or its unit"),
     ("slip", "position"): Wording("position slips by {size} at {instant}", by="the log up to there, or the encoder"),
     ("eccentric", "position"): Wording("eccentric encoder, {size}", by="the encoder's mounting, or a table of its errors"),
     ("rotor", "drive"): Wording("rotor inertia of {size} is missing", "--armature all"),
@@ -49,26 +51,28 @@ WORDINGS: Mapping[tuple[str, str], Wording] = {
     ("spring", "drive"): Wording(
         "a spring of {size}", by="stiffness and springref of the joint in the robot's file, or --balancer"
     ),
-    ("load", "friction"): Wording("friction grows with the load, by {size}", "--friction {j}standard+load"),
-    ("velocity", "friction"): Wording("friction bends over velocity", "--friction {j}standard+stribeck"),
-    ("asymmetry", "friction"): Wording("friction differs by direction", "--friction {j}asymmetric"),
+    ("load", "friction"): Wording("friction grows with the load, by {size}", "--friction {laws}", law="load"),
+    ("velocity", "friction"): Wording("friction bends over velocity", "--friction {laws}", law="stribeck"),
+    ("asymmetry", "friction"): Wording("friction differs by direction", "--friction {laws}", law="asymmetric-viscous"),
     ("warming", "friction"): Wording(
         "friction changes with time, as of a robot that warms up", by="a log of a warm robot, or its temperature"
     ),
     ("hysteresis", "friction"): Wording(
         "friction turns gradually after a reversal", by="a larger --mask-speed, or longer strokes"
     ),
-    ("cogging", "drive"): Wording("cogging of {setting:g} waves a turn, {size}", "--friction {j}standard+cogging:{setting:g}"),
+    ("cogging", "drive"): Wording(
+        "cogging of {setting:g} waves a turn, {size}", "--friction {laws}", law="cogging:{setting:g}"
+    ),
     ("backlash", "drive"): Wording("play of {size}", by="positions measured at the link"),
     ("elasticity", "drive"): Wording("compliance of {size}", by="positions measured at the link, or slower motion"),
-    ("length", "link"): Wording("origin of the joint off by {size}", by="its origin in the robot's file"),
+    ("length", "link"): Wording("origin of the joint off by {size} along {axis}", by="its origin in the robot's file"),
     ("axis", "link"): Wording("axis turned by {size}", by="its axis in the robot's file"),
     ("payload", "link"): Wording("a payload from {instant} on", by="the log up to there, or idbench payload"),
     ("collision", "torque"): Wording("a push of {size} at {instant}", by="the log without it"),
     ("tilt", "base"): Wording("the base is tilted by {size}", "--gravity {gravity}"),
     ("gravity", "base"): Wording("gravity points elsewhere, or is not in the torques", "--gravity {gravity}"),
     ("base_motion", "base"): Wording("the base moves, {size}", by="a stiffer stand, or slower motion"),
-    ("rate", "clock"): Wording("the motion is {size} faster than t says", by="the unit of t, or fs"),
+    ("rate", "clock"): Wording("the motion is {size} {faster} than t says", by="the unit of t, or fs"),
     ("clock_drift", "clock"): Wording(
         "clocks of positions and torques drift apart by {size}", by="one clock, or a shorter log"
     ),
@@ -111,12 +115,14 @@ class Cause:
     @property
     def remedy(self) -> str:
         """The option that mends it; empty if none does."""
+        if self._wording.law and self.robot_model.laws.smooth:
+            return ""
         return self._wording.mend.format(**self._values)
 
     @property
     def mends(self) -> str:
         """What mends it, an option or else."""
-        return self.remedy or self._wording.by
+        return self.remedy or self._wording.by or "another law of friction"
 
     @property
     def advice(self) -> str:
@@ -137,7 +143,7 @@ class Cause:
             "of": s.of,
             "size": s.size[0] if single else list(s.size),
             "sigma": s.sigma[0] if single else list(s.sigma),
-            "unit": s.unit,
+            "unit": self._unit,
             "p": s.p,
             "alternatives": [{"cause": c, "joint": None if j is None else joints[j]} for c, j in s.alternatives],
             "remedy": self.mends,
@@ -150,21 +156,46 @@ class Cause:
         return WORDINGS[self.suspect.cause, self.suspect.of]
 
     @property
+    def _unit(self) -> str:
+        """The unit of its size, of a slide that of translation."""
+        unit, j = self.suspect.unit, self.suspect.joint
+        if j is None or self.robot_model.tree.joints[j].kind != "slide":
+            return unit
+        return unit.replace("N m", "N").replace("kg m^2", "kg").replace("rad", "m")
+
+    def _laws(self, law: str) -> str:
+        """Return words of friction with a law more, of the joint or of all."""
+        joints, laws, j = self.robot_model.robot.joints, self.robot_model.laws, self.suspect.joint
+        if not law or laws.smooth:
+            return ""
+        more = [(law,) if j in (None, k) else () for k in range(len(joints))]
+        if len(set(laws.names)) > 1:
+            return " ".join(laws.chosen(more, [()] * len(joints)).texts(joints))
+        own = "+".join(laws.names[0]).replace("viscous+coulomb", "standard") or "none"
+        together = f"{own}+{law}" if own != "none" else law
+        return together if j is None else f"{own} {said(j, joints)}={together}"
+
+    @property
     def _values(self) -> dict[str, Any]:
         s, joints = self.suspect, self.robot_model.robot.joints
         size, sigma = s.size[0], s.sigma[0]
         if s.cause in LENGTHS:
             size, sigma = (float(np.linalg.norm(x[:2])) for x in (s.size, s.sigma))
-        unit = "" if s.unit == "1" else f" {s.unit}"
+        unit = "" if s.unit == "1" else f" {self._unit}"
+        if any(word in self._wording.what for word in ("{large}", "{late}", "{faster}")):
+            size = abs(size)
         j = s.joint or 0
-        where = "" if s.joint is None else f"{said(j, joints)}="
         gains = np.broadcast_to(np.asarray(self.log.torque.gain), (len(joints),)).copy()
         gains[j] *= -1.0 if s.cause == "sign" else 1 / (1 + s.size[0]) if s.cause == "gain" else 1.0
         last = min(j + 1, len(joints) - 1)
         return {
             "size": f"{size:.3g}{unit} +- {sigma:.1g}" if sigma else f"{size:.3g}{unit}",
             "instant": "" if s.instant is None else f"{s.instant:.1f} s",
-            "j": where,
+            "large": "large" if s.size[0] > 0 else "small",
+            "late": "late" if s.size[0] > 0 else "early",
+            "faster": "faster" if s.size[0] > 0 else "slower",
+            "axis": "xyz"[int(s.setting)] if s.cause == "length" else "",
+            "laws": self._laws(self._wording.law.format(setting=s.setting)),
             "gains": " ".join(f"{x:.4g}" for x in gains),
             "delay": "joints" if s.joint is not None else "estimate",
             "coupling": f"motor{last + 1}={joints[j]}+{joints[last]}",
@@ -177,7 +208,7 @@ class Cause:
         """Return gravity as it would be without the mistake [m/s^2]."""
         g = self.robot_model.tree.gravity
         if self.suspect.cause == "gravity":
-            return np.round(self.suspect.size, 2) + 0.0
+            return np.round(self.suspect.size, 1) + 0.0
         if self.suspect.cause == "tilt" and np.any(g):
             axes = np.linalg.svd(g[None])[2][1:]
             return np.asarray(g + sum(size * np.cross(a, g) for size, a in zip(self.suspect.size, axes, strict=False)))

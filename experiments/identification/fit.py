@@ -82,7 +82,7 @@ def _with_its_cause(found: "Fit", error: IdentificationError) -> IdentificationE
         return error
     try:
         suspects = diagnosed(found.problem, ESTIMATORS.create("GLS").fit(found.problem.explicit).X)
-    except IdentificationError:
+    except (IdentificationError, np.linalg.LinAlgError):
         return error
     causes = [Cause(each, found.robot_model, found.logs.fitted[0]).advice for each in suspects]
     return IdentificationError(f"{error}; with GLS, {'; '.join(causes)}") if causes else error

@@ -279,7 +279,9 @@ def channel_of(stated: TorqueChannel | None, meaning: Meaning, delay: str | None
             f"a torque delay of {seconds:g} s is impossible: it must be below {LATEST:g} s in size; is it in ms or in samples? "
             "Write s, such as --torque-delay 0.002, or let --torque-delay estimate find it"
         )
-    return replace(stated, meaning=meaning, delay=seconds, period=stated.period if stated.meaning == meaning else None)
+    same = stated.meaning == meaning
+    lags = stated.lags if same and delay is None else ()
+    return replace(stated, meaning=meaning, delay=seconds, period=stated.period if same else None, lags=lags)
 
 
 def _seconds(delay: str | None, otherwise: float) -> float:
@@ -288,6 +290,4 @@ def _seconds(delay: str | None, otherwise: float) -> float:
     try:
         return float(delay)
     except ValueError:
-        raise ExperimentError(
-            f"--torque-delay {delay} must be seconds, such as 0.002, estimate, or joints, for one of each"
-        ) from None
+        raise ExperimentError(f"--torque-delay {delay} must be seconds, such as 0.002, or estimate, or joints") from None

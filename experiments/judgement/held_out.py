@@ -78,7 +78,7 @@ class Verdict:
         if not np.isfinite(validation.percent).any():
             yield "no joint moves long enough for its torque to be judged"
             return
-        share = validation.excess if self.word in ("fair", "poor") else validation.rms
+        share = validation.excess if self.word in ("fair", "poor") and validation.excess.any() else validation.rms
         j = int(np.nan_to_num(validation.percent_of_level(share), posinf=np.inf).argmax())
         worst = int(np.nan_to_num(validation.percent, posinf=np.inf).argmax())
         others = ", the others by less" if len(joints) > 1 and j == worst else ""

@@ -77,4 +77,7 @@ class LogColumns:
         warm = self.temperature
         if warm is not None and warm.shape[1] > 1:
             warm = warm[:, place]
-        return replace(self, q=self.q[:, place], tau=self.tau[:, place], qd=qd, temperature=warm, joints=tuple(joints))
+        torque = None if self.torque is None else self.torque.ordered(place)
+        return replace(
+            self, q=self.q[:, place], tau=self.tau[:, place], qd=qd, torque=torque, temperature=warm, joints=tuple(joints)
+        )

@@ -1,6 +1,6 @@
 """What a robot logged: the one thing that a simulator, or a real robot, hands to identification."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, Self, get_args
 
@@ -77,6 +77,15 @@ class TorqueChannel:
         if gains.ndim != 1 or not np.isfinite(gains).all() or (gains == 0).any():
             raise SettingError(f"torque gain = {self.gain} must be finite and not 0")
         object.__setattr__(self, "gain", float(gains[0]) if gains.size == 1 else tuple(float(g) for g in gains))
+
+    def ordered(self, places: Sequence[int]) -> "TorqueChannel":
+        """Return the channel of joints in another order."""
+
+        def moved(x: float | tuple[float, ...]) -> float | tuple[float, ...]:
+            return tuple(x[k] for k in places) if isinstance(x, tuple) and x else x
+
+        lags = tuple(self.lags[k] for k in places) if self.lags else ()
+        return replace(self, gain=moved(self.gain), delay_sigma=moved(self.delay_sigma), lags=lags)
 
     @property
     def late(self) -> str:

@@ -155,10 +155,7 @@ class AdaptiveRows:
     @cached_property
     def _turned(self) -> tuple[Array, Array]:
         """Q and R of the columns that are made once, and of what is measured."""
-        joined = self._fixed.joined_by_kind
-        if (short := joined.shape[-1] - joined.shape[-2]) > 0:
-            joined = np.concatenate([joined, np.zeros((*joined.shape[:-2], short, joined.shape[-1]))], axis=-2)
-        Q, R = np.linalg.qr(joined)
+        Q, R = np.linalg.qr(self._fixed.joined_by_kind)
         return Q, R
 
     def misfit(self, basis: Basis) -> Array:

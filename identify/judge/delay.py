@@ -130,7 +130,7 @@ def estimate_joint_delays(
 ) -> DelayEstimate:
     """Return the delay of each joint's torque, beside the parameters in generalized least squares.
 
-        [X; delta] = argmin (Y - W X - D delta)' C^-1 (Y - W X - D delta),   D = dY/d(delays), a column a joint
+        [X; delta] = argmin (Y + D delta - W X)' C^-1 (Y + D delta - W X),   D = dY/d(delays), a column a joint
 
     from the delay that is best for all: torques of joints are logged at different instants where drives answer one after the
     other, or filter by themselves. Model errors that are alike in all joints move a common delay less than these.
@@ -155,8 +155,9 @@ def estimate_joint_delays(
         each = zip(problem.parts, D, strict=True)
         A = _white(problem, [np.column_stack([part.unbiased.W, -slopes, part.rows.Y]) for part, slopes in each])
         steps, whole = _left_out(A[:, :-1], A[:, -1], basis.n)
-        delays, sigma = delays + whole, _jackknife(steps)
-        if (np.abs(whole) < SETTLED * sigma).all():
+        shown = np.isfinite(whole)  # not of a joint without torque
+        delays, sigma = delays + np.where(shown, whole, 0.0), np.where(shown, _jackknife(steps), 0.0)
+        if (np.abs(whole[shown]) < SETTLED * sigma[shown]).all():
             return replace(found, sigma=tuple(sigma.tolist()))
     raise RangeError(
         "the delays of the joints do not settle: does the model fit the robot? `estimate` finds one delay for all joints"
@@ -223,7 +224,7 @@ class _Search:
         )
 
     def _delayed(self, delay: float) -> tuple[MotionLog, ...]:
-        return tuple(replace(log, torque=replace(log.torque, delay=delay)) for log in self._logs)
+        return tuple(replace(log, torque=replace(log.torque, delay=delay, lags=())) for log in self._logs)
 
     def _misfit(self, delay: float) -> float:
         factors = self._at(delay).factors
@@ -244,7 +245,7 @@ def _jackknife(steps: Array) -> Array:
 def _left_out(A: Array, y: Array, last: int) -> tuple[Array, Array]:
     """Return the `last` unknowns of A x = y, by least squares, with each block of rows left out, and of all rows."""
     block, scale = np.arange(len(A)) * BLOCKS // len(A), np.linalg.norm(A, axis=0)
-    A = A / scale
+    A = A / np.where(scale > 0, scale, 1.0)
     squares = np.array([A[block == b].T @ A[block == b] for b in range(BLOCKS)])
     products = np.array([A[block == b].T @ y[block == b] for b in range(BLOCKS)])
     left = np.concatenate([squares.sum(axis=0) - squares, squares.sum(axis=0, keepdims=True)])
@@ -252,5 +253,5 @@ def _left_out(A: Array, y: Array, last: int) -> tuple[Array, Array]:
         np.linalg.pinv(left, hermitian=True)
         @ np.concatenate([products.sum(axis=0) - products, products.sum(axis=0, keepdims=True)])[..., None]
     )
-    found = x[:, -last:, 0] / scale[-last:]
+    found = x[:, -last:, 0] / np.where(scale[-last:] > 0, scale[-last:], np.nan)
     return found[:-1], found[-1]

@@ -229,10 +229,7 @@ def falls(problem: Problem, j: int) -> bool:
     qd[j] = top * np.array(BEYOND)
     conditions = {name: np.mean(x, axis=-1, keepdims=True) + np.zeros(qd.shape) for name, x in states[0].conditions.items()}
     state = State(np.zeros(qd.shape), qd, np.zeros_like, conditions)
-    X = problem.factors.fit(2).X.copy()
-    for place, shape in problem.basis.operating_point.items():  # columns of shapes are slopes about these
-        X[place] -= shape
-    X = X[[problem.basis.places[p] for p in laws.parameters]]
+    X = problem.factors.fit(2).X[[problem.basis.places[p] for p in laws.parameters]]
     tau = combined(laws.explicit(state), X, np.zeros(qd.shape))[j]
     return bool(tau[3] < tau[2] or tau[0] > tau[1])
 

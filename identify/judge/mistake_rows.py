@@ -19,7 +19,6 @@ from idbench.identify.judge.mistakes import (
     OF_ROBOT,
     Mistake,
     Rows,
-    not_zero,
 )
 from idbench.identify.signals.signals import State
 
@@ -29,8 +28,11 @@ RATE = 10.0
 USUAL = 5.0
 """Cut-off of an operator that states none [Hz]."""
 
-AT_ONCE = 32
-"""Columns that are filtered at once."""
+AT_ONCE = 2_000_000
+"""Values of columns that are filtered at once: some 16 MB."""
+
+OF_HINGES = frozenset({"eccentric", "cogging"})
+"""Mistakes of what turns."""
 
 INSTANTS = 12
 """Instants from which on something may have changed: a twelfth of a log apart."""
@@ -81,7 +83,8 @@ class MistakeRows:
     def every(self) -> list[Candidate]:
         """Return the mistakes of joints and of the robot, and those that are looked for from an instant on."""
         joints, robot = range(self.basis.n), (None,)
-        asked = [(m, j) for m in OF_JOINTS if m is not GAIN for j in joints] + [
+        hinges = [j for j in joints if j not in self.basis.slides]
+        asked = [(m, j) for m in OF_JOINTS if m is not GAIN for j in (hinges if m.cause in OF_HINGES else joints)] + [
             (m, j) for m in (*OF_ROBOT, *FROM_AN_INSTANT) for j in robot
         ]
         found = [*self._gains(), *self._made(asked)]
@@ -92,8 +95,9 @@ class MistakeRows:
 
     def _gains(self) -> Iterator[Candidate]:
         """Yield torques that are too large beside others, from rows of what is predicted: parameters leave little of them."""
-        predicted = np.concatenate([part.rows.predicted(self.X) for part in self.parts])
-        measured = np.concatenate([part.rows.Y for part in self.parts])
+        held = np.concatenate([held_torque(part) for part in self.parts])
+        predicted = np.concatenate([part.rows.predicted(self.X) for part in self.parts]) + held
+        measured = np.concatenate([part.rows.Y for part in self.parts]) + held
         group = np.concatenate([part.rows.group for part in self.parts])
         driven = [j for j in range(self.basis.n) if np.any(measured[group == j])]
         for j in driven if len(driven) > 1 else ():
@@ -156,7 +160,7 @@ class MistakeRows:
         """Yield mistakes with their rows, those that have as many columns in every log."""
         of_parts = [self._of_part(part, asked) for part in self.parts]
         for (mistake, joint), *each in zip(asked, *of_parts, strict=True):
-            if each[0] and len({len(columns) for columns in each}) == 1:
+            if any(np.any(x) for columns in each for x in columns):
                 yield self._candidate(mistake, joint, np.concatenate([np.stack(columns, axis=-1) for columns in each]))
 
     def _of_part(self, part: LogRows, asked: Iterable[tuple[Mistake, int | None]]) -> list[list[Array]]:
@@ -165,9 +169,15 @@ class MistakeRows:
         cutoff = getattr(part.problem.own_chain.operator, "cutoff", None) or USUAL
         thin = max(1, int(signals.fs / (RATE * cutoff)))
         motion = _thinned(part, self.basis, self.X, thin)
-        columns = [not_zero(mistake.columns(motion, joint or 0)) for mistake, joint in asked]
+        columns = [each if isinstance(each := m.columns(motion, j or 0), tuple) else (each,) for m, j in asked]
         made = _filtered(part, [rows for each in columns for rows in each], motion.t, thin)
         return [[next(made) for _ in each] for each in columns]
+
+
+def held_torque(part: LogRows) -> Array:
+    """Return the rows of the torque of parameters that are held, and of laws about their shapes: measured ones less Y."""
+    to_rows = part.rows.maps[0]
+    return np.asarray(to_rows.measurement(to_rows.signals.torque.mean) - part.rows.Y)
 
 
 def _thinned(part: LogRows, basis: Basis, X: Array, thin: int) -> FittedMotion:
@@ -181,8 +191,9 @@ def _filtered(part: LogRows, columns: Sequence[Rows], t: Array, thin: int) -> It
     """Yield the rows of torques at some instants."""
     to_rows, log = part.rows.maps[0], part.signals.log
     every = np.arange(log.samples) / part.signals.fs
-    for begin in range(0, len(columns), AT_ONCE):
-        some = columns[begin : begin + AT_ONCE]
+    at_once = max(1, AT_ONCE // (log.n * log.samples))
+    for begin in range(0, len(columns), at_once):
+        some = columns[begin : begin + at_once]
         whole = np.zeros((len(some), log.n, log.samples))
         for i, rows in enumerate(some):
             for j, x in rows.items():

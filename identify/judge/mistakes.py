@@ -42,7 +42,7 @@ class Mistake(NamedTuple):
     of: str = "torque"
     """What it is a mistake of: torque, position, friction, drive, base, link or clock."""
     setting: float = 0.0
-    """Of cogging: waves a turn."""
+    """Of cogging: waves a turn; of a length: along which axis."""
     most: float = np.inf
     """Size above which it is not small, and its column says nothing of it."""
     left: float = 1e-4
@@ -247,7 +247,7 @@ OF_JOINTS: tuple[Mistake, ...] = (
     Mistake("delay", _late_position, "s", "position"),
     Mistake("zero", _zero, "rad", "position", most=0.5),
     Mistake("scale", _scale, "1", "position", most=0.3),
-    Mistake("eccentric", _eccentric, "rad", "position"),
+    Mistake("eccentric", _eccentric, "rad", "position", most=0.5),
     Mistake("rotor", _own(lambda m, j: m.state.qdd[j]), "kg m^2", "drive", positive=True),
     Mistake("coupled_rotor", _coupled, "kg m^2", "drive"),
     Mistake("spring", _own(lambda m, j: m.state.q[j]), "N m/rad", "drive"),
@@ -261,8 +261,8 @@ OF_JOINTS: tuple[Mistake, ...] = (
     *(Mistake("cogging", _cogging(k), "N m", "drive", k) for k in TURNS),
     Mistake("backlash", _backlash, "rad", "drive", positive=True),
     Mistake("elasticity", _elasticity, "rad/(N m)", "drive", positive=True),
-    *(Mistake("length", _length(axis), "m", "link") for axis in range(3)),
-    Mistake("axis", _axis, "rad", "link"),
+    *(Mistake("length", _length(axis), "m", "link", axis) for axis in range(3)),
+    Mistake("axis", _axis, "rad", "link", most=0.5),
 )
 """Mistakes of a joint."""
 
@@ -288,10 +288,3 @@ COLLISION = Mistake("collision", _own(lambda m, _: np.ones_like(m.t)), "N m")
 
 BASE: tuple[Mistake, ...] = tuple(Mistake("base_motion", _pushed(axis), "m/s^2", "base") for axis in range(3))
 """Motion of the base, at the frequencies that residuals have."""
-
-
-def not_zero(found: Rows | tuple[Rows, ...]) -> tuple[Rows, ...]:
-    """Return the columns of a mistake that are not zero."""
-    each = found if isinstance(found, tuple) else (found,)
-    some = ({j: x for j, x in rows.items() if np.any(x)} for rows in each)
-    return tuple(rows for rows in some if rows)

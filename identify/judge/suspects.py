@@ -9,8 +9,9 @@ import numpy as np
 import scipy
 
 from idbench.identify.arrays import TINY, Array
+from idbench.identify.errors import IdentificationError
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.judge.mistake_rows import Candidate, MistakeRows
+from idbench.identify.judge.mistake_rows import Candidate, MistakeRows, held_torque
 from idbench.identify.judge.mistakes import COLLISION, GAIN
 from idbench.identify.judge.stretches import errors_of_stretches, scatter_of_sums
 
@@ -34,6 +35,9 @@ MOST = 3
 
 MEDIAN = 0.4549
 """Of chi squared with one degree of freedom."""
+
+FEWEST, MANY = 2, 100_000
+"""Rows a parameter, and rows at most: hundreds of columns of as many take a GB."""
 
 ROUNDS = 5
 """Of the gain of a torque, which is not small where a constant is wrong by tenths."""
@@ -70,7 +74,7 @@ class Suspect:
     gain: float
     """What it takes of minus twice the logarithm of the likelihood."""
     setting: float = 0.0
-    """Of cogging: waves a turn."""
+    """Of cogging: waves a turn; of a length: along which axis."""
     instant: float | None = None
     """When it happened, or from when on it is there [s]."""
 
@@ -94,6 +98,8 @@ def suspects(problem: Problem, X: Array) -> tuple[Suspect, ...]:
     """
     problem.require_rows("mistakes are looked for by rows, and ")
     explicit = problem.explicit
+    if not FEWEST * len(X) < (count := len(explicit.rows.time)) < MANY:
+        raise IdentificationError(f"{count} rows are too few or too many to test mistakes beside {len(X)} parameters")
     rows = MistakeRows(explicit.parts, explicit.basis, X)
     return tuple(_Search(explicit, rows, rows.every()).found())
 
@@ -228,12 +234,13 @@ class _Search:
 
     def _torque_gain(self, j: int) -> float:
         """Return how much too large torques of a joint are: 1 + g(k+1) = (1 + g(k)) (1 + b), b that of Y_j / (1 + g(k))."""
-        rows, gain = self.problem.rows, 1.0
+        rows, gain, held = self.problem.rows, 1.0, np.concatenate([held_torque(part) for part in self.problem.parts])
         Q, R = np.linalg.qr(self._W)
         for _ in range(ROUNDS):
-            Y = self._white(np.where(rows.group == j, rows.Y / gain, rows.Y))
+            Y = self._white(np.where(rows.group == j, (rows.Y + held) / gain - held, rows.Y))
+            Y[len(Y) - self._known :] = self._Y[len(Y) - self._known :]
             X = np.linalg.lstsq(R, Q.T @ Y)[0]
-            c = self._white(np.where(rows.group == j, rows.predicted(X), 0.0))
+            c = self._white(np.where(rows.group == j, rows.predicted(X) + held, 0.0))
             left = c - Q @ (Q.T @ c)
             gain *= 1 + float(left @ Y) / float(left @ left)
         return gain - 1

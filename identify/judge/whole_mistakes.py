@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+import numpy.typing as npt
 
 from idbench.identify.arrays import TINY, Array
 from idbench.identify.basis.tree_links import TreeLinks
@@ -28,8 +29,14 @@ BALANCED, KNOWN = 0.1, 4.0
 """Share of its terms that a joint without a drive has as residual at most: what balances, balances to its noise; and sigma of
 parameters that count for that: those of a joint whose torque was not logged vanish."""
 
+MOVES = 100.0
+"""Standard deviations of the noise of a position beyond which a joint moves, and does not flicker by a count."""
+
 SAMPLES = 20.0
 """Samples for each period of the operator's cut-off with which large mistakes are looked for."""
+
+MOST = 3
+"""Large mistakes that are tried on held-out stretches, the most likely first."""
 
 NOTHING_LEFT = 1 / 3
 """Share of the largest error that the right sign or axis leaves at most: a wrong one also explains a part of other mistakes."""
@@ -87,22 +94,25 @@ def _with_fewer(log: MotionLog, every: int) -> MotionLog:
 def whole_mistake(problem: Problem, small: Suspect | None = None) -> Suspect | None:
     """Return the mistake without which the rows are by far most likely, by more than a `small` one; None where none is."""
     explicit = problem.explicit
-    before = _unlikely(explicit.factors)
+    before, counts = _unlikely(explicit.factors), explicit.factors.rows
     tried = [*_signs(explicit), *(_rates(explicit) if small else ())]
     if _worst(explicit) > POOR:
         tried += [*_exchanged(explicit), *_gravities(explicit), *_turned(explicit)]
-    gains = [before - _unlikely(each.problem.factors) for each in tried]
-    if not gains or max(gains) < max(DECISIVE, small.gain if small else 0.0):
-        return None
-    best = tried[int(np.argmax(gains))]
-    near = [each for each, gain in zip(tried, gains, strict=True) if gain > 0.9 * max(gains) and each is not best]
-    others = tuple(dict.fromkeys((each.cause, each.joint) for each in near))
-    errors = [held_out_errors(each) for each in (explicit, best.problem)]
-    k = int(np.argmax(np.log(errors[0]) - np.log(errors[1])))
-    if errors[1][k] > min(NOTHING_LEFT * errors[0][k], small.held_out[1] if small else np.inf):
-        return None
-    found, gain = (float(errors[0][k]), float(errors[1][k])), float(max(gains))
-    return Suspect(best.cause, best.of, best.joint, best.size, (0.0,), "1", 0.0, float(np.sqrt(gain)), others, found, gain)
+    gains = [before - _unlikely(each.problem.with_logs(each.problem.logs).factors, counts) for each in tried]  # kept by none
+    found = sorted(zip(gains, tried, strict=True), key=lambda one: -one[0])
+    before_errors = held_out_errors(explicit)
+    for gain, best in found[:MOST]:
+        if gain < max(DECISIVE, small.gain if small else 0.0):
+            break
+        errors = held_out_errors(best.problem)
+        k = int(np.argmax(np.log(before_errors) - np.log(errors)))
+        if errors[k] > min(NOTHING_LEFT * before_errors[k], small.held_out[1] if small else np.inf):
+            continue
+        near = [(each.cause, each.joint) for other, each in found if other > 0.9 * gain and each is not best]
+        others = tuple(key for key in dict.fromkeys(near) if key != (best.cause, best.joint))
+        pair, unit = (float(before_errors[k]), float(errors[k])), "rad" if best.cause == "zero" else "1"
+        return Suspect(best.cause, best.of, best.joint, best.size, (0.0,), unit, 0.0, float(np.sqrt(gain)), others, pair, gain)
+    return None
 
 
 def _silent(problem: Problem, X: Array) -> Suspect | None:
@@ -113,22 +123,22 @@ def _silent(problem: Problem, X: Array) -> Suspect | None:
     rows, factor = problem.rows, problem.factors.fit(2).factor
     sigma = np.sqrt(np.diagonal(factor.inverse(np.array(factor.determined))))
     known = np.where(np.abs(X) > KNOWN * sigma, X, 0.0)
-    for log in problem.logs:
-        for j in map(int, np.flatnonzero((np.ptp(log.tau, axis=-2) == 0) & (np.ptp(log.q, axis=-2) > 0))):
-            own = rows.group == j
-            terms, left = np.sum((rows.W[own] * known) ** 2), np.sum((rows.Y - rows.predicted(X))[own] ** 2)
-            if left < BALANCED**2 * terms:
-                continue
+    still = np.all([np.ptp(log.tau, axis=-2) == 0 for log in problem.logs], axis=0)
+    moves = np.any([np.ptp(log.q, axis=-2) > MOVES * problem.position_noise for log in problem.logs], axis=0)
+    for j in map(int, np.flatnonzero(still & moves)):
+        own = rows.group == j
+        terms, left = np.sum((rows.W[own] * known) ** 2), np.sum((rows.Y - rows.predicted(X))[own] ** 2)
+        if left >= BALANCED**2 * terms:
             return Suspect("missing_torque", "torque", j, (1.0,), (0.0,), "1", 0.0, np.inf, (), (100.0, 0.0), np.inf)
     return None
 
 
-def _unlikely(factors: Factors) -> float:
-    """Return minus twice the logarithm of the likelihood, with a level of noise of each kind."""
-    X = factors.fit(2).X
+def _unlikely(factors: Factors, counts: npt.NDArray[np.intp] | None = None) -> float:
+    """Return minus twice the logarithm of the likelihood, with a level of noise of each kind, as of so many rows."""
+    X, rows = factors.fit(2).X, np.maximum(factors.rows, 1)
     if not np.isfinite(X).all():
         return np.inf
-    return float(np.sum(factors.rows * np.log(np.maximum(factors.squares(X), TINY))))
+    return float(np.sum((rows if counts is None else counts) * np.log(np.maximum(factors.squares(X) / rows, TINY))))
 
 
 def _worst(problem: Problem) -> float:
@@ -150,11 +160,12 @@ def _changed(problem: Problem, q: Array | None = None, tau: Array | None = None)
 def _signs(problem: Problem) -> Iterator[_Tried]:
     """Yield the torque of each joint with the other sign: of the factors alone the last column changes."""
     n, factors = problem.basis.n, problem.factors
+    held = bool(problem.basis.held)  # whose torque keeps its sign
     for j in range(n):
         R = factors.R.copy()
         R[j, :, -1] *= -1
         flipped = replace(factors, R=R, _fits=[])
-        if _unlikely(flipped) < _unlikely(factors) - DECISIVE:
+        if held or _unlikely(flipped) < _unlikely(factors) - DECISIVE:
             yield _Tried("sign", "torque", j, (-1.0,), _changed(problem, tau=_diagonal(n, j)))
 
 
@@ -198,6 +209,6 @@ def _turned(problem: Problem) -> Iterator[_Tried]:
     n = problem.basis.n
     for j in range(n):
         yield _Tried("sign", "position", j, (-1.0,), _changed(problem, q=_diagonal(n, j)))
-        for turn in (np.pi / 2, -np.pi / 2, np.pi):
+        for turn in () if j in problem.basis.slides else (np.pi / 2, -np.pi / 2, np.pi):
             moved = [replace(log, q=log.q - turn * (np.arange(n) == j)) for log in problem.logs]
             yield _Tried("zero", "position", j, (turn,), problem.with_logs(moved))
