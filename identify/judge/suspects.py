@@ -234,7 +234,8 @@ class _Search:
 
     def _torque_gain(self, j: int) -> float:
         """Return how much too large torques of a joint are: 1 + g(k+1) = (1 + g(k)) (1 + b), b that of Y_j / (1 + g(k))."""
-        rows, gain, held = self.problem.rows, 1.0, np.concatenate([held_torque(part) for part in self.problem.parts])
+        rows, gain = self.problem.rows, 1.0
+        held = np.concatenate([held_torque(part) for part in self.problem.parts])
         Q, R = np.linalg.qr(self._W)
         for _ in range(ROUNDS):
             Y = self._white(np.where(rows.group == j, (rows.Y + held) / gain - held, rows.Y))

@@ -289,4 +289,4 @@ def test_a_log_is_shown_and_drawn(idbench, first, tmp_path):
 def test_what_a_log_is_not_is_told(complaint, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "words.csv").write_text("a,b,c\n" + "1,2,3\n" * 30)
-    assert "no time, positions and torques of some joints" in complaint("log", "words.csv")
+    assert "looks like positions and torques or currents; its columns: a, b, c" in complaint("log", "words.csv")
