@@ -165,7 +165,8 @@ class Cause:
 
     def _laws(self, law: str) -> str:
         """Return words of friction with a law more, of the joint or of all."""
-        joints, laws, j = self.robot_model.robot.joints, self.robot_model.laws, self.suspect.joint
+        joints, j = self.robot_model.robot.joints, self.suspect.joint
+        laws = self.robot_model.laws
         if not law or laws.smooth:
             return ""
         more = [(law,) if j in (None, k) else () for k in range(len(joints))]
