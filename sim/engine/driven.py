@@ -4,7 +4,7 @@ One loop: plants start somewhere in the log, get its torques as its channel says
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import final
 
 import numpy as np
@@ -172,6 +172,10 @@ def physics_steps(fs: float, longest: float) -> tuple[float, int]:
 
 def mean_torques(log: MotionLog, h: float, per_sample: int) -> Array:
     """Return the mean of the torque that acts in every physics step, shape (time, step, joint)."""
+    if lags := log.torque.lags:
+        channels = (replace(log.torque, delay=log.torque.delay + lag, lags=()) for lag in lags)
+        each = [mean_torques(replace(log, torque=channel), h, per_sample)[..., j] for j, channel in enumerate(channels)]
+        return np.stack(each, axis=-1)
     tau = log.tau * np.asarray(log.torque.gain)
     T = 1 / log.fs
     delay = log.torque.delay

@@ -26,6 +26,7 @@ from idbench.identify.judge.delay import estimate_delay, estimate_joint_delays
 from idbench.identify.signals.filters import shift
 from idbench.sim.drives import AveragedDrive
 from idbench.sim.encoders import IncrementalEncoder
+from idbench.sim.engine.driven import mean_torques
 from idbench.sim.engine.simulation import simulate
 from idbench.sim.scenario.measurement import TorqueMeasurement
 from idbench.sim.scenario.scenario import Timing
@@ -170,3 +171,16 @@ def test_estimators_that_hold_a_torque_for_a_sampling_period_refuse_another(acro
     slower = replace(log, torque=TorqueChannel("held", period=3 / log.fs))
     with pytest.raises(IdentificationError, match=r"is held for 0\.03 s, not for its sampling period of 0\.01 s"):
         identify(slower, scara(), MODELS.create("explicit"), estimator=ESTIMATORS.create(acronym))
+
+
+@pytest.mark.parametrize("meaning", ["held", "instantaneous"])
+def test_a_replay_is_driven_with_the_delay_of_each_joint(meaning, log):
+    """Lags of one size are a delay that is longer by it; those that differ are each joint's own."""
+
+    def driven(**channel):
+        return mean_torques(replace(log.part(0, 50), torque=TorqueChannel(meaning, **channel)), 1 / log.fs / 4, 4)
+
+    np.testing.assert_allclose(driven(delay=0.001, lags=(0.002, 0.002)), driven(delay=0.003), atol=1e-12)
+    mixed = driven(lags=(0.0, 0.004))
+    np.testing.assert_array_equal(mixed[..., 0], driven()[..., 0])
+    np.testing.assert_array_equal(mixed[..., 1], driven(delay=0.004)[..., 1])
