@@ -52,13 +52,13 @@ WORDINGS: Mapping[tuple[str, str], Wording] = {
         "a spring of {size}", by="stiffness and springref of the joint in the robot's file, or --balancer"
     ),
     ("load", "friction"): Wording("friction grows with the load, by {size}", "--friction {laws}", law="load"),
-    ("velocity", "friction"): Wording("friction bends over velocity", "--friction {laws}", law="stribeck"),
+    ("velocity", "friction"): Wording("friction is nonlinear in velocity", "--friction {laws}", law="stribeck"),
     ("asymmetry", "friction"): Wording("friction differs by direction", "--friction {laws}", law="asymmetric-viscous"),
     ("warming", "friction"): Wording(
         "friction changes with time, as of a robot that warms up", by="a log of a warm robot, or its temperature"
     ),
     ("hysteresis", "friction"): Wording(
-        "friction turns gradually after a reversal", by="a larger --mask-speed, or longer strokes"
+        "friction with hysteresis after reversals (pre-sliding)", by="a larger --mask-speed, or longer strokes"
     ),
     ("cogging", "drive"): Wording(
         "cogging of {setting:g} waves a turn, {size}", "--friction {laws}", law="cogging:{setting:g}"
@@ -110,7 +110,7 @@ class Cause:
         t = "" if np.isinf(suspect.t) else f" (t = {suspect.t:.0f})"
         others = ", ".join(dict.fromkeys(map(self._named, suspect.alternatives)))
         before = f"{self.joint}: " if self.joint else "all torques: " if wording.what.startswith("torque") else ""
-        return f"{before}{what}{t}{f'; or {others}, which this log does not tell apart' if others else ''}"
+        return f"{before}{what}{t}{f'; or {others}, which this log cannot distinguish' if others else ''}"
 
     @property
     def remedy(self) -> str:
