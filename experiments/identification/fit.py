@@ -6,7 +6,7 @@ from typing import Any, Self, final
 
 import numpy as np
 
-from idbench.experiments.identification.diagnosis import Cause
+from idbench.experiments.identification.causes import Cause
 from idbench.experiments.identification.friction_choice import chosen_in_turns, masked_laws, suited_mask
 from idbench.experiments.identification.logs import Logs
 from idbench.experiments.identification.prior_share import chosen_share
@@ -29,9 +29,9 @@ from idbench.identify import (
     attempt_each,
     encoder_steps,
 )
+from idbench.identify.judge.diagnosis import diagnosed
 from idbench.identify.judge.friction_choice import FrictionChoice
 from idbench.identify.judge.torque_interval import TorqueInterval, torque_interval
-from idbench.identify.judge.whole_mistakes import diagnosed
 from idbench.identify.rows.rows import Rows
 
 NOTHING = 1e-12

@@ -8,8 +8,8 @@ from typing import Any, Self, final
 
 import numpy as np
 
+from idbench.experiments.identification.causes import Cause
 from idbench.experiments.identification.consistent_robot import WrittenRobot
-from idbench.experiments.identification.diagnosis import Cause
 from idbench.experiments.identification.fit import Fit, fit
 from idbench.experiments.judgement.warnings import wrong_sign
 from idbench.experiments.results.writing import finite

@@ -12,7 +12,7 @@ from idbench.identify.arrays import combined
 from idbench.identify.basis import LoadFriction
 from idbench.identify.basis.joint_law import AbstractFriction
 from idbench.identify.basis.of_joints import inner_of
-from idbench.identify.judge.diagnosis import filtered
+from idbench.identify.judge.residuals import filtered
 from idbench.identify.rows.row_map import Kernel
 from idbench.identify.signals.signals import Signals, State
 

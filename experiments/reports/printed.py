@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from idbench.experiments.identification.diagnosis import words_of_diagnosis
+from idbench.experiments.identification.causes import words_of_diagnosis
 from idbench.experiments.identification.fit import Fit
 from idbench.experiments.identification.iterations import words_of_iterations
 from idbench.experiments.judgement.held_out import HeldOut

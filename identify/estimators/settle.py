@@ -9,7 +9,7 @@ from typing import Any, final
 import numpy as np
 import numpy.typing as npt
 
-from idbench.identify.arrays import TINY, Array
+from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.basis.block import Kind, Parameter
 from idbench.identify.basis.friction.shape import ShapedFriction, with_settings
@@ -160,7 +160,7 @@ class AdaptiveRows:
 
     def misfit(self, basis: Basis) -> Array:
         """Return the misfit with the current nonlinear parameters of friction, shape (...)."""
-        return misfit(self.factors(basis).only(_rest(basis), basis.operating_point))
+        return self.factors(basis).only(_rest(basis), basis.operating_point).misfit()
 
     @cached_property
     def _last(self) -> list[Any]:
@@ -182,12 +182,6 @@ class AdaptiveRows:
 
     def _rows_of(self, basis: Basis) -> Rows:
         return self.problem.with_basis(basis).some_rows
-
-
-def misfit(factors: Factors) -> Array:
-    """Return minus twice the logarithm of the likelihood, with a level of noise of each joint, shape (...); inf without any."""
-    found = np.sum(factors.rows * np.log(np.maximum(factors.squares(factors.fit(2).X), TINY)), axis=-1)
-    return np.where(np.isnan(found), np.inf, found)
 
 
 def _scanned(rows: AdaptiveRows, basis: Basis, count: int) -> Basis:
@@ -233,7 +227,7 @@ def _best(rows: AdaptiveRows, basis: Basis, shaped: ShapedFriction, joints: Sequ
         for j in joints if here else (*joints, *joints):  # at first, a second time beside what the others have
             others = [there.places[candidates.parameter(i, k)] for k, i in found.items() if k != j]
             own = [there.places[candidates.parameter(i, j)] for i in range(len(candidates.grid))]
-            costs = np.array([misfit(alone.only([*plain, *others, place], at)) for place in own])
+            costs = np.array([alone.only([*plain, *others, place], at).misfit() for place in own])
             costs[: len(grid)] -= _below(costs[: len(grid)]) if len(settings) == 1 else 0.0
             found[j] = int(np.argmin(costs))
         chosen[run][list(found)] = list(found.values())

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from idbench.identify.arrays import TINY, Array
+from idbench.identify.arrays import Array
 from idbench.identify.basis.basis import Basis
 from idbench.identify.data.motion_log import MotionLog, TorqueChannel
 from idbench.identify.errors import LogError, RangeError, SettingError
@@ -227,8 +227,7 @@ class _Search:
         return tuple(replace(log, torque=replace(log.torque, delay=delay, lags=())) for log in self._logs)
 
     def _misfit(self, delay: float) -> float:
-        factors = self._at(delay).factors
-        return float(np.sum(factors.rows * np.log(np.maximum(factors.squares(factors.fit(2).X), TINY))))
+        return float(self._at(delay).factors.misfit())
 
 
 def _white(problem: Problem, each: Sequence[Array]) -> Array:

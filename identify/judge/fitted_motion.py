@@ -79,16 +79,15 @@ class FittedMotion:
 
     def on(self, changed: Callable[[KinematicTree], KinematicTree]) -> Array | None:
         """Return what the torque of a robot whose tree is changed by `SMALL` has more, over that; None if it has no tree."""
-        basis, X = self.rigid
-        blocks = tuple(replace(b, tree=changed(b.tree)) if isinstance(b, TreeLinks) else b for b in basis.blocks)
         if self.tree is None:
             return None
-        return np.asarray((self._of(replace(basis, blocks=blocks), X, self.state) - self.load) / SMALL)
+        basis, X = self.rigid
+        return np.asarray((self._of(on_tree(basis, changed(self.tree)), X, self.state) - self.load) / SMALL)
 
     @cached_property
     def tree(self) -> KinematicTree | None:
         """Of the links, if they are those of a tree."""
-        return next((block.tree for block in self.basis.blocks if isinstance(block, TreeLinks)), None)
+        return tree_of(self.basis)
 
     def _friction_slope(self) -> Array:
         """Return qd times the slope of what is no rigid torque."""
@@ -99,6 +98,17 @@ class FittedMotion:
 
     def _of(self, basis: Basis, X: Array, state: State) -> Array:
         return combined(basis.explicit(replace(state, conditions=self.state.conditions)), X, np.zeros(state.q.shape))
+
+
+def tree_of(basis: Basis) -> KinematicTree | None:
+    """Return the tree of a robot's links; None if they are no tree's."""
+    return next((block.tree for block in basis.blocks if isinstance(block, TreeLinks)), None)
+
+
+def on_tree(basis: Basis, tree: KinematicTree) -> Basis:
+    """Return a basis whose links are those of another tree."""
+    blocks = tuple(replace(block, tree=tree) if isinstance(block, TreeLinks) else block for block in basis.blocks)
+    return replace(basis, blocks=blocks)
 
 
 def _state(q: Array, qd: Array, qdd: Array) -> State:

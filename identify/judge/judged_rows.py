@@ -9,7 +9,7 @@ import scipy
 from idbench.identify.arrays import Array
 from idbench.identify.data.motion_log import MotionLog
 from idbench.identify.estimators.problem import Problem
-from idbench.identify.judge.diagnosis import Instants
+from idbench.identify.judge.residuals import Instants
 from idbench.identify.models import ExplicitModel
 from idbench.identify.noise.row_weights import two_levels
 from idbench.identify.rows.chain import Chain

@@ -1,19 +1,16 @@
-"""Mistakes that are not small: signs, exchanged torques, gravity that points elsewhere, torques that were not logged."""
+"""Mistakes that are not small: signs, exchanged torques, gravity that points elsewhere, other zeros and rates."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-import numpy.typing as npt
 
-from idbench.identify.arrays import TINY, Array
-from idbench.identify.basis.tree_links import TreeLinks
-from idbench.identify.data.motion_log import MotionLog
+from idbench.identify.arrays import Array
 from idbench.identify.estimators.problem import Problem
+from idbench.identify.judge.fitted_motion import on_tree, tree_of
 from idbench.identify.judge.stretches import held_out_errors
-from idbench.identify.judge.suspects import Suspect, suspects
-from idbench.identify.rows.factors import Factors
+from idbench.identify.judge.suspect import Suspect
 
 POOR = 5.0
 """Residuals [% of a joint's torque] above which more is tried than signs of torques: a wrong axis leaves tens."""
@@ -24,16 +21,6 @@ steps, four sigma of independent ones."""
 
 RATES = (0.8, 0.9, 0.95, 1.05, 1.1, 1.25)
 """Rates of the clock, over the stated one, that are tried where something is wrong."""
-
-BALANCED, KNOWN = 0.1, 4.0
-"""Share of its terms that a joint without a drive has as residual at most: what balances, balances to its noise; and sigma of
-parameters that count for that: those of a joint whose torque was not logged vanish."""
-
-MOVES = 100.0
-"""Standard deviations of the noise of a position beyond which a joint moves, and does not flicker by a count."""
-
-SAMPLES = 20.0
-"""Samples for each period of the operator's cut-off with which large mistakes are looked for."""
 
 MOST = 3
 """Large mistakes that are tried on held-out stretches, the most likely first."""
@@ -55,54 +42,18 @@ class _Tried:
     """The problem as it would be without the mistake."""
 
 
-def diagnosed(problem: Problem, X: Array) -> tuple[Suspect, ...]:
-    """Return what is wrong: a mistake that is not small, or small ones, whatever makes the rows most likely.
-
-    Parameters
-    ----------
-    problem : Problem
-        Of one run, whose rows are kept.
-    X : Array, shape (p,)
-        Its estimate.
-    """
-    problem.require_rows("mistakes are looked for by rows, and ")
-    if (silent := _silent(problem.explicit, X)) is not None:
-        return (silent,)
-    small = suspects(problem, X)
-    whole = whole_mistake(_thinned(problem.explicit), small[0] if small else None)
-    return (whole,) if whole else small
-
-
-def _thinned(problem: Problem) -> Problem:
-    """Return the problem of fewer samples, where there are many for the band of its rows: they show signs as well."""
-    cutoff = getattr(problem.own_chain.operator, "cutoff", None)
-    return problem.with_logs(
-        [_with_fewer(log, max(1, int(log.fs / (SAMPLES * cutoff))) if cutoff else 1) for log in problem.logs]
-    )
-
-
-def _with_fewer(log: MotionLog, every: int) -> MotionLog:
-    if every == 1:
-        return log
-    torque = replace(log.torque, period=log.torque.period or 1 / log.fs)
-    conditions = {name: x[..., ::every, :] for name, x in log.conditions.items()}
-    return replace(
-        log, fs=log.fs / every, q=log.q[..., ::every, :], tau=log.tau[..., ::every, :], torque=torque, conditions=conditions
-    )
-
-
 def whole_mistake(problem: Problem, small: Suspect | None = None) -> Suspect | None:
     """Return the mistake without which the rows are by far most likely, by more than a `small` one; None where none is."""
     explicit = problem.explicit
-    before, counts = _unlikely(explicit.factors), explicit.factors.rows
+    before, counts = float(explicit.factors.misfit()), explicit.factors.rows
     tried = [*_signs(explicit), *(_rates(explicit) if small else ())]
     if _worst(explicit) > POOR:
         tried += [*_exchanged(explicit), *_gravities(explicit), *_turned(explicit)]
-    gains = [before - _unlikely(each.problem.with_logs(each.problem.logs).factors, counts) for each in tried]  # kept by none
+    gains = [before - float(each.problem.with_logs(each.problem.logs).factors.misfit(counts)) for each in tried]  # kept by none
     found = sorted(zip(gains, tried, strict=True), key=lambda one: -one[0])
     before_errors = held_out_errors(explicit)
     for gain, best in found[:MOST]:
-        if gain < max(DECISIVE, small.gain if small else 0.0):
+        if gain < max(DECISIVE, small.evidence if small else 0.0):
             break
         errors = held_out_errors(best.problem)
         k = int(np.argmax(np.log(before_errors) - np.log(errors)))
@@ -113,32 +64,6 @@ def whole_mistake(problem: Problem, small: Suspect | None = None) -> Suspect | N
         pair, unit = (float(before_errors[k]), float(errors[k])), "rad" if best.cause == "zero" else "1"
         return Suspect(best.cause, best.of, best.joint, best.size, (0.0,), unit, 0.0, float(np.sqrt(gain)), others, pair, gain)
     return None
-
-
-def _silent(problem: Problem, X: Array) -> Suspect | None:
-    """Return that the torque of the first joint whose torque never changes though it moves was not logged.
-
-    A joint without a drive has none: inertia and weight balance in it, where parameters of one that has vanish.
-    """
-    rows, factor = problem.rows, problem.factors.fit(2).factor
-    sigma = np.sqrt(np.diagonal(factor.inverse(np.array(factor.determined))))
-    known = np.where(np.abs(X) > KNOWN * sigma, X, 0.0)
-    still = np.all([np.ptp(log.tau, axis=-2) == 0 for log in problem.logs], axis=0)
-    moves = np.any([np.ptp(log.q, axis=-2) > MOVES * problem.position_noise for log in problem.logs], axis=0)
-    for j in map(int, np.flatnonzero(still & moves)):
-        own = rows.group == j
-        terms, left = np.sum((rows.W[own] * known) ** 2), np.sum((rows.Y - rows.predicted(X))[own] ** 2)
-        if left >= BALANCED**2 * terms:
-            return Suspect("missing_torque", "torque", j, (1.0,), (0.0,), "1", 0.0, np.inf, (), (100.0, 0.0), np.inf)
-    return None
-
-
-def _unlikely(factors: Factors, counts: npt.NDArray[np.intp] | None = None) -> float:
-    """Return minus twice the logarithm of the likelihood, with a level of noise of each kind, as of so many rows."""
-    X, rows = factors.fit(2).X, np.maximum(factors.rows, 1)
-    if not np.isfinite(X).all():
-        return np.inf
-    return float(np.sum((rows if counts is None else counts) * np.log(np.maximum(factors.squares(X) / rows, TINY))))
 
 
 def _worst(problem: Problem) -> float:
@@ -165,7 +90,7 @@ def _signs(problem: Problem) -> Iterator[_Tried]:
         R = factors.R.copy()
         R[j, :, -1] *= -1
         flipped = replace(factors, R=R, _fits=[])
-        if held or _unlikely(flipped) < _unlikely(factors) - DECISIVE:
+        if held or flipped.misfit() < factors.misfit() - DECISIVE:
             yield _Tried("sign", "torque", j, (-1.0,), _changed(problem, tau=_diagonal(n, j)))
 
 
@@ -191,17 +116,14 @@ def _exchanged(problem: Problem) -> Iterator[_Tried]:
 
 def _gravities(problem: Problem) -> Iterator[_Tried]:
     """Yield gravity the other way, none, and along the other axes of the base."""
-    tree = next((block.tree for block in problem.basis.blocks if isinstance(block, TreeLinks)), None)
+    tree = tree_of(problem.basis)
     if tree is None or not np.any(tree.gravity):
         return
     g = float(np.linalg.norm(tree.gravity))
     across = [sign * g * a for a in np.linalg.svd(tree.gravity[None])[2][1:] for sign in (1, -1)]
     for gravity in (-tree.gravity, ALMOST_NONE * tree.gravity, *across):
-        moved = replace(tree, gravity=gravity)
-        blocks = tuple(replace(b, tree=moved) if isinstance(b, TreeLinks) else b for b in problem.basis.blocks)
-        yield _Tried(
-            "gravity", "base", None, tuple(gravity.tolist()), problem.with_basis(replace(problem.basis, blocks=blocks))
-        )
+        elsewhere = problem.with_basis(on_tree(problem.basis, replace(tree, gravity=gravity)))
+        yield _Tried("gravity", "base", None, tuple(gravity.tolist()), elsewhere)
 
 
 def _turned(problem: Problem) -> Iterator[_Tried]:

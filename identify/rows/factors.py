@@ -16,7 +16,6 @@ NOT_SHOWN = 1e-6
 """A direction of the parameters, in columns scaled to unit length, is not shown when its singular value is below this share of
 the largest: it would take columns known to seven digits to identify it to 10 %, and no log gives those."""
 
-
 NOISE = 1e-3
 """Share of the measurements that counts as noise at least beside what is known before: rows as few as parameters show none."""
 
@@ -245,6 +244,12 @@ class Factors:
     def squares(self, X: Array) -> Array:
         """Return |Y - W X|^2 of every kind, shape (..., kind)."""
         return Factor(self.R, self.rows, self.names).squares(X[..., None, :])
+
+    def misfit(self, counts: npt.NDArray[np.intp] | None = None) -> Array:
+        """Return minus twice the log-likelihood, shape (...), as of `counts` rows, shape (..., kind); inf if unsolved."""
+        each = np.log(np.maximum(self.squares(self.fit(2).X) / np.maximum(self.rows, 1), TINY))
+        found = np.sum((self.rows if counts is None else counts) * each, axis=-1)
+        return np.where(np.isnan(found), np.inf, found)
 
     def fit(self, rounds: int = 0) -> LeastSquaresFit:
         """Return the least-squares solution, with rows divided by the rms of their kind's residuals after the first step.

@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "identify"))
 
 from fault_logs import FAULTS, NULLS, Case
 
-from idbench.identify.judge.suspects import Suspect
+from idbench.identify.judge.suspect import Suspect
 
 
 def _named(cause: str, j: int | None) -> str:

@@ -160,7 +160,7 @@ def test_the_last_line_says_what_to_check_first_and_models_alike_are_one(csv, ca
     assert main(["identify", str(csv), "--torque", "held", "--torque-delay", "0.003"]) == 0
     lines = capsys.readouterr().out.strip().splitlines()
     assert lines[-1].startswith("Result: ")
-    assert "all torques: torque late by 0.00301 s" in lines[-1]
+    assert "all torques: torque late by 0.00301 +- " in lines[-1]
     assert lines[-1].endswith("next: --torque-delay estimate")
     assert any(line.startswith("explicit: ") and line.endswith(" (implicit: the same)") for line in lines)
 

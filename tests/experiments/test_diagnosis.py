@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from idbench.experiments.identification.diagnosis import WORDINGS
+from idbench.experiments.identification.causes import WORDINGS
 from idbench.experiments.identification.friction_laws import FrictionLaws
 from idbench.identify.judge.mistakes import BASE, COLLISION, FROM_AN_INSTANT, OF_JOINTS, OF_ROBOT
 

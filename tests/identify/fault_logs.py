@@ -21,8 +21,8 @@ from idbench.identify import (
 from idbench.identify.basis import tree_basis
 from idbench.identify.basis.basis import Basis
 from idbench.identify.data.kinematics import KinematicTree
-from idbench.identify.judge.suspects import Suspect
-from idbench.identify.judge.whole_mistakes import diagnosed
+from idbench.identify.judge.diagnosis import diagnosed
+from idbench.identify.judge.suspect import Suspect
 from idbench.identify.signals.signals import State
 from idbench.sim.robot.robot import Robot
 from idbench.sim.robot.tree import kinematic_tree

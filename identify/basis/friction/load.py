@@ -79,10 +79,7 @@ class LoadFriction(AbstractJointLaw):
         """Return the torque that each joint carries [N m], shape (..., joint, time)."""
         if self.bodies is None or self.X is None:
             return state.qdd
-        bodies = self.bodies
-        # With the bodies, whose identity is the key, so that it lasts as long as their columns.
-        _, columns = state.shared(("bodies", id(bodies)), lambda state: (bodies, bodies.explicit(state)))
-        return combined(columns, self.X, np.zeros(state.q.shape))
+        return combined(state.shared(self.bodies.explicit, self.bodies.explicit), self.X, np.zeros(state.q.shape))
 
     @property
     def is_nonlinear(self) -> bool:
@@ -92,8 +89,8 @@ class LoadFriction(AbstractJointLaw):
     def adapted(self, basis: Basis, X: Array) -> Self:
         """Return the law with the load of an estimate."""
         bodies = basis.only(RIGID)
-        if self.bodies is not None and self.bodies.parameters == bodies.parameters:  # their columns are kept
-            bodies = self.bodies
+        if self.bodies is not None and self.bodies.parameters == bodies.parameters:
+            bodies = self.bodies  # whose columns are kept
         x = X[..., [basis.places[parameter] for parameter in bodies.parameters]]
         known = np.isfinite(x).all(axis=-1, keepdims=True)
         if self.X is None and not known.any():

@@ -1,9 +1,8 @@
-"""Which mistakes the residuals of a fit show: one test each, against residuals as correlated as they are."""
+"""Small mistakes that the residuals of a fit show: one test each, against residuals as correlated as they are."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import final
 
 import numpy as np
 import scipy
@@ -14,6 +13,7 @@ from idbench.identify.estimators.problem import Problem
 from idbench.identify.judge.mistake_rows import Candidate, MistakeRows, held_torque
 from idbench.identify.judge.mistakes import COLLISION, GAIN
 from idbench.identify.judge.stretches import errors_of_stretches, scatter_of_sums
+from idbench.identify.judge.suspect import Suspect
 
 APART = 1e-2
 """Share of the squares of several columns that parameters must leave, and for one to be distinct from the others. With 1e-4,
@@ -46,40 +46,7 @@ SOME = 6
 """One of so many tests is made whatever it says, to see how they scatter."""
 
 
-@final
-@dataclass(frozen=True)
-class Suspect:
-    """A mistake that would explain residuals."""
-
-    cause: str
-    """What is wrong, in a word."""
-    of: str
-    """What it is a mistake of: torque, position, friction, drive, base, link or clock."""
-    joint: int | None
-    """Of which joint, from 0; None if it is the whole robot's."""
-    size: tuple[float, ...]
-    """How large, as far as it is small."""
-    sigma: tuple[float, ...]
-    """Standard deviations of that, with residuals as correlated as they are."""
-    unit: str
-    """Of both."""
-    p: float
-    """Probability that any mistake seems as significant by chance."""
-    t: float
-    """Its size over sigma, or the root of the sum of squares of independent ones."""
-    alternatives: tuple[tuple[str, int | None], ...]
-    """Causes, and joints, that explain as much: the log does not tell them apart."""
-    held_out: tuple[float, float]
-    """Largest error of a torque that changes, on stretches that were not fitted, without and with it [%]."""
-    gain: float
-    """What it takes of minus twice the logarithm of the likelihood."""
-    setting: float = 0.0
-    """Of cogging: waves a turn; of a length: along which axis."""
-    instant: float | None = None
-    """When it happened, or from when on it is there [s]."""
-
-
-def suspects(problem: Problem, X: Array) -> tuple[Suspect, ...]:
+def small_mistakes(problem: Problem, X: Array) -> tuple[Suspect, ...]:
     """Return the mistakes that residuals show, each beside those before it, and proved on stretches that were not fitted.
 
     With whitened rows of a fit and the column c of a mistake, c' what parameters leave of it,
@@ -96,7 +63,6 @@ def suspects(problem: Problem, X: Array) -> tuple[Suspect, ...]:
     X : Array, shape (p,)
         Its estimate.
     """
-    problem.require_rows("mistakes are looked for by rows, and ")
     explicit = problem.explicit
     if not FEWEST * len(X) < (count := len(explicit.rows.time)) < MANY:
         raise IdentificationError(f"{count} rows are too few or too many to test mistakes beside {len(X)} parameters")

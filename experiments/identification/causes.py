@@ -10,7 +10,7 @@ from idbench.experiments.identification.friction_laws import said
 from idbench.experiments.identification.robot_model import RobotModel
 from idbench.experiments.text import error_percentage
 from idbench.identify import Array, MotionLog
-from idbench.identify.judge.suspects import Suspect
+from idbench.identify.judge.suspect import Suspect
 
 
 class Wording(NamedTuple):
@@ -19,7 +19,7 @@ class Wording(NamedTuple):
     what: str
     """What is wrong, {size} being how much."""
     mend: str = ""
-    """An option, {j} being the joint as options name it; empty if it is no option."""
+    """The option that mends it; empty if none does."""
     by: str = ""
     """What else mends it."""
     law: str = ""
@@ -182,7 +182,10 @@ class Cause:
         size, sigma = s.size[0], s.sigma[0]
         if s.cause in LENGTHS:
             size, sigma = (float(np.linalg.norm(x[:2])) for x in (s.size, s.sigma))
-        unit = "" if s.unit == "1" else f" {self._unit}"
+        unit = f" {self._unit}"
+        if s.unit == "1":
+            size, sigma = 100 * size, 100 * sigma
+            unit = " %"
         if any(word in self._wording.what for word in ("{large}", "{late}", "{faster}")):
             size = abs(size)
         j = s.joint or 0
@@ -190,7 +193,7 @@ class Cause:
         gains[j] *= -1.0 if s.cause == "sign" else 1 / (1 + s.size[0]) if s.cause == "gain" else 1.0
         last = min(j + 1, len(joints) - 1)
         return {
-            "size": f"{size:.3g}{unit} +- {sigma:.1g}" if sigma else f"{size:.3g}{unit}",
+            "size": f"{size:.3g} +- {sigma:.1g}{unit}" if sigma else f"{size:.3g}{unit}",
             "instant": "" if s.instant is None else f"{s.instant:.1f} s",
             "large": "large" if s.size[0] > 0 else "small",
             "late": "late" if s.size[0] > 0 else "early",

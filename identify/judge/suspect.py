@@ -1,0 +1,37 @@
+"""What a diagnosis finds."""
+
+from dataclasses import dataclass
+from typing import final
+
+
+@final
+@dataclass(frozen=True)
+class Suspect:
+    """A mistake that would explain residuals."""
+
+    cause: str
+    """What is wrong, in a word."""
+    of: str
+    """What it is a mistake of: torque, position, friction, drive, base, link or clock."""
+    joint: int | None
+    """Of which joint, from 0; None if it is the whole robot's."""
+    size: tuple[float, ...]
+    """How large, as far as it is small."""
+    sigma: tuple[float, ...]
+    """Standard deviations of that, with residuals as correlated as they are."""
+    unit: str
+    """Of both."""
+    p: float
+    """Probability that any mistake seems as significant by chance."""
+    t: float
+    """Its size over sigma, or the root of the sum of squares of independent ones."""
+    alternatives: tuple[tuple[str, int | None], ...]
+    """Causes, and joints, that explain as much: the log cannot distinguish them."""
+    held_out: tuple[float, float]
+    """Largest error of a torque that changes, on stretches that were not fitted, without and with it [%]."""
+    evidence: float
+    """What it takes of minus twice the logarithm of the likelihood."""
+    setting: float = 0.0
+    """Of cogging: waves a turn; of a length: along which axis."""
+    instant: float | None = None
+    """When it happened, or from when on it is there [s]."""
